@@ -1,4 +1,4 @@
-"""Writes what a release consists of: checksums, and a bill of materials in CycloneDX."""
+"""Writes checksums of a release, and its bill of materials in CycloneDX."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ from cyclonedx.output.json import JsonV1Dot6
 from cyclonedx.spdx import is_supported_id
 from cyclonedx.validation.json import JsonStrictValidator
 from packageurl import PackageURL
-from provenance import ProvenanceError, license_texts
+from program import program
+from provenance import license_texts
 
 CHECKSUMS = "SHA256SUMS"
 BILL = "sbom.cdx.json"
@@ -77,17 +78,7 @@ def bill_of_materials(
     parts: list[Component],
     required: Sequence[Component] = (),
 ) -> str:
-    """Text in JSON; it depends only on the arguments.
-
-    Parameters
-    ----------
-    checksums : dict
-        Of the files, by their names.
-    parts : list of Component
-        What is compiled into the FMUs.
-    required : sequence of Component
-        What the wheel requires.
-    """
+    """Text in JSON of files by checksum, of parts in the FMUs, and of what the wheel requires."""
     bom = Bom(components=[*parts, *required])
     for name, checksum in checksums.items():
         component = Component(
@@ -110,8 +101,8 @@ def bill_of_materials(
     return text + "\n"
 
 
-def main() -> int:
-    """Write both files; 2 with a line on standard error where one cannot be written."""
+@program(ValueError)
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "files", type=Path, nargs="+", help="files of the release, below the output"
@@ -126,26 +117,21 @@ def main() -> int:
     parser.add_argument("--project", type=Path, help="pyproject.toml, if there is a wheel")
     parser.add_argument("--requirements", type=Path, help="folder of the lock files, for the same")
     arguments = parser.parse_args()
-    try:
-        folder = arguments.output
-        checksums = {
-            file.relative_to(folder).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
-            for file in sorted(arguments.files)
-        }
-        license_id = license_texts(arguments.license)["license"]
-        parts = [part(text) for text in arguments.part]
-        required = packages(arguments.project, arguments.requirements) if arguments.project else []
-        texts = {
-            CHECKSUMS: "".join(f"{text}  {name}\n" for name, text in checksums.items()),
-            BILL: bill_of_materials(checksums, arguments.version, license_id, parts, required),
-        }
-        for name, text in texts.items():
-            with atomic_write(folder / name) as temporary:
-                temporary.write_bytes(text.encode())
-    except (OSError, ValueError, ProvenanceError) as error:
-        print(f"bill_of_materials.py: {error!s:.2000}", file=sys.stderr)
-        return 2
-    return 0
+    folder = arguments.output
+    checksums = {
+        file.relative_to(folder).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
+        for file in sorted(arguments.files)
+    }
+    license_id = license_texts(arguments.license)["license"]
+    parts = [part(text) for text in arguments.part]
+    required = packages(arguments.project, arguments.requirements) if arguments.project else []
+    texts = {
+        CHECKSUMS: "".join(f"{text}  {name}\n" for name, text in checksums.items()),
+        BILL: bill_of_materials(checksums, arguments.version, license_id, parts, required),
+    }
+    for name, text in texts.items():
+        with atomic_write(folder / name) as temporary:
+            temporary.write_bytes(text.encode())
 
 
 if __name__ == "__main__":

@@ -19,7 +19,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from atomic_write import atomic_write
-from source_code import SourceCodeError, SourceFolder, manifest
+from program import program
+from source_code import SourceFolder, manifest
 
 
 def collect(build: Path) -> dict[str, bytes]:
@@ -32,7 +33,6 @@ def collect(build: Path) -> dict[str, bytes]:
     names = {folder: name for name, folder in roots.items()} | {roots["generated"]: platform}
 
     def named(path: str | Path) -> str:
-        """Name of a file, of which the path begins with a root."""
         return re.sub(f"({found})(?=/)", lambda root: names[root[1]], str(path), count=1)
 
     # of a folder and one inside it, the inner one comes first
@@ -67,23 +67,18 @@ def packed(files: Iterable[tuple[str, bytes]]) -> bytes:
     return lzma.compress(archive.getvalue(), preset=9 | lzma.PRESET_EXTREME)
 
 
-def main() -> int:
-    """Pack; 2 with a line on standard error where a file is missing or cannot be written."""
+@program(ValueError)
+def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("builds", type=Path, nargs="+", help="folder of a build for each platform")
     parser.add_argument("--page", type=Path, required=True, help="the playground")
     parser.add_argument("--output", type=Path, required=True, help="the archive")
     arguments = parser.parse_args()
-    try:
-        files = {"playground/index.html": arguments.page.read_bytes()}
-        for build in arguments.builds:
-            files |= collect(build)
-        with atomic_write(arguments.output) as temporary:
-            temporary.write_bytes(packed(files.items()))
-    except (OSError, ValueError, SourceCodeError) as error:
-        print(f"built.py: {error!s:.2000}", file=sys.stderr)
-        return 2
-    return 0
+    files = {"playground/index.html": arguments.page.read_bytes()}
+    for build in arguments.builds:
+        files |= collect(build)
+    with atomic_write(arguments.output) as temporary:
+        temporary.write_bytes(packed(files.items()))
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ LOG_CATEGORIES = {
 
 
 def texts_of(declaration: Declaration, provenance: Provenance) -> dict[str, str]:
-    """Attributes of the root that say what the model is and where it comes from."""
+    """Attributes of the root: what the model is and where it comes from."""
     model = declaration.model
     texts = {
         "author": provenance.author,
@@ -72,7 +72,6 @@ def add_log_categories(root: ET.Element, prefix: str) -> None:
 
 
 def add_experiment(root: ET.Element, experiment: Experiment) -> None:
-    """Write DefaultExperiment."""
     ET.SubElement(
         root,
         "DefaultExperiment",
@@ -84,6 +83,5 @@ def add_experiment(root: ET.Element, experiment: Experiment) -> None:
 
 
 def document(root: ET.Element) -> str:
-    """Text of the file."""
     ET.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"

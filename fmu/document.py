@@ -14,19 +14,22 @@ import html
 import shutil
 import sys
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from itertools import chain, pairwise
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from atomic_write import atomic_write
+from jinja2 import Environment, FileSystemLoader
 from latex_to_mathml import FormulaError, mathml
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 from mdit_py_plugins.anchors import anchors_plugin
 from mdit_py_plugins.dollarmath import dollarmath_plugin
+from program import WrongInputError, program, read_text
 
 STYLE_SHEET = Path(__file__).with_suffix(".css")
+TEMPLATE = Path(__file__).with_suffix(".html")
 
 # headings of the tables of variables by causality, in the order of the page
 GROUPS = {
@@ -38,18 +41,12 @@ GROUPS = {
     "independent": "Independent variable",
 }
 
-# their columns, attributes of a ScalarVariable and of its type element
+# their columns, attributes of a ScalarVariable and of its type element, with their headings
 COLUMNS = ("valueReference", "name", "type", "causality", "variability", "initial", "unit")
 COLUMNS += ("start", "min", "max", "description")
+HEADINGS = {key: key.capitalize() for key in COLUMNS} | {"valueReference": "VR"}
 NUMBERS = ("valueReference", "start", "min", "max")
-
-
-# identifier and text of their heading
-VARIABLES = ("variables", "Variables of the FMU")
-
-
-class DocumentError(Exception):
-    """A page that cannot be made: file and reason in one line."""
+SECONDS = ("startTime", "stopTime", "stepSize")  # of the default experiment
 
 
 def is_remote(address: str) -> bool:
@@ -74,7 +71,7 @@ def without_local_links(tokens: Iterable[Token]) -> list[Token]:
 
 
 def scroller(kind: str, name: str) -> str:
-    """Start of a box for what may be wider than the page: keys scroll it, so it takes the focus."""
+    """Opening tag of a box that scrolls, also by keys, what is wider than the page."""
     return f'<div class="{kind}" tabindex="0" role="group" aria-label="{html.escape(name)}">'
 
 
@@ -98,13 +95,10 @@ def prepare_tables(tokens: Iterable[Token]) -> None:
 
 
 def readme_page(readme: Path) -> tuple[str, list[Path], list[tuple[str, str]]]:
-    """Convert README.md to the inside of an HTML body.
+    """README.md as the inside of an HTML body.
 
-    Returns
-    -------
-    tuple of str, list of Path and list of tuple of str and str
-        the HTML; the local images, which it refers to by their names; identifier and text (HTML)
-        of each heading of level 2.
+    Also its local images, which the HTML refers to by their names, and identifier and text (HTML)
+    of each heading of level 2.
     """
 
     def formula(latex: str, options: dict[str, bool]) -> str:
@@ -112,7 +106,7 @@ def readme_page(readme: Path) -> tuple[str, list[Path], list[tuple[str, str]]]:
             return mathml(latex, "block" if options["display_mode"] else "inline")
         except FormulaError as error:
             line = " ".join(latex.split())
-            raise DocumentError(f"{readme}: formula ${line}$ does not convert: {error}") from None
+            raise WrongInputError(f"{readme}: formula ${line}$ does not convert: {error}") from None
 
     markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
     markdown.use(dollarmath_plugin, allow_space=False, allow_labels=False, renderer=formula)
@@ -139,7 +133,7 @@ def readme_page(readme: Path) -> tuple[str, list[Path], list[tuple[str, str]]]:
                 continue
             image = readme.parent / unquote(address)
             if not image.is_file():
-                raise DocumentError(f"{readme}: the image {address} does not exist")
+                raise WrongInputError(f"{readme}: the image {address} does not exist")
             token.attrs["src"] = image.name
             images.append(image)
     headings = [
@@ -150,28 +144,17 @@ def readme_page(readme: Path) -> tuple[str, list[Path], list[tuple[str, str]]]:
     return markdown.renderer.render(tokens, markdown.options, {}), images, headings
 
 
-def read_text(path: Path) -> str:
-    """Read a UTF-8 text file."""
-    try:
-        return path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise DocumentError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise DocumentError(f"{path}: is not UTF-8: {error}") from None
-
-
 def read_model_description(path: Path) -> ET.Element:
-    """Read modelDescription.xml of FMI 2.0."""
     try:
         root = ET.fromstring(read_text(path))
     except ET.ParseError as error:
-        raise DocumentError(f"{path}: is not valid XML: {error}") from None
+        raise WrongInputError(f"{path}: is not valid XML: {error}") from None
     if root.tag != "fmiModelDescription" or root.get("fmiVersion") != "2.0":
-        raise DocumentError(f"{path}: is not a model description of FMI 2.0")
+        raise WrongInputError(f"{path}: is not a model description of FMI 2.0")
     for variable in root.iterfind("ModelVariables/ScalarVariable"):
         for key in ("name", "valueReference"):
             if key not in variable.attrib:
-                raise DocumentError(f"{path}: a ScalarVariable lacks {key}")
+                raise WrongInputError(f"{path}: a ScalarVariable lacks {key}")
     return root
 
 
@@ -184,86 +167,55 @@ def variable_row(variable: ET.Element) -> dict[str, str]:
     return row
 
 
-def variable_cell(row: dict[str, str], key: str) -> str:
-    """One cell of a table of variables."""
-    text = html.escape(row.get(key, ""))
-    if key == "name":
-        text = f"<code>{text}</code>"
-    return f'<td class="number">{text}</td>' if key in NUMBERS else f"<td>{text}</td>"
-
-
-def variable_tables(root: ET.Element) -> str:
-    """Describe the default experiment and list the variables, one table per causality."""
-    lines = ['<section class="variables">', f'<h2 id="{VARIABLES[0]}">{VARIABLES[1]}</h2>']
-    experiment = root.find("DefaultExperiment")
-    if experiment is not None:
-        units = {"startTime": " s", "stopTime": " s", "stepSize": " s"}
-        values = (f"{k} {html.escape(v)}{units.get(k, '')}" for k, v in experiment.items())
-        lines.append(f"<p>Default experiment: {', '.join(values)}.</p>")
+def variable_groups(root: ET.Element) -> Iterator[tuple[str, list[dict[str, str]]]]:
+    """Heading and rows of a table per causality."""
     rows = [variable_row(v) for v in root.iterfind("ModelVariables/ScalarVariable")]
-    titles = {"valueReference": "VR"}
-    head = "".join(f'<th scope="col">{titles.get(key, key.capitalize())}</th>' for key in COLUMNS)
     for causality, heading in GROUPS.items():
         group = [row for row in rows if row["causality"] == causality]
         if group:
-            box = scroller("table", f"Variables: {heading}")
-            lines += [f"<h3>{heading}</h3>", f"{box}<table>"]
-            lines += [f"<thead><tr>{head}</tr></thead>", "<tbody>"]
-            lines += [f"<tr>{''.join(variable_cell(row, key) for key in COLUMNS)}</tr>"
-                      for row in group]  # fmt: skip
-            lines += ["</tbody>", "</table></div>"]
-    return "\n".join([*lines, "</section>"])
+            yield heading, group
 
 
 def document(pages: list[Path], model_description: Path, output: Path) -> None:
     """Write output/index.html and copy the images of the pages next to it."""
-    contents, all_images, all_headings = zip(*map(readme_page, pages), strict=True)
-    images, headings = chain(*all_images), chain(*all_headings, [VARIABLES])
-    entries = "\n".join(f'<li><a href="#{name}">{text}</a></li>' for name, text in headings)
+    contents, images, headings = zip(*map(readme_page, pages), strict=True)
     root = read_model_description(model_description)
-    title = ": ".join(root.attrib[k] for k in ("modelName", "description") if k in root.attrib)
-    page = f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{html.escape(title)}</title>
-<style>
-{read_text(STYLE_SHEET)}</style>
-</head>
-<body>
-<nav aria-label="Contents">
-<ul>
-{entries}
-</ul>
-</nav>
-<main>
-{"".join(contents)}{variable_tables(root)}
-</main>
-</body>
-</html>
-"""
+    experiment = root.find("DefaultExperiment")
+    values = {} if experiment is None else experiment.attrib
+    templates = Environment(
+        loader=FileSystemLoader(TEMPLATE.parent),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    templates.filters["text"] = html.escape
+    page = templates.get_template(TEMPLATE.name).render(
+        title=": ".join(root.attrib[k] for k in ("modelName", "description") if k in root.attrib),
+        style=read_text(STYLE_SHEET),
+        headings=chain(*headings, [("variables", "Variables of the FMU")]),
+        contents="".join(contents),
+        experiment=", ".join(f"{k} {v}{' s' if k in SECONDS else ''}" for k, v in values.items()),
+        groups=variable_groups(root),
+        columns=HEADINGS,
+        numbers=NUMBERS,
+        scroller=scroller,
+    )
     output.mkdir(parents=True, exist_ok=True)
-    for image in images:
+    for image in chain(*images):
         with atomic_write(output / image.name) as temporary:
             shutil.copyfile(image, temporary)
     with atomic_write(output / "index.html") as temporary:
         temporary.write_text(page, encoding="utf-8", newline="\n")
 
 
-def main() -> int:
-    """Make the page; 2 with a line on standard error where that is not possible."""
+@program()
+def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--readme", type=Path, nargs="+", required=True, help="pages of the model")
     parser.add_argument("--model-description", type=Path, required=True)
     parser.add_argument("--output", type=Path, required=True, help="folder for the page")
     arguments = parser.parse_args()
-    try:
-        document(arguments.readme, arguments.model_description, arguments.output)
-    except (DocumentError, OSError) as error:
-        print(f"document.py: {error}", file=sys.stderr)
-        return 2
-    return 0
+    document(arguments.readme, arguments.model_description, arguments.output)
 
 
 if __name__ == "__main__":

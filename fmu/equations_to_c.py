@@ -14,33 +14,29 @@ from pathlib import Path
 from equations import declaration, lock
 from equations.model_file import ModelFileError, read
 from generate import write_if_changed
+from program import program
 
 
-def main() -> int:
-    """Write; 2 with a line on standard error where something is wrong."""
+@program(ModelFileError)
+def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("file", type=Path, help="the file of the model")
     parser.add_argument("--output", type=Path, required=True, help="folder for the files")
     parser.add_argument("--terminals", type=Path, help="file with [terminals], of variables.toml")
     arguments = parser.parse_args()
-    try:
-        file = read(arguments.file, declaration.solver_names())
-        lock_file = lock.path_of(arguments.file)
-        references = lock.references(lock_file, [])
-        hidden = {variable.name for variable in file.of("where")}
-        for name, kind in declaration.keys(file):
-            if (name, kind) not in references and name not in hidden:
-                raise ModelFileError(f"{lock_file}: has no {name}: build the model by rparm build")
-        terminals = arguments.terminals.read_text(encoding="utf-8") if arguments.terminals else ""
-        texts = declaration.generated(file, references)
-        texts["variables.toml"] += terminals
-        arguments.output.mkdir(parents=True, exist_ok=True)
-        for name, text in texts.items():
-            write_if_changed(arguments.output / name, text)
-    except (ModelFileError, OSError) as error:
-        print(f"equations_to_c.py: {error!s:.2000}", file=sys.stderr)
-        return 2
-    return 0
+    file = read(arguments.file, declaration.solver_names())
+    lock_file = lock.path_of(arguments.file)
+    references = lock.references(lock_file, [])
+    hidden = {variable.name for variable in file.of("where")}
+    for name, kind in declaration.keys(file):
+        if (name, kind) not in references and name not in hidden:
+            raise ModelFileError(f"{lock_file}: has no {name}: build the model by rparm build")
+    terminals = arguments.terminals.read_text(encoding="utf-8") if arguments.terminals else ""
+    texts = declaration.generated(file, references)
+    texts["variables.toml"] += terminals
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    for name, text in texts.items():
+        write_if_changed(arguments.output / name, text)
 
 
 if __name__ == "__main__":

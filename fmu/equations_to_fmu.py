@@ -13,14 +13,12 @@ from pathlib import Path
 
 from building.contents import PLACES, build
 from building.runtime import Runtime
-from declaration.load import DeclarationError
-from document import DocumentError
 from equations import declaration, lock
 from equations.model_file import ModelFileError, read
 from package import pack
-from source_code import SourceCodeError
+from program import WrongInputError
 
-MISTAKES = (ModelFileError, DeclarationError, DocumentError, SourceCodeError, OSError)
+MISTAKES = (ModelFileError, WrongInputError, OSError)
 
 
 def main() -> int:

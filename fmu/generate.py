@@ -12,12 +12,13 @@ from pathlib import Path
 
 from atomic_write import atomic_write
 from declaration.c_tables import value_references, variable_table
-from declaration.load import Declaration, DeclarationError, load
+from declaration.load import Declaration, load
 from fmi2.model_description import model_description as fmi2_description
 from fmi3.build_description import build_description
 from fmi3.model_description import model_description as fmi3_description
 from fmi3.terminals import terminals_and_icons
-from provenance import Provenance, ProvenanceError, build_date, license_texts
+from program import program
+from provenance import Provenance, build_date, license_texts
 
 
 def write_if_changed(path: Path, text: str) -> None:
@@ -48,8 +49,8 @@ def release_files(
     }
 
 
-def main() -> int:
-    """Generate; 2 with a line on standard error where the declaration is wrong."""
+@program()
+def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("variables", type=Path, help="variables.toml of the model")
     parser.add_argument("--output", type=Path, required=True, help="folder for the files")
@@ -64,27 +65,22 @@ def main() -> int:
         "--fmi", choices=["fmi2", "fmi3"], default="fmi2", help="its version, with --sources"
     )
     arguments = parser.parse_args()
-    try:
-        declaration = load(arguments.variables)
-        texts = license_texts(arguments.license) if arguments.license else {}
-        provenance = Provenance(arguments.version, **texts, date=build_date(os.environ))
-        if arguments.sources:
-            files = release_files(arguments.fmi, declaration, provenance, arguments.sources)
-        else:
-            files = {
-                "modelDescription.xml": fmi2_description(declaration, provenance),
-                "fmi3/modelDescription.xml": fmi3_description(declaration, provenance),
-                "terminalsAndIcons.xml": terminals_and_icons(declaration),
-                "value_references.h": value_references(declaration),
-                "variables.c": variable_table(declaration),
-            }
-        for name, text in files.items():
-            (arguments.output / name).parent.mkdir(parents=True, exist_ok=True)
-            write_if_changed(arguments.output / name, text)
-    except (DeclarationError, ProvenanceError, OSError) as error:
-        print(f"generate.py: {error!s:.2000}", file=sys.stderr)
-        return 2
-    return 0
+    declaration = load(arguments.variables)
+    texts = license_texts(arguments.license) if arguments.license else {}
+    provenance = Provenance(arguments.version, **texts, date=build_date(os.environ))
+    if arguments.sources:
+        files = release_files(arguments.fmi, declaration, provenance, arguments.sources)
+    else:
+        files = {
+            "modelDescription.xml": fmi2_description(declaration, provenance),
+            "fmi3/modelDescription.xml": fmi3_description(declaration, provenance),
+            "terminalsAndIcons.xml": terminals_and_icons(declaration),
+            "value_references.h": value_references(declaration),
+            "variables.c": variable_table(declaration),
+        }
+    for name, text in files.items():
+        (arguments.output / name).parent.mkdir(parents=True, exist_ok=True)
+        write_if_changed(arguments.output / name, text)
 
 
 if __name__ == "__main__":

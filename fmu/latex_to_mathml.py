@@ -23,27 +23,10 @@ class FormulaError(Exception):
 
 
 def mathml(latex: str, display: str) -> str:
-    """Convert one formula.
+    """A formula without its dollar signs as a math element; `display` is "inline" or "block".
 
-    The converter passes on unknown commands and does not notice a missing argument. Its result is
-    therefore searched for signs of either.
-
-    Parameters
-    ----------
-    latex : str
-        formula without its dollar signs
-    display : str
-        "inline" or "block"
-
-    Returns
-    -------
-    str
-        a math element.
-
-    Raises
-    ------
-    FormulaError
-        where the formula does not convert.
+    FormulaError if it does not convert: the converter passes on unknown commands and does not
+    notice a missing argument, so its result is searched for signs of either.
     """
     try:
         root = ET.fromstring(convert(latex, display=display))

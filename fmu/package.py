@@ -8,6 +8,7 @@ import zipfile
 from pathlib import Path
 
 from atomic_write import atomic_write
+from program import program
 from universal import universal
 
 FIXED_DATE = (1980, 1, 1, 0, 0, 0)
@@ -56,18 +57,13 @@ def pack(archive: Path, files: list[tuple[str, Path]]) -> None:
             target.writestr(info, content, compresslevel=9)
 
 
-def main() -> int:
-    """Pack; 2 with a line on standard error where a file is missing or cannot be written."""
+@program(ValueError)
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("archive", type=Path)
     parser.add_argument("entries", nargs="+", metavar="NAME=PATH")
     arguments = parser.parse_args()
-    try:
-        pack(arguments.archive, collect(arguments.entries))
-    except (OSError, ValueError) as error:
-        print(f"package.py: {error}", file=sys.stderr)
-        return 2
-    return 0
+    pack(arguments.archive, collect(arguments.entries))
 
 
 if __name__ == "__main__":

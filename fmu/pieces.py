@@ -26,7 +26,9 @@ def write_pieces(release: Path, folder: Path) -> None:
             for path in sorted(path for path in archives if path.suffix in (".fmu", ".ssp")):
                 content = path.read_bytes()
                 pieces = []
-                for piece in _pieces(path, content):
+                cuts = sorted({0, *_beginnings(path, 0, content), len(content)})
+                for first, last in pairwise(cuts):
+                    piece = content[first:last]
                     if piece not in places:
                         places[piece] = (stored.tell(), len(piece))
                         stored.write(piece)
@@ -38,13 +40,8 @@ def write_pieces(release: Path, folder: Path) -> None:
         raise FileNotFoundError(f"{release}: has no FMU")
 
 
-def _pieces(path: Path, content: bytes) -> list[bytes]:
-    """An archive, cut where its files begin, and where those of stored archives in it do."""
-    cuts = sorted({0, *_beginnings(path, 0, content), len(content)})
-    return [content[first:last] for first, last in pairwise(cuts)]
-
-
 def _beginnings(archive: Path | IO[bytes], offset: int, content: bytes) -> list[int]:
+    """Where files of an archive begin, and those of stored archives in it."""
     cuts = []
     with zipfile.ZipFile(archive) as opened:
         for entry in opened.infolist():

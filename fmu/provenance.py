@@ -1,4 +1,4 @@
-"""What an FMU says of where it comes from: version, author, license, copyright and date."""
+"""The origin of an FMU: version, author, license, copyright and date."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-
-class ProvenanceError(Exception):
-    """A license or a date that cannot be read: source and reason in one line."""
+from program import WrongInputError, read_text
 
 
 @dataclass(frozen=True)
@@ -25,20 +23,12 @@ class Provenance:
 
 
 def license_texts(path: Path) -> dict[str, str]:
-    """Author, license and copyright, from the project's LICENSE.
-
-    Its first line is "NAME License", another one "Copyright (c) YEAR, AUTHOR".
-    """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ProvenanceError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise ProvenanceError(f"{path}: is not UTF-8: {error}") from None
+    """Author, license and copyright of a LICENSE: "NAME License", "Copyright (c) YEAR, AUTHOR"."""
+    text = read_text(path)
     title = re.match(r"(.+) License\n", text)
     notice = re.search(r"^Copyright \(c\) [-\d]+, (.+)$", text, re.MULTILINE)
     if not title or not notice:
-        raise ProvenanceError(f"{path}: lacks 'NAME License' or 'Copyright (c) YEAR, AUTHOR'")
+        raise WrongInputError(f"{path}: lacks 'NAME License' or 'Copyright (c) YEAR, AUTHOR'")
     return {"license": title[1].replace(" ", "-"), "copyright": notice[0], "author": notice[1]}
 
 
@@ -50,4 +40,4 @@ def build_date(environment: Mapping[str, str]) -> str | None:
     try:
         return datetime.fromtimestamp(int(epoch), UTC).isoformat()
     except (ValueError, OverflowError, OSError):
-        raise ProvenanceError(f"SOURCE_DATE_EPOCH = {epoch!r:.40} is not a time in s") from None
+        raise WrongInputError(f"SOURCE_DATE_EPOCH = {epoch!r:.40} is not a time in s") from None

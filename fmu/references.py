@@ -17,9 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from atomic_write import atomic_write
-from declaration.load import Declaration, DeclarationError, load
+from declaration.load import Declaration, load
 from declaration.schema import Boolean, Enumeration, Float64, Variable
 from description_parts import document
+from program import WrongInputError, program
 
 MANIFEST = "fmi-ls-manifest.xml"
 NAME = "org.fmi-standard.fmi-ls-ref"
@@ -41,10 +42,6 @@ FILES = {
 }
 
 
-class CarriedScenarioError(Exception):
-    """A scenario that an FMU cannot carry: file and reason in one line."""
-
-
 @dataclass(frozen=True)
 class Scenario:
     """What a parameter set and the manifest need of a scenario."""
@@ -56,11 +53,10 @@ class Scenario:
 
 
 def content_of(path: Path) -> bytes:
-    """Content of a file."""
     try:
         return path.read_bytes()
     except OSError as error:
-        raise CarriedScenarioError(f"{path}: cannot be read: {error.strerror}") from None
+        raise WrongInputError(f"{path}: cannot be read: {error.strerror}") from None
 
 
 def read(path: Path) -> Scenario:
@@ -69,12 +65,12 @@ def read(path: Path) -> Scenario:
     try:
         keys = tomllib.loads(content.decode())
     except (ValueError, RecursionError) as error:  # of the parser, and of reading as UTF-8
-        raise CarriedScenarioError(f"{path}: is not valid TOML: {error}") from None
+        raise WrongInputError(f"{path}: is not valid TOML: {error}") from None
     title, parameters, initial = (keys.get(k, {}) for k in ("title", "parameters", "initial"))
     if not isinstance(title, str):
-        raise CarriedScenarioError(f"{path}: title is missing or not a text")
+        raise WrongInputError(f"{path}: title is missing or not a text")
     if not isinstance(parameters, dict) or not isinstance(initial, dict):
-        raise CarriedScenarioError(f"{path}: parameters and initial must be tables")
+        raise WrongInputError(f"{path}: parameters and initial must be tables")
     return Scenario(path.stem, path, title, parameters | initial)
 
 
@@ -97,7 +93,7 @@ def parameter_set(scenario: Scenario, declaration: Declaration) -> str:
     for name, value in scenario.values.items():
         variable = declaration.variables.get(name)
         if variable is None:
-            raise CarriedScenarioError(f"{scenario.path}: '{name}' is not declared")
+            raise WrongInputError(f"{scenario.path}: '{name}' is not declared")
         parameter = ET.SubElement(parameters, tag("ssv:Parameter"), name=name)
         kind, attributes = typed(variable, value, f"{scenario.path}: {name}")
         ET.SubElement(parameter, tag(f"ssv:{kind}"), attributes)
@@ -108,18 +104,16 @@ def parameter_set(scenario: Scenario, declaration: Declaration) -> str:
 
 
 def typed(variable: Variable, value: Any, place: str) -> tuple[str, dict[str, str]]:
-    """Element of a value and its attributes."""
+    """Element for a value, with its attributes."""
     if isinstance(variable, Enumeration):
         if not isinstance(value, str) or value not in variable.items:
-            raise CarriedScenarioError(
+            raise WrongInputError(
                 f"{place} = {value!r:.40} is not one of {', '.join(variable.items)}"
             )
         return "Enumeration", {"value": value}
     wanted = {"float64": (int, float), "int32": (int,), "boolean": (bool,)}
     if type(value) not in wanted[variable.type]:
-        raise CarriedScenarioError(
-            f"{place} = {value!r:.40} is not a value of type {variable.type}"
-        )
+        raise WrongInputError(f"{place} = {value!r:.40} is not a value of type {variable.type}")
     if isinstance(variable, Float64):
         return "Real", {"value": repr(float(value)), "unit": variable.unit}
     if isinstance(variable, Boolean):
@@ -184,15 +178,14 @@ def files(
 
 
 def write(output: Path, contents: Mapping[str, bytes]) -> None:
-    """Write the files below a folder."""
     for name, content in contents.items():
         (output / name).parent.mkdir(parents=True, exist_ok=True)
         with atomic_write(output / name) as temporary:
             temporary.write_bytes(content)
 
 
-def main() -> int:
-    """Collect; 2 with a line on standard error where something is missing or wrong."""
+@program()
+def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("variables", type=Path, help="variables.toml of the model")
     parser.add_argument("names", nargs="+", metavar="NAME", help="scenarios of the model")
@@ -201,14 +194,9 @@ def main() -> int:
     arguments = parser.parse_args()
     for prefix, namespace in NAMESPACES.items():
         ET.register_namespace(prefix, namespace)
-    try:
-        declaration = load(arguments.variables)
-        folder = arguments.folder or arguments.variables.parent
-        write(arguments.output, dict(files(declaration, arguments.names, folder)))
-    except (DeclarationError, CarriedScenarioError, OSError) as error:
-        print(f"references.py: {error!s:.2000}", file=sys.stderr)
-        return 2
-    return 0
+    declaration = load(arguments.variables)
+    folder = arguments.folder or arguments.variables.parent
+    write(arguments.output, dict(files(declaration, arguments.names, folder)))
 
 
 if __name__ == "__main__":

@@ -79,7 +79,7 @@ ${entries}]}
             --depfile ${ARG_FOLDER}/sources.d --target ${description}
     COMMAND ${ARG_GENERATE} --output ${ARG_FOLDER} --sources ${ARG_FOLDER}/sources
     COMMAND ${CMAKE_COMMAND} -E touch ${description}
-    DEPENDS ${FMU_SOURCE_DIR}/source_code.py ${manifest} ${ARG_DEPENDS}
+    DEPENDS ${FMU_SOURCE_DIR}/source_code.py ${FMU_SOURCE_DIR}/program.py ${manifest} ${ARG_DEPENDS}
     DEPFILE ${ARG_FOLDER}/sources.d
     COMMENT "Collecting ${name}"
     VERBATIM)

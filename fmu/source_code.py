@@ -22,6 +22,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from program import WrongInputError, program
+
 # of the root `project`: in front of all files
 PRELUDE = Path("fmu", "source_code.h")
 PLATFORM = Path("src", "model", "platform.h")
@@ -40,10 +42,6 @@ NOT_REACHED = {"caliper/cali.h", "mpi.h", "sundials/sundials_context.hpp"}
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 WORD = re.compile(r"\w+(?=\s*\(|\.h\")")  # called, or in a header's name: log_data.h
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"\n]+)[>"]', re.MULTILINE)
-
-
-class SourceCodeError(Exception):
-    """What is wrong with a file or the manifest, in one line."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +84,7 @@ def read(path: Path) -> str:
     try:
         return path.read_bytes().decode("utf-8", "surrogateescape")
     except OSError as error:
-        raise SourceCodeError(f"{path}: cannot be read: {error.strerror}") from None
+        raise WrongInputError(f"{path}: cannot be read: {error.strerror}") from None
 
 
 class SourceFolder:
@@ -124,7 +122,7 @@ class SourceFolder:
             pattern = rf"^[a-z]+ {function}(\([^)]*\))\s*\{{"
             definition = re.search(pattern, read(source), re.MULTILINE)
             if definition is None:
-                raise SourceCodeError(f"{source}: does not define {function}")
+                raise WrongInputError(f"{source}: does not define {function}")
             head = definition[0].rstrip("{ \t\n")
             lines.append(f"#define {function} fmu_{function}\n{head};\n")
         self.texts[RENAMES] = "".join(lines)
@@ -151,13 +149,13 @@ class SourceFolder:
         for name, folder in self.roots:
             if path.is_relative_to(folder):
                 return name, path.relative_to(folder).as_posix()
-        raise SourceCodeError(f"{path}: is in no folder of the manifest")
+        raise WrongInputError(f"{path}: is in no folder of the manifest")
 
     def claim(self, name: str, origin: Path) -> None:
         """Refuse two files of one name; upper and lower case are the same on some systems."""
         other = self.origins.setdefault(name.lower(), origin)
         if other != origin:
-            raise SourceCodeError(f"{origin}: would be sources/{name}, as {other}")
+            raise WrongInputError(f"{origin}: would be sources/{name}, as {other}")
 
     def with_relative_includes(self, path: Path, name: str, library: Library) -> str:
         """Text of a file that is called `name` in sources/."""
@@ -185,7 +183,7 @@ class SourceFolder:
         if not line.is_quoted and line.name in self.system_headers:
             return as_it_is
         number = text.count("\n", 0, line.start) + 1
-        raise SourceCodeError(f"{path}:{number}: header {line.name} was not found")
+        raise WrongInputError(f"{path}:{number}: header {line.name} was not found")
 
 
 def load(path: Path) -> Manifest:
@@ -194,7 +192,7 @@ def load(path: Path) -> Manifest:
         content = json.loads(read(path))
         return manifest(content["libraries"], content["roots"], path.parent)
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise SourceCodeError(f"{path}: is not a manifest: {error!r:.200}") from None
+        raise WrongInputError(f"{path}: is not a manifest: {error!r:.200}") from None
 
 
 def manifest(entries: list[dict[str, Any]], roots: dict[str, str], folder: Path) -> Manifest:
@@ -212,11 +210,10 @@ def manifest(entries: list[dict[str, Any]], roots: dict[str, str], folder: Path)
 
 
 def collect(manifest: Manifest) -> SourceFolder:
-    """Read all files."""
     folder = SourceFolder(manifest.roots)
     elementary = [library for library in manifest.libraries if library.name == ELEMENTARY]
     if not elementary:
-        raise SourceCodeError(f"the manifest has no library {ELEMENTARY}")
+        raise WrongInputError(f"the manifest has no library {ELEMENTARY}")
     for library in manifest.libraries:
         if library.name != ELEMENTARY:
             folder.add_library(library)
@@ -257,24 +254,19 @@ def dependencies(target: str, files: list[Path]) -> str:
     return f"{target}:" + "".join(f" \\\n  {name}" for name in sorted(names)) + "\n"
 
 
-def main() -> int:
-    """Write sources/; 2 with a line on standard error where a file is missing or wrong."""
+@program()
+def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("manifest", type=Path, help="what the FMU is built from, as JSON")
     parser.add_argument("--output", type=Path, required=True, help="the folder sources/")
     parser.add_argument("--depfile", type=Path, help="file for a rule of make: what was read")
     parser.add_argument("--target", help="target of this rule")
     arguments = parser.parse_args()
-    try:
-        folder = collect(load(arguments.manifest))
-        write(folder.texts, arguments.output)
-        if arguments.depfile:
-            rule = dependencies(arguments.target, list(folder.origins.values()))
-            arguments.depfile.write_text(rule)
-    except (SourceCodeError, OSError) as error:
-        print(f"source_code.py: {error!s:.2000}", file=sys.stderr)
-        return 2
-    return 0
+    folder = collect(load(arguments.manifest))
+    write(folder.texts, arguments.output)
+    if arguments.depfile:
+        rule = dependencies(arguments.target, list(folder.origins.values()))
+        arguments.depfile.write_text(rule)
 
 
 if __name__ == "__main__":

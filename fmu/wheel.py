@@ -29,7 +29,14 @@ from pieces import write_pieces  # noqa: E402
 
 SHARE = "rparm/share"
 OF_MODELS = (".csv", ".json", ".py", ".ssd", ".svg", ".toml")
-OF_FMU = ("fmu/**/*.py", "fmu/**/*.toml", "fmu/**/*.in", "fmu/*.css", "src/instance/*.toml")
+OF_FMU = (
+    "fmu/**/*.py",
+    "fmu/**/*.toml",
+    "fmu/**/*.in",
+    "fmu/*.css",
+    "fmu/*.html",
+    "src/instance/*.toml",
+)
 OF_RELEASES = ("bill_of_materials", "built", "pieces", "references", "wheel")  # not for a model
 FOR_TESTS = ("_in", "sampled", "tightest")  # ends of names of tables that no command reads
 

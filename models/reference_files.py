@@ -15,7 +15,7 @@ import numpy as np
 from rparm import project, trajectory_csv
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import read_model
-from rparm.output_files import whole
+from rparm.output_files import write_text
 from rparm.scenarios import scenario as scenarios
 from rparm.scenarios.scenario import Scenario
 
@@ -23,48 +23,44 @@ from rparm.scenarios.scenario import Scenario
 Writer = Callable[[Scenario, Path], None]
 
 
+def input_table(scenario: Scenario, names: Sequence[str]) -> np.ndarray:
+    """Inputs at every communication point, (n + 1, names)."""
+    table = np.empty((len(scenario.times), len(names)))
+    for column, name in zip(table.T, names, strict=True):
+        column[:] = scenario.input(name)
+    return table
+
+
 def write(
     scenario: Scenario,
     folder: Path,
     model: str,
-    outputs: tuple[Sequence[str], np.ndarray],
-    inputs: tuple[Sequence[str], np.ndarray],
+    outputs: Sequence[str],
+    values: np.ndarray,
+    inputs: Sequence[str],
 ) -> None:
-    """Write the reference of one scenario.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    folder : Path
-        Made if it is missing.
-    model : str
-        Name of the model, which its FMU has too.
-    outputs : names and ndarray, shape (rows, names)
-        At the communication points of the reference.
-    inputs : names and ndarray, shape (n + 1, names)
-        At every communication point.
-    """
+    """Write the reference of a scenario; `values` are at all points, (n + 1, outputs)."""
     folder.mkdir(parents=True, exist_ok=True)
-    times = {"ref": scenario.times[scenario.reference_rows], "in": scenario.times}
-    for file, (names, values) in (("ref", outputs), ("in", inputs)):
-        rounded = values.astype(np.float64) + 0.0  # no negative zeros
-        trajectory_csv.write(folder / f"{model}_{file}.csv", times[file], names, rounded)
+    rows = scenario.reference_rows
+    tables = {
+        "ref": (scenario.times[rows], outputs, values[rows]),
+        "in": (scenario.times, inputs, input_table(scenario, inputs)),
+    }
+    for file, (times, names, table) in tables.items():
+        rounded = table.astype(np.float64) + 0.0  # no negative zeros
+        trajectory_csv.write(folder / f"{model}_{file}.csv", times, names, rounded)
     options = {
         "StartTime": scenario.start,
         "StopTime": scenario.stop,
         "StepSize": scenario.steps[0] if len(scenario.steps) == 1 else 0.0,  # 0: variable
         "RelTol": scenario.tolerance,
     }
-    with whole(folder / f"{model}_ref.opt") as path:
-        text = "".join(f"{key},{value!r}\n" for key, value in options.items())
-        path.write_text(text, encoding="utf-8", newline="\n")
+    text = "".join(f"{key},{value!r}\n" for key, value in options.items())
+    write_text(folder / f"{model}_ref.opt", text)
 
 
 def main(model_folder: Path, prepare: Callable[[], Writer]) -> None:
-    """Command line: make the references of the scenarios named, or of all of the model's.
-
-    `prepare` is called once, after the names have been checked, for what writes them.
-    """
+    """Command line: make the references of the scenarios named, or of all of the model's."""
     parser = argparse.ArgumentParser(description="Makes the reference trajectories.")
     parser.add_argument("names", nargs="*", metavar="NAME", help="scenarios (default: all)")
     parser.add_argument("--output", type=Path, metavar="DIR", help="write to DIR/NAME instead")

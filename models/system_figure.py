@@ -84,7 +84,6 @@ def _draw_path(axes: Axes, outcome: Outcome, arm: str) -> None:
 def finish(
     picture: Figure, system: str, outcome: Outcome, arm: str, more: Sequence[Line2D | Patch]
 ) -> None:
-    """Title and legend, with `more` entries."""
     error = tracking_error(arm).value(outcome)
     picture.suptitle(
         f"{system}, {outcome.variant}: largest distance of the end effector from its reference "
@@ -104,5 +103,4 @@ def finish(
 
 
 def limit_entry(label: str) -> Line2D:
-    """Entry of the legend for `draw_limit`."""
     return Line2D([], [], color=MUTED, linestyle=DASHED, label=label)

@@ -17,7 +17,7 @@ from rparm.errors import UserError
 from rparm.fmi.model import Value
 
 NAMESPACE = {"ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues"}
-KEPT = 20  # every so many communication points go into the files
+KEPT = 20  # every 20th communication point goes into the files
 
 Columns = Mapping[str, np.ndarray]
 # Times (rows,) and columns (rows,) by name of each file of a variant, by the name of the file.
@@ -44,17 +44,7 @@ def communication_points(stop: float, per_second: int) -> np.ndarray:
 
 
 def main(folder: Path, known: Iterable[str], make: Callable[[str], Files]) -> None:
-    """Command line: make the references of the variants named, or of all.
-
-    Parameters
-    ----------
-    folder : Path
-        Where they are.
-    known : iterable of str
-        All variants.
-    make : callable
-        Gives the files of a variant.
-    """
+    """Command line: `make` the files of the `known` variants that are named, or of all."""
     parser = argparse.ArgumentParser(description="Makes the references of the system.")
     parser.add_argument("names", nargs="*", metavar="VARIANT", help="variants (default: all)")
     parser.add_argument("--output", type=Path, default=folder, metavar="DIR", help="write there")

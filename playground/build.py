@@ -58,7 +58,6 @@ def notices(licenses: list[str]) -> str:
 
 
 def page(fmus: dict[str, Path], licenses: list[str]) -> str:
-    """The whole page."""
     text = (PAGE / "page.html").read_text()
     parts = {
         "@styles@": joined(STYLES),

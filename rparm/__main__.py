@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import webbrowser
 from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import suppress
@@ -16,8 +17,7 @@ from rparm.commands import Ended
 from rparm.errors import UserError, reason
 from rparm.interruption import handle_endings
 from rparm.output import streams
-from rparm.output_files import whole, written
-from rparm.report import browser
+from rparm.output_files import write_text, written
 
 LONGEST_MESSAGE = 2000  # characters; some quote what a file says
 
@@ -50,7 +50,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _ended(arguments: Sequence[str]) -> Ended:
-    """Run a command to its end."""
     try:
         options = command_line.parsed(arguments)
         # imported here because it takes long: so Ctrl-C during the import leaves no traceback
@@ -65,8 +64,8 @@ def _ended(arguments: Sequence[str]) -> Ended:
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("rparm"):
             raise
-        way_out = project.how_to_install(command_line.NEEDS.get(options.command, "all"))
-        return Ended(2, "", error=UserError(f"{error.name}: not installed, {way_out} does it"))
+        extra = command_line.NEEDS.get(options.command, "all")
+        return Ended(2, "", error=project.not_installed(str(error.name), extra))
 
 
 def _keep_document(options: Namespace, ended: Ended) -> None:
@@ -75,20 +74,23 @@ def _keep_document(options: Namespace, ended: Ended) -> None:
     if folder is not None:
         path = folder / f"{options.command}.json"
         with written(path):
-            folder.mkdir(parents=True, exist_ok=True)
-            text = f"{streams.document(_document(ended))}\n"
-            with whole(path) as temporary:
-                temporary.write_text(text, encoding="utf-8", newline="\n")
+            write_text(path, f"{streams.document(_document(ended))}\n")
 
 
 def _show_page(options: Namespace, ended: Ended) -> None:
-    """Show what a command has written."""
     if not options.open:
         return
-    if ended.page is not None:
-        browser.show(ended.page)
-    elif ended.error is None:
-        print(f"--open: {options.command} has written no page", file=sys.stderr)
+    if ended.page is None:
+        if ended.error is None:
+            print(f"--open: {options.command} has written no page", file=sys.stderr)
+        return
+    page = ended.page.absolute()
+    try:
+        opened = webbrowser.open_new_tab(page.as_uri())
+    except webbrowser.Error:
+        opened = False
+    if not opened:
+        print(f"no browser found, open this file in one: {page}", file=sys.stderr)
 
 
 def _document(ended: Ended) -> dict[str, object]:

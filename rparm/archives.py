@@ -25,25 +25,14 @@ LONGEST_NAME = 400  # characters of a path in an archive, each other of which ma
 # those of FMI and SSP; zipfile unpacks others without a limit of memory
 METHODS = {zipfile.ZIP_STORED: "stored", zipfile.ZIP_DEFLATED: "deflate"}
 ENCRYPTED = 0x1 | 0x40 | 0x2000  # flags: encrypted, strongly, with a hidden directory
-CONTROL = ("Cc", "Cs", "Zl", "Zp")  # categories of characters that end lines, or are none
+CONTROL = ("Cc", "Cs", "Zl", "Zp")  # categories of characters that end lines or control a terminal
 
 
 def unpack(path: Path, folder: Path, kind: str, only: str | None = None) -> dict[str, int]:
     """Unpack an archive, or one file of it, to an empty folder; nothing is written elsewhere.
 
-    UnreadableError for whatever is wrong with the archive.
-
-    Parameters
-    ----------
-    kind : str
-        What it should be, FMU or SSP.
-    only : str, optional
-        The one file to unpack, if it is there.
-
-    Returns
-    -------
-    dict
-        Bytes of all files in the archive, by their names: relative paths with "/".
+    Returns the bytes of all files in the archive, by their names: relative paths with "/".
+    UnreadableError for whatever is wrong with what should be an FMU or SSP (`kind`).
     """
     check_regular(path)
     if path.is_dir():
@@ -56,7 +45,10 @@ def unpack(path: Path, folder: Path, kind: str, only: str | None = None) -> dict
             for entry in entries:
                 if only in (None, entry.filename):
                     where = f"{_shown(entry.filename)} "
-                    _extract(archive, entry, folder)
+                    file = Path(archive.extract(entry, folder))
+                    size = file.stat().st_size if is_file(file) else entry.file_size
+                    if size != entry.file_size:
+                        raise zipfile.BadZipFile(f"{size} bytes, expected {entry.file_size}")
     except (UnreadableError, MemoryError):
         raise
     except Exception as error:  # zipfile and its decoders raise many
@@ -69,11 +61,7 @@ def unpack(path: Path, folder: Path, kind: str, only: str | None = None) -> dict
 
 
 def read_xml(path: Path) -> etree._ElementTree:
-    """Parse an XML file of an archive that was unpacked, without its comments.
-
-    UnreadableError if it is none, too large, or has a DOCTYPE: entities could grow, or read other
-    files.
-    """
+    """Parse an unpacked XML file; UnreadableError if it is none, too large, or has a DOCTYPE."""
     size = path.stat().st_size
     if size > LARGEST_XML:
         raise UnreadableError(
@@ -104,10 +92,7 @@ def wrong_name(name: str) -> str:
 
 
 def check_library(path: Path) -> None:
-    """Refuse a shared object (ELF, 64 bit) that is cut off: using it would kill the process.
-
-    Raises UnreadableError.
-    """
+    """Refuse a shared object (ELF, 64 bit) that is cut off: it would kill the process."""
     with path.open("rb") as file:
         header = file.read(64)
         if header[:6] != b"\x7fELF\x02\x01" or len(header) < 64:
@@ -181,12 +166,6 @@ def _place(name: str) -> tuple[str, ...]:
     """
     parts = unicodedata.normalize("NFC", name).casefold().split("/")
     return tuple(part.rstrip(" .") for part in parts if part not in ("", "."))
-
-
-def _extract(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, folder: Path) -> None:
-    file = Path(archive.extract(entry, folder))
-    if is_file(file) and file.stat().st_size != entry.file_size:
-        raise zipfile.BadZipFile(f"{file.stat().st_size} bytes, expected {entry.file_size}")
 
 
 def _shown(name: str) -> str:

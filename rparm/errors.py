@@ -9,10 +9,7 @@ SHORTEST_PART = 3  # letters of a longer name that may be meant
 
 
 class UserError(Exception):
-    """Something the user can put right.
-
-    Its text is one line: the file, the key, what was wrong and what was expected.
-    """
+    """Something the user can put right, in one line: file, key, what is wrong, what is expected."""
 
 
 class StoppedError(UserError):
@@ -41,7 +38,7 @@ def placed(where: object) -> Iterator[None]:
 
 
 def together(errors: Sequence[UserError]) -> UserError:
-    """One error for all of a command's."""
+    """All errors of a command as one."""
     return UserError("; ".join(dict.fromkeys(map(str, errors))))
 
 

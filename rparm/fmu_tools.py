@@ -1,4 +1,4 @@
-"""The folder of the programs that make FMUs, each run in a process of its own."""
+"""The folder of the programs that make FMUs, each of which runs as a separate process."""
 
 from rparm.shipped import SHARE
 

@@ -22,10 +22,7 @@ class UnreadableError(UnplacedError):
 
 
 def check_regular(path: Path) -> None:
-    """Refuse what may never end when it is read: devices, pipes, sockets; not a folder.
-
-    Raises UnreadableError.
-    """
+    """UnreadableError for what may never end: a device, pipe or socket; not for a folder."""
     try:
         mode = Path(path).stat().st_mode
     except FileNotFoundError:
@@ -68,10 +65,7 @@ def read_bytes(path: Path, largest: int) -> bytes:
 
 
 def read_text(path: Path, largest: int) -> str:
-    """Text of a file of at most `largest` bytes in UTF-8, without a byte order mark.
-
-    UnreadableError, or UnicodeDecodeError with the position in the file.
-    """
+    """UTF-8 text of a file of at most `largest` bytes; UnreadableError or UnicodeDecodeError."""
     return decoded(read_bytes(path, largest))
 
 
@@ -81,10 +75,7 @@ def decoded(content: bytes) -> str:
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Parse a TOML file.
-
-    UserError for whatever keeps the file from being read.
-    """
+    """Parse a TOML file; UserError for whatever keeps it from being read."""
     try:
         with placed(path):
             text = read_text(path, LARGEST_TOML)
@@ -109,10 +100,7 @@ def show(value: Any, longest: int = 40) -> str:
 
 
 def number_in(text: str) -> float:
-    """The number that a file has in digits; ValueError if it is none.
-
-    1_000 is none: only Python would read it so.
-    """
+    """The number in a text; ValueError for others, and for 1_000, which only Python reads."""
     if "_" in text:
         raise ValueError(f"could not convert string to float: {text!r}")
     return float(text)

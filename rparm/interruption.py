@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 ENDINGS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 
 _received: list[int] = []  # since the handlers are there
-_waiting: list[int] = []  # of these, those that a block keeps waiting
+_waiting: list[int] = []  # of these, those held back by a block
 _depth = 0  # of blocks that signals must not interrupt
 
 

@@ -25,12 +25,35 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def written(path: Path) -> Iterator[None]:
+def written(path: str | Path) -> Iterator[None]:
     """Turn a failure of the system inside into the user's error: `path` cannot be written."""
     try:
         yield
     except OSError as error:
         raise UserError(f"{path}: cannot be written: {reason(error)}") from error
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text; its folder is made, and the file appears complete or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def create(path: Path, text: str) -> None:
+    """Write a file that must not exist yet, in a folder that does; UserError if that fails."""
+    try:
+        path.touch(exist_ok=False)  # so that no file is ever overwritten
+    except FileExistsError:
+        raise UserError(f"{path}: exists already, choose another name") from None
+    except (OSError, ValueError) as error:
+        raise UserError(f"{path}: cannot be written: {reason(error)}") from error
+    try:
+        with written(path):
+            write_text(path, text)
+    except UserError:
+        path.unlink(missing_ok=True)
+        raise
 
 
 def copied(file: Path, path: Path) -> Path:
@@ -51,7 +74,7 @@ def check_writable(folder: Path) -> None:
 
 
 def from_here(path: Path) -> Path:
-    """`path` as short as it can be given from the current folder."""
+    """`path` relative to the current folder if it is inside."""
     try:
         here = Path.cwd()
     except OSError:  # it has been removed
@@ -60,7 +83,7 @@ def from_here(path: Path) -> Path:
 
 
 def from_folder(path: Path, folder: Path) -> str:
-    """A path as it is from a folder; in full where there is no way, on another drive."""
+    """A path relative to a folder; absolute if it is on another drive."""
     try:
         return Path(os.path.relpath(path, folder)).as_posix()
     except ValueError:

@@ -17,7 +17,7 @@ build/*.fmu, build/*.ssp                built from the folder of the same name, 
 build/fmi3/                             the same of FMI 3.0
 build/runtime/runtime.json              what FMUs of own equations are linked with
 build/release/built.tar.xz              the same for all platforms, that program, and the playground
-fmu/equations_to_fmu.py                 makes these FMUs, in a process of its own
+fmu/equations_to_fmu.py                 makes these FMUs, in a separate process
 build/report/                           what the commands write: index.html, folders of its parts
 
 An installed package has fmu/ and models/ in its folder share/, what is built as `rparm.shipped`
@@ -27,6 +27,7 @@ says, and writes to rparm-output/ in the current folder.
 import os
 import platform
 import re
+from collections.abc import Iterable
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
@@ -52,8 +53,12 @@ BUILD_FOLDERS = {"2.0": "build", "3.0": "build/fmi3"}  # by version of FMI
 VERSIONS = tuple(BUILD_FOLDERS)
 
 
+def fmi_version(given: object) -> str | None:
+    """Version of FMI by its first digit or in full; None if it is none of `VERSIONS`."""
+    return next((x for x in VERSIONS if str(given) in (x, x[0])), None)
+
+
 def models_folder() -> Path:
-    """Folder of all models and systems."""
     return ROOT / "models"
 
 
@@ -108,10 +113,7 @@ def convergence_files() -> list[Path]:
 
 
 def model_folder(scenario: Path) -> Path:
-    """Folder of the model that a scenario or problem belongs to.
-
-    UserError if the file is in no such folder.
-    """
+    """Folder of the model of a scenario or problem; UserError if the file is in none."""
     folder = scenario.absolute().parent
     if folder.name not in SCENARIO_FOLDERS:
         raise UserError(f"{scenario}: expected in models/MODEL/scenarios/")
@@ -119,12 +121,10 @@ def model_folder(scenario: Path) -> Path:
 
 
 def references(folder: Path) -> Path:
-    """Folder of all references of a model or system."""
     return folder / "references"
 
 
 def reference_folder(scenario: Path) -> Path:
-    """Folder of the reference of a scenario or problem."""
     return references(model_folder(scenario)) / scenario.stem
 
 
@@ -240,10 +240,7 @@ def model_builder() -> Path:
 
 
 def runtimes(all_platforms: bool) -> list[Path]:
-    """What FMUs of own equations are linked with: for this machine, or for each platform.
-
-    UserError if it is not there.
-    """
+    """What models are linked with, here or on all platforms; UserError if it is not there."""
     if all_platforms:
         return sorted(built_for_all().glob("*.json"))
     if INSTALLED:
@@ -257,7 +254,7 @@ def runtimes(all_platforms: bool) -> list[Path]:
 
 
 def from_root(path: Path) -> Path:
-    """`path` as it is given in commands that run in the project's folder, if it has one."""
+    """`path` as commands in the project's folder write it, in a checkout."""
     path = path.absolute()
     return path.relative_to(ROOT) if path.is_relative_to(ROOT) and not INSTALLED else path
 
@@ -290,7 +287,6 @@ def plotly_script() -> Path:
 
 
 def version() -> str:
-    """Version of the project."""
     if INSTALLED:
         return metadata.version("rparm")
     text = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
@@ -303,9 +299,20 @@ def how_to_install(extra: str) -> str:
     """The command that installs what an extra of the distribution needs."""
     if INSTALLED:
         return f'pip install "rparm[{extra}]"'
-    return (
-        f"./setup.sh --{extra}" if extra in ("campaign", "control", "federation") else "./setup.sh"
-    )
+    of_setup = extra in ("campaign", "control", "federation")
+    return f"./setup.sh --{extra}" if of_setup else "./setup.sh"
+
+
+def not_installed(packages: str, extra: str) -> UserError:
+    """What to say of missing packages that an extra of the distribution needs."""
+    return UserError(f"{packages}: not installed, {how_to_install(extra)} does it")
+
+
+def check_installed(packages: Iterable[str], extra: str) -> None:
+    """UserError if some of the packages are missing."""
+    missing = [name for name in packages if find_spec(name) is None]
+    if missing:
+        raise not_installed(", ".join(missing), extra)
 
 
 def cache_folder(part: str) -> Path:

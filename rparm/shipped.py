@@ -1,4 +1,4 @@
-"""What an installed package has that is built, put together or unpacked when it is first used.
+"""The built files of an installed package, assembled or unpacked on first use.
 
 It has the bytes of FMUs and systems in pieces, each once: FMUs share most of their sources, and
 systems contain FMUs. The files keep every byte of those of the release.
@@ -32,10 +32,7 @@ def names() -> list[str]:
 
 
 def file(name: str, cache: Path) -> Path:
-    """The file called `name` in the folder `cache`, written if it is not there or damaged.
-
-    UserError if it cannot be written, or if the package is damaged.
-    """
+    """A file of the release in `cache`; UserError if it cannot be written or is damaged."""
     entry = _files()[name]
     path = cache / entry["sha256"][:16] / PurePosixPath(name).name
     try:
@@ -52,10 +49,7 @@ def file(name: str, cache: Path) -> Path:
 
 @functools.cache
 def unpacked(archive: Path, cache: Path) -> Path:
-    """The folder below `cache` with the files of an archive; those that differ are written.
-
-    UserError if it cannot be read, or if a file cannot be written.
-    """
+    """The folder below `cache` with an archive's files; UserError if one cannot be written."""
     try:
         content = archive.read_bytes()
         folder = cache / _digest(content)[:16]

@@ -5,7 +5,7 @@ import re
 from collections.abc import Sequence, Sized
 from decimal import ROUND_CEILING, Context
 
-SMALLEST = 1e-99  # number that is written as it is
+SMALLEST = 1e-99  # smaller numbers are shown as ~0
 GAP = ".."  # in a text that is shortened
 
 

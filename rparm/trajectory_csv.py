@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rparm.errors import UserError
 from rparm.input_files import UnreadableError, decoded, is_file, number_in, read_bytes, read_text
 from rparm.output_files import whole
 
@@ -15,6 +16,16 @@ LARGEST = 50_000_000  # bytes; references of the project stay below 1 MB
 
 # Makes the exception to raise, from the mistake and the line number, if known.
 Failure = Callable[[str, int | None], Exception]
+
+
+def failure(path: Path, way_out: str = "") -> Failure:
+    """Makes the user's errors of a file; they may end with a way out."""
+
+    def wrong(message: str, line: int | None = None) -> UserError:
+        where = f"{path}, line {line}" if line else f"{path}"
+        return UserError(f"{where}: {message}{way_out}")
+
+    return wrong
 
 
 def write(
@@ -25,20 +36,10 @@ def write(
     digits: int | None = 17,
     short_times: bool = False,
 ) -> None:
-    """Write trajectories; the file appears complete or not at all.
+    """Write trajectories, (rows, names), over times in s; the file appears complete or not at all.
 
-    Parameters
-    ----------
-    times : ndarray, shape (rows,)
-        s.
-    names : sequence of str
-        One name per column of `values`.
-    values : ndarray, shape (rows, len(names))
-        In the variables' units.
-    digits : int, optional
-        Significant ones; None: those that values need to be read back as they are.
-    short_times : bool, optional
-        Whether times have those that they need, too.
+    `digits` are the significant ones; None, and for times `short_times`: as many as are needed to
+    read the same number back.
     """
     form = _shortest if digits is None else f"{{:.{digits}g}}".format
     of_time = _shortest if short_times else form
@@ -57,12 +58,8 @@ def _shortest(value: float) -> str:
 def read(path: Path, failure: Failure) -> tuple[tuple[str, ...], np.ndarray]:
     """Read trajectories as `write` writes them; those of an installed package are compressed.
 
-    Returns
-    -------
-    names : tuple of str
-        Of all columns; the first is "time".
-    table : ndarray, shape (rows, len(names))
-        At least one row; finite.
+    Names of all columns, of which the first is "time", and the table (rows, names): at least one
+    row, all finite.
     """
     try:
         text = _text(path)

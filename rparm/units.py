@@ -111,10 +111,7 @@ def finite_number(given: Any) -> float:
 
 
 def quantity(given: Any, known: Units, is_difference: bool = False) -> float:
-    """Value of a number, or of a text with a number and one of the `known` units.
-
-    WrongValueError if it is neither, or not finite; names the known units.
-    """
+    """Value of a number, or of one with a `known` unit; WrongValueError, with these, if neither."""
     if not isinstance(given, str):
         return finite_number(given)
     number, unit = _parts(given, known)
@@ -127,16 +124,12 @@ def quantity(given: Any, known: Units, is_difference: bool = False) -> float:
 
 
 def typed_quantity(text: str, known: Units) -> float:
-    """Value of a text of the command line: a number, with a unit or without one.
-
-    WrongValueError: as `quantity`.
-    """
+    """Value of a text of the command line, with a unit or without one; errors as of `quantity`."""
     number, unit = _parts(text, known)
     return _value(text, number, unit or next(iter(known), ""), known)
 
 
 def _parts(text: str, known: Units) -> tuple[str, str]:
-    """Number and unit of a text."""
     found = QUANTITY.fullmatch(text.strip()) if len(text) <= LONGEST else None
     if not found:
         form = f"a number, or a number and its unit{_known(known)}" if known else "a number"

@@ -9,7 +9,6 @@ C_TYPES = {"float64": "double", "int32": "int", "enumeration": "int", "boolean":
 
 
 def value_references(declaration: Declaration) -> str:
-    """Text of value_references.h."""
     name = declaration.model.name
     prefix = macro_prefix(name)
     lines = [

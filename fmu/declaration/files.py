@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from program import WrongInputError
 from pydantic import ValidationError
 
 from declaration.schema import (
@@ -26,15 +27,12 @@ from declaration.schema import (
 LONGEST_SHOWN = 60  # characters of a value in a message
 
 
-class DeclarationError(Exception):
+class DeclarationError(WrongInputError):
     """A variables.toml that cannot be used: file, place and reason in one line."""
 
 
 def files_of(path: Path, including: tuple[Path, ...] = ()) -> Iterator[tuple[Path, File]]:
-    """What a file includes, as it changes it, and the file itself at the end.
-
-    `including`: the files on the way.
-    """
+    """What a file, included by others, includes and changes, and the file itself at the end."""
     file = read(path)
     if path.resolve() in including:
         raise DeclarationError(f"{path}: includes itself")
@@ -145,7 +143,6 @@ def reason(mistake: Any, table: type[Table], key: str) -> str:
 
 
 def keys_of(table: type[Table]) -> list[str]:
-    """Keys that a table of the file may have."""
     return [field.alias or name for name, field in table.model_fields.items()]
 
 

@@ -47,13 +47,7 @@ class Declaration:
 
 
 def load(path: Path) -> Declaration:
-    """Read variables.toml and the files that it includes.
-
-    Raises
-    ------
-    DeclarationError
-        where something in them is wrong.
-    """
+    """Read variables.toml and what it includes; DeclarationError if something in them is wrong."""
     units = dict(read(UNITS).units)
     variables: dict[str, Variable] = {}
     places: dict[str, str] = {}
@@ -72,7 +66,6 @@ def load(path: Path) -> Declaration:
     check_references(variables, places)
     check_names(variables, units, places)
     check_dependencies(variables, places)
-    check_states(variables, places)
     check_indicators(file.model.event_indicators, variables, f"{path}: [model]")
     check_terminals(file.terminals, variables, f"{path}: terminal ")
     by_reference = sorted(variables.items(), key=lambda item: item[1].reference)
@@ -110,9 +103,11 @@ def check_names(
 
 
 def check_dependencies(variables: dict[str, Variable], places: dict[str, str]) -> None:
-    """Check that variables depend on what the model structure knows."""
+    """Check that variables depend on what the model structure knows, and that events can."""
     states = {v.derivative_of for v in variables.values()}
     for name, variable in variables.items():
+        if variable.reinit and name not in states:
+            raise DeclarationError(f"{places[name]}: reinit is for states only")
         for other in variable.dependencies or []:
             causality = variables[other].causality
             if causality not in ("input", "independent") and other not in states:
@@ -120,14 +115,6 @@ def check_dependencies(variables: dict[str, Variable], places: dict[str, str]) -
         for other in variable.parameters:
             if variables[other].causality != "parameter":
                 raise DeclarationError(f"{places[name]}: '{other}' is not a parameter")
-
-
-def check_states(variables: dict[str, Variable], places: dict[str, str]) -> None:
-    """Check that only states can be changed by events."""
-    states = {v.derivative_of for v in variables.values()}
-    for name, variable in variables.items():
-        if variable.reinit and name not in states:
-            raise DeclarationError(f"{places[name]}: reinit is for states only")
 
 
 def check_indicators(names: list[str], variables: dict[str, Variable], place: str) -> None:

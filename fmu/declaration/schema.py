@@ -109,8 +109,6 @@ class Table(BaseModel):
 
 
 class Model(Table):
-    """The model that the variables belong to."""
-
     name: Identifier
     description: str
     header: str
@@ -163,8 +161,6 @@ class Unit(Table):
 
 
 class Item(Table):
-    """An item of an enumeration."""
-
     constant: Identifier
     description: str
 
@@ -217,8 +213,6 @@ class Variable(Table):
 
 
 class Float64(Variable):
-    """A floating-point number."""
-
     type: Literal["float64"] = "float64"
     unit: str
     start: float | None = None
@@ -242,8 +236,6 @@ class Discrete(Variable):
 
 
 class Int32(Discrete):
-    """An integer."""
-
     type: Literal["int32"]
     start: Int32Value | None = None
     min: Int32Value | None = None
@@ -260,7 +252,6 @@ class Enumeration(Discrete):
     @field_validator("items")
     @classmethod
     def check_items(cls, items: dict[str, Item]) -> dict[str, Item]:
-        """Refuse an enumeration of nothing."""
         if not items:
             raise ValueError("must have one item at least")
         return items
@@ -268,7 +259,6 @@ class Enumeration(Discrete):
     @field_validator("start_item", mode="before")
     @classmethod
     def check_start(cls, name: Any, info: ValidationInfo) -> Any:
-        """Refuse a start that is no item."""
         items = [*info.data.get("items", {})]
         if items and name not in items:
             raise ValueError(f"should be one of {', '.join(items)}")
@@ -281,12 +271,10 @@ class Enumeration(Discrete):
 
     @property
     def min(self) -> int:
-        """Value of the first item."""
         return 1
 
     @property
     def max(self) -> int:
-        """Value of the last item."""
         return len(self.items)
 
     @property
@@ -303,12 +291,10 @@ class Boolean(Discrete):
 
     @property
     def min(self) -> int:
-        """Value of false."""
         return 0
 
     @property
     def max(self) -> int:
-        """Value of true."""
         return 1
 
 

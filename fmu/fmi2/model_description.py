@@ -121,7 +121,6 @@ def add_types(root: ET.Element, variables: dict[str, Variable]) -> None:
 def add_variable(
     parent: ET.Element, name: str, variable: Variable, index: dict[str, str], units: dict[str, Unit]
 ) -> None:
-    """Write one ScalarVariable."""
     attributes = {
         "description": variable.description,
         "causality": variable.causality,

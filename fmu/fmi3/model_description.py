@@ -27,7 +27,6 @@ TYPES = {
 
 
 def model_description(declaration: Declaration, provenance: Provenance) -> str:
-    """Text of modelDescription.xml."""
     model, variables = declaration.model, declaration.variables
     root = ET.Element(
         "fmiModelDescription",
@@ -95,7 +94,6 @@ def float_type_name(variable: Float64) -> str:
 
 
 def add_float_type(parent: ET.Element, variable: Float64, units: dict[str, Unit]) -> None:
-    """Write one Float64Type."""
     element = ET.SubElement(
         parent, "Float64Type", name=float_type_name(variable), unit=variable.unit
     )
@@ -114,7 +112,6 @@ def has_intermediate_update(variable: Variable) -> bool:
 def add_variable(
     parent: ET.Element, name: str, variable: Variable, declaration: Declaration
 ) -> None:
-    """Write one variable."""
     element = ET.SubElement(
         parent,
         TYPES[variable.type],

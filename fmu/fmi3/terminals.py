@@ -41,7 +41,6 @@ def add_icon(root: ET.Element, icon: Path) -> None:
 
 
 def png_size(path: Path) -> tuple[int, int]:
-    """Width and height in pixels."""
     head = path.read_bytes()[:24]
     if len(head) < 24 or not head.startswith(PNG_START):
         raise OSError(f"{path}: is not a PNG file")

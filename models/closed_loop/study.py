@@ -6,20 +6,11 @@ rparm/system/study.py says what each name means.
 from pathlib import Path
 
 from rparm.models.closed_loop.experiment import START, STEPS_PER_SECOND, STOP
-from rparm.models.closed_loop.motion_figure import ARM, figure
+from rparm.models.closed_loop.motion_figure import ARM
+from rparm.models.closed_loop.motion_figure import figure as figure
 from rparm.models.system_figure import tracking_error
 
 from rparm.system.study import Diagram, Rest
-
-__all__ = [
-    "COUPLING_PICTURE",
-    "DIAGRAMS",
-    "EXPERIMENT",
-    "MEASURES",
-    "REST",
-    "figure",
-    "study_coupling",
-]
 
 EXPERIMENT = (START, STOP, 1 / STEPS_PER_SECOND)
 COUPLING_PICTURE = "coupling.png"

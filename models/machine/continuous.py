@@ -18,11 +18,10 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from rparm.models.machine.experiment import STOP
-from rparm.models.machine.systems import SENSOR, direct, fmus_of, run_in_ecos
+from rparm.models.machine.systems import SENSOR, SEQUENCE, direct, run_in_ecos
 
 from rparm import project, trajectory_csv
 from rparm.coupling.master import Master
-from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value
 from rparm.report.style import ERRORS, RUN, STYLE, save
@@ -81,11 +80,7 @@ def parameters(opened: Ssp, variant: str) -> dict[str, dict[str, Value]]:
 def reference(variant: str) -> Columns:
     """Columns of the solution in continuous time, by name."""
     path = project.references(FOLDER) / variant / "monolithic.csv"
-
-    def failure(message: str, line: int | None) -> UserError:
-        return UserError(f"{path}, line {line}: {message}")
-
-    names, table = trajectory_csv.read(path, failure)
+    names, table = trajectory_csv.read(path, trajectory_csv.failure(path))
     return dict(zip(names, table.T, strict=True))
 
 
@@ -113,15 +108,8 @@ def run(
 def limit(runs: Sequence[Columns], per_second: Sequence[int], power: int) -> tuple[Columns, float]:
     """Values for a step that goes to 0, and by which factor rounding of the runs grows at most.
 
-    Parameters
-    ----------
-    runs : sequence of dict
-        Columns of runs that differ by their step.
-    per_second : sequence of int
-        Steps of each run.
-    power : int
-        Errors are taken for a polynomial in the step that begins with this power and has as many
-        terms as there are runs but one.
+    The `runs` differ by their steps. Errors are taken for a polynomial in the step that begins with
+    `power` and has as many terms as there are runs but one.
     """
     steps = per_second[0] / np.array(per_second)
     terms = steps[:, None] ** np.array([0, *range(power, power + len(runs) - 1)])
@@ -187,7 +175,10 @@ def draw(measured: Mapping[tuple[str, str], tuple[list[float], float]]) -> Figur
 
 def main() -> None:
     measured: dict[tuple[str, str], tuple[list[float], float]] = {}
-    with ssp.unpacked(project.built(FOLDER, ".ssp")) as opened, fmus_of(opened) as fmus:
+    with (
+        ssp.unpacked(project.built(FOLDER, ".ssp")) as opened,
+        opened.unpacked_fmus(SEQUENCE) as fmus,
+    ):
         for variant in VARIANTS:
             expected = reference(variant)
             print(f"{variant}: tracking error {1e3 * tracking_error(expected):.4g} mm")

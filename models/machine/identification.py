@@ -80,7 +80,6 @@ def demo(folder: Path) -> Demo:
 
 
 def _write(machine: Path, log: Path, circle: dict[str, float]) -> None:
-    """Run the machine on a circle and write its log."""
     with ssp.unpacked(machine) as opened:
         values: dict[str, dict[str, Value]] = {
             name: dict(given) for name, given in opened.system.parameter_sets[BASE].items()

@@ -53,8 +53,9 @@ def figure(ssp: Ssp, outcome: Outcome) -> Figure:
             _draw_wall(axes["path"], ssp.system.parameter_sets[outcome.variant]["environment"])
         attached = outcome.column("trajectory.payload_attached") != 0
         for name, panel in axes.items():
-            if name != "path":
-                _shade(panel, times, attached)
+            if name != "path" and attached.any():
+                carried = times[attached]
+                panel.axvspan(carried[0], carried[-1], color=CARRIED, zorder=0)
         for name in ("mode1", "mode2", "wall"):
             axes[name].set_xlabel("time (s)")
         more: list[Line2D | Patch] = [Line2D([], [], color=ERRORS[1], linewidth=1.3, label="wall")]
@@ -79,13 +80,6 @@ def _draw_motor(axes: dict[str, Axes], ssp: Ssp, outcome: Outcome, joint: int) -
         is_limited |= draw_limit(axes[name], shown, limit, NEAR)
         axes[name].set_title(f"limit: ±{limit:g} {unit}", loc="left", fontsize=11)
     return is_limited
-
-
-def _shade(axes: Axes, times: np.ndarray, attached: np.ndarray) -> None:
-    """Mark the times at which the payload is attached."""
-    if attached.any():
-        rows = np.flatnonzero(attached)
-        axes.axvspan(times[rows[0]], times[rows[-1]], color=CARRIED, zorder=0)
 
 
 def _draw_mode(axes: Axes, times: np.ndarray, mode: np.ndarray, joint: int) -> None:

@@ -30,15 +30,7 @@ BISECTIONS = 60
 
 @dataclass(frozen=True)
 class Contact:
-    """A mass in contact with the wall.
-
-    Parameters
-    ----------
-    mass : float
-        kg, above 0.
-    stiffness, damping : float
-        N/m, above 0; N.s/m.
-    """
+    """A mass (kg) in contact with the wall: stiffness (N/m) and damping (N.s/m)."""
 
     mass: float
     stiffness: float
@@ -53,12 +45,8 @@ class Contact:
 def effective_mass(inertia: np.ndarray, direction: np.ndarray) -> float:
     """Mass that an arm opposes to a force at its tip, its joints being free, kg.
 
-    Parameters
-    ----------
-    inertia : ndarray, shape (n, n)
-        Mass matrix.
-    direction : ndarray, shape (n,)
-        Velocity of the tip along the normal by each joint velocity: the row n^T J.
+    From the mass matrix (n, n) and the velocity of the tip along the normal by each joint velocity,
+    the row n^T J (n,).
     """
     return float(1 / (direction @ np.linalg.solve(inertia, direction)))
 
@@ -71,14 +59,8 @@ def least_damping(
 ) -> float:
     """Damping above which the contact is stable, to leading order in the step, N.s/m.
 
-    Parameters
-    ----------
-    contact : Contact
-        Its damping is not used; with held inputs neither is its mass.
-    step : float
-        s, small against the period of the contact.
-    order, inputs : str
-        How the master steps.
+    The step (s) is small against the period of the contact, whose damping is not used; with held
+    inputs neither is its mass.
     """
     if inputs == "held":
         return AGE[order] * step * contact.stiffness
@@ -171,15 +153,7 @@ def growth(contact: Contact, step: float, order: str = "jacobi", inputs: str = "
 def exact_least_damping(
     contact: Contact, step: float, order: str = "jacobi", inputs: str = "held"
 ) -> float:
-    """Damping above which the contact is stable, from the eigenvalues, N.s/m.
-
-    Its own damping is not used.
-
-    Raises
-    ------
-    ValueError
-        If no damping makes it stable: the step is too long.
-    """
+    """Least damping (N.s/m) from the eigenvalues; ValueError if the step is too long for any."""
 
     def is_stable(damping: float) -> bool:
         return growth(replace(contact, damping=damping), step, order, inputs) < 1.0

@@ -1,17 +1,13 @@
-"""What rparm asks of this folder: measures and picture of a run.
-
-rparm/system/study.py says what each name means.
-"""
+"""What rparm asks of this folder, by the names of rparm/system/study.py: measures, picture."""
 
 import numpy as np
 from rparm.models.machine.experiment import START, STEPS_PER_SECOND, STOP
-from rparm.models.machine.machine_figure import ARM, figure
+from rparm.models.machine.machine_figure import ARM
+from rparm.models.machine.machine_figure import figure as figure
 from rparm.models.system_figure import tracking_error
 
 from rparm.system.comparison import Outcome
 from rparm.system.study import Diagram, Measure, Rest
-
-__all__ = ["DIAGRAMS", "EXPERIMENT", "MEASURES", "REST", "figure"]
 
 EXPERIMENT = (START, STOP, 1 / STEPS_PER_SECOND)
 

@@ -1,8 +1,7 @@
 """Systems made of the machine: other parameters and times, or the controller without encoders."""
 
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -10,7 +9,6 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from lxml import etree
 
-from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Model, Value
 from rparm.system import ecos, ssp
 from rparm.system.ssp import Ssp
@@ -19,7 +17,8 @@ from rparm.system.structure import Connection
 STRUCTURE = "SystemStructure.ssd"
 VARIANT = "changed"
 SENSOR = "sensor"
-SEQUENCE = ("trajectory", "controller", "actuator", "plant", "environment")  # without the sensor
+# the components but the sensor, whose outputs have no slopes
+SEQUENCE = ("trajectory", "controller", "actuator", "plant", "environment")
 
 Parameters = Mapping[str, Mapping[str, Value]]  # by component and name
 
@@ -35,13 +34,6 @@ def direct(connections: Iterable[Connection]) -> list[Connection]:
     ]
 
 
-@contextmanager
-def fmus_of(opened: Ssp) -> Iterator[dict[str, Fmu]]:
-    """The FMUs of the machine but the sensor, in their order: its outputs have no slopes."""
-    with ExitStack() as stack:
-        yield {name: stack.enter_context(opened.unpacked_fmu(name)) for name in SEQUENCE}
-
-
 def write_system(
     opened: Ssp,
     path: Path,
@@ -50,20 +42,7 @@ def write_system(
     step: float,
     with_sensor: bool = True,
 ) -> None:
-    """Write an SSP of the machine with one variant, `VARIANT`.
-
-    Parameters
-    ----------
-    opened : Ssp
-        The machine.
-    path : Path
-    parameters : mapping
-        Values by component and name.
-    stop, step : float
-        s.
-    with_sensor : bool
-        Without it, the controller reads the joints themselves.
-    """
+    """Write an SSP of the machine with one variant, `VARIANT`, with its sensor or `direct`."""
     tree = etree.parse(opened.folder / STRUCTURE)
     root = tree.getroot()
     spaces = root.nsmap
@@ -118,7 +97,6 @@ def _remove_sensor(root: etree._Element) -> None:
 
 
 def values_file(model: Model, values: Mapping[str, Value]) -> str:
-    """Text of a parameter set."""
     rows = "".join(
         f'<ssv:Parameter name="{name}"><ssv:{model.variables[name].type} value="{value!r}"/>'
         "</ssv:Parameter>"

@@ -18,7 +18,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from rparm.models.machine.stability import Contact, exact_least_damping, least_damping
-from rparm.models.machine.systems import direct, fmus_of, run_in_ecos, write_system
+from rparm.models.machine.systems import SEQUENCE, direct, run_in_ecos, write_system
 
 from rparm import project
 from rparm.coupling.master import Master
@@ -81,7 +81,6 @@ def _product(depth: np.ndarray) -> float:
 
 
 def in_ecos(opened: Ssp) -> Measure:
-    """Runs the machine in Ecos."""
 
     def measure(stiffness: float, damping: float) -> np.ndarray:
         run = run_in_ecos(opened, pressed(stiffness, damping), STEPS * STEP, STEP, [DEPTH])
@@ -150,7 +149,7 @@ def draw(measured: Mapping[str, list[float]], in_engine: list[float]) -> Figure:
 def main() -> None:
     path = project.built(FOLDER, ".ssp")
     measured = {f"{order}, {inputs}": [] for order, inputs in CASES}
-    with ssp.unpacked(path) as opened, fmus_of(opened) as fmus:
+    with ssp.unpacked(path) as opened, opened.unpacked_fmus(SEQUENCE) as fmus:
         engine = in_ecos(opened)
         in_engine = []
         for stiffness in STIFFNESSES:

@@ -1,7 +1,4 @@
-"""What the report animates: the arm, of this model and of the models and systems that contain it.
-
-rparm/report/motion.py says what the names mean, rparm/report/assets/arm.js draws them.
-"""
+"""What the report animates of an arm, by the names of rparm/report/motion.py and arm.js."""
 
 from collections.abc import Mapping
 from typing import Any

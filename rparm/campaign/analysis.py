@@ -71,10 +71,7 @@ def groups(campaign: Campaign, values: np.ndarray) -> np.ndarray:
 
 
 def indices(campaign: Campaign, values: np.ndarray) -> list[Index]:
-    """Sobol' indices of `values`, (runs,); none if they do not vary or hardly a group is complete.
-
-    First-order and total indices with the confidence `CONFIDENCE`, by SALib.
-    """
+    """First-order and total Sobol' indices of `values`, (runs,); none if too few runs have any."""
     rows = groups(campaign, values)
     if len(rows) < 2 or np.ptp(rows) == 0:
         return []

@@ -8,6 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from rparm.coupling.connected_instance import start_value
 from rparm.errors import UserError, WrongValueError, did_you_mean, hint
 from rparm.fmi.compiled.loop import Part
 from rparm.fmi.fmu_file import describe, read_model
-from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, Model, Value, Variable
+from rparm.fmi.model import INPUTS, Model, Value, Variable
 from rparm.scenarios import scenario
 from rparm.scenarios.scenario import MAX_STEPS, Scenario
 from rparm.system import ssp
@@ -26,27 +27,35 @@ from rparm.system.ssp import Ssp
 
 
 class Base(ABC):
-    """A scenario or system, opened."""
+    """A scenario or system, opened: its FMU or SSP, the folder below models/, times (n + 1,) in s.
 
-    path: Path  # FMU or SSP
-    folder: str  # of the model or system, below models/
+    `models` and the values `given` for their variables are by what stands before the names of
+    variables: nothing in a scenario, ``component.`` in a system.
+    """
+
+    KIND: ClassVar[str]  # for messages
     archives: dict[str, bytes]  # FMUs by their hash
-    times: np.ndarray  # (n + 1,) communication points in s
-    tolerance: float | None
+    tolerance: float | None = None
     questions: tuple[str, ...] = ()  # to ask the user about the scenario
 
-    @property
-    @abstractmethod
-    def models(self) -> list[Model]:
-        """What the FMU of each component declares."""
-
-    @abstractmethod
-    def variable(self, name: str) -> tuple[int, Variable]:
-        """A variable and the number of its component; WrongValueError if there is none."""
-
-    @abstractmethod
-    def start_values(self) -> dict[str, Value]:
-        """Start values of all variables, by the names that a campaign uses."""
+    def __init__(
+        self,
+        path: Path,
+        folder: str,
+        times: np.ndarray,
+        models: Mapping[str, Model],
+        given: Mapping[str, Mapping[str, Value]],
+    ) -> None:
+        self.path, self.folder, self.times = path, folder, times
+        self.models = list(models.values())
+        self._models, self._given = models, given
+        self._variables = {
+            f"{prefix}{name}": (component, variable)
+            for component, (prefix, model) in enumerate(models.items())
+            for name, variable in model.variables.items()
+        }
+        self._reals: dict[str, np.ndarray] = {}
+        self._switches: dict[str, np.ndarray] = {}
 
     @abstractmethod
     def components(
@@ -54,56 +63,63 @@ class Base(ABC):
     ) -> list[Component]:
         """The components, which read Real variables `read` and start from values `fixed`."""
 
-    @abstractmethod
-    def real_outputs(self) -> list[str]:
-        """Names of all Real outputs."""
-
-    @abstractmethod
-    def states(self) -> list[str]:
-        """Names of the continuous states that are outputs."""
-
-    @property
-    @abstractmethod
-    def held(self) -> tuple[HeldInputs, HeldInputs]:
-        """Inputs with zero-order hold that the file gives: Reals and Booleans."""
-
     @property
     @abstractmethod
     def hashes(self) -> dict[str, str]:
-        """SHA-256 of the files that runs follow from: scenario or SSP, and FMUs."""
+        """SHA-256 of the files that determine the runs: scenario or SSP, and FMUs."""
+
+    @property
+    def held(self) -> tuple[HeldInputs, HeldInputs]:
+        """Inputs with zero-order hold that the file gives: Reals and Booleans."""
+        count = len(self.times)
+        reals = HeldInputs.of(self._reals, count, np.float64)
+        return reals, HeldInputs.of(self._switches, count, np.int32)
+
+    def variable(self, name: str) -> tuple[int, Variable]:
+        """A variable and the number of its component; WrongValueError if there is none."""
+        if name not in self._variables:
+            guess = did_you_mean(name, self._variables)
+            raise WrongValueError(f"the {self.KIND} has no variable {name!r}{guess}")
+        return self._variables[name]
 
     def settable(self, name: str) -> tuple[int, Variable]:
         """A variable that a run may start from; WrongValueError if there is none of that name."""
         component, variable = self.variable(name)
-        local_state = variable.causality == "local" and variable.initial == "exact"
-        if not (variable.is_a(PARAMETERS) or variable.is_a(INITIAL) or local_state):
+        if not variable.can_start:
             raise WrongValueError(f"{name!r} is not a parameter or the start value of a state")
         return component, variable
+
+    def start_values(self) -> dict[str, Value]:
+        """Start values of all variables, by the names that a campaign uses."""
+        return {
+            f"{prefix}{name}": value
+            for prefix, model in self._models.items()
+            for name, value in (model.start_values | self._given.get(prefix, {})).items()
+        }
+
+    def real_outputs(self) -> list[str]:
+        return [f"{start}{x}" for start, model in self._models.items() for x in model.real_outputs]
+
+    def states(self) -> list[str]:
+        """Names of the continuous states that are outputs."""
+        found = [f"{prefix}{x}" for prefix, model in self._models.items() for x in model.states]
+        return [name for name in found if name in self.real_outputs()]
 
 
 class ScenarioBase(Base):
     """A scenario; names are those of its model."""
 
+    KIND = "model"
+
     def __init__(self, path: Path, given: Scenario, model: Model) -> None:
+        values = given.parameters | given.initial
+        super().__init__(path, given.model, given.times, {"": model}, {"": values})
         content = path.read_bytes()
-        digest = _sha256(content)
-        self.path, self.folder, self.archives = path, given.model, {digest: content}
-        self._hash, self._scenario, self._model = digest, given, model
-        self.times, self.tolerance = given.times, given.tolerance
+        self._hash, self._scenario, self._model = _sha256(content), given, model
+        self.archives, self.tolerance = {self._hash: content}, given.tolerance
         self.questions = tuple(f"scenario {given.name}: {text}" for text in given.questions)
-        kinds = {name: values.dtype == bool for name, values in given.inputs.items()}
-        self._reals = {n: v for n, v in given.inputs.items() if not kinds[n]}
-        self._switches = {n: v for n, v in given.inputs.items() if kinds[n]}
-
-    @property
-    def models(self) -> list[Model]:
-        return [self._model]
-
-    def variable(self, name: str) -> tuple[int, Variable]:
-        if name not in self._model.variables:
-            guess = did_you_mean(name, self._model.variables)
-            raise WrongValueError(f"the model has no variable {name!r}{guess}")
-        return 0, self._model.variables[name]
+        for name, column in given.inputs.items():
+            (self._switches if column.dtype == bool else self._reals)[name] = column
 
     def settable(self, name: str) -> tuple[int, Variable]:
         """Also an input, which then is constant."""
@@ -111,15 +127,6 @@ class ScenarioBase(Base):
         if variable.is_a(INPUTS) and variable.type == "Real":
             return component, variable
         return super().settable(name)
-
-    def start_values(self) -> dict[str, Value]:
-        return self._scenario.start_values
-
-    def real_outputs(self) -> list[str]:
-        return self._model.real_outputs
-
-    def states(self) -> list[str]:
-        return [name for name in self._model.states if name in self.real_outputs()]
 
     def hold(self, name: str, value: float) -> int:
         """Column of a held input, which is `value` throughout from now on."""
@@ -134,12 +141,11 @@ class ScenarioBase(Base):
         def references(names: Sequence[str]) -> tuple[int, ...]:
             return tuple(variables[name].reference for name in names)
 
-        given = self._scenario.parameters | self._scenario.initial
         return [
             Component(
                 name=self._scenario.name,
                 archive=self._hash,
-                values=given | {name: value for (_, name), value in fixed.items()},
+                values=self._given[""] | {name: value for (_, name), value in fixed.items()},
                 reals=Part(
                     references(list(self._reals)),
                     tuple(range(len(self._reals))),
@@ -150,12 +156,6 @@ class ScenarioBase(Base):
                 ),
             )
         ]
-
-    @property
-    def held(self) -> tuple[HeldInputs, HeldInputs]:
-        count = len(self.times)
-        reals = HeldInputs.of(self._reals, count, np.float64)
-        return reals, HeldInputs.of(self._switches, count, np.int32)
 
     @property
     def hashes(self) -> dict[str, str]:
@@ -182,36 +182,18 @@ class ScenarioBase(Base):
 class SystemBase(Base):
     """A variant of a system; names are ``component.variable``."""
 
+    KIND = "system"
+
     def __init__(self, folder: str, opened: Ssp, variant: str, times: np.ndarray) -> None:
-        self.path, self.folder, self.times, self.tolerance = opened.path, folder, times, None
         self._ssp, self._system = opened, opened.system
         self._names = [component.name for component in self._system.components]
         self._parameters = self._system.parameter_sets[variant]
-        self.archives, self._hashes = {}, {}
-        for name in self._names:
-            content = opened.fmu(name).read_bytes()
-            self._hashes[name] = _sha256(content)
-            self.archives[self._hashes[name]] = content
-
-    @property
-    def models(self) -> list[Model]:
-        return [self._ssp.models[name] for name in self._names]
-
-    def variable(self, name: str) -> tuple[int, Variable]:
-        component, _, variable = name.partition(".")
-        known = self._ssp.models[component].variables if component in self._names else {}
-        if variable not in known:
-            everything = [f"{c}.{v}" for c in self._names for v in self._ssp.models[c].variables]
-            guess = did_you_mean(name, everything)
-            raise WrongValueError(f"the system has no variable {name!r}{guess}")
-        return self._names.index(component), known[variable]
-
-    def start_values(self) -> dict[str, Value]:
-        found = {}
-        for name in self._names:
-            values = self._ssp.models[name].start_values | self._parameters.get(name, {})
-            found |= {f"{name}.{variable}": value for variable, value in values.items()}
-        return found
+        models = {f"{name}.": opened.models[name] for name in self._names}
+        given = {f"{name}.": values for name, values in self._parameters.items()}
+        super().__init__(opened.path, folder, times, models, given)
+        contents = {name: opened.fmu(name).read_bytes() for name in self._names}
+        self._hashes = {name: _sha256(content) for name, content in contents.items()}
+        self.archives = {self._hashes[name]: content for name, content in contents.items()}
 
     def components(
         self, read: Sequence[tuple[int, str]], fixed: Mapping[tuple[int, str], Value]
@@ -219,12 +201,14 @@ class SystemBase(Base):
         connections = self._system.connections
         fed = {
             kind: [
-                c for c in connections if self._type(c.start_component, c.start_connector) == kind
+                c
+                for c in connections
+                if self._ssp.variable(f"{c.start_component}.{c.start_connector}").type == kind
             ]
             for kind in ("Real", "Boolean")
         }
         for c in connections:
-            if self._type(c.start_component, c.start_connector) not in fed:
+            if self._ssp.variable(f"{c.start_component}.{c.start_connector}").type not in fed:
                 raise UserError(f"{self.path}: {c}: is neither Real nor Boolean")
         outputs = {"Real": list(read), "Boolean": []}
         for kind, known in outputs.items():
@@ -250,13 +234,6 @@ class SystemBase(Base):
             )
         return result
 
-    def real_outputs(self) -> list[str]:
-        return [f"{c}.{name}" for c in self._names for name in self._ssp.models[c].real_outputs]
-
-    def states(self) -> list[str]:
-        found = [f"{c}.{name}" for c in self._names for name in self._ssp.models[c].states]
-        return [name for name in found if name in self.real_outputs()]
-
     def _started(self, component: str) -> dict[str, Value]:
         with self._ssp.unpacked_fmu(component) as fmu:
             return {
@@ -264,16 +241,8 @@ class SystemBase(Base):
                 for name, value in self._parameters.get(component, {}).items()
             }
 
-    def _type(self, component: str, variable: str) -> str:
-        return self._ssp.models[component].variables[variable].type
-
     def _reference(self, component: int, variable: str) -> int:
-        return self._ssp.models[self._names[component]].variables[variable].reference
-
-    @property
-    def held(self) -> tuple[HeldInputs, HeldInputs]:
-        count = len(self.times)
-        return HeldInputs.of({}, count, np.float64), HeldInputs.of({}, count, np.int32)
+        return self.models[component].variables[variable].reference
 
     @property
     def hashes(self) -> dict[str, str]:
@@ -288,10 +257,7 @@ def _sha256(content: bytes) -> str:
 def opened(
     campaign: Campaign, given: Path | None, where: Path = Path("campaign")
 ) -> Iterator[Base]:
-    """The scenario or system of a campaign, with the FMU or SSP `given`, or that of its model.
-
-    UserError if it cannot be opened; beginning with `where`, the campaign's file, if that is wrong.
-    """
+    """The scenario or system of a campaign, on its own FMU or SSP, or on that which is `given`."""
     times = campaign.time.model_dump(exclude_none=True)
     if campaign.scenario is not None:
         with _said_of(where):

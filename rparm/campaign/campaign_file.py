@@ -27,7 +27,7 @@ from rparm.input_files import read_toml, show
 from rparm.units import SECONDS, quantity
 
 MAX_RUNS = 10**9
-WHOLE = ("latin", "indices")  # samplings whose points are made at once
+WHOLE = ("latin", "indices")  # samplings that make all points together
 MAX_WHOLE = 10**7  # runs of those
 BEYOND = 10**99  # no greater number of runs is written out
 MAX_PARAMETERS = 1000
@@ -67,7 +67,6 @@ class Distribution(_Table):
 
     @property
     def kind(self) -> str:
-        """Name of the distribution that is given."""
         return next(name for name in KINDS if getattr(self, name) is not None)
 
     @property
@@ -158,8 +157,6 @@ class Time(_Table):
 
 
 class Campaign(_Table):
-    """A campaign file."""
-
     title: Title
     description: Text
     scenario: Name | None = None  # or a file FILE.toml, beside this one
@@ -180,7 +177,6 @@ class Campaign(_Table):
 
     @property
     def count(self) -> int:
-        """Number of runs."""
         if self.sampling == "grid":
             return math.prod(d.size for d in self.parameters.values())
         if self.sampling == "indices":
@@ -265,10 +261,7 @@ def grid_value(distribution: Distribution, index: int) -> float:
 
 
 def read(path: Path) -> Campaign:
-    """Read and check the campaign at `path`.
-
-    UserError if it cannot be read or anything in it is wrong: the first mistake, with its place.
-    """
+    """Read and check a campaign; UserError for the first mistake, with its place."""
     return checked(read_toml(path), path)
 
 

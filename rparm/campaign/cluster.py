@@ -22,7 +22,7 @@ from rparm.errors import UserError, one_line
 from rparm.interruption import uninterrupted
 
 LOCAL = "127.0.0.1"
-KILLS = 5  # so many workers may die over a task
+KILLS = 5  # workers that may die in a task before it counts as failed
 RESTART_EVERY = 2000  # ms
 WAIT = 60  # s, for workers to start
 
@@ -45,22 +45,11 @@ def opened(
     security: Security | None = None,
     dashboard: bool = False,
 ) -> Iterator[Client]:
-    """A cluster's client.
+    """A cluster's client; UserError if the scheduler cannot be reached.
 
-    UserError if the scheduler cannot be reached.
-
-    Parameters
-    ----------
-    scheduler : str, optional
-        Address of one that runs elsewhere; else the cluster is made on this machine.
-    workers : int, optional
-        Processes on this machine; default: one a core.
-    folder : Path
-        For their files.
-    security : Security, optional
-        Certificates for a scheduler elsewhere.
-    dashboard : bool
-        Whether Dask shows its pages, on this machine: to all its users, who can change nothing.
+    Without the address of a scheduler that runs elsewhere, and certificates for it, the cluster is
+    made on this machine: `workers` processes, by default one per core, with their files in
+    `folder`. There, Dask shows its pages (`dashboard`) to all users, who can change nothing.
     """
     logging.disable(logging.CRITICAL)  # what is wrong is said by the errors that are raised here
     try:
@@ -90,7 +79,7 @@ def _connected(address: str, security: Security | None) -> Iterator[Client]:
 
 
 class _NoPages:
-    """Of a scheduler or worker: without the HTTP server that Dask starts in any case."""
+    """A scheduler or worker without the HTTP server that Dask always starts."""
 
     def start_http_server(self, *_: object, **__: object) -> None:
         pass
@@ -122,7 +111,7 @@ def _local(count: int, folder: Path, dashboard: bool) -> Iterator[Client]:
             **common,
             "worker_class": _Worker,
             "nthreads": 1,
-            "memory_limit": 1 / count,  # of what there is
+            "memory_limit": 1 / count,  # share of the machine's memory
             "local_directory": str(folder),
             "silence_logs": logging.CRITICAL,
         },
@@ -162,7 +151,7 @@ async def _keep_signals_from_children() -> None:
 
 
 def _keep_workers(made: SpecCluster, count: int) -> None:
-    """Make workers again that died while they started; nannies take care of the others."""
+    """Replace workers that died while starting; nannies restart the others."""
     for name, nanny in list(made.workers.items()):
         if nanny.status in (Status.failed, Status.closed):
             del made.workers[name]

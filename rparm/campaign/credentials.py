@@ -17,13 +17,9 @@ EXPECTED = "an address as tls://192.168.0.1:8786"
 def of(address: str, ca: Path | None, cert: Path | None, key: Path | None) -> Security | None:
     """What a client of the scheduler at `address` needs; None for one without certificates.
 
-    UserError if they do not fit the address or cannot be used.
-
-    Parameters
-    ----------
-    ca, cert, key : Path, optional
-        Files in PEM form: the certificate of the authority that signs those of all, and the
-        client's own with its private key. Without them, those of Dask's configuration.
+    Files in PEM form: the certificate of the authority that signs all others, and the client's own
+    with its private key; without them, those of Dask's configuration. UserError if they do not fit
+    the address or cannot be used.
     """
     given = dict(zip(OPTIONS, (ca, cert, key), strict=True))
     named = [option for option, path in given.items() if path is not None]

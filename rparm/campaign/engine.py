@@ -97,10 +97,7 @@ class Engine:
         await self._client.scheduler.unregister_worker_plugin(name=self._plugin)
 
     def run(self, blocks: Sequence[int], done: Callable[[int], object]) -> None:
-        """Run blocks and keep their results; `done` is called with the number of runs of each.
-
-        UserError if the cluster is lost or the results cannot be written.
-        """
+        """Run blocks and keep results; `done` gets the runs of each. UserError if that fails."""
         watch = PeriodicCallback(self._watch, COUNT_EVERY)
         try:
             self._seen = time.monotonic()
@@ -157,7 +154,7 @@ class Engine:
         return future
 
     def _rows(self, future: Future, block: _Block) -> Rows:
-        """Results of a task; run by run if workers died over it again and again."""
+        """Results of a task; run by run if it has killed too many workers."""
         if future.status == "finished":
             return future.result()
         error = self._error(future)
@@ -167,7 +164,7 @@ class Engine:
         return _joined([self._alone(run, point[None]) for run, point in pairs])
 
     def _alone(self, run: int, point: np.ndarray) -> Rows:
-        """One run as a task; a failed row if workers die over it."""
+        """One run as a task; a failed row if it kills workers."""
         try:
             return self._submit([run], point).result()
         except KilledWorker:

@@ -106,10 +106,7 @@ def indices(found: Mapping[str, Sequence[Index]]) -> Figure:
 
 
 def heat_map(labels: Sequence[str], x: np.ndarray, y: np.ndarray, colour: np.ndarray) -> Figure:
-    """Columns (runs,): cells where x and y make a grid, else points.
-
-    Nothing is drawn for a run that lacks one of the three.
-    """
+    """Columns (runs,): cells where x and y form a grid, else points; of complete runs only."""
     there = np.isfinite([x, y, colour]).all(axis=0)
     with mpl.rc_context(TEXTS):
         figure = Figure(figsize=(10, 7), layout="constrained")

@@ -64,9 +64,8 @@ class Job:
     targets: tuple[tuple[str, Target], ...]  # by column of the table
     measures: tuple[Measure, ...]
     trajectories: frozenset[int]  # runs of which all that is recorded is kept
-    hashes: dict[str, str]  # SHA-256 of the files that runs follow from
+    hashes: dict[str, str]  # SHA-256 of the files that determine the runs
 
     @property
     def steps(self) -> int:
-        """Communication steps of a run."""
         return len(self.times) - 1

@@ -75,7 +75,7 @@ class Page:
         return Command(f"{self.again} --replay {run}")
 
     def drawn(self, columns: Iterable[str]) -> tuple[list[str], str]:
-        """Columns that fit into a picture; what to say of the others."""
+        """Columns that fit into a picture, and a note on the others."""
         columns = list(columns)
         left = columns[DRAWN:]
         text = (
@@ -113,7 +113,6 @@ class Page:
     # ---- Sobol' indices --------------------------------------------------------------------------
 
     def indices(self) -> dict[str, list[Index]]:
-        """Of each column that has them."""
         if self.campaign.sampling != "indices":
             return {}
         found = {name: analysis.indices(self.campaign, x) for name, x in self.kept.items()}
@@ -141,7 +140,7 @@ class Page:
         return Table("Sobol' indices", head, rows, note)
 
     def doubts(self, found: Mapping[str, list[Index]]) -> list[str]:
-        """What a reader of the indices must know."""
+        """Warnings about the indices."""
         if self.campaign.sampling != "indices":
             return []
         texts = []

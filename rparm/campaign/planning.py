@@ -1,4 +1,4 @@
-"""Checks what a campaign says of its scenario or system, and makes the job of it."""
+"""Checks a campaign against its scenario or system, and turns it into a job."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -28,10 +28,7 @@ MAX_RECORDED = 100_000_000  # numbers that a run records
 
 
 def plan(campaign: Campaign, base: Base, where: object, also: Sequence[str] = ()) -> Job:
-    """The job of a campaign, which records the variables `also`, too.
-
-    UserError for the first mistake, beginning with `where`.
-    """
+    """The job of a campaign, which records `also`, too; UserError, at `where`, for a mistake."""
     return _Planner(campaign, base, where).job(also)
 
 
@@ -125,7 +122,7 @@ class _Planner:
             self.fail(place, f"has no value: {one_line(error)}")
 
     def settable(self, name: str, place: str, used: bool) -> tuple[int, Variable] | None:
-        """The variable; None if it is none but `used` by an expression."""
+        """The variable; None for a name that is no variable, but `used` by an expression."""
         try:
             self.base.variable(name)
         except WrongValueError as error:
@@ -157,10 +154,7 @@ class _Planner:
     def check_tolerances(
         self, components: Sequence[Component], targets: Mapping[str, Target]
     ) -> None:
-        """Refuse tolerances that the methods of integration cannot reach.
-
-        Derived values and normal distributions are not known before the runs.
-        """
+        """Refuse tolerances that methods cannot reach, as far as they are known before the runs."""
         varied = {
             (target.component, target.variable): name
             for name, target in targets.items()
@@ -247,7 +241,7 @@ class _Planner:
         return tuple(np.array(references, np.uint32) for references in found)
 
     def check_columns(self, measures: Sequence[Measure]) -> None:
-        """Columns that the page asks for are there, and no name stands for two."""
+        """Refuse columns that the page needs and does not find, and names of two columns."""
         places = {name: f"[parameters.{name}]" for name in self.campaign.parameters}
         places |= {name: f"[derived] {name}" for name in self.campaign.derived}
         for name in (RUN, FAILURE):
@@ -271,7 +265,7 @@ def columns_of(campaign: Campaign, measures: Sequence[Measure]) -> list[str]:
 
 
 def units(campaign: Campaign, base: Base, measures: Iterable[Measure]) -> dict[str, str]:
-    """Units of the columns of numbers; empty texts where there is none, or it is not known."""
+    """Units of the columns of numbers; empty if a column has none, or it is unknown."""
 
     def of(name: str) -> str:
         try:

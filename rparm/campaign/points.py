@@ -8,13 +8,7 @@ from rparm.campaign.sampling import Sampler
 
 
 class Points:
-    """Parameters and derived values of the runs.
-
-    Parameters
-    ----------
-    constants : dict
-        Numbers that expressions may name.
-    """
+    """Parameters and derived values of the runs; expressions may name `constants`."""
 
     def __init__(self, campaign: Campaign, constants: dict[str, float]) -> None:
         self._sampler, self._constants = Sampler(campaign), constants

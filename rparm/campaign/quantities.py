@@ -10,11 +10,7 @@ from rparm.units import quantity
 
 
 def in_si(campaign: Campaign, base: Base, where: object) -> Campaign:
-    """The campaign with numbers for all values that have a unit.
-
-    UserError if one is in no unit of its variable, or the campaign is wrong then; beginning with
-    `where`.
-    """
+    """The campaign with numbers for values with units; UserError, at `where`, if one is wrong."""
     converter = _Converter(base, where)
     content = campaign.model_dump(exclude_unset=True)
     for name, distribution in content["parameters"].items():
@@ -41,7 +37,7 @@ def in_si(campaign: Campaign, base: Base, where: object) -> Campaign:
 
 
 def questions(campaign: Campaign, base: Base) -> Iterator[str]:
-    """What to ask about start values: angles without a unit that are beyond a turn."""
+    """Questions about start values: angles without a unit beyond one turn."""
     given = {name: (f"[set] {name}", [value]) for name, value in campaign.set.items()}
     for name, distribution in campaign.parameters.items():
         values = distribution.numbers[: 1 if distribution.kind == "normal" else None]

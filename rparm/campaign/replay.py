@@ -23,7 +23,7 @@ from rparm.report import assets, motion, pages
 from rparm.report.motion import Recorded
 from rparm.report.overview import RAN
 from rparm.report.pages import INDEX, RunPage, Table
-from rparm.report.run_data import Curve, Plot, RunData, thinned, without_rounding
+from rparm.report.run_data import Plot, RunData, result_curve, thinned
 from rparm.texts import unit
 
 FOLDER = "replays"
@@ -32,8 +32,6 @@ DIED = "the run takes its process down"
 
 @dataclass(frozen=True)
 class Replay:
-    """What came out of a run."""
-
     parameters: dict[str, float]
     kept: dict[str, float]
     files: list[Path]  # values and page, if it ended
@@ -47,22 +45,17 @@ class Replay:
 
     @property
     def page(self) -> Path | None:
-        """Its page, if it ended."""
         return self.files[-1] if self.files else None
 
     @property
     def document(self) -> dict[str, object]:
-        """It for programs."""
         return dataclasses.asdict(self)
 
 
 def replay(
     campaign: Campaign, base: Base, points: Points, run: int, folder: Path, command: str
 ) -> Replay:
-    """Run again. The page shows `command`, which does it again.
-
-    UserError if there is no such run.
-    """
+    """Make a run again by `command`, which its page shows; UserError if there is no such run."""
     if run >= campaign.count:
         raise UserError(f"no run {run}: the campaign has runs 0 to {campaign.count - 1}")
     job = plan(campaign, base, "replay", base.real_outputs())
@@ -138,7 +131,7 @@ def _serve(connection: Connection) -> None:
 def _data(base: Base, job: Job, given: dict[str, float], record: np.ndarray) -> RunData:
     """Plots of the states, and the motion; record: (n + 1, watched)."""
     outputs = dict(zip(job.watched, record.T, strict=True))
-    curves = [Curve(x, without_rounding(outputs[x])) for x in base.states() or list(outputs)]
+    curves = [result_curve(x, outputs[x]) for x in base.states() or list(outputs)]
     rows = thinned([curve.values for curve in curves])
     plots = [
         Plot(curve.name, unit(base.variable(curve.name)[1].unit), [curve.at(rows)])

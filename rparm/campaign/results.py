@@ -1,8 +1,8 @@
 """Results of a campaign as files: a Parquet file per block, trajectories, and a manifest.
 
 Each file is written to a temporary name and renamed: a file that is there is complete, unless the
-disk has lost something. In its schema's metadata, each Parquet file says of which campaign and
-which part of it is, and has the hash of its values: what does not fit is found by each reading.
+disk has lost something. The metadata of each Parquet file name its campaign and its part, and
+have the hash of its values, which every reading checks.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ from rparm.campaign.job import Job
 from rparm.campaign.planning import FAILURE, RUN, columns_of
 from rparm.campaign.runs import Rows
 from rparm.errors import UserError, reason
-from rparm.output_files import check_writable, whole
+from rparm.output_files import check_writable, whole, written
 
 MANIFEST, BLOCKS, TRAJECTORIES = "manifest.json", "blocks", "trajectories"
 PACKAGES = ("dask", "distributed", "fmpy", "numba", "numpy", "pyarrow", "SALib", "scipy")
@@ -63,21 +63,16 @@ class Results:
         self._check_blocks()
 
     def begin(self) -> None:
-        """Make the folder, or check that it holds results of the same campaign.
-
-        UserError if it holds those of another one, or has no room for these.
-        """
+        """Make the folder; UserError if it has another campaign, or no room for this one."""
         check_writable(self.folder)
         path = self.folder / MANIFEST
         self.check()
         self._check_room()
-        try:
+        with written(self.folder):
             for name in (BLOCKS, TRAJECTORIES):
                 (self.folder / name).mkdir(parents=True, exist_ok=True)
             self._remove_left()
             self._write_manifest(path)
-        except OSError as error:
-            raise UserError(f"{self.folder}: cannot be written: {reason(error)}") from error
         self._check_manifest(path)
 
     @contextmanager
@@ -158,7 +153,6 @@ class Results:
     # ---- Blocks ----------------------------------------------------------------------------------
 
     def block_path(self, block: int) -> Path:
-        """File of a block."""
         return self.folder / BLOCKS / f"block_{block:0{DIGITS}d}.parquet"
 
     def missing(self) -> list[int]:
@@ -201,27 +195,21 @@ class Results:
         return table.replace_schema_metadata(marks)
 
     def write(self, block: int, points: np.ndarray, rows: Rows) -> None:
-        """Keep a block: parameters and derived values (rows, columns), and its runs.
-
-        UserError if the disk does not take it.
-        """
+        """Keep a block, with its points (rows, columns); UserError if the disk does not take it."""
         numbers = np.column_stack([points, rows.measures])
         columns = [pa.array(rows.runs), *(pa.array(column) for column in numbers.T)]
         columns.append(pa.array(rows.failures, pa.string()))
         try:
             for run, record in rows.trajectories.items():
-                self._write_trajectory(run, record)
+                columns_of_run = [pa.array(column) for column in (self._job.times, *record.T)]
+                table = pa.table(columns_of_run, schema=self._recorded)
+                self._write(self.trajectory_path(run), table, f"run {run}")
             table = pa.table(columns, schema=self._schema)
             self._write(self.block_path(block), table, f"block {block}")
         except (OSError, pa.ArrowException) as error:
             raise UserError(
                 f"{self.folder}: the results cannot be written: {reason(error)}; {RESUMES}"
             ) from error
-
-    def _write_trajectory(self, run: int, record: np.ndarray) -> None:
-        columns = [pa.array(column) for column in (self._job.times, *record.T)]
-        table = pa.table(columns, schema=self._recorded)
-        self._write(self.trajectory_path(run), table, f"run {run}")
 
     def trajectory_path(self, run: int) -> Path:
         """File of a run of which everything is kept."""
@@ -250,7 +238,6 @@ class Results:
         return {name: whole_table[name].to_numpy() for name in columns}
 
     def failed(self) -> int:
-        """Number of runs that failed."""
         reasons = (self.block(block)[FAILURE] for block in range(self._campaign.blocks))
         return sum(pc.sum(pc.not_equal(texts, "")).as_py() for texts in reasons)
 
@@ -284,7 +271,6 @@ def _as_text(manifest: dict[str, object]) -> bytes:
 
 
 def _sha256(table: pa.Table) -> str:
-    """SHA-256 of all values of a table."""
     total = hashlib.sha256()
     for column in table.columns:
         is_text = column.type == pa.string()
@@ -293,5 +279,4 @@ def _sha256(table: pa.Table) -> str:
 
 
 def _size(count: float) -> str:
-    """Bytes as text."""
     return f"{count / 1e9:.3g} GB" if count >= 1e9 else f"{count / 1e6:.3g} MB"

@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,22 +22,14 @@ LONGEST_REASON = 500  # characters
 
 @dataclass(frozen=True)
 class Rows:
-    """Results of some runs."""
-
     runs: np.ndarray  # (rows,) their numbers
     measures: np.ndarray  # (rows, measures); NaN in a run that failed
     failures: list[str]  # why each run failed, "" if it did not
     trajectories: dict[int, np.ndarray]  # (n + 1, watched) by number of the run
 
 
-class Runner:
-    """Instances of all components; a context manager that frees them.
-
-    Parameters
-    ----------
-    fmus : mapping of str to Fmu
-        By their hash.
-    """
+class Runner(AbstractContextManager["Runner"]):
+    """Instances of all components, of FMUs by their hash; a context manager that frees them."""
 
     def __init__(self, job: Job, fmus: Mapping[str, Fmu]) -> None:
         self._job, self._fmus = job, fmus
@@ -57,9 +49,6 @@ class Runner:
         self._integers: list[int] = []  # at the end of the last run
         column = {name: i for names in (job.watched, job.integers) for i, name in enumerate(names)}
         self._columns = [[column[name] for name in m.variables] for m in job.measures]
-
-    def __enter__(self) -> "Runner":
-        return self
 
     def __exit__(self, *error: object) -> None:
         self._stack.__exit__(*error)
@@ -96,14 +85,10 @@ class Runner:
             self._integers = [self._instances[c].integer(v) for c, v in self._job.integers.values()]
             return ""
         except UserError as error:
-            self._drop_instances()
+            with suppress(UserError):  # the run has failed already: instances are not used again
+                self._stack.close()
+            self._instances = []
             return one_line(error)[:LONGEST_REASON]
-
-    def _drop_instances(self) -> None:
-        """Free the instances of a failed run, which are not used again."""
-        with suppress(UserError):  # the run has failed already
-            self._stack.close()
-        self._instances = []
 
     # ---- Initialization --------------------------------------------------------------------------
 
@@ -190,7 +175,7 @@ def open_fmus(archives: Mapping[str, bytes], folder: Path) -> Iterator[dict[str,
 
 
 def check(job: Job, archives: Mapping[str, bytes], path: Path) -> None:
-    """Load the FMUs of a job and make an instance of each; UserError of `path` if that fails."""
+    """Load the FMUs of a job and instantiate each; the UserError names `path` if that fails."""
     with TemporaryDirectory(prefix="rparm-") as name:
         folder = Path(name)
         try:

@@ -17,8 +17,6 @@ SMALLEST = 2.0**-54  # a normal distribution is cut there, where its values are 
 
 
 class Sampler:
-    """Points of a campaign."""
-
     def __init__(self, campaign: Campaign) -> None:
         self._campaign = campaign
         self._distributions = list(campaign.parameters.values())

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Work:
-    """What there is to do, and the folder where it is kept."""
+    """A campaign, its job, and the folder of its results."""
 
     campaign: Campaign
     base: Base
@@ -65,14 +65,9 @@ def opened(
 ) -> Iterator[Work]:
     """The work of a campaign's file; UserError if anything in it is wrong.
 
-    Parameters
-    ----------
-    fmu : Path, optional
-        The FMU or SSP; default: the built one.
-    output : Path, optional
-        Folder for the results; default: that in the file, or else the project's.
-    ask : callable, optional
-        Called with what to ask the user: values that are hardly meant so.
+    By default, the FMU or SSP is the built one, and results go to the folder that the file names,
+    or else to the project's. `ask` is called with questions to the user: values that are hardly
+    meant so.
     """
     given = campaign_file.read(file)
     with bases.opened(given, fmu, file) as base:

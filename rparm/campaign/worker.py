@@ -31,7 +31,6 @@ class Plugin(WorkerPlugin):
             self._leave()
 
     def rows(self, numbers: Sequence[int], points: np.ndarray) -> Rows:
-        """Make runs in this thread."""
         with self._lock:
             if not self._users:
                 raise RuntimeError("the campaign has ended")

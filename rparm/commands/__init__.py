@@ -12,8 +12,6 @@ from rparm.errors import UserError
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command has ended."""
-
     code: int  # to exit with
     verdict: str  # the last line
     document: Mapping[str, object] = field(default_factory=dict)  # for programs

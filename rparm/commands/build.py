@@ -7,14 +7,13 @@ import shutil
 import subprocess
 import sys
 from contextlib import ExitStack
-from importlib.util import find_spec
 from pathlib import Path
 
 from rparm import project
+from rparm.command_line.options import add_output
 from rparm.commands import Ended
 from rparm.errors import UserError, one_line
 from rparm.interruption import run_group, temporary_folder, uninterrupted
-from rparm.options import add_output
 from rparm.output_files import whole, written
 
 DESCRIPTION = (
@@ -27,7 +26,6 @@ NEEDED = ("latex2mathml", "markdown_it", "mdit_py_plugins", "pydantic")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which file, and where to."""
     parser.add_argument("file", metavar="FILE.toml", type=Path, help="the file with the equations")
     parser.add_argument(
         "--platforms", action="store_true", help="for all platforms, by zig, not for this machine"
@@ -36,11 +34,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> Ended:
-    """Build."""
-    missing = [name for name in NEEDED if find_spec(name) is None]
-    if missing:
-        way_out = project.how_to_install("build")
-        raise UserError(f"{', '.join(missing)}: not installed, {way_out} does it")
+    project.check_installed(NEEDED, "build")
     runtimes = project.runtimes(options.platforms)
     with temporary_folder() as work:
         lock, *fmus = _build(options, runtimes, work)

@@ -1,19 +1,17 @@
 """`campaign`: run a scenario or a system many times, over parameters."""
 
 import argparse
-import shlex
 import sys
 import time
 from collections.abc import Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rparm import project
+from rparm.command_line.options import add_output, count, number, retyped
 from rparm.commands import Ended
 from rparm.errors import UserError, one_line
 from rparm.interruption import arrived
-from rparm.options import add_output, count, number
 from rparm.output import console
 from rparm.output.progress import Progress
 from rparm.output_files import from_here, written
@@ -31,7 +29,6 @@ NEEDED = ("SALib", "cryptography", "distributed", "numba", "pyarrow", "scipy")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which campaign, and where it runs."""
     parser.add_argument("file", type=Path, metavar="FILE.toml", help="the campaign")
     parser.add_argument(
         "--fmu", type=Path, metavar="PATH", help="the FMU or SSP (default: that in build/)"
@@ -72,11 +69,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Ended:
     """Run what is missing of the campaign; 0 when all runs are there, failed ones among them."""
-    missing = [name for name in NEEDED if find_spec(name) is None]
-    if missing:
-        raise UserError(
-            f"{', '.join(missing)}: not installed, {project.how_to_install('campaign')} does it"
-        )
+    project.check_installed(NEEDED, "campaign")
     # imported here: what a campaign needs may not be installed
     from rparm.campaign import page, planning, replay, work
 
@@ -136,16 +129,10 @@ def _security(options: argparse.Namespace) -> "Security | None":
 
 
 def _command(options: argparse.Namespace) -> str:
-    """What to type for the campaign, in the project's folder."""
-    parts = [project.PROGRAM, "campaign", str(project.from_root(options.file))]
-    for name in ("fmu", "output"):
-        value = getattr(options, name)
-        parts += [] if value is None else [f"--{name}", str(project.from_root(value))]
-    return shlex.join(parts)
+    return retyped("campaign", [options.file], {"fmu": options.fmu, "output": options.output})
 
 
 def _run_missing(options: argparse.Namespace, security: "Security | None", made: "Work") -> None:
-    """Run the blocks whose results are not there."""
     blocks = made.begin()
     if not blocks:
         return

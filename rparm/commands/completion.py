@@ -8,9 +8,9 @@ from typing import Any
 import shtab
 
 from rparm import command_line, project
+from rparm.command_line.options import add_output
 from rparm.commands import Ended
-from rparm.options import add_output
-from rparm.output_files import written
+from rparm.output_files import write_text, written
 from rparm.system import comparison
 
 SCRIPT = Path(project.PROGRAM).name
@@ -24,20 +24,18 @@ SHELLS = {"bash": SCRIPT, "zsh": f"_{SCRIPT}", "tcsh": f"{SCRIPT}.tcsh"}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which shell, and where the script goes."""
     parser.add_argument("shell", choices=list(SHELLS), help="the shell that reads the script")
     add_output(parser, "write the script into this folder, by the name that the shell looks for")
 
 
 def run(options: argparse.Namespace) -> Ended:
-    """Print the script, with the names of the scenarios and systems that there are."""
+    """Print the script, with the names of all scenarios and systems."""
     script = shtab.complete(_all_commands(), options.shell)
     if options.output is None:
         return Ended(0, script, {"script": script})
     file = options.output / SHELLS[options.shell]
     with written(file):
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(f"{script}\n", encoding="utf-8", newline="\n")
+        write_text(file, f"{script}\n")
     return Ended(0, f"{file}: written", {"script": script, "file": file.absolute()})
 
 

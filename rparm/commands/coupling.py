@@ -3,9 +3,9 @@
 import argparse
 
 from rparm import project
+from rparm.command_line.options import add_report, add_system
 from rparm.commands import Ended
 from rparm.linearization import stable_steps
-from rparm.options import add_report, add_system
 from rparm.output import console
 from rparm.output_files import check_writable
 from rparm.system import study
@@ -18,13 +18,11 @@ DESCRIPTION = (
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which system, and where the picture goes."""
     add_system(parser)
     add_report(parser, "system")
 
 
 def run(options: argparse.Namespace) -> Ended:
-    """Make the study."""
     folder, known = study.of_coupling()
     path = options.ssp or project.built(folder, ".ssp", "--ssp", options.fmi)
     check_writable(options.report)

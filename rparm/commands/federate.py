@@ -4,19 +4,18 @@ import argparse
 import os
 from pathlib import Path
 
+from rparm.command_line.options import add_document, add_silence
 from rparm.commands import Ended
 from rparm.errors import UserError, hint
 from rparm.federation import SILENCE, addresses, component, screen, watching
 from rparm.federation.network import KEY, key
 from rparm.federation.parts import parts
-from rparm.options import add_document, add_silence
 from rparm.system import ssp
 
 DESCRIPTION = "Steps one component of a system until the federation has come to the end."
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which component, and where the federation is."""
     parser.add_argument("ssp", type=Path, metavar="SSP", help="the system")
     parser.add_argument("variant", metavar="VARIANT")
     parser.add_argument("component", metavar="COMPONENT")
@@ -31,7 +30,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> Ended:
-    """Step the component to the end."""
     screen.apart()
     addresses.check_form(options.broker)
     if KEY not in os.environ:

@@ -3,20 +3,19 @@
 import argparse
 import shlex
 import time
-from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 
 from rparm import project, trajectory_csv
+from rparm.command_line.options import add_output, add_silence, add_system
 from rparm.commands import Ended
 from rparm.coupling.master import Master
 from rparm.errors import UserError, hint
 from rparm.federation import SILENCE, addresses, federation, screen
 from rparm.federation.federation import Record
 from rparm.federation.network import KEY, key
-from rparm.federation.parts import parts, real_connections
-from rparm.options import add_output, add_silence, add_system
+from rparm.federation.parts import real_connections
 from rparm.output import console
 from rparm.output.progress import Progress
 from rparm.output.result_tables import FederationTable
@@ -34,7 +33,6 @@ BOUND = 1e-12  # on the largest difference to the master, relative to the variab
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which variants, and where their processes are."""
     parser.add_argument("names", nargs="*", metavar="NAME", help="variants (default: all)")
     add_system(
         parser,
@@ -105,7 +103,6 @@ def run(options: argparse.Namespace) -> Ended:
 
 
 def _write(path: Path, record: Record) -> None:
-    """Write what was recorded of a variant."""
     with written(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         trajectory_csv.write(path, record.times, record.names, record.values)
@@ -133,13 +130,8 @@ def _check_names(system: Ssp, options: argparse.Namespace) -> None:
 
 def _master(system: Ssp, variant: str, record: Record) -> tuple[float, float]:
     """Largest relative difference to the Jacobi master, and its time for all steps, s."""
-    with ExitStack() as stack:
-        fmus = {
-            c.name: stack.enter_context(system.unpacked_fmu(c.name))
-            for c in system.system.components
-        }
-        master = stack.enter_context(Master(fmus, real_connections(system)))
-        times = next(iter(parts(system, variant).values())).times
+    with system.unpacked_fmus() as fmus, Master(fmus, real_connections(system)) as master:
+        times = system.system.times
         master.initialize(times[0], times[-1], system.system.parameter_sets[variant])
         begin = time.perf_counter()
         rows = master.run(times)

@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 
 from rparm import project
+from rparm.command_line.options import add_fmi, add_output
 from rparm.commands import Ended
-from rparm.options import add_fmi, add_output
 from rparm.output_files import copied
 from rparm.project import VERSIONS
 
@@ -13,7 +13,6 @@ DESCRIPTION = "Copies the FMU of a model, for another tool."
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which FMU, and where it goes."""
     parser.add_argument("name", metavar="NAME", help="name of the FMU, or of its model")
     add_fmi(parser, VERSIONS[0], "its version of FMI (default: 2)")
     add_output(parser, "copy it into this folder (default: the current one)")

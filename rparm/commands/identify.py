@@ -1,16 +1,15 @@
 """`identify`: find parameters of an FMU that fit logs of a machine."""
 
 import argparse
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rparm import project
+from rparm.command_line.options import add_report, names, pairs, retyped
 from rparm.commands import Ended
 from rparm.errors import UserError, placed
 from rparm.input_files import number_in
-from rparm.options import add_report, names, pairs
 from rparm.output import console
 from rparm.output_files import check_writable, from_here, written
 from rparm.units import SECONDS, typed_quantity
@@ -30,7 +29,6 @@ GIVEN = *SEVERAL, "delay", "validate"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which FMU and logs, what is estimated, what is known."""
     parser.add_argument("fmu", nargs="?", metavar="FMU", help="a file, or a model of the project")
     parser.add_argument(
         "logs", nargs="*", type=Path, metavar="LOG.csv", help="with a column of times in s"
@@ -142,18 +140,10 @@ def _fmu(given: str) -> Path:
 
 
 def _again(options: argparse.Namespace) -> str:
-    """What to type for it, in the project's folder."""
-    parts = [project.PROGRAM, "identify"]
-    files = [options.fmu, *options.logs] if options.fmu else []
-    parts += [str(project.from_root(Path(file))) for file in files]
-    for name in SEVERAL:
-        given = getattr(options, name)
-        parts += [f"--{name}", *given] if given else []
-    if options.validate is not None:
-        parts += ["--validate", str(project.from_root(options.validate))]
-    parts += ["--segment", options.segment] if options.segment != SEGMENT else []
-    parts += [f"--{name}" for name in ("delay", "demo") if getattr(options, name)]
-    return shlex.join(parts)
+    files = map(Path, [options.fmu, *options.logs] if options.fmu else [])
+    given = {name: getattr(options, name) for name in (*SEVERAL, "validate")}
+    given["segment"] = options.segment if options.segment != SEGMENT else None
+    return retyped("identify", files, given | {"delay": options.delay, "demo": options.demo})
 
 
 def _values(option: str, given: Sequence[str]) -> dict[str, Any]:

@@ -1,13 +1,12 @@
 """`linearize`: the linear model of an FMU or a system at a point."""
 
 import argparse
-import shlex
 from pathlib import Path
 
 from rparm import project
+from rparm.command_line.options import add_fmi, add_report, names, pairs, retyped
 from rparm.commands import Ended
 from rparm.errors import WrongValueError
-from rparm.options import add_fmi, add_report, names, pairs
 from rparm.output import console
 from rparm.output_files import check_writable, from_here, written
 from rparm.units import SECONDS, typed_quantity
@@ -21,7 +20,6 @@ DESCRIPTION = (
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """What to linearize, at which point, and where results go."""
     parser.add_argument("what", metavar="FMU|SSP", help="a file, or a name of the project")
     add_fmi(parser, project.VERSIONS[0], "version of FMI where a name is given (default: 2)")
     parser.add_argument("--variant", default="", metavar="NAME", help="parameter set of a system")
@@ -97,16 +95,10 @@ def run(options: argparse.Namespace) -> Ended:
 
 
 def _command(options: argparse.Namespace) -> str:
-    """What to type for the same again."""
-    parts = [project.PROGRAM, "linearize", str(options.what)]
-    if options.fmi != project.VERSIONS[0]:
-        parts += ["--fmi", options.fmi]
-    for option in ("variant", "at", "time", "trim", "inputs", "outputs", "without", "cut", "step"):
-        given = getattr(options, option)
-        if given not in (None, "", []):
-            values = given if isinstance(given, list) else [str(given)]
-            parts += ["--break" if option == "cut" else f"--{option}", *values]
-    return shlex.join(parts)
+    given = {"fmi": options.fmi if options.fmi != project.VERSIONS[0] else None}
+    for name in ("variant", "at", "time", "trim", "inputs", "outputs", "without", "cut", "step"):
+        given["break" if name == "cut" else name] = getattr(options, name)
+    return retyped("linearize", [options.what], given)
 
 
 def _seconds(text: str) -> float:

@@ -4,8 +4,8 @@ import argparse
 import textwrap
 
 from rparm import project
+from rparm.command_line.options import add_document
 from rparm.commands import Ended
-from rparm.options import add_document
 from rparm.output import console
 from rparm.scenarios import scenario
 from rparm.texts import shortened
@@ -14,12 +14,10 @@ DESCRIPTION = "Prints the name and the title of every scenario."
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Where the list goes."""
     add_document(parser)
 
 
 def run(_: argparse.Namespace) -> Ended:
-    """Print the name and the title of every scenario."""
     files = project.scenario_files()
     found = [
         {"name": name, "title": scenario.title(path), "model": project.model_folder(path).name}

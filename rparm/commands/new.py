@@ -4,11 +4,11 @@ import argparse
 from pathlib import Path
 
 from rparm import project
+from rparm.command_line.options import add_output
 from rparm.commands import Ended
-from rparm.errors import UserError, reason
+from rparm.errors import UserError
 from rparm.fmi.fmu_file import read_model
-from rparm.options import add_output
-from rparm.output_files import from_folder, whole
+from rparm.output_files import create, from_folder, written
 from rparm.scenarios import template
 
 DESCRIPTION = (
@@ -20,7 +20,6 @@ RESERVED = {"CON", "PRN", "AUX", "NUL"} | {f"{x}{i}" for x in ("COM", "LPT") for
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which scenario."""
     parser.add_argument("name", metavar="NAME", help="name of the scenario, or path of its file")
     parser.add_argument(
         "--model",
@@ -31,7 +30,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> Ended:
-    """Write the file."""
     path = _path(options.name)
     if options.output:
         path = options.output / path
@@ -43,20 +41,10 @@ def run(options: argparse.Namespace) -> Ended:
         key, name = "model", subject.name
     model = read_model(project.fmu_of(subject))
     text = template.text(path.stem, key, name, model)
-    try:
-        if options.output:
+    if options.output:
+        with written(path):
             options.output.mkdir(parents=True, exist_ok=True)
-        path.touch(exist_ok=False)  # so that nobody's file is overwritten, at no time
-    except FileExistsError:
-        raise UserError(f"{path}: exists already, choose another name") from None
-    except (OSError, ValueError) as error:
-        raise UserError(f"{path}: cannot be written: {reason(error)}") from error
-    try:
-        with whole(path) as temporary:
-            temporary.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        path.unlink(missing_ok=True)
-        raise UserError(f"{path}: cannot be written: {reason(error)}") from error
+    create(path, text)
     verdict = f"{path}: written; run it by {project.PROGRAM} '{path}'"
     return Ended(0, verdict, {"file": path.absolute(), "model": name}, page=path)
 

@@ -6,10 +6,10 @@ import shlex
 from pathlib import Path
 
 from rparm import project
+from rparm.command_line.options import add_output
 from rparm.commands import Ended
 from rparm.errors import UserError
-from rparm.options import add_output
-from rparm.output_files import written
+from rparm.output_files import create, written
 
 DESCRIPTION = (
     f"Writes NAME.toml, a model of one's own with comments: {project.PROGRAM} build NAME.toml "
@@ -46,23 +46,18 @@ energy = {{ value = "(mass * v**2 + spring * x) / 2", unit = "J" }}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which name."""
     parser.add_argument("name", metavar="NAME", help="of the FMU: letters, digits and _")
     add_output(parser, "folder for the file (default: the current one)")
 
 
 def run(options: argparse.Namespace) -> Ended:
-    """Write the file."""
     if not NAME.fullmatch(options.name):
         raise UserError(
             f"{options.name!r} is no name for a model: a letter, then letters, digits, _"
         )
     path = (options.output or Path()) / f"{options.name}.toml"
-    if path.exists():
-        raise UserError(f"{path}: exists already, choose another name")
     with written(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("x", encoding="utf-8", newline="\n") as file:
-            file.write(TEXT.format(name=options.name))
+    create(path, TEXT.format(name=options.name))
     verdict = f"{path}: written; {project.PROGRAM} build {shlex.quote(str(path))} makes FMUs of it"
     return Ended(0, verdict, {"file": path.absolute()}, page=path.absolute())

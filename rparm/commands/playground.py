@@ -3,20 +3,18 @@
 import argparse
 
 from rparm import project
+from rparm.command_line.options import add_output
 from rparm.commands import Ended
-from rparm.options import add_output
 from rparm.output_files import copied, from_here
 
 DESCRIPTION = "Says where the page with the plant is; --open shows it."
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Where a copy goes."""
     add_output(parser, "copy the page into this folder")
 
 
 def run(options: argparse.Namespace) -> Ended:
-    """Name the page, and show it."""
     page = project.playground_page()
     if options.output:
         page = copied(page, options.output / "playground.html")

@@ -1,7 +1,6 @@
 """`prove`: how far runs and references are from the exact motion at most, by theorem."""
 
 import argparse
-import shlex
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -9,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from rparm import project
+from rparm.command_line.options import add_report, add_tolerance, retyped
 from rparm.commands import Ended
 from rparm.errors import UserError, WrongValueError, placed
 from rparm.fmi.fmu_file import Fmu
-from rparm.options import add_report, add_tolerance
 from rparm.output import console
 from rparm.output.progress import Progress
 from rparm.output_files import check_writable, from_here, written
@@ -34,7 +33,6 @@ COLUMNS = {"values": 8, "nearest doubles": 8, "error beyond": 9, "interval": 9}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which scenario, and how it runs."""
     parser.add_argument(
         "name", nargs="?", metavar="SCENARIO", help="a scenario, or a file FILE.toml of your own"
     )
@@ -96,12 +94,9 @@ def run(options: argparse.Namespace) -> Ended:
 
 
 def _command(options: argparse.Namespace) -> str:
-    """What to type for the same again."""
-    parts = [project.PROGRAM, "prove", *([options.name] if options.name else [])]
-    for option in ("method", "tolerance", "within"):
-        given = getattr(options, option)
-        parts += [] if given is None else [f"--{option}", str(given)]
-    return shlex.join(parts)
+    names = [options.name] if options.name else []
+    given = {name: getattr(options, name) for name in ("method", "tolerance", "within")}
+    return retyped("prove", names, given)
 
 
 def _within(given: str | None, program: Prover, fmu: Fmu) -> dict[str, float]:
@@ -139,10 +134,7 @@ def _runs(
     methods: list[str],
     tolerance: float | None,
 ) -> tuple[dict[str, dict[str, proven.ProvenError]], dict[str, np.ndarray]]:
-    """Run with each method; prints the largest errors, and where they are.
-
-    Returns the largest errors by method, and all of them by what the table calls the run.
-    """
+    """Print the largest errors of runs by each method; return these, and all errors by run."""
     units = [fmu.model.variables[name].unit for name in enclosure.states]
     heads = {f"{n} {u or ''}".strip(): 10 for n, u in zip(enclosure.states, units, strict=True)}
     print(f"{scenario.name}: largest distance from the exact motion at communication points")

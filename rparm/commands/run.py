@@ -1,7 +1,4 @@
-"""`run`: simulate scenarios, compare them with their references, write a report.
-
-Files of users are run in the same way; they have no references.
-"""
+"""`run`: simulate scenarios, compare those of the project with references, write a report."""
 
 import argparse
 import os
@@ -11,12 +8,12 @@ from pathlib import Path
 
 from rparm import project
 from rparm.command_line import COMMANDS, PROGRAM
+from rparm.command_line.options import add_fmi, add_report, add_tolerance
 from rparm.commands import Ended
 from rparm.commands import list as scenario_list
 from rparm.errors import UserError, did_you_mean, placed, together
 from rparm.fmi.fmu_file import Fmu
 from rparm.input_files import missing
-from rparm.options import add_fmi, add_report, add_tolerance
 from rparm.output import console, results
 from rparm.output.progress import Progress
 from rparm.output.result_tables import RunTable, SweepTable, measured
@@ -46,7 +43,6 @@ QUICK = 20.0  # s, longest sweep that runs by default for a named scenario
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which scenarios, on which FMUs, and where the report goes."""
     parser.add_argument(
         "names",
         nargs="*",
@@ -90,7 +86,9 @@ def run(options: argparse.Namespace) -> Ended:
         else:
             done.runs = _runs(runs, chosen, bool(twins), done.failures, None, TIGHTEST)
             swept = _quick(done.runs) if options.names else chosen
-            done.sweeps = _sweeps(runs, _finished(swept, done.failures), bool(options.names))
+            failed = {failure.scenario.path for failure in done.failures}
+            swept = [scenario for scenario in swept if scenario.path not in failed]
+            done.sweeps = _sweeps(runs, swept, bool(options.names))
             done.studies = [] if options.names else _convergence(fmus, twins)
         done.runs += _estimated(runs, own, done.failures, options.tolerance)
         console.stage("writing the report")
@@ -246,10 +244,7 @@ def _runs(
     failures: list[Failure],
     *tolerances: float | None,
 ) -> list[Run]:
-    """Run `chosen` at `tolerances`; None: at the tolerance of the scenario.
-
-    A run that an FMU does not finish is added to `failures`.
-    """
+    """Run `chosen` at `tolerances`, None: their own; what an FMU does not finish is a failure."""
     if not chosen:
         return []
     console.stage(f"simulating {counted(chosen, 'scenario')}")
@@ -296,19 +291,10 @@ def _one(
     return [found]
 
 
-def _finished(chosen: Sequence[Scenario], failures: Sequence[Failure]) -> list[Scenario]:
-    """Those of `chosen` that did not fail."""
-    failed = {failure.scenario.path for failure in failures}
-    return [scenario for scenario in chosen if scenario.path not in failed]
-
-
 def _estimated(
     runs: Runs, own: Sequence[Scenario], failures: list[Failure], tolerance: float | None
 ) -> list[Run]:
-    """Run scenarios of users, which have no references; None: at their own tolerances.
-
-    A run that an FMU does not finish is added to `failures`.
-    """
+    """Run users' scenarios, without references; what an FMU does not finish is a failure."""
     if not own:
         return []
     console.stage(f"simulating {counted(own, 'scenario')} of your own")
@@ -361,10 +347,7 @@ def _sweeps(runs: Runs, chosen: Sequence[Scenario], in_full: bool) -> list[Sweep
 
 
 def _convergence(fmus: Mapping[str, Fmu], twins: Mapping[str, Fmu]) -> list[Convergence]:
-    """Study the order of convergence of the models whose FMUs are open.
-
-    An FMU that asks for inputs within a step, or else its twin, shows that of intermediate update.
-    """
+    """Study the order of convergence; also by intermediate update, of an FMU or its twin."""
     studies = []
     for file in project.convergence_files():
         folder = project.model_folder(file).name

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from rparm import project
 from rparm.command_line import PROGRAM
+from rparm.command_line.options import add_report, add_system
 from rparm.commands import Ended
 from rparm.coupling import in_process
 from rparm.errors import UserError, did_you_mean, hint, together
-from rparm.options import add_report, add_system
 from rparm.output import console
 from rparm.output.result_tables import VariantTable
 from rparm.output_files import check_writable, from_here, written
@@ -27,7 +27,6 @@ DESCRIPTION = (
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which variants, and where the report goes."""
     add_system(parser)
     parser.add_argument(
         "names",
@@ -60,20 +59,15 @@ def run(options: argparse.Namespace) -> Ended:
             raise
         chosen = _choose(systems, options.names)
         if options.list:
-            return _listed(chosen)
+            found = {system.name: names for system, names in chosen}
+            blocks = ("\n  ".join([name, *names]) for name, names in found.items())
+            return Ended(0, "\n".join(blocks), {"systems": found})
         check_writable(options.report)
         with written(options.report):
             for system, names in chosen:
                 system_page.remove(options.report, system.name, names)
         plans = [(system, _references(system, names)) for system, names in chosen]
         return _run(plans, options)
-
-
-def _listed(chosen: Sequence[tuple[Section, Sequence[str]]]) -> Ended:
-    """The names of systems and variants."""
-    found = {system.name: names for system, names in chosen}
-    lines = [line for name, names in found.items() for line in (name, *(f"  {n}" for n in names))]
-    return Ended(0, "\n".join(lines), {"systems": found})
 
 
 def _paths(options: argparse.Namespace) -> list[Path]:
@@ -96,10 +90,7 @@ def _opened(path: Path, stack: ExitStack) -> Section:
 
 
 def _choose(systems: Sequence[Section], names: Sequence[str]) -> list[tuple[Section, list[str]]]:
-    """Variants to run of each system: those named, all of a system that is named, or all.
-
-    UserError if a name is unknown, or stands for two things.
-    """
+    """Variants to run of each system, all without names; UserError if a name is not clear."""
     owners: dict[str, str] = {system.name: "a system" for system in systems}
     for system in systems:
         for variant in system.variants:
@@ -122,7 +113,6 @@ def _choose(systems: Sequence[Section], names: Sequence[str]) -> list[tuple[Sect
 
 
 def _references(section: Section, names: Sequence[str]) -> dict[str, Reference]:
-    """References by variant."""
     return {
         name: comparison.load_reference(section.ssp, name, section.folder, section.study.EXPERIMENT)
         for name in names
@@ -160,8 +150,13 @@ def _run(
             with written(options.report):
                 entries.append(system_page.write_variant(options.report, section, outcome))
             if options.pictures:
+                from rparm.report.style import save  # matplotlib takes long to import
+
                 with written(options.pictures):
-                    _draw(options.pictures, section, outcome)
+                    options.pictures.mkdir(parents=True, exist_ok=True)
+                    save(
+                        section.study.figure(section.ssp, outcome), options.pictures / f"{name}.png"
+                    )
             outcomes.append(outcome)
         print()
     with written(options.report):
@@ -176,7 +171,6 @@ def _run(
 
 
 def _row(section: Section, outcome: Outcome) -> dict[str, object]:
-    """A variant for programs."""
     return {
         "system": section.name,
         "name": outcome.variant,
@@ -190,11 +184,3 @@ def _row(section: Section, outcome: Outcome) -> dict[str, object]:
         "seconds": outcome.run.wall_time,
         "passed": outcome.passed,
     }
-
-
-def _draw(folder: Path, section: Section, outcome: Outcome) -> None:
-    """Write the picture of a run, as READMEs have it."""
-    from rparm.report.style import save  # matplotlib takes long to import
-
-    folder.mkdir(parents=True, exist_ok=True)
-    save(section.study.figure(section.ssp, outcome), folder / f"{outcome.variant}.png")

@@ -1,62 +1,52 @@
 """A component of a system, as a master drives it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from ctypes import Array, c_double, sizeof
-from dataclasses import dataclass
 
 import numpy as np
 
 from rparm.errors import UserError, placed
 from rparm.fmi.fmi_instance import Instance, Reals, UnpackedFmu
-from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, Value, Variable
-
-
-@dataclass(frozen=True)
-class Wiring:
-    """How a component is connected."""
-
-    inputs: Sequence[str]  # set before each step
-    outputs: Sequence[str]  # read after each step
-    first: int  # index of the first of `outputs` in the system's values
-    connected: Sequence[int]  # which of `outputs` feed an input
-    sources: Sequence[int]  # of each input, in the system's values
-    ahead: Sequence[bool]  # of each input, whether its source steps before this component
+from rparm.fmi.model import INPUTS, Value
 
 
 class ConnectedInstance:
     """An instance, its place among the system's values, and the sources of its inputs.
 
-    Parameters
-    ----------
-    instance : Instance
-        Instantiated.
-    values, slopes : ctypes array of double, ndarray
-        The system's values, and their derivatives with respect to time.
+    Of `values` and their derivatives with respect to time, `slopes`, those from `first` on belong
+    to its outputs, of which some are `feeding` inputs. Each input has a source, an index among
+    them, which steps `ahead` of this component or not.
     """
 
     def __init__(
-        self, instance: Instance, wiring: Wiring, values: Array, slopes: np.ndarray
+        self,
+        instance: Instance,
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        first: int,
+        feeding: Collection[str],
+        sources: Sequence[int],
+        ahead: Sequence[bool],
+        values: Array,
+        slopes: np.ndarray,
     ) -> None:
         self.instance = instance
-        self.sources = np.array(wiring.sources, dtype=int)
-        self.ahead = np.array(wiring.ahead, dtype=bool)
-        offset = wiring.first * sizeof(c_double)
-        memory = (c_double * len(wiring.outputs)).from_buffer(values, offset)
-        self.outputs = instance.reals(wiring.outputs, memory)
-        self.inputs = instance.reals(wiring.inputs)
-        self._lines = instance.input_polynomials(wiring.inputs, 1)
-        connected = [wiring.outputs[i] for i in wiring.connected]
-        self._output_slopes = instance.output_derivatives(connected, 1)
+        self.sources = np.array(sources, dtype=int)
+        self.ahead = np.array(ahead, dtype=bool)
+        memory = (c_double * len(outputs)).from_buffer(values, first * sizeof(c_double))
+        self.outputs = instance.reals(outputs, memory)
+        self.inputs = instance.reals(inputs)
+        self._lines = instance.input_polynomials(inputs, 1)
+        connected = [i for i, name in enumerate(outputs) if name in feeding]
+        self._output_slopes = instance.output_derivatives([outputs[i] for i in connected], 1)
         self._slopes = slopes
-        self._slope_indices = wiring.first + np.array(wiring.connected, dtype=int)
+        self._slope_indices = first + np.array(connected, dtype=int)
 
     @property
     def name(self) -> str:
-        """Name of the component."""
         return self.instance.name
 
     def begin(self, start: float, stop: float | None, parameters: Mapping[str, Value]) -> None:
-        """From instantiated into initialization mode."""
         begin(self.instance, start, stop, parameters)
 
     def set_inputs(self, values: np.ndarray) -> None:
@@ -70,11 +60,9 @@ class ConnectedInstance:
         self._lines.set()
 
     def read(self) -> None:
-        """Read the outputs into the system's values."""
         self.outputs.get()
 
     def read_slopes(self) -> None:
-        """Read the derivatives of the connected outputs into the system's slopes."""
         self._output_slopes.get()
         self._slopes[self._slope_indices] = self._output_slopes.view
 
@@ -82,7 +70,6 @@ class ConnectedInstance:
 def begin(
     instance: Instance, start: float, stop: float | None, parameters: Mapping[str, Value]
 ) -> None:
-    """Bring an instance of a component into initialization mode."""
     instance.set_up(start, stop)
     for name, value in parameters.items():
         instance.set(name, start_value(instance.fmu, instance.name, name, value))
@@ -90,7 +77,6 @@ def begin(
 
 
 def check_finite(component: str, outputs: Reals, when: str) -> None:
-    """Refuse outputs that are not finite."""
     bad = np.flatnonzero(~np.isfinite(outputs.view))
     if len(bad):
         name, value = f"{component}.{outputs.names[bad[0]]}", outputs.view[bad[0]]
@@ -98,21 +84,13 @@ def check_finite(component: str, outputs: Reals, when: str) -> None:
 
 
 def start_value(fmu: UnpackedFmu, component: str, name: str, value: Value) -> Value:
-    """Value to set before initialization: an Enumeration's item may be given by its name.
-
-    UserError if it is not a parameter, the start value of a state or a Boolean input.
-    """
+    """Value to set before initialization, an item as its number; UserError if it cannot be set."""
     variable = fmu.model.variables.get(name)
-    if variable is None or not _can_start(variable):
+    is_switch = variable is not None and variable.is_a(INPUTS) and variable.type == "Boolean"
+    if variable is None or not (variable.can_start or is_switch):
         raise UserError(f"{component}: {fmu.path} has no parameter {name!r}")
     is_item = variable.type == "Enumeration" and isinstance(value, str)
     if not is_item and variable.type != "Boolean":
         return value
     with placed(f"{component}.{name}"):
         return variable.checked(value)
-
-
-def _can_start(variable: Variable) -> bool:
-    local_state = variable.causality == "local" and variable.initial == "exact"
-    switch = variable.is_a(INPUTS) and variable.type == "Boolean"
-    return variable.is_a(PARAMETERS) or variable.is_a(INITIAL) or local_state or switch

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 
 import numpy as np
 
@@ -15,21 +14,14 @@ from rparm.system.ssp import Ssp
 def run(ssp: Ssp, variant: str, names: Sequence[str]) -> Run:
     """Run a system in Jacobi order with one of its parameter sets; read what Ecos would read.
 
-    That is the values at a communication point after the inputs of the next step have been set.
-
-    UserError if a component fails, or gives a value that is not finite.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Variables to read, ``component.variable``: Real, Integer or Boolean.
+    That is the values of the Real, Integer or Boolean variables ``component.variable`` at a
+    communication point after the inputs of the next step have been set. UserError if a component
+    fails, or gives a value that is not finite.
     """
     system = ssp.system
-    times = system.start + system.step * np.arange(system.steps + 1)
+    times = system.times
     rows = np.empty((len(times), len(names)))
-    with ExitStack() as stack:
-        fmus = {c.name: stack.enter_context(ssp.unpacked_fmu(c.name)) for c in system.components}
-        master = stack.enter_context(Master(fmus, system.connections))
+    with ssp.unpacked_fmus() as fmus, Master(fmus, system.connections) as master:
         master.initialize(times[0], times[-1], system.parameter_sets[variant])
         readers = [_Reader(ssp, c, names) for c in master.components.values()]
         begin = time.perf_counter()

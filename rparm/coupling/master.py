@@ -18,14 +18,13 @@ values jump to what follows from it at this time, as at the start.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from ctypes import c_double
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
-from rparm.coupling.connected_instance import ConnectedInstance, Wiring, check_finite
-from rparm.coupling.switches import Switches, split
+from rparm.coupling.connected_instance import ConnectedInstance, check_finite
 from rparm.errors import UserError
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
@@ -36,7 +35,7 @@ ORDERS = ("jacobi", "gauss_seidel")
 INPUTS = ("held", "extrapolated")
 
 
-class Snapshot:
+class Snapshot(AbstractContextManager["Snapshot"]):
     """The state of a whole system at a communication point; a context manager that frees it."""
 
     def __init__(self, master: "Master") -> None:
@@ -48,9 +47,6 @@ class Snapshot:
         self._states = [
             component.instance.saved_state() for component in master.components.values()
         ]
-
-    def __enter__(self) -> "Snapshot":
-        return self
 
     def __exit__(self, *_: object) -> None:
         for state in self._states:
@@ -76,22 +72,13 @@ class Snapshot:
         return f"at the communication point t = {self._master.time!r} s"
 
 
-class Master:
+class Master(AbstractContextManager["Master"]):
     """A system of connected components; a context manager that frees their instances.
 
-    UserError if names are unknown, a Real input is connected not once, or an FMU cannot do what is
+    In Gauss-Seidel order the components step in the order of `fmus`. After each step all Real
+    outputs are read, and the Real variables `also`, pairs of component and variable. UserError if
+    names are unknown, a Real input has no or several connections, or an FMU cannot do what is
     asked.
-
-    Parameters
-    ----------
-    fmus : mapping of str to Fmu
-        By name of the component. Their order is that of stepping in Gauss-Seidel order.
-    order : str
-        One of ORDERS.
-    inputs : str
-        One of INPUTS.
-    also : sequence of (component, variable), optional
-        Real variables that are read besides all Real outputs.
 
     Attributes
     ----------
@@ -122,8 +109,7 @@ class Master:
         self.extrapolates = inputs == "extrapolated"
         self.jacobi = order == "jacobi"
         self.time, self.do_steps = 0.0, 0
-        switches, real = split(fmus, connections)
-        _check(fmus, real, self.extrapolates)
+        self._switches, real = _split(fmus, connections, self.extrapolates)
         for component, name in also:
             _find(fmus, component, name, None)
         self._stack = ExitStack()
@@ -137,10 +123,6 @@ class Master:
             self._stack.close()
             raise
         self._connect(instances, real, also)
-        self._switches = Switches(instances, switches)
-
-    def __enter__(self) -> "Master":
-        return self
 
     def __exit__(self, *error: object) -> None:
         self._stack.__exit__(*error)
@@ -172,15 +154,17 @@ class Master:
         for name, instance in instances.items():
             incoming = [c for c in connections if c.end_component == name]
             feeding = {c.start_connector for c in connections if c.start_component == name}
-            wiring = Wiring(
+            self.components[name] = ConnectedInstance(
+                instance,
                 inputs=[c.end_connector for c in incoming],
                 outputs=outputs[name],
                 first=first,
-                connected=[i for i, output in enumerate(outputs[name]) if output in feeding],
+                feeding=feeding,
                 sources=[index[c.start_component, c.start_connector] for c in incoming],
                 ahead=[c.start_component in self.components and not self.jacobi for c in incoming],
+                values=memory,
+                slopes=self.slopes,
             )
-            self.components[name] = ConnectedInstance(instance, wiring, memory, self.slopes)
             first += len(outputs[name])
 
     # ---- Initialization --------------------------------------------------------------------------
@@ -191,15 +175,7 @@ class Master:
         stop: float | None = None,
         parameters: Mapping[str, Mapping[str, Value]] | None = None,
     ) -> None:
-        """From instantiated to the first communication point, with consistent outputs there.
-
-        Parameters
-        ----------
-        start, stop : float
-            s.
-        parameters : mapping, optional
-            Parameters and start values of states by component and name.
-        """
+        """To the first communication point, with consistent outputs there; times in s."""
         parameters = parameters or {}
         for name in parameters:
             if name not in self.components:
@@ -219,7 +195,7 @@ class Master:
         """Set inputs until no output follows any more: along direct feedthrough, once each."""
         before = np.full(len(self.names), np.nan)
         for _ in range(len(self.components) + 2):
-            switched = self._switches.transfer()
+            switched = self._transfer_switches()
             for component in self.components.values():
                 read(component)
             changing = np.flatnonzero(before != self.values)
@@ -231,6 +207,18 @@ class Master:
                     component.set_inputs(self.values[component.sources])
         names = ", ".join([*(self.names[i] for i in changing), *switched])
         raise UserError(f"the connections form an algebraic loop: {names}")
+
+    def _transfer_switches(self) -> list[str]:
+        """Set the Boolean inputs whose sources have another value; which these are."""
+        changed = []
+        for c in self._switches:
+            source = self.components[c.start_component].instance
+            target = self.components[c.end_component].instance
+            value = source.boolean(c.start_connector)
+            if value != target.boolean(c.end_connector):
+                target.set(c.end_connector, value)
+                changed.append(f"{c.end_component}.{c.end_connector}")
+        return changed
 
     def _read_early(self, component: ConnectedInstance) -> None:
         with component.instance.explained_early():
@@ -272,7 +260,7 @@ class Master:
             for component in group:
                 self._read(component, end)
         self.time = end
-        if self._switches.transfer():
+        if self._transfer_switches():
             self._propagate(lambda component: self._read(component, end), f"at t = {end!r} s")
             if self.extrapolates:
                 self._propagate_slopes()
@@ -298,13 +286,7 @@ class Master:
     def run(
         self, times: Sequence[float], progress: Callable[[int], object] = lambda _: None
     ) -> np.ndarray:
-        """Steps from the present time, times[0], to each of `times`.
-
-        Returns
-        -------
-        ndarray, shape (len(times), len(names))
-            Row i is what is read right after the step to times[i]; row 0 the present values.
-        """
+        """Steps from the present time, times[0]; rows (times, names) of what is read after each."""
         rows = np.empty((len(times), len(self.names)))
         rows[0] = self.values
         for i, end in enumerate(np.asarray(times)[1:].tolist(), start=1):
@@ -325,27 +307,40 @@ def _find(fmus: Mapping[str, Fmu], component: str, name: str, causality: str | N
         raise UserError(f"{component}: {fmus[component].path} has no {kind} {name!r}")
 
 
-def _check(fmus: Mapping[str, Fmu], connections: Sequence[Connection], sloped: bool) -> None:
-    """Every connection leads from an output to an input, and one to every input."""
+def _split(
+    fmus: Mapping[str, Fmu], connections: Iterable[Connection], sloped: bool
+) -> tuple[list[Connection], list[Connection]]:
+    """Connections of Booleans, and of Reals; every Real input has one, no input has two."""
+    switches: list[Connection] = []
+    reals: list[Connection] = []
     seen = set()
-    for connection in connections:
-        _find(fmus, connection.start_component, connection.start_connector, "output")
-        _find(fmus, connection.end_component, connection.end_connector, "input")
-        end = connection.end_component, connection.end_connector
+    for c in connections:
+        end = c.end_component, c.end_connector
+        if _is_switch(fmus, c.start_component, c.start_connector, "output"):
+            switches.append(c)
+            if not _is_switch(fmus, *end, "input"):
+                raise UserError(f"{c}: a Boolean feeds a Boolean input only")
+        else:
+            reals.append(c)
+            _find(fmus, c.start_component, c.start_connector, "output")
+            _find(fmus, *end, "input")
         if end in seen:
             raise UserError(f"{'.'.join(end)}: is connected more than once")
         seen.add(end)
-        source, target = fmus[connection.start_component], fmus[connection.end_component]
-        if sloped and not source.model.gives_output_derivatives:
-            raise UserError(
-                f"{connection.start_component}: {source.path} has no output derivatives"
-            )
-        if sloped and not target.model.interpolates_inputs:
-            raise UserError(
-                f"{connection.end_component}: {target.path} does not interpolate inputs"
-            )
+    for c in reals if sloped else ():
+        source, target = fmus[c.start_component], fmus[c.end_component]
+        if not source.model.gives_output_derivatives:
+            raise UserError(f"{c.start_component}: {source.path} has no output derivatives")
+        if not target.model.interpolates_inputs:
+            raise UserError(f"{c.end_component}: {target.path} does not interpolate inputs")
     for component, fmu in fmus.items():
         for variable in fmu.model.variables.values():
             connects = variable.causality == "input" and variable.type == "Real"
             if connects and (component, variable.name) not in seen:
                 raise UserError(f"{component}.{variable.name}: the input is not connected")
+    return switches, reals
+
+
+def _is_switch(fmus: Mapping[str, Fmu], component: str, name: str, causality: str) -> bool:
+    variable = fmus[component].model.variables.get(name) if component in fmus else None
+    return variable is not None and (variable.type, variable.causality) == ("Boolean", causality)

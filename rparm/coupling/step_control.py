@@ -1,6 +1,6 @@
 """Step-size control by step doubling, for any master of rparm.coupling.master.
 
-A step H is made at once and, rolled back by the FMU states, again as two steps H/2. A coupling of
+A step H is made whole and, after a rollback by FMU states, again as two steps H/2. A coupling of
 order p makes an error of C H^(p+1) in a step. Then the two results are C H^(p+1) (1 - 2^-p) apart,
 and the second one, which is kept, is off by 1/(2^p - 1) of that. The step is accepted if this
 estimate is within the tolerance; the next one aims at a little less.
@@ -32,11 +32,7 @@ SMALLEST_FACTOR, LARGEST_FACTOR = 0.2, 2.5  # from one step to the next
 
 @dataclass(frozen=True)
 class Control:
-    """What the steps have to keep.
-
-    The norm of a difference is the largest over the signals of `scales`, each divided by its
-    scale.
-    """
+    """What steps have to keep; the norm is the largest of `scales`, each signal by its own."""
 
     tolerance: float  # of the error that one accepted step makes, in the norm
     scales: Mapping[str, float]  # "component.variable": what counts as 1, in its unit
@@ -69,20 +65,14 @@ def run(
     control: Control,
     before: Callable[[float], object] = lambda _: None,
 ) -> Controlled:
-    """Step `master`, which is initialized, to the time `stop`.
+    """Step `master`, which is initialized, to end exactly at the time `stop`, s.
+
+    The order is 1 with zero-order hold of the inputs, with extrapolated ones 2. `before` is called
+    with the length of each accepted step while the system is back at the beginning of that step; it
+    may step the system.
 
     UserError if a signal is unknown, a step would have to be shorter than the shortest, or an FMU
     fails or has no state to go back to.
-
-    Parameters
-    ----------
-    master : Master
-        Its order is 1 with zero-order hold of the inputs, with extrapolated ones 2.
-    stop : float
-        s; the last step ends exactly there.
-    before : callable, optional
-        Called with the length of each accepted step while the system is back at the beginning of
-        that step; it may step the system.
     """
     steps = _Steps(master, control)
     times, rows, estimates, limited = [master.time], [master.values.copy()], [], []
@@ -118,7 +108,7 @@ def run(
 
 
 class _Steps:
-    """Makes steps, each at once and in two halves, and chooses the length of the next one."""
+    """Makes each step whole and in two halves, and chooses the length of the next one."""
 
     def __init__(self, master: Master, control: Control) -> None:
         self._master, self._control = master, control
@@ -128,7 +118,7 @@ class _Steps:
         self.rejected, self.do_steps = 0, 0
 
     def attempt(self, begin: Snapshot, start: float, target: float) -> float:
-        """Make a step at once, then in two halves, which are kept; the estimate of its error."""
+        """Make a step whole, then in two halves, which are kept; the estimate of its error."""
         master, calls = self._master, self._master.do_steps
         master.advance(target)
         coarse = master.values[self._columns]

@@ -21,10 +21,7 @@ def free() -> str:
 
 
 def check_form(address: str) -> tuple[str, int]:
-    """Host and port; UserError if `address` is none that a process can connect to.
-
-    Addresses of IPv6 are refused too: HELICS would listen there and never return.
-    """
+    """Host and port; UserError for others, and for IPv6: HELICS would listen and never return."""
     found = re.fullmatch(r"tcp://([\w.-]+):([1-9]\d{0,4})", address)
     if not found or int(found[2]) > 65535 or found[1] == "0.0.0.0":
         raise UserError(f"{address!r}: expected an address as tcp://192.168.0.1:23404")
@@ -43,7 +40,7 @@ def wait_for(address: str, seconds: float, say: Callable[[], object]) -> None:
 
     HELICS would wait too, but print that it does, several times a second.
 
-    UserError if nothing listens there for `seconds`, or the host is unknown.
+    UserError if nothing has listened there after `seconds`, or the host is unknown.
     """
     place = check_form(address)
     latest = time.monotonic() + seconds

@@ -19,17 +19,11 @@ def run(
 ) -> None:
     """Step a component from the first to the last communication point.
 
+    A call of the FMU, and silence of the broker at `address`, may last `silence` s. `is_gone` says
+    whether the process that started this one has ended.
+
     UserError if the FMU fails, the federation steps something else or ends, or an output changes
     that must not.
-
-    Parameters
-    ----------
-    address : str
-        Of the federation.
-    silence : float
-        s, that a call of the FMU may take, and the broker be silent.
-    is_gone : callable, optional
-        Whether the process is gone that started this one.
     """
     name = part.component
     federate = Federate(name, address, sorted({s.component for s in part.sources}))

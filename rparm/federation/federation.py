@@ -47,22 +47,13 @@ def run(
     progress: Callable[[int], object] = lambda _: None,
     connected: Callable[[], object] = lambda: None,
 ) -> Record:
-    """Run a variant, each component in its own process.
+    """Run a variant, each component in its own process, with the broker at `address`.
+
+    Components `elsewhere` are stepped by other machines: they are waited for. A process that is
+    silent for `silence` s ends the federation. `progress` is called with the number of steps made,
+    `connected` when all components have been initialized and the first step begins.
 
     UserError if a process fails; its text is the first one that one of them gave.
-
-    Parameters
-    ----------
-    address : str
-        Where the broker listens, as "tcp://127.0.0.1:23404".
-    elsewhere : collection of str
-        Components that other machines step: they are waited for.
-    silence : float
-        s, after which a process that is silent ends the federation.
-    progress : callable, optional
-        Called with the number of steps made.
-    connected : callable, optional
-        Called when all components have been initialized and the first step begins.
     """
     made = parts(ssp, variant)
     whole = next(iter(made.values())).system
@@ -173,10 +164,7 @@ def _recorded(
 def _processes(
     commands: Mapping[str, list[str]], folder: Path
 ) -> Iterator[dict[str, subprocess.Popen]]:
-    """Processes by component. None is left: they end when their standard input is closed.
-
-    Their texts and temporary files are in `folder`.
-    """
+    """Processes by component, with texts in `folder`, that end as their standard input closes."""
     places = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder))
     environment = project.child_environment() | places
     processes: dict[str, subprocess.Popen] = {}
@@ -209,7 +197,7 @@ def _wait(processes: Mapping[str, subprocess.Popen]) -> None:
 
 
 def _failure(processes: Mapping[str, subprocess.Popen], folder: Path) -> UserError | None:
-    """What a process here says that has failed: others only say that the federation ended."""
+    """The error of a local process, but not that the federation has ended."""
     texts = _texts(processes, folder)
     causes = (text for text in texts if ENDED not in text and ABSENT not in text)
     return next(map(UserError, causes), None)

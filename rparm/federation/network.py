@@ -10,7 +10,7 @@ import secrets
 import time
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import partial
 from threading import Thread
 from typing import Any
@@ -50,26 +50,15 @@ def helics() -> Any:
 
 
 def key() -> str:
-    """What processes must know to join the federation; made if this one does not know any.
-
-    UserError if it could be guessed, or HELICS would not take it.
-    """
+    """The secret that lets processes join, made if there is none; UserError if it is too weak."""
     found = os.environ.setdefault(KEY, secrets.token_hex(16))
     if not re.fullmatch(r"[0-9A-Za-z]{16,128}", found):
         raise UserError(f"{KEY}: expected 16 to 128 letters and digits in the environment")
     return found
 
 
-class Broker:
-    """What all processes of a federation are connected to.
-
-    Parameters
-    ----------
-    count : int
-        Of processes.
-    address : str
-        Where it listens.
-    """
+class Broker(AbstractContextManager["Broker"]):
+    """What all `count` processes of a federation are connected to, at `address`."""
 
     def __init__(self, count: int, address: str) -> None:
         h = self._h = helics()
@@ -87,9 +76,6 @@ class Broker:
             self._close()
             raise UserError(f"no broker at {address}: nothing can listen there any more")
 
-    def __enter__(self) -> "Broker":
-        return self
-
     def __exit__(self, *_: object) -> None:
         self._close()
 
@@ -106,11 +92,7 @@ class Broker:
 
     @contextmanager
     def shielded(self) -> Iterator[None]:
-        """Where the first process joins; then those that are refused end nothing.
-
-        They take leave without a number, which HELICS 3.6 reads as that of the first that joined:
-        so that is one which has left.
-        """
+        """Keep a first process, the one that HELICS 3.6 ends in place of those that are refused."""
         h = self._h
         options = f"--federates=1 --brokerkey={key()} --broker_address={self._address} {QUIET}"
         try:
@@ -124,7 +106,7 @@ class Broker:
             h.helicsCoreDisconnect(first)
 
     def announce(self, system: str) -> None:
-        """Say what all must step."""
+        """Publish the system that all must step."""
         self._h.helicsBrokerSetGlobal(self._broker, SYSTEM, system)
 
     def end(self, text: str) -> None:
@@ -132,10 +114,7 @@ class Broker:
         self._h.helicsBrokerGlobalError(self._broker, 1, text.encode())  # takes no str
 
     def silent(self, names: Sequence[str], to_come: Collection[str]) -> list[str]:
-        """Processes that do not answer; if all do, those that are unknown and not `to_come`.
-
-        HELICS forgets a process that has not answered for some time, and one that has left.
-        """
+        """Processes that do not answer, or else those that HELICS forgot and not `to_come`."""
 
         def ask(name: str) -> object:
             query = self._h.helicsCreateQuery(name, "current_time")
@@ -154,7 +133,7 @@ class _Questions:
         self._threads: list[Thread] = []
 
     def answers(self, ask: Callable[[str], object], names: Sequence[str]) -> dict[str, object]:
-        """What `ask` returns in time, by name."""
+        """Answers of `ask` that arrive in time, by name."""
         answers: dict[str, object] = {}
 
         def put(name: str) -> None:
@@ -176,19 +155,10 @@ class _Questions:
 
 
 class Federate:
-    """A process in a federation: publishes one vector, and reads those of others.
+    """A process in a federation: publishes one vector, under its name, reads those of `sources`.
 
     All federates make the same exchanges. The first number of a vector is the count of exchanges
     before it: what is read is of the present exchange, or an error.
-
-    Parameters
-    ----------
-    name : str
-        Also of what it publishes.
-    address : str
-        Of the broker.
-    sources : sequence of str
-        Names of federates whose values it reads.
     """
 
     def __init__(
@@ -215,7 +185,6 @@ class Federate:
             self.waits, self.calls = False, self.calls + 1
 
     def join(self) -> None:
-        """Connect to the broker."""
         h = self._h
         for left in reversed(range(JOINS)):
             try:
@@ -253,7 +222,7 @@ class Federate:
         return info
 
     def system(self) -> str:
-        """What all must step, as soon as the broker has announced it."""
+        """The system that all must step, once the broker has announced it."""
         with self._waiting(f"at the start {ENDED}"):
             while True:
                 answer = self._ask("global_value", SYSTEM)
@@ -264,7 +233,6 @@ class Federate:
                 time.sleep(PAUSE)
 
     def has_broker(self) -> bool:
-        """Whether the broker answers."""
         ask = partial(self._ask, about="federates")
         return self._federate is None or bool(_Questions().answers(ask, ["root"]))
 
@@ -278,10 +246,7 @@ class Federate:
         self._h.helicsPublicationPublishVector(self._publication, vector)
 
     def read(self) -> Mapping[str, Sequence[float]]:
-        """What the sources published before the last exchange.
-
-        UserError if HELICS has not passed it on.
-        """
+        """What sources published before the last exchange; UserError if it has not arrived."""
         values = {}
         for source, place in self._subscriptions.items():
             count, *values[source] = self._h.helicsInputGetVector(place)
@@ -324,7 +289,6 @@ class Federate:
         self.exchanges += 1
 
     def leave(self) -> None:
-        """Leave at the end."""
         self._h.helicsFederateDisconnect(self._federate)
 
     def fail(self, text: str) -> None:

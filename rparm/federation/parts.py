@@ -30,7 +30,7 @@ class Part:
     inputs: tuple[str, ...]  # connected Real inputs
     sources: tuple[Source, ...]  # of each of `inputs`
     constant: tuple[str, ...]  # outputs that feed an input which is no Real: they must not change
-    rounds: int  # after so many exchanges of outputs in initialization none changes any more
+    rounds: int  # exchanges in initialization after which no output changes any more
     times: np.ndarray  # s, communication points
     system: str  # variant and SHA-256 of the SSP: those of all processes must be the same
 
@@ -50,18 +50,12 @@ class Part:
 
 
 def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
-    """The parts of a variant, by component.
-
-    Only Real values are exchanged in the steps.
-
-    UserError if the variant is unknown.
-    """
+    """The parts of a variant, by component; UserError if it is unknown."""
     system = ssp.system
     if variant not in system.parameters:
         known = hint(variant, system.parameters, "there are")
         raise UserError(f"{ssp.path}: has no variant {variant!r}{known}")
     published = {name: model.real_outputs for name, model in ssp.models.items()}
-    times = system.start + system.step * np.arange(system.steps + 1)
     whole = f"{variant} {hashlib.sha256(ssp.path.read_bytes()).hexdigest()}"
     made = {}
     for component in system.components:
@@ -81,14 +75,13 @@ def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
                 dict.fromkeys(c.start_connector for c in others if c.start_component == name)
             ),
             rounds=len(system.components) + 1,
-            times=times,
+            times=system.times,
             system=whole,
         )
     return made
 
 
 def real_connections(ssp: Ssp) -> Sequence[Connection]:
-    """Connections of Real variables."""
     return [
         c
         for c in ssp.system.connections

@@ -1,7 +1,4 @@
-"""Work that waits in HELICS, watched: HELICS neither returns for a signal nor limits its waiting.
-
-The work runs in a thread, so the main thread can end it at any time.
-"""
+"""Runs work that waits in HELICS in a thread: HELICS has no time limit and ignores signals."""
 
 import os
 import signal
@@ -24,7 +21,7 @@ LEAVE = 2.0  # s, for work and processes to end after a failure
 def run(
     work: Callable[[], Result], look: Callable[[], None], end: Callable[[BaseException], None]
 ) -> Result:
-    """Do `work`, and `look` now and then; where one of them fails, or a signal comes, `end` it."""
+    """Do `work`, and `look` now and then; `end` both if one fails or a signal arrives."""
     outcome: Future[Result] = Future()
 
     def do() -> None:
@@ -49,10 +46,7 @@ def run(
 
 
 class Silence:
-    """Says when a federate has neither begun nor ended a call of HELICS for too long.
-
-    It counts looks: the time in which the process is suspended is no silence.
-    """
+    """Detects calls of HELICS that take too long; counts polls, so suspension does not count."""
 
     def __init__(self, federate: Federate, limit: float) -> None:
         self._federate, self._limit = federate, limit

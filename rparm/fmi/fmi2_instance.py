@@ -19,8 +19,6 @@ from rparm.fmi.fmi_instance import (
 
 
 class Fmi2Instance(Instance):
-    """An instance of an FMU of FMI 2.0."""
-
     # the folder of FMI 3.0 first, because on Arm linux64 may be for x86-64
     PLATFORMS = (fmpy.platform_tuple, fmpy.platform)
     LIBRARY = fmi2.FMU2Slave

@@ -12,7 +12,7 @@ from fmpy import fmi3
 from fmpy.fmi1 import FMICallException
 
 from rparm.errors import UserError
-from rparm.fmi.fmi_instance import Call, InputPolynomials, Instance, Reals, SavedState
+from rparm.fmi.fmi_instance import Call, InputPolynomials, Instance, SavedState
 
 # Without them FMUs send errors only. They cost nothing as long as all is well.
 LOGGED = ("logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal")
@@ -43,10 +43,7 @@ class Fmi3Instance(Instance):
             intermediateUpdate=self._update if smooth else None,
             requiredIntermediateVariables=self._references(self.smooth_inputs) if smooth else None,
         )
-        logged = [name for name in LOGGED if name in self.fmu.log_categories]
-        if logged:
-            with suppress(FMICallException):  # messages are not worth a run
-                fmi.setDebugLogging(True, logged)
+        self._log_warnings()
         self._inputs: Callable[[float], object] | None = None  # sets those of a time in a step, s
         self._start = 0.0  # s, of the present step
         self._raised: BaseException | None = None  # in a callback, where it would be lost
@@ -57,6 +54,12 @@ class Fmi3Instance(Instance):
         self._event, self._early = fmi3.fmi3Boolean(), fmi3.fmi3Boolean()
         results = (self._event, self._terminates, self._early, self._time)
         self._results = tuple(map(byref, results))
+
+    def _log_warnings(self) -> None:
+        logged = [name for name in LOGGED if name in self.fmu.log_categories]
+        if logged:
+            with suppress(FMICallException):  # messages are not worth a run
+                self.fmi.setDebugLogging(True, logged)
 
     def _log(self, _environment: int, status: int, _category: bytes, message: bytes) -> None:
         self._keep_unless_ok(status, message)
@@ -83,13 +86,16 @@ class Fmi3Instance(Instance):
 
     def input_polynomials(self, names: Sequence[str], order: int) -> InputPolynomials:
         coefficients = np.zeros((order + 1, len(names)))
-        inputs = _SmoothInputs(self.reals(names), coefficients)
+        inputs, powers = self.reals(names), np.arange(order + 1)
+        factorials = np.array([math.factorial(power) for power in powers], dtype=float)
 
         def set_in_step(time: float) -> None:
-            inputs.set_at(time - self._start)
+            elapsed = time - self._start
+            inputs.view[:] = elapsed**powers / factorials @ coefficients
+            inputs.set()
 
         def set_all() -> None:
-            inputs.set_at(0.0)
+            set_in_step(self._start)
             self._inputs = set_in_step if order else None
 
         return InputPolynomials(coefficients, set_all)
@@ -97,15 +103,7 @@ class Fmi3Instance(Instance):
     def input_functions(
         self, names: Sequence[str], values: Callable[[float], Sequence[float] | np.ndarray]
     ) -> None:
-        """Let Real inputs be functions of time in all further steps.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Of inputs that are among `smooth_inputs`.
-        values : callable
-            Their values at a time (s), (inputs,).
-        """
+        """Let Real inputs, of `smooth_inputs`, be functions of time (s) in all further steps."""
         inputs = self.reals(names)
 
         def set_in_step(time: float) -> None:
@@ -141,19 +139,3 @@ class Fmi3Instance(Instance):
         return SavedState(
             fmi.component, fmi.fmi3GetFMUState, fmi.fmi3SetFMUState, fmi.fmi3FreeFMUState
         )
-
-
-class _SmoothInputs:
-    """Inputs that are polynomials in time."""
-
-    def __init__(self, inputs: Reals, derivatives: np.ndarray) -> None:
-        self._inputs = inputs
-        self._derivatives = derivatives  # (order + 1, inputs)
-        orders = np.arange(len(derivatives))
-        self._orders = orders
-        self._factorials = np.array([math.factorial(order) for order in orders], dtype=float)
-
-    def set_at(self, elapsed: float) -> None:
-        """Set the inputs' values `elapsed` s after the beginning of the step."""
-        self._inputs.view[:] = elapsed**self._orders / self._factorials @ self._derivatives
-        self._inputs.set()

@@ -41,10 +41,7 @@ class UnpackedFmu(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Reals:
-    """Some Real variables of an instance; `get` and `set` move their values from and to `view`.
-
-    Both raise FMICallException if that fails.
-    """
+    """Real variables of an instance, moved to and from `view`; FMICallException if that fails."""
 
     names: list[str]
     view: np.ndarray  # (len(names),) in the variables' units
@@ -62,10 +59,7 @@ class OutputDerivatives:
 
 @dataclass(frozen=True, eq=False)
 class InputPolynomials:
-    """Polynomials in time for some Real inputs over the next step.
-
-    `set` gives them to the instance; FMICallException if that fails.
-    """
+    """Polynomials of Real inputs over the next step, for `set`; FMICallException if it fails."""
 
     view: np.ndarray  # (order + 1, inputs): values at the beginning of the step, then derivatives
     set: Call
@@ -101,14 +95,8 @@ class SavedState:
 class Instance(ABC):
     """One instance of an FMU: a context manager that instantiates, terminates and frees it.
 
-    Parameters
-    ----------
-    fmu : UnpackedFmu
-        Stays open as long as the instance.
-    name : str
-        Of the instance, for messages.
-    smooth_inputs : sequence of str, optional
-        All inputs that `input_polynomials` will be used for.
+    The FMU stays open as long as the instance, which has the `name` in messages;
+    `input_polynomials` is for `smooth_inputs`.
     """
 
     # of the version of FMI
@@ -227,7 +215,6 @@ class Instance(ABC):
     # ---- Values ----------------------------------------------------------------------------------
 
     def set(self, name: str, value: Value) -> None:
-        """Set one variable."""
         variable = self.fmu.model.variables[name]
         try:
             getattr(self.fmi, self.SETTERS[variable.type])([variable.reference], [value])
@@ -246,18 +233,11 @@ class Instance(ABC):
     def _integer(self, reference: int) -> int: ...
 
     def boolean(self, name: str) -> bool:
-        """Value of a Boolean variable."""
         with self.explained(f"({name})"):
             return bool(self.fmi.getBoolean([self.fmu.model.variables[name].reference])[0])
 
     def reals(self, names: Sequence[str], memory: Array | None = None) -> Reals:
-        """The Real variables `names`, to get or set at once, many times.
-
-        Parameters
-        ----------
-        memory : ctypes array of double, optional
-            Memory for their values; made if it is not given.
-        """
+        """The Real variables `names`, to get or set together, many times, in `memory` if given."""
         values = (c_double * len(names))() if memory is None else memory
         calls = self._real_calls(self._references(names), values) if names else (no_call, no_call)
         return Reals(list(names), view(values), *calls)
@@ -267,7 +247,7 @@ class Instance(ABC):
         """Calls that get and set Real variables."""
 
     def output_derivatives(self, names: Sequence[str], order: int) -> OutputDerivatives:
-        """The derivatives of one order of the Real outputs `names`, to get at once, many times."""
+        """Derivatives of one order of the Real outputs `names`, to get together, many times."""
         values, numbers = doubles(len(names))
         references, orders = self._references(names), (c_int * len(names))(*[order] * len(names))
         call = self._derivative_call(references, orders, values) if names else no_call
@@ -278,10 +258,7 @@ class Instance(ABC):
         """Call that gets derivatives of Real outputs."""
 
     def partials(self, unknowns: Sequence[str], knowns: Sequence[str]) -> np.ndarray:
-        """Partial derivatives of Real variables by directional derivatives, (unknowns, knowns).
-
-        `knowns` are continuous states and inputs.
-        """
+        """Partial derivatives of variables by states and inputs, (unknowns, knowns)."""
         variables = self.fmu.model.variables
         rows = [variables[name].reference for name in unknowns]
         found = np.zeros((len(unknowns), len(knowns)))
@@ -294,7 +271,7 @@ class Instance(ABC):
 
     @abstractmethod
     def input_polynomials(self, names: Sequence[str], order: int) -> InputPolynomials:
-        """Polynomials up to `order` for the Real inputs `names`, to set at once, many times."""
+        """Polynomials up to `order` for the Real inputs `names`, to set together, many times."""
 
     def _references(self, names: Sequence[str]) -> Array:
         variables = self.fmu.model.variables
@@ -304,10 +281,7 @@ class Instance(ABC):
 
     @abstractmethod
     def do_step(self, start: float, length: float, goes_back: bool = False) -> None:
-        """Make a step from `start` (s); `goes_back`: it may be undone by a saved state.
-
-        Raises FMICallException.
-        """
+        """Step from `start` (s), for good unless it `goes_back`; FMICallException if that fails."""
 
     @abstractmethod
     def saved_state(self) -> SavedState:

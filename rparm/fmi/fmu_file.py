@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,7 +34,7 @@ INSTANCES: dict[tuple[str, str], type[Instance]] = {
 BINARY, SOURCE = re.compile(r"binaries/[^/]+/[^/]+"), re.compile(r"sources/.+\.c")
 
 
-class Fmu:
+class Fmu(AbstractContextManager["Fmu"]):
     """An FMU that is unpacked; a context manager that removes the unpacked copy.
 
     Raises UserError if the file is no FMU of the `kind`, co-simulation or model exchange, of a
@@ -67,21 +67,14 @@ class Fmu:
                 raise UserError(f"{self.path}: {library}: {reason(error)}") from error
             self._unpacked = unpacked.pop_all()
 
-    def __enter__(self) -> "Fmu":
-        return self
-
     def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
-        """Remove the unpacked copy."""
         self._unpacked.close()
 
     def instance(self, name: str, smooth_inputs: Sequence[str] = ()) -> Instance:
-        """A new instance, of the class for the FMU's kind and version; `name` is in its messages.
-
-        What `smooth_inputs` are: `Instance`.
-        """
+        """A new `Instance`, of the class for the FMU's kind and version."""
         return INSTANCES[self.model.fmi_version, self.kind](self, name, smooth_inputs)
 
 
@@ -100,10 +93,7 @@ class Described:
 
 
 def describe(path: Path, kind: str = CO_SIMULATION) -> Described:
-    """Read what an FMU of a known version of FMI, of a kind, declares.
-
-    Raises UnreadableError.
-    """
+    """Read what an FMU of a known version and this kind declares; UnreadableError if it is none."""
     with temporary_folder() as folder:
         sizes = unpack(path, folder, "FMU", DESCRIPTION)
         if DESCRIPTION not in sizes:
@@ -115,7 +105,9 @@ def describe(path: Path, kind: str = CO_SIMULATION) -> Described:
             raise
         except (UnreadableError, ValidationError, ValueError) as error:
             raise UnreadableError(f"wrong {DESCRIPTION}: {one_line(error)}") from error
-        except Exception as error:  # fmpy raises bare exceptions, and others where it is surprised
+        except (
+            Exception
+        ) as error:  # fmpy raises bare exceptions, and others for input it does not expect
             kind = "" if type(error) is Exception else f"fmpy fails with {type(error).__name__}: "
             raise UnreadableError(f"wrong {DESCRIPTION}: {kind}{one_line(error)}") from error
 

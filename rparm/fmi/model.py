@@ -31,8 +31,6 @@ SMALLEST_TOLERANCES = {"cvode_adams": 5e-12, "cvode_bdf": 5e-12, "erk": 1e-12, "
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable of a model."""
-
     name: str
     reference: int  # value reference
     type: str  # Real, Integer, Boolean, String, Enumeration, or one that is neither read nor set
@@ -52,6 +50,12 @@ class Variable:
         if kind == INITIAL:
             return self.causality == "output" and self.initial == "exact"
         return self.causality == {PARAMETERS: "parameter", INPUTS: "input"}[kind]
+
+    @property
+    def can_start(self) -> bool:
+        """Whether it is a parameter or the start value of a state, which need not be an output."""
+        is_state = self.causality in ("output", "local") and self.initial == "exact"
+        return self.causality == "parameter" or is_state
 
     def checked(self, given: Any) -> Value:
         """Value to set, from what a user gives.
@@ -92,7 +96,6 @@ class Variable:
         return next((name for name, item in self.items.items() if item == value), value)
 
     def item(self, name: Any) -> int:
-        """Number of an Enumeration's item."""
         if not isinstance(name, str) or name not in self.items:
             guess = did_you_mean(name, self.items) if isinstance(name, str) else ""
             known = ", ".join(f'"{item}"' for item in self.items)
@@ -110,8 +113,6 @@ class Variable:
 
 @dataclass(frozen=True)
 class Model:
-    """What an FMU declares."""
-
     name: str
     fmi_version: str  # one of `project.VERSIONS`
     variables: Mapping[str, Variable]  # by name, in the order of the model description
@@ -132,13 +133,11 @@ class Model:
 
     @property
     def real_outputs(self) -> list[str]:
-        """Names of all outputs of type Real."""
         found = (v for v in self.variables.values() if v.causality == "output")
         return [variable.name for variable in found if variable.type == "Real"]
 
     @property
     def start_values(self) -> dict[str, Value]:
-        """Start values of all variables that have one."""
         return {v.name: v.start for v in self.variables.values() if v.start is not None}
 
     def method(self, values: Mapping[str, Value]) -> str:
@@ -153,10 +152,7 @@ class Model:
         return SMALLEST_TOLERANCES.get(self.method(values), 0.0)
 
     def check_tolerance(self, tolerance: float, values: Mapping[str, Value]) -> None:
-        """Check a relative tolerance to run at, with `values` for start values.
-
-        WrongValueError if the method that integrates cannot be so exact.
-        """
+        """WrongValueError if the method of these values, or of start values, cannot be so exact."""
         smallest = self.smallest_tolerance(values)
         if tolerance < smallest:
             method = self.method(values)
@@ -165,10 +161,7 @@ class Model:
             )
 
     def find(self, name: str, kind: str) -> Variable:
-        """Variable called `name`.
-
-        WrongValueError if it is not of the kind, one of `KINDS`; lists those that are.
-        """
+        """A variable of one of `KINDS`; WrongValueError, with all of these, if it is none."""
         variable = self.variables.get(name)
         if variable is not None and variable.is_a(kind):
             return variable

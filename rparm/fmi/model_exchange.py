@@ -3,14 +3,11 @@
 They exist so that what is asked of an FMU at one time can be asked of either kind.
 """
 
-from contextlib import suppress
-
 from fmpy import fmi2, fmi3
-from fmpy.fmi1 import FMICallException
 
 from rparm.errors import UserError
 from rparm.fmi.fmi2_instance import Fmi2Instance
-from rparm.fmi.fmi3_instance import LOGGED, Fmi3Instance
+from rparm.fmi.fmi3_instance import Fmi3Instance
 from rparm.fmi.fmi_instance import Instance
 
 MOST_UPDATES = 100  # of the discrete states at one time
@@ -37,8 +34,6 @@ class _ModelExchange(Instance):
 
 
 class Fmi2ModelExchange(_ModelExchange, Fmi2Instance):
-    """An instance of an FMU of FMI 2.0."""
-
     LIBRARY = fmi2.FMU2Model
 
     def _update_discrete_states(self) -> tuple:
@@ -46,17 +41,12 @@ class Fmi2ModelExchange(_ModelExchange, Fmi2Instance):
 
 
 class Fmi3ModelExchange(_ModelExchange, Fmi3Instance):
-    """An instance of an FMU of FMI 3.0."""
-
     LIBRARY = fmi3.FMU3Model
     INSTANTIATE = "fmi3InstantiateModelExchange"
 
     def _instantiate(self) -> None:
         self.fmi.instantiate(logMessage=self._log)
-        logged = [name for name in LOGGED if name in self.fmu.log_categories]
-        if logged:
-            with suppress(FMICallException):  # messages are not worth a run
-                self.fmi.setDebugLogging(True, logged)
+        self._log_warnings()
 
     def _update_discrete_states(self) -> tuple:
         return self.fmi.updateDiscreteStates()

@@ -15,12 +15,11 @@ NAMED = 5  # failed things in the last line
 
 
 def width() -> int:
-    """Columns of a line."""
     return min(WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
 
 
 def stage(text: str) -> None:
-    """Say what begins, on a terminal."""
+    """Name the stage that begins, on a terminal."""
     if sys.stderr is not None and sys.stderr.isatty() and not streams.is_quiet():
         print(f"{text} ...", file=sys.stderr, flush=True)
 
@@ -46,18 +45,9 @@ def verdict_line(failed: Iterable[str], done: Sized, name: str) -> str:
 class Table:
     """Rows under a head, each printed when it is known.
 
-    Parameters
-    ----------
-    title : str
-        Of the column of names.
-    names : iterable of str
-        All names that rows will have; the column is cut where there is no room.
-    columns : mapping of str to int
-        Titles, of one or several words, with the width of the column.
-    gap : int, optional
-        Blanks in front of each column.
-    result : int, optional
-        Width of the last column, which is set to the left; 0: there is none.
+    `names` are those of all rows to come: they set the width of the first column, which is cut if
+    it has no room. `columns` are titles with the widths of their columns, `gap` blanks apart. The
+    last column is aligned to the left and `result` characters wide; 0: there is none.
     """
 
     def __init__(
@@ -88,13 +78,7 @@ class Table:
         return f"{name:<{self._width}}{numbers}{INDENT}{result}".rstrip()
 
     def row(self, name: str, cells: Sequence[str], result: str = "") -> None:
-        """Print a row."""
         print(self._line(name, cells, result), flush=True)
-
-    @staticmethod
-    def remark(text: str) -> None:
-        """Print what is to be said of the row above."""
-        remark(text)
 
 
 def plain_table(title: str, head: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
@@ -108,7 +92,7 @@ def plain_table(title: str, head: Sequence[str], rows: Sequence[Sequence[object]
 
 
 def remark(text: str) -> None:
-    """Print a text in lines that are set in."""
+    """Print a text, wrapped and indented."""
     wrapped = textwrap.wrap(
         text, width(), initial_indent=INDENT, subsequent_indent=2 * INDENT, break_on_hyphens=False
     )

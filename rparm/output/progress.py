@@ -1,6 +1,7 @@
-"""How far an activity is, on standard error."""
+"""Progress bars on standard error."""
 
 import sys
+from contextlib import AbstractContextManager
 
 from tqdm import tqdm
 
@@ -9,7 +10,7 @@ from rparm.output import streams
 DELAY = 1.0  # s, shorter activities show nothing
 
 
-class Progress:
+class Progress(AbstractContextManager["Progress"]):
     """A live bar on stderr, once an activity has taken about a second; nothing if not a terminal.
 
     Call it with the number of steps (or of what `counted` names) done since the last call.
@@ -26,9 +27,6 @@ class Progress:
                 delay=DELAY,
                 leave=False,
             )
-
-    def __enter__(self) -> "Progress":
-        return self
 
     def __exit__(self, *_: object) -> None:
         if self._bar is not None:

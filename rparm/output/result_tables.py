@@ -58,8 +58,6 @@ def _count(number: int) -> str:
 
 
 class SweepTable:
-    """Errors of scenarios over the tolerances."""
-
     def __init__(self, names: Iterable[str], tolerances: Iterable[float]) -> None:
         print()
         columns = {short(tolerance): 5 for tolerance in tolerances}

@@ -12,8 +12,6 @@ from rparm.scenarios.scenario import Scenario
 
 @dataclass
 class Done:
-    """What has been run."""
-
     chosen: Sequence[Scenario]  # of the project
     own: Sequence[Scenario]  # of users, which are not compared with anything
     runs: list[Run] = field(default_factory=list)

@@ -19,10 +19,7 @@ def is_quiet() -> bool:
 
 @contextmanager
 def of_results(as_json: bool, quiet: bool) -> Iterator[TextIO | None]:
-    """The stream for the result of a command; None if there is none.
-
-    With `as_json`, all else that is printed inside goes to standard error; with `quiet`, nowhere.
-    """
+    """The stream for a command's result; all else goes to standard error, or nowhere if `quiet`."""
     global _quiet
     real, before, _quiet = sys.stdout, _quiet, quiet
     try:
@@ -54,7 +51,7 @@ def _apart(real: TextIO, elsewhere: TextIO) -> Iterator[TextIO]:
     try:
         yield out
     finally:
-        with suppress(OSError):  # full, or nobody reads it: it has been said
+        with suppress(OSError):  # full, or nobody reads it: already reported
             out.close()
         os.dup2(kept, number)
         os.close(kept)

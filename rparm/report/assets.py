@@ -17,10 +17,7 @@ TEMPLATE = "unpack.js"  # becomes PLOTLY
 
 
 def write(report: Path) -> None:
-    """Write all assets into the folder of a report, unless they are there as they must be.
-
-    If one cannot be written, those that this call has written are removed.
-    """
+    """Write the assets that a report does not have yet: all of them, or none if that fails."""
     folder = report / FOLDER
     folder.mkdir(parents=True, exist_ok=True)
     made: list[Path] = []
@@ -37,7 +34,7 @@ def write(report: Path) -> None:
     except OSError:
         for target in made:
             target.unlink(missing_ok=True)
-        with suppress(OSError):  # there is something in it
+        with suppress(OSError):  # not empty
             folder.rmdir()
         raise
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from rparm.fmi.model import Model
 from rparm.report.pages import Table
-from rparm.report.run_data import Curve, Plot, without_rounding
+from rparm.report.run_data import Plot, result_curve
 from rparm.runs.measured import Comparison
 from rparm.texts import unit
 
@@ -20,9 +20,9 @@ def with_measured(
         drawn = (i for i, plot in enumerate(result) if name in [x.name for x in plot.curves])
         index = next(drawn, len(result))
         if index == len(result):
-            simulated = Curve(name, without_rounding(compared.simulated))
+            simulated = result_curve(name, compared.simulated)
             result.append(Plot(name, unit(model.variables[name].unit), [simulated]))
-        curve = Curve(f"{name} measured", without_rounding(compared.measured))
+        curve = result_curve(f"{name} measured", compared.measured)
         result[index] = replace(result[index], curves=[*result[index].curves, curve])
     return result
 

@@ -20,6 +20,9 @@ from rparm.scenarios.scenario import Scenario
 from rparm.system.comparison import Outcome
 from rparm.system.ssp import Ssp
 
+Rows = Sequence[int] | np.ndarray | slice  # of a run, that are shown
+EVERY = slice(None)
+
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
@@ -32,12 +35,8 @@ class Recorded:
 
     def component(self, name: str) -> "Recorded":
         """The same of one component of a system, without its name in front."""
-        return Recorded(
-            self.times,
-            _within(name, self.columns),
-            _within(name, self.references),
-            _within(name, self.values),
-        )
+        named = self.columns, self.references, self.values
+        return Recorded(self.times, *(_within(name, each) for each in named))
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,14 +48,8 @@ class Animation:
     arm: Mapping[str, Any]  # lengths in m, limits, what surrounds it
 
 
-def of_run(run: Run, rows: Sequence[int] | np.ndarray | slice = slice(None)) -> dict | None:
-    """Data of the player for a scenario's run; None: nothing to animate.
-
-    Parameters
-    ----------
-    rows : sequence of int or slice, optional
-        Those of the recorded rows that the page holds.
-    """
+def of_run(run: Run, rows: Rows = EVERY) -> dict | None:
+    """Data of the player for a scenario's run, at `rows` of it; None: nothing to animate."""
     references = {name: run.reference.column(name) for name in run.result.names}
     return of_result(run.scenario, run.result, references, rows)
 
@@ -65,9 +58,9 @@ def of_result(
     scenario: Scenario,
     result: Result,
     references: Mapping[str, np.ndarray],
-    rows: Sequence[int] | np.ndarray | slice = slice(None),
+    rows: Rows = EVERY,
 ) -> dict | None:
-    """The same of a run that may have stopped early, with the references that there are."""
+    """The same of a run that may have stopped early, and may have no references."""
     # a row holds the outputs at the end of a step, so the inputs too are those of this step
     steps = scenario.input_rows[: len(result.times)]
     inputs = {name: values[steps] for name, values in scenario.inputs.items()}
@@ -78,18 +71,8 @@ def of_result(
     return of_recorded(scenario.model, recorded, rows)
 
 
-def of_outcome(
-    system: str, ssp: Ssp, outcome: Outcome, rows: Sequence[int] | np.ndarray | slice = slice(None)
-) -> dict | None:
-    """Data of the player for a run of a system's variant; None: nothing to animate.
-
-    Parameters
-    ----------
-    system : str
-        Name of the system's folder.
-    rows : sequence of int or slice, optional
-        Those of the recorded rows that the page holds.
-    """
+def of_outcome(system: str, ssp: Ssp, outcome: Outcome, rows: Rows = EVERY) -> dict | None:
+    """Data of the player for a run of a variant of `system`, a folder; None: nothing to animate."""
     given = ssp.system.parameter_sets[outcome.variant]
     values = {
         f"{component}.{name}": value
@@ -100,9 +83,7 @@ def of_outcome(
     return of_recorded(system, Recorded(outcome.run.times, columns, {}, values), rows)
 
 
-def of_recorded(
-    folder: str, recorded: Recorded, rows: Sequence[int] | np.ndarray | slice = slice(None)
-) -> dict[str, Any] | None:
+def of_recorded(folder: str, recorded: Recorded, rows: Rows = EVERY) -> dict[str, Any] | None:
     """Data of the player for a folder below models/; None: nothing to animate."""
     animate = _animate(folder)
     if animate is None:

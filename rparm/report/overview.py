@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from rparm.output_files import whole
+from rparm.output_files import write_text
 from rparm.report import assets, pages
 from rparm.report.pages import RunPage
 from rparm.report.sparkline import HEIGHT, WIDTH, scale_of
@@ -38,9 +38,9 @@ class Entry:
     group: str  # model or system, with its version of FMI
     page: str  # file name in the section's folder
     status: str  # PASSED, FAILED or RAN
-    error: float | None = None  # the worst one; None: not a number, or there is none
+    error: float | None = None  # the worst one; None if it is NaN or unknown
     bound: float | None = None
-    detail: str = ""  # what the error is of, or why there is none
+    detail: str = ""  # which output is worst, or why the run failed
     line: str = ""  # path of the sparkline
     line_text: str = ""  # what it shows
     line_of: str = ""  # the variable of the sparkline
@@ -71,11 +71,8 @@ def record(report: Path, section: str, entries: Sequence[Entry]) -> Path:
 
 
 def _keep(report: Path, section: str, entries: Sequence[Entry]) -> None:
-    folder = report / section
-    folder.mkdir(parents=True, exist_ok=True)
-    with whole(folder / ENTRIES) as path:
-        text = json.dumps([asdict(entry) for entry in entries], ensure_ascii=False, indent=1)
-        path.write_text(text + "\n", encoding="utf-8", newline="\n")
+    text = json.dumps([asdict(entry) for entry in entries], ensure_ascii=False, indent=1)
+    write_text(report / section / ENTRIES, text + "\n")
 
 
 def forget(report: Path, section: str, names: Collection[str] | None = None) -> None:

@@ -9,7 +9,7 @@ from urllib.parse import quote
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from rparm import texts
-from rparm.output_files import whole
+from rparm.output_files import write_text
 from rparm.report.run_data import RunData
 
 INDEX = "index.html"
@@ -75,7 +75,5 @@ def write_run(path: Path, page: RunPage) -> Path:
 
 def write_page(path: Path, template: str, **values: object) -> Path:
     """Write a page, complete or not at all; return its path."""
-    with whole(path) as temporary:
-        text = _templates.get_template(template).render(values)
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+    write_text(path, _templates.get_template(template).render(values))
     return path

@@ -28,20 +28,16 @@ def write(
     errors: Mapping[str, np.ndarray],
     again: str,
 ) -> Path:
-    """Write the page of a scenario; return its path.
+    """Write the page of a scenario; return its path. The command `again` proves it again.
 
-    Parameters
-    ----------
-    errors : mapping of str to ndarray of shape (communication points, states)
-        Proven errors of a run, by what it is called: its method and tolerance.
-    again : str
-        Command that proves it again.
+    `errors` are the proven ones of runs, (communication points, states), by method and tolerance.
     """
     plots = [
         Plot(
             f"proven error of {name}",
             unit(model.variables[name].unit),
-            [Curve(run, _drawn(course[:, i])) for run, course in errors.items()],
+            # 0 where only the allowance for underflow is left, as at the start
+            [Curve(x, np.where(e[:, i] < SMALLEST, 0.0, e[:, i])) for x, e in errors.items()],
             log=True,
             note=f"The exact {name} is no farther than this from the run.",
         )
@@ -91,11 +87,6 @@ def _write(report: Path, name: str, page: RunPage) -> Path:
     (report / FOLDER).mkdir(parents=True, exist_ok=True)
     with_overview = (report / INDEX).exists()
     return write_run(report / FOLDER / f"{name}.html", replace(page, overview=with_overview))
-
-
-def _drawn(course: np.ndarray) -> np.ndarray:
-    """0 where a run is exact but for what stands for underflows, as at the start."""
-    return np.where(course < SMALLEST, 0.0, course)
 
 
 def _largest(model: Model, enclosure: Enclosure, errors: Mapping[str, np.ndarray]) -> Table:

@@ -44,7 +44,7 @@ OPTIONS = ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disab
 
 LARGEST = 1_000_000  # bytes
 COLOURS = 64  # in all frames together
-PLAYS = 3  # then it comes to rest, which readers who do not want it to move can wait for
+PLAYS = 3  # then it stops: readers who dislike motion need not wait for long
 REST = 1.5  # s, of the last frame
 
 PAGE = """<!DOCTYPE html>
@@ -124,17 +124,7 @@ def _of_variant(name: str, others: list[str]) -> dict[str, Any] | None:
 
 
 def frames(data: dict[str, Any], step: float, width: int) -> "list[Image]":
-    """Draw a motion in Chromium.
-
-    Parameters
-    ----------
-    data : dict
-        Of `rparm.report.motion`.
-    step : float
-        Time of the motion between two frames, s.
-    width : int
-        px.
-    """
+    """Draw the motion on a page in Chromium, with a frame every `step` s, `width` px wide."""
     from PIL.PngImagePlugin import PngImageFile
 
     style = "".join((ASSETS / name).read_text(encoding="utf-8") for name in STYLES)
@@ -177,15 +167,7 @@ def _chromium() -> "Iterator[Chrome]":
 
 
 def write(file: Path, drawn: "Sequence[Image]", duration: float) -> int:
-    """Write frames as an animated PNG, complete or not at all; its size in bytes.
-
-    UserError if it would be larger than `LARGEST`.
-
-    Parameters
-    ----------
-    duration : float
-        Of a frame, s.
-    """
+    """Write frames of `duration` s as an animated PNG of at most `LARGEST` bytes; its size."""
     first, *others = _with_few_colours(drawn)
     times = [round(1000 * duration)] * len(others) + [round(1000 * REST)]
     buffer = io.BytesIO()

@@ -41,7 +41,7 @@ class Plot:
     curves: Sequence[Curve]
     log: bool = False
     levels: Sequence[tuple[str, float]] = ()  # dashed lines: name and value
-    note: str = ""  # what its numbers stand for
+    note: str = ""  # what its values mean
 
     @property
     def gaps(self) -> bool:
@@ -130,6 +130,14 @@ def without_rounding(values: np.ndarray) -> np.ndarray:
     """Values of a variable, with 0 for what is rounding beside its scale, 3e-17 say."""
     scale = max(np.abs(values[np.isfinite(values)]).max(initial=0.0), SMALLEST_SCALE)
     return np.where(np.abs(values) < ROUNDING * scale, 0.0, values)
+
+
+def result_curve(
+    name: str, values: np.ndarray, reference: np.ndarray | None = None, steps: bool = False
+) -> Curve:
+    """Values of a variable over those of its reference, without rounding."""
+    below = None if reference is None else without_rounding(reference)
+    return Curve(name, without_rounding(values), below, steps)
 
 
 def thinned(columns: Sequence[np.ndarray], most: int = MOST_ROWS) -> np.ndarray:

@@ -14,7 +14,7 @@ from rparm.report import motion, overview
 from rparm.report.measured_data import measured_tables, with_measured
 from rparm.report.overview import FAILED, PASSED, RAN, Entry
 from rparm.report.pages import RunPage, Table
-from rparm.report.run_data import Curve, Plot, RunData, thinned, without_rounding
+from rparm.report.run_data import Curve, Plot, RunData, result_curve, thinned
 from rparm.report.signal_texts import describe
 from rparm.runs.comparison import Failure, Run, estimated_from
 from rparm.runs.measured import comparisons
@@ -28,20 +28,10 @@ DIGITS = 12  # of values; the references of the project have more, users' files 
 def write(
     folder: Path, name: str, runs: Sequence[Run], again: str, failures: Sequence[Failure] = ()
 ) -> Entry:
-    """Write the page and the values of a scenario; its line in the overview.
+    """Write page and values, called `name`, of a scenario to a section; its line in the overview.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the section in the report.
-    name : str
-        Of the page and the file of values.
-    runs : sequence of Run
-        Of one scenario; the first one is drawn.
-    again : str
-        Command that runs it again.
-    failures : sequence of Failure, optional
-        Of other runs of the scenario.
+    The first of its runs is drawn; `failures` are others that did not end. The command `again` runs
+    it again.
     """
     folder.mkdir(parents=True, exist_ok=True)
     first, scenario = runs[0], runs[0].scenario
@@ -79,7 +69,7 @@ def write(
 
 
 def write_failed(folder: Path, name: str, failure: Failure, again: str) -> Entry:
-    """Write the page of a scenario that did not run to its end: what there is of it."""
+    """Write the page of a scenario that stopped early: what was recorded until then."""
     folder.mkdir(parents=True, exist_ok=True)
     scenario, model, result = failure.scenario, failure.fmu.model, failure.result
     csv, data = "", None
@@ -184,13 +174,8 @@ def _value_plots(
     panels += [*map(tuple, units.values()), *scenario.panels]
 
     def curve(name: str) -> Curve:
-        wanted = references.get(name)
-        return Curve(
-            name,
-            without_rounding(columns[name].astype(float)),
-            None if wanted is None else without_rounding(wanted),
-            steps=name not in model.real_outputs,
-        )
+        steps = name not in model.real_outputs
+        return result_curve(name, columns[name].astype(float), references.get(name), steps)
 
     plots = [
         Plot(
@@ -205,7 +190,7 @@ def _value_plots(
 
 
 def meanings(variables: Iterable[Variable]) -> str:
-    """What the numbers of Integers stand for, as their descriptions say."""
+    """What the values of Integers mean, from their descriptions."""
     texts = [v.description for v in variables if v.type == "Integer" and v.description]
     return ". ".join(texts) + "." if texts else ""
 

@@ -21,10 +21,7 @@ def scale_of(x: np.ndarray, plot: Plot, unit: str) -> str:
 
 
 def path(x: np.ndarray, y: np.ndarray) -> str:
-    """Path of an SVG in a view box of `WIDTH` by `HEIGHT` through points (rows,), `x` in order.
-
-    It is empty if nothing is finite.
-    """
+    """Path of an SVG of `WIDTH` by `HEIGHT` through points (rows,), `x` ascending; may be empty."""
     finite = np.isfinite(y)
     x, y = x[finite], y[finite]
     if not len(x):

@@ -16,7 +16,7 @@ from rparm.output_files import whole
 from rparm.report import assets, motion, overview
 from rparm.report.overview import FAILED, PASSED, SYSTEM, Entry
 from rparm.report.pages import RunPage, Table
-from rparm.report.run_data import Curve, Plot, RunData, thinned, without_rounding
+from rparm.report.run_data import Plot, RunData, result_curve, thinned
 from rparm.report.scenario_page import cells, meanings
 from rparm.system import ecos
 from rparm.system.comparison import BOUND, Outcome
@@ -43,12 +43,10 @@ class Section:
 
     @property
     def variants(self) -> list[str]:
-        """Names of its variants."""
         return list(self.ssp.system.parameters)
 
     @property
     def name(self) -> str:
-        """Name of the system."""
         return self.folder.name
 
     @property
@@ -75,6 +73,8 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
     """Write the page and the values of a run, complete or not at all; its line in the overview."""
     run, folder = outcome.run, _folder(report, section)
     rows, data = _data(section, outcome)
+    error = f"{outcome.error:.1e}"
+    above = f"the error of {outcome.worst}, {error}, is above its bound {short(BOUND)}"
     page = RunPage(
         status=PASSED if outcome.passed else FAILED,
         facts=_facts(section, outcome),
@@ -88,7 +88,7 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
             *(f"{m.name.capitalize()}: {m.meaning}." for m in section.study.MEASURES),
             "These numbers are of all steps, also of those that the file leaves out.",
         ],
-        failures=[*_failures(outcome), *run.messages],
+        failures=[*([] if outcome.passed else [above]), *run.messages],
         **_values(folder, outcome, rows),
         **_texts(section, outcome.variant),
     )
@@ -105,7 +105,7 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
 
 
 def write_failed(report: Path, section: Section, variant: str, error: UserError) -> Entry:
-    """Write the page of a variant that did not run to its end: what there is of it."""
+    """Write the page of a variant that stopped early: what was recorded until then."""
     folder, system = _folder(report, section), section.ssp.system
     run = error.result if isinstance(error, StoppedError) else None
     facts = [("system", section.title), ("time", f"{system.start:g} to {system.stop:g} s")]
@@ -171,14 +171,9 @@ def _plot(ssp: Ssp, outcome: Outcome, diagram: Diagram) -> Plot:
     curves = []
     for name in diagram.curves:
         wanted = diagram.references.get(name)
-        curves.append(
-            Curve(
-                name,
-                without_rounding(outcome.column(name)),
-                None if wanted is None else without_rounding(outcome.column(wanted)),
-                steps=ssp.variable(name).type != "Real",
-            )
-        )
+        reference = None if wanted is None else outcome.column(wanted)
+        steps = ssp.variable(name).type != "Real"
+        curves.append(result_curve(name, outcome.column(name), reference, steps))
     variables = [ssp.variable(name) for name in diagram.curves]
     meaning = meanings(variables)
     return Plot(diagram.title, unit(variables[0].unit), curves, note=meaning)
@@ -198,12 +193,6 @@ def _facts(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
 
 def _measures(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
     return [(m.name, f"{m.value(outcome):.3g} {m.unit}") for m in section.study.MEASURES]
-
-
-def _failures(outcome: Outcome) -> list[str]:
-    if outcome.passed:
-        return []
-    return [f"the error of {outcome.worst}, {outcome.error:.1e}, is above its bound {short(BOUND)}"]
 
 
 def _description(system: System, variant: str) -> str:

@@ -48,14 +48,8 @@ class ReportWriter:
     ) -> Path:
         """Write all pages; return the one to open: that of a single file, or the overview.
 
-        Parameters
-        ----------
-        groups : mapping
-            Runs by scenario; the first one of each is drawn.
-        progress : callable, optional
-            Called with 1 after each scenario.
-        failures : sequence of Failure, optional
-            Runs that did not end.
+        Of the runs of each scenario, the first one is drawn. `progress` is called with 1 after
+        each.
         """
         failed: dict[Path, list[Failure]] = {}
         for failure in failures:

@@ -47,10 +47,7 @@ class Run(Compared):
 
     @property
     def violation(self) -> str:
-        """Why the run has not passed, after its tolerance; empty if it has.
-
-        An error that is only estimated has no bound.
-        """
+        """Why the run has not passed, or nothing; an error that is only estimated has no bound."""
         at = f"tolerance {short(self.result.tolerance)}:"
         if self.twin is not None and self.twin.differing:
             others = ", ".join(self.twin.differing)
@@ -73,15 +70,7 @@ class Failure:
 
 
 class Runs:
-    """Runs scenarios on the FMUs of their models, each at a tolerance only once.
-
-    Parameters
-    ----------
-    fmus : mapping of str to Fmu
-        By `Scenario.model`.
-    twins : mapping of str to Fmu, optional
-        FMUs of another version of FMI, which have to give the same bits.
-    """
+    """Runs scenarios on FMUs by `Scenario.model`, once at a tolerance; twins give the same bits."""
 
     def __init__(self, fmus: Mapping[str, Fmu], twins: Mapping[str, Fmu] | None = None) -> None:
         self._fmus = fmus

@@ -37,13 +37,7 @@ def step_through(
 
 
 class _Steps:
-    """How far a run is.
-
-    Attributes
-    ----------
-    count, done : int
-        Steps of the whole run, and those made.
-    """
+    """How far a run is: `done` of `count` steps."""
 
     def __init__(self, instance: Instance, scenario: Scenario) -> None:
         variables = instance.fmu.model.variables
@@ -85,7 +79,7 @@ class _Steps:
         return None
 
     def advance(self, count: int) -> UserError | None:
-        """Make so many steps, or the last ones; what failed, if one did."""
+        """Make `count` steps, or those that are left; the error of one that failed."""
         first = self.done
         last = min(first + count, self.count)
         here = slice(first, last + 1)

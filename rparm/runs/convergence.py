@@ -1,9 +1,9 @@
 """Order of convergence in the communication step, with inputs that are smooth functions of time.
 
-A master knows its inputs at the communication points. With zero-order hold of them, an FMU is off
-by the first power of the step; with their derivatives up to order k it is off by power
-k + 1. An FMU of FMI 3.0 that asks for the inputs at four times of a step (intermediate update) is
-off by power 4. The problems are models/<model>/convergence/<name>.toml, in the format of a
+A master knows its inputs at the communication points. With zero-order hold, the error of an FMU
+falls with the first power of the step, with derivatives up to order k with power k + 1. If an FMU
+of FMI 3.0 asks for the inputs at four times of a step (intermediate update), it falls with power 4.
+The problems are models/<model>/convergence/<name>.toml, in the format of a
 scenario; the exact final state of each is models/<model>/references/<name>/exact.json.
 """
 
@@ -83,7 +83,6 @@ class Convergence:
 
     @property
     def scenario(self) -> Scenario:
-        """Scenario of the problem."""
         return self.problem.scenario
 
     @property
@@ -136,7 +135,6 @@ class Convergence:
 
     @property
     def passed(self) -> bool:
-        """Whether every slope is the one expected."""
         return not self.violations
 
 
@@ -146,10 +144,7 @@ def slope(steps: np.ndarray, errors: np.ndarray) -> float:
 
 
 def smooth_inputs(scenario: Scenario) -> dict[str, Sines]:
-    """Inputs of `scenario` as smooth functions of time.
-
-    UserError if one of them is no sum of sines.
-    """
+    """Inputs of `scenario` as smooth functions; UserError if one of them is no sum of sines."""
     for name, signal in scenario.signals.items():
         if not isinstance(signal, Sines):
             raise UserError(f"{scenario.path}: [inputs.{name}]: expected sines, which are smooth")
@@ -157,10 +152,7 @@ def smooth_inputs(scenario: Scenario) -> dict[str, Sines]:
 
 
 def load(path: Path, model: Model) -> Problem:
-    """Read the problem at `path` and its exact final state.
-
-    UserError if one of the two files is missing or wrong.
-    """
+    """A problem and its exact final state; UserError if one of the files is missing or wrong."""
     scenario = scenarios.load(path, model)
     if len(scenario.steps) != 1 or (len(scenario.times) - 1) % FACTORS[0]:
         raise UserError(f"{path}: [time] step: {FACTORS[0]} of it do not divide the duration")
@@ -195,16 +187,10 @@ def study(
 ) -> Convergence:
     """Run `problem` in every case and with every communication step.
 
-    UserError if a function of an FMU fails.
+    `fmu` takes all orders of input derivatives, `updated` intermediate update; without it, this
+    case is left out. `progress` is called with the number of steps that each run has made.
 
-    Parameters
-    ----------
-    fmu : Fmu
-        For all orders of input derivatives.
-    progress : callable, optional
-        Called with the number of steps that each run has made.
-    updated : Fmu, optional
-        For intermediate update; without it, this case is left out.
+    UserError if a function of an FMU fails.
     """
     fmus = [fmu] * len(ORDERS) + ([] if updated is None else [updated])
     errors = np.empty((len(fmus), len(FACTORS)))
@@ -216,15 +202,10 @@ def study(
 
 
 def final_state(fmu: Fmu, problem: Problem, case: int, factor: int) -> dict[str, float]:
-    """States at the end of a run.
+    """States at the end of a run, whose step is `factor` shortest steps of the problem.
 
-    Parameters
-    ----------
-    case : int
-        Highest derivative of the inputs that is set, along with all lower ones, 0: none; or
-        INTERMEDIATE_UPDATE.
-    factor : int
-        Communication step, in shortest steps of the problem.
+    The case is the highest derivative of the inputs that is set, along with all lower ones, 0:
+    none; or INTERMEDIATE_UPDATE.
     """
     scenario = problem.scenario
     step_through = _with_updates if case == INTERMEDIATE_UPDATE else _with_derivatives

@@ -11,7 +11,7 @@ from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, Model, Value
 from rparm.scenarios.scenario import MAX_STEPS
 
 Input = float | bool | np.ndarray | Sequence[float] | tuple[Any, Any] | Callable[[float], float]
-WHOLE = 1e-9  # of a step: by so much the stop time may miss a communication point
+WHOLE = 1e-9  # of a step: largest distance of the stop time from a communication point
 
 
 def is_number(given: object) -> bool:

@@ -41,8 +41,6 @@ class Compared:
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """Reference trajectory of one scenario."""
-
     path: Path
     times: np.ndarray  # (rows,) s
     names: tuple[str, ...]
@@ -66,15 +64,10 @@ class Reference:
 
 
 def load(scenario: Scenario, model: Model) -> Reference:
-    """Read and check the reference of `scenario`.
+    """Read and check the reference of `scenario`, which was checked against `model`.
 
     UserError if the file is missing, damaged, or not of this scenario; names the line and the
     command that makes references.
-
-    Parameters
-    ----------
-    model : Model
-        What the scenario was checked against.
     """
     path = project.reference_file(scenario.path, model.name)
     folder = project.model_folder(scenario.path)
@@ -86,20 +79,12 @@ def load(scenario: Scenario, model: Model) -> Reference:
 
 
 def failure(path: Path, folder: Path, name: str) -> trajectory_csv.Failure:
-    """What makes errors of the reference `name` of a model or system, which say how to make it."""
-
-    def wrong(message: str, line: int | None = None) -> UserError:
-        where = f"{path}, line {line}" if line else f"{path}"
-        return UserError(f"{where}: {message}; {project.making_references(folder, name)}")
-
-    return wrong
+    """Makes errors of the reference `name` of a model or system, with how to make it again."""
+    return trajectory_csv.failure(path, f"; {project.making_references(folder, name)}")
 
 
 def read_summed(folder: Path) -> Summed:
-    """Which errors of a model or system, by its folder, have the scale of a sum; maybe none.
-
-    UserError if the file is wrong.
-    """
+    """Errors of a model or system, by folder, that a sum scales; UserError if the file is wrong."""
     path = project.scales_file(folder)
     if not is_file(path):
         return {}
@@ -113,12 +98,8 @@ def read_summed(folder: Path) -> Summed:
 def scale(columns: Mapping[str, np.ndarray], name: str, summed: Summed) -> float:
     """What an error of a variable is divided by, in its unit: its largest value, or that of a sum.
 
-    Parameters
-    ----------
-    columns : mapping of str to ndarray
-        Reference of all variables, (rows,) each.
-    summed : mapping
-        As `read_summed` gives it; a sum of which a term is missing does not count.
+    `columns` are the reference of all variables, (rows,) each; a sum of which a term is missing
+    does not count.
     """
     terms = summed.get(name, ())
     if not terms or not set(terms) <= set(columns):

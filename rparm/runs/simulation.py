@@ -50,21 +50,14 @@ def simulate(
     progress: Callable[[int], object] | None = None,
     compiled: bool = False,
 ) -> Result:
-    """Run `scenario` on `fmu` and record its Real outputs.
+    """Run `scenario` on the FMU that it was checked against, and record its Real outputs.
+
+    The relative tolerance is that of the scenario if none is given. `progress` is called now and
+    then with the number of steps done since the last call. `compiled` uses the compiled loop, where
+    numba is installed, even if it does not pay.
 
     UserError if the FMU has no Real outputs, or if one of its functions fails; the text holds the
     FMU's own message. In a step it is a `StoppedError`.
-
-    Parameters
-    ----------
-    fmu : Fmu
-        The one that the scenario was checked against.
-    tolerance : float, optional
-        Relative tolerance; None: that of the scenario.
-    progress : callable, optional
-        Called now and then with the number of steps done since the last call.
-    compiled : bool, optional
-        Use the compiled loop, where numba is installed, even if it does not pay.
     """
     tolerance = scenario.tolerance if tolerance is None else tolerance
     if not fmu.model.real_outputs:
@@ -112,7 +105,7 @@ def initialize(instance: Instance, scenario: Scenario, tolerance: float) -> None
 
 
 def _compiled_loop(wanted: bool, steps: int) -> Callable[..., Steps] | None:
-    """What steps through a run faster; None if it does not pay or cannot be had."""
+    """The compiled stepping loop; None if it does not pay or cannot be loaded."""
     global _steps_made
     _steps_made += steps
     if wanted or _steps_made > WORTH_COMPILING:

@@ -26,7 +26,6 @@ class Sweep:
 
     @property
     def passed(self) -> bool:
-        """Whether the errors keep all rules."""
         return not self.violations
 
 

@@ -21,15 +21,7 @@ BESIDE = {"offset": SINES, "column": FILE, "time": FILE, "scale": FILE, "hold": 
 
 
 class InputReader:
-    """Reads the sections [inputs] and [measured] of a scenario.
-
-    Parameters
-    ----------
-    reader : Reader
-        Of the scenario's file.
-    times : ndarray, shape (n + 1,)
-        Communication points in s.
-    """
+    """Reads the sections [inputs] and [measured]; `times` are communication points in s."""
 
     def __init__(self, reader: Reader, model: Model, times: np.ndarray) -> None:
         self._reader, self._model = reader, model
@@ -185,7 +177,7 @@ class InputReader:
         return self._logs[file]
 
     def _check_covers(self, times: np.ndarray, where: str) -> None:
-        """A log has values for each point where a step begins; its end may be one step short."""
+        """Check that a log covers each point where a step begins: it may end one step early."""
         begin, end = float(self._times[0]), float(self._times[-2])
         if times[0] > begin + EARLY:
             found = f"begins at {float(times[0])!r} s"

@@ -31,10 +31,7 @@ class Log:
     names: tuple[str, ...]  # of the columns
 
     def columns(self, time: str, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Times (rows,), which increase, and values (rows,) of a column; all finite.
-
-        UserError if there is no such column, or anything in it is wrong; names the line.
-        """
+        """Increasing times and values of a column, (rows,), finite; UserError names the line."""
         first, second = self._index(time), self._index(name)
         found = array("d")
         for line, row in self._rows():
@@ -95,10 +92,7 @@ class Log:
 
 
 def read(path: Path) -> Log:
-    """Read a log with commas, semicolons or tabs between its columns.
-
-    UserError if it cannot be read, or has no columns.
-    """
+    """Read a log with , ; or tabs between its columns; UserError if it has none, or is no text."""
     try:
         with placed(path):
             content = read_bytes(path, LARGEST)

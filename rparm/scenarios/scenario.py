@@ -133,14 +133,8 @@ def name_of(subject: Path) -> str:
 def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> Scenario:
     """Read and check the scenario at `path`, of the project or of a user.
 
-    UserError if the file cannot be read, or if anything in it is wrong.
-
-    Parameters
-    ----------
-    model : Model
-        What the model's FMU declares.
-    times : mapping, optional
-        Values that replace those of section [time].
+    Values of `times` replace those of section [time]. UserError if the file cannot be read, or if
+    anything in it is wrong.
     """
     path = Path(path)
     content = read_toml(path)

@@ -1,4 +1,7 @@
-"""Inputs as functions of time, as scenarios give them."""
+"""Inputs as functions of time, as scenarios give them.
+
+`values` are those at times in s after the start, (n,).
+"""
 
 from dataclasses import dataclass
 
@@ -14,7 +17,6 @@ class Constant:
     value: float
 
     def values(self, elapsed: np.ndarray) -> np.ndarray:
-        """Values at `elapsed` seconds after the start, (n,)."""
         return np.full(len(elapsed), self.value)
 
 
@@ -26,7 +28,6 @@ class Sines:
     terms: tuple[tuple[float, float, float], ...]  # amplitude, frequency (Hz), phase (rad)
 
     def values(self, elapsed: np.ndarray) -> np.ndarray:
-        """Values at `elapsed` seconds after the start, (n,)."""
         # numpy's sine of doubles depends on the processor; that of long doubles, rounded, does not
         t = elapsed.astype(np.longdouble)
         total = np.full(len(t), self.offset, t.dtype)
@@ -56,7 +57,6 @@ class Table:
     points: tuple[tuple[float, float], ...]  # s since the start, value; in order of time
 
     def values(self, elapsed: np.ndarray) -> np.ndarray:
-        """Values at `elapsed` seconds after the start, (n,)."""
         times, values = np.array(self.points).T
         return np.interp(elapsed, times, values)
 
@@ -68,7 +68,6 @@ class Switches:
     points: tuple[tuple[float, bool], ...]  # s since the start, value; in order of time
 
     def values(self, elapsed: np.ndarray) -> np.ndarray:
-        """Values at `elapsed` seconds after the start, (n,), Boolean."""
         times, values = zip(*self.points, strict=True)
         rows = np.searchsorted(times, elapsed + EARLY, side="right") - 1
         return np.array(values)[np.maximum(rows, 0)]
@@ -84,7 +83,6 @@ class Logged:
     source: str  # file and column
 
     def values(self, elapsed: np.ndarray) -> np.ndarray:
-        """Values at `elapsed` seconds after the start, (n,); beyond the ends those there."""
         if self.is_held:
             rows = np.searchsorted(self.times, elapsed + EARLY, side="right") - 1
             return self.numbers[np.maximum(rows, 0)]

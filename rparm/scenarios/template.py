@@ -43,13 +43,8 @@ INPUT_HELP = """\
 def text(name: str, key: str, subject: str, model: Model) -> str:
     """Content of the file, which runs as it is.
 
-    Parameters
-    ----------
-    name : str
-        Of the scenario.
-    key, subject : str
-        `model` and its folder below models/, or `fmu` and the path of an FMU from the file.
-    model : Model
+    The `key` is `model`, with its folder below models/, or `fmu`, with the path of an FMU from the
+    file.
     """
     outputs = model.real_outputs[:2]
     panels = "# Further plots, each of variables of one unit:\n"

@@ -41,7 +41,6 @@ class Outcome(Compared):
 
     @property
     def passed(self) -> bool:
-        """Whether all errors are within the bound."""
         return self.error <= BOUND
 
     def column(self, name: str) -> np.ndarray:
@@ -92,17 +91,10 @@ def reference_names(system: Path) -> list[str]:
 def load_reference(
     ssp: Ssp, variant: str, system: Path, experiment: tuple[float, float, float]
 ) -> Reference:
-    """Read and check the reference of a variant.
+    """Read and check the reference of a variant of the system in a folder.
 
-    UserError if the file is missing, damaged, or not of this system; names the line and the command
-    that makes references.
-
-    Parameters
-    ----------
-    system : Path
-        Folder of the system.
-    experiment : tuple of float
-        Start, stop and step in s that the references are for.
+    References are for `experiment`: start, stop and step in s. UserError if the file is missing,
+    damaged, or not of this system; names the line and the command that makes references.
     """
     _check_experiment(ssp, experiment)
     path = project.variant_reference_file(system, variant)

@@ -59,7 +59,7 @@ class Run:
     values: np.ndarray  # (rows, len(names)) in the variables' units; Booleans are 0 or 1
     wall_time: float  # s, of the steps with the reading
     messages: tuple[str, ...]  # warnings of the components
-    # by component.variable, of those in STATISTICS that there are
+    # those of STATISTICS that components have, by component.variable
     statistics: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -76,15 +76,9 @@ def absent() -> str:
 def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     """Run a system from its start to its stop time with one of its parameter sets.
 
-    UserError if a component fails or gives a value that is not finite (the text names component,
-    variable and time), or if Ecos itself fails. After the start it is a `StoppedError`.
-
-    Parameters
-    ----------
-    variant : str
-        Name of a parameter set; must exist: for an unknown name Ecos sets nothing.
-    names : sequence of str
-        Variables to read, ``component.variable``: Real, Integer or Boolean.
+    Reads the Real, Integer or Boolean variables ``component.variable``. UserError if a component
+    fails or gives a value that is not finite (the text names component, variable and time), or if
+    Ecos itself fails. After the start it is a `StoppedError`.
     """
     system = ssp.system
     if variant not in system.parameters:
@@ -220,7 +214,7 @@ def _check_values(
         return
     row = bad_rows[0]
     bad = [name for name, value in zip(names, values[row], strict=True) if not np.isfinite(value)]
-    # a component that was given one passes it on at once
+    # a component passes on a bad input in the same step
     victims = {
         connection.end_component
         for connection in ssp.system.connections

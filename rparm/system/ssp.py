@@ -1,7 +1,7 @@
 """SSP archives: unpacked, read and checked, once."""
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,12 +25,18 @@ class Ssp:
     models: Mapping[str, Model]  # what the FMU of each component declares
 
     def fmu(self, component: str) -> Path:
-        """FMU of a component, as a file."""
         return self.folder / self.system.component(component).source
 
     def unpacked_fmu(self, component: str) -> Fmu:
         """FMU of a component, unpacked; messages name the SSP."""
         return Fmu(self.fmu(component), shown=self.path / self.system.component(component).source)
+
+    @contextmanager
+    def unpacked_fmus(self, names: Iterable[str] | None = None) -> Iterator[dict[str, Fmu]]:
+        """FMUs of all components, or of those named, in this order."""
+        with ExitStack() as stack:
+            wanted = self.models if names is None else names
+            yield {name: stack.enter_context(self.unpacked_fmu(name)) for name in wanted}
 
     def variable(self, name: str) -> Variable:
         """What the FMU declares of ``component.variable``."""
@@ -40,11 +46,7 @@ class Ssp:
 
 @contextmanager
 def unpacked(path: Path) -> Iterator[Ssp]:
-    """Unpack an SSP to a temporary folder, which is removed at the end, and read it.
-
-    UserError if it is damaged, or no system that can be run (what that is:
-    `rparm.system.ssp_checks`).
-    """
+    """Unpack and read an SSP until the end; UserError if it is damaged, or `ssp_checks` refuses."""
     path = Path(path)
     with temporary_folder() as folder:
         with placed(path):

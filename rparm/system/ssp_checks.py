@@ -27,16 +27,8 @@ def checked_models(path: Path, folder: Path, system: System) -> dict[str, Model]
 
     Every component has its FMU, every connector is a variable of it with that causality, type and
     unit, connections go from an output to an input of the same type and unit, every input of every
-    FMU is connected exactly once, and parameters are variables that can be set.
-
-    UserError if not; the text names component and variable.
-
-    Parameters
-    ----------
-    path : Path
-        The SSP, for messages.
-    folder : Path
-        Where it is unpacked.
+    FMU is connected exactly once, and parameters are variables that can be set. UserError if not;
+    the text names component and variable. The SSP is unpacked in `folder`.
     """
     checker = _Checker(path, system)
     for component in system.components:
@@ -68,7 +60,6 @@ class _Checker:
                 self.tolerance(variant, component, values)
 
     def read(self, folder: Path, component: Component) -> Model:
-        """What the component's FMU declares."""
         path = folder / component.source
         where = f"component {component.name!r}: {component.source}"
         if not is_file(path):
@@ -117,7 +108,6 @@ class _Checker:
             fed[target] = str(connection)
 
     def end(self, where: str, component: str, connector: str) -> Connector:
-        """Connector at one end of a connection."""
         names = [known.name for known in self.system.components]
         if component not in names:
             hint = did_you_mean(component, names)

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from rparm.fmi.model import Value
 
 
@@ -77,9 +79,12 @@ class System:
 
     @property
     def steps(self) -> int:
-        """Number of communication steps from start to stop."""
         return round((self.stop - self.start) / self.step)
 
+    @property
+    def times(self) -> np.ndarray:
+        """Communication points, (steps + 1,) s."""
+        return self.start + self.step * np.arange(self.steps + 1)
+
     def component(self, name: str) -> Component:
-        """Component called `name`."""
         return next(component for component in self.components if component.name == name)

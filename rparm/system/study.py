@@ -1,7 +1,4 @@
-"""Loads what is specific to a system: its measures, its picture, the study of its coupling.
-
-The folder has a module study.py with the names of `Study`; `load` gives it.
-"""
+"""What is specific to a system: the module study.py of its folder, with names of `Study`."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -68,10 +65,7 @@ class CouplingStudy(Study, Protocol):
     COUPLING_PICTURE: str  # file name of what it draws
 
     def study_coupling(self, ssp: Path, report: Path) -> dict[str, dict[str, object]]:
-        """Study what the coupling costs, print tables, write the picture.
-
-        Numbers of each part of the study by its name; whether all is well is ``passed``.
-        """
+        """Print tables, write the picture; numbers by part, whether all is well is ``passed``."""
         ...
 
 
@@ -84,10 +78,7 @@ def load(folder: Path) -> Study:
 
 
 def of_coupling() -> tuple[Path, CouplingStudy]:
-    """Folder and module of the system that has a study of its coupling.
-
-    UserError if there is not exactly one.
-    """
+    """Folder and module of the one system that has a study of its coupling; else UserError."""
     found = _having("study_coupling")
     if len(found) != 1:
         names = ", ".join(folder.name for folder in found) or "none"
@@ -97,7 +88,7 @@ def of_coupling() -> tuple[Path, CouplingStudy]:
 
 
 def rests() -> dict[Path, Rest]:
-    """Where systems rest, by folder, of those that say it: as ``REST``."""
+    """Where systems rest, by folder, of those that define ``REST``."""
     return {folder: cast(Rest, known.REST) for folder, known in _having("REST").items()}
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 import pytest
-from rparm.models.machine.systems import fmus_of
+from rparm.models.machine.systems import SEQUENCE
 
 from rparm.fmi.fmu_file import Fmu
 from rparm.system import ssp
@@ -19,5 +19,5 @@ def opened() -> Iterator[Ssp]:
 
 @pytest.fixture(scope="module")
 def fmus(opened: Ssp) -> Iterator[dict[str, Fmu]]:
-    with fmus_of(opened) as found:
+    with opened.unpacked_fmus(SEQUENCE) as found:
         yield found

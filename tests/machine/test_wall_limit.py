@@ -18,7 +18,7 @@ STIFFNESS = 1e4  # N/m
 
 @pytest.fixture(scope="module")
 def fmus(opened: Ssp) -> Iterator[dict[str, Fmu]]:
-    with wall_limit.fmus_of(opened) as found:
+    with opened.unpacked_fmus(wall_limit.SEQUENCE) as found:
         yield found
 
 

@@ -2,11 +2,11 @@
 
 import json
 import re
+import webbrowser
 from pathlib import Path
 
 import pytest
 
-from rparm.report import browser as shown
 from rparm.report.overview import Entry, forget, read, record
 from rparm.report.signal_texts import describe
 from rparm.scenarios import scenario
@@ -240,7 +240,7 @@ def test_a_long_table_is_summed_up() -> None:
 
 def test_the_page_of_a_file_is_opened(console: Console, monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[str] = []
-    monkeypatch.setattr(shown.webbrowser, "open_new_tab", lambda url: opened.append(url) or True)
+    monkeypatch.setattr(webbrowser, "open_new_tab", lambda url: opened.append(url) or True)
     Path("x.toml").write_text(CONTENT, encoding="utf-8")
     assert console("run", "x.toml", "--open", "--report", "out")[0] == 0
     quick = ("constant_effort_single_step", "--tolerance", "1e-8")
@@ -250,11 +250,11 @@ def test_the_page_of_a_file_is_opened(console: Console, monkeypatch: pytest.Monk
 
 
 def test_without_a_browser_the_page_is_named(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    console: Console, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(shown.webbrowser, "open_new_tab", lambda _: False)
-    shown.show(Path("index.html"))
-    assert capsys.readouterr().err.endswith(f"{Path('index.html').absolute()}\n")
+    monkeypatch.setattr(webbrowser, "open_new_tab", lambda _: False)
+    code, _, err = console("new", "first", "--open")
+    assert code == 0 and err.endswith(f"{Path('first.toml').absolute()}\n")
 
 
 # ---- overview ------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
+from rparm.models.reference_files import input_table
 from rparm.models.rp_manipulator.references.make_references import (
     INPUTS,
     PARAMETERS,
@@ -142,7 +143,7 @@ def test_energy_changes_by_the_work_of_the_efforts(run: Scenario, reference: Ref
     """Over a step with held inputs the work is tau1 (change of q1) + f2 (change of q2), exactly."""
     values = dict(zip(reference.outputs, reference.simulate(run).T, strict=True))
     moved = np.diff(np.stack([values["q1"], values["q2"]], axis=1), axis=0)
-    work = np.cumsum(np.sum(reference.inputs(run)[:-1] * moved, axis=1))
+    work = np.cumsum(np.sum(input_table(run, INPUTS)[:-1] * moved, axis=1))
     gained = values["total_energy"][1:] - values["total_energy"][0]
     scale = np.max(np.abs(values["kinetic_energy"]) + np.abs(values["potential_energy"]))
     assert np.max(np.abs(gained - work)) < 1e-17 * scale

@@ -6,7 +6,7 @@ expected and why.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -99,7 +99,6 @@ class ClosedLoop:
         return float(self.parameters("nominal")["controller"].get(name, start))
 
     def master(self, method: Method) -> Master:
-        """A master with the components in the order of the method."""
         fmus = {name: self.fmus[name] for name in method.sequence}
         also = [*MASSES, ("controller", "integral1"), ("controller", "integral2")]
         return Master(fmus, self.connections, method.order, method.inputs, also)
@@ -125,12 +124,8 @@ class ClosedLoop:
 @contextmanager
 def opened(path: Path) -> Iterator[ClosedLoop]:
     """Unpack the closed loop from an SSP; everything is removed at the end."""
-    with ExitStack() as stack:
-        unpacked = stack.enter_context(ssp.unpacked(path))
+    with ssp.unpacked(path) as unpacked, unpacked.unpacked_fmus() as fmus:
         system = unpacked.system
-        fmus = {
-            c.name: stack.enter_context(unpacked.unpacked_fmu(c.name)) for c in system.components
-        }
         # the master connects Reals; that the payload is attached never changes
         real = [
             c
@@ -174,12 +169,8 @@ def grid(stop: float, step: float) -> np.ndarray:
 
 def read_reference(path: Path) -> Columns:
     """Columns of a reference by name, with "time"."""
-
-    def failure(message: str, line: int | None) -> UserError:
-        place = f"{path}, line {line}" if line else f"{path}"
-        return UserError(f"{place}: {message}")
-
-    names, table = trajectory_csv.read(path, failure)
+    wrong = trajectory_csv.failure(path)
+    names, table = trajectory_csv.read(path, wrong)
     if not set(STATES) <= set(names):
-        raise failure("not a reference of the closed loop", 1)
+        raise wrong("not a reference of the closed loop", 1)
     return dict(zip(names, table.T, strict=True))

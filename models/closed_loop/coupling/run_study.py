@@ -1,7 +1,4 @@
-"""The study of the coupling: run, printed and drawn.
-
-The page ../coupling.md says which results are expected.
-"""
+"""The study of the coupling, run, printed and drawn; ../coupling.md says what is expected."""
 
 from pathlib import Path
 
@@ -21,13 +18,7 @@ from rparm.report.style import save
 
 
 def run(path: Path, ssp: Path) -> dict[str, dict[str, object]]:
-    """Make the study, print its tables, write its picture; the numbers of each part.
-
-    Raises
-    ------
-    UserError
-        If the system or a reference is missing, an FMU fails, or the picture cannot be written.
-    """
+    """Make the study, print its tables, draw its picture to `path`; the numbers of each part."""
     with opened(ssp) as loop:
         with written(path):  # a place that cannot be written shows before anything has run
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -10,7 +10,6 @@ from rparm.texts import short, verdict
 
 
 def step_error_lines(study: StepErrors) -> list[str]:
-    """Errors, calls and energies over the step."""
     steps = "".join(f"{1e3 * step:>5g} ms" for step in study.steps)
     width = max(len(method.name) for method in study.methods)
     blocks = (
@@ -32,7 +31,6 @@ def step_error_lines(study: StepErrors) -> list[str]:
 
 
 def tracking_lines(tracking: list[Tracking]) -> list[str]:
-    """End effector's error by order of stepping."""
     title = f"end effector on the circle, {1e3 * tracking[0].step:g} ms"
     head = f"{title:<34}  {'measured':>11}  {'predicted':>11}  deviation  result"
     lines = [head, "-" * len(head)]
@@ -48,7 +46,6 @@ def tracking_lines(tracking: list[Tracking]) -> list[str]:
 
 
 def payload_lines(payload: Payload) -> list[str]:
-    """Errors with a payload that the controller does not know."""
     title = "unknown payload, 1 ms, Jacobi"
     head = f"{title:<34}  {'on circle':>11}  {'held: q1':>13}  {'q2':>13}"
     lines = [head, "-" * len(head)]
@@ -61,7 +58,6 @@ def payload_lines(payload: Payload) -> list[str]:
 
 
 def doubling_lines(doubling: list[Doubling]) -> list[str]:
-    """Step doubling against fixed steps."""
     head = "tolerance  accepted  rejected  calls  largest, median local error  global error"
     lines = ["step doubling; local errors in tolerances", head, "-" * len(head)]
     for d in doubling:

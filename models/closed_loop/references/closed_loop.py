@@ -45,24 +45,10 @@ def monolithic(
     state: Sequence[float] | None = None,
     real: type = np.longdouble,
 ) -> Columns:
-    """The closed loop in continuous time.
+    """The closed loop in continuous time: every one of `COLUMNS`, (times,), in `real`.
 
-    Parameters
-    ----------
-    parameters : mapping
-        Values of parameters, ``component.name``.
-    times : sequence of float
-        Times of the values, in s, ascending; the motion begins at the first.
-    state : sequence of float, optional
-        q1, q2, dq1, dq2, integral1, integral2 at the first time, in the units of the variables;
-        without it the parameters' start values.
-    real : type
-        Floating-point type to compute in.
-
-    Returns
-    -------
-    dict
-        Every one of `COLUMNS`, (times,), in `real`.
+    The motion begins at the first of `times` (s, ascending) with `state`: q1, q2, dq1, dq2,
+    integral1, integral2; without it, with the start values of the parameters.
     """
     loop, segments, start = prepare(parameters, real)
     times = _ascending(times, real)
@@ -97,29 +83,17 @@ def sampled(
     read: str = "before",
     real: type = np.longdouble,
 ) -> Columns:
-    """The closed loop as it is stepped with held inputs, each component solved exactly.
+    """The closed loop stepped with held inputs, each component solved exactly; as `monolithic`.
 
-    At the first point everything is consistent. Every step takes the components to the next point
-    with the inputs that they were given; then inputs are set from the outputs of that point.
+    At the first point everything is consistent. Every step takes the components to the next of
+    `times` with the inputs that they were given; then inputs are set from the outputs of that
+    point.
 
-    Parameters
-    ----------
-    parameters, state, real
-        As in `monolithic`.
-    times : sequence of float
-        Communication points in s, ascending.
-    order : str
-        ``jacobi``: all components step with the outputs of the point before; ``gauss_seidel``:
-        trajectory, controller and arm, each with the newest outputs of those before it;
-        ``gauss_seidel_arm_first``: the same for trajectory, arm and controller.
-    read : str
-        When the values of a point are read: ``before`` the inputs are set there, so that outputs
-        still have the inputs of the step, or ``after`` it.
-
-    Returns
-    -------
-    dict
-        Every one of `COLUMNS`, (times,), in `real`.
+    Order ``jacobi``: all components step with the outputs of the point before; ``gauss_seidel``:
+    trajectory, controller and arm, each with the newest outputs of those before it;
+    ``gauss_seidel_arm_first``: the same for trajectory, arm and controller. The values of a point
+    are read ``before`` the inputs are set there, so that outputs still have the inputs of the step,
+    or ``after``.
     """
     for what, value, items in (("order", order, ORDERS), ("read", read, READ)):
         if value not in items:
@@ -190,7 +164,7 @@ def prepare(parameters: Parameters, real: type) -> tuple[Loop, np.ndarray, np.nd
     loop.set({"segment.sign": -1 if values["trajectory.branch"] == "backward" else 1})
     if motion != "point_to_point":  # whose first angle is a parameter
         first = loop.references(segments[:1, 0], segments[:1])[0, 0]
-        turn = 2 * _pi(real)
+        turn = 8 * np.arctan(real(1))
         loop.set({"segment.whole_turns": -np.ceil((first - turn / 2) / turn)})
     return loop, segments, np.array([number[name] for name in STATE])
 
@@ -262,10 +236,6 @@ def _ascending(times: Sequence[float], real: type) -> np.ndarray:
     if times.ndim != 1 or len(times) == 0 or np.any(np.diff(times) <= 0):
         raise UserError("times must ascend")
     return times
-
-
-def _pi(real: type) -> np.floating:
-    return 4 * np.arctan(real(1))
 
 
 def _held_controller(

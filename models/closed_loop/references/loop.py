@@ -31,30 +31,19 @@ class Switch:
     def __call__(self, integrator: hy.taylor_adaptive, direction: int) -> bool:
         integrator.pars[self.at_limit] = 1 if direction * self.side > 0 else 0
         integrator.pars[self.level] = self.side * integrator.pars[self.bound]
-        return True  # go on
+        return True  # continue
 
 
 class Loop:
-    """Equations of one kind of path and one mode of the controller.
+    """Equations of one of `equations.PATHS` and one of `equations.MODES`.
 
     All that changes from run to run or within one is a runtime value, named like the variable:
 
-    - the parameters of the components, in `numbers`;
+    - the parameters of the components that are `numbers`;
     - ``segment.*``, the trajectory between two of its corners;
     - ``held.*``, what a component reads during a step;
     - ``at_limit*``, 1 where an effort is at the limit ``level*``, else 0;
     - ``back*`` in 1/(kg.m2.s) and 1/(kg.s), how fast the integral part gives way there.
-
-    Parameters
-    ----------
-    path : str
-        One of `equations.PATHS`.
-    mode : str
-        One of `equations.MODES`.
-    numbers : iterable of str
-        Names of the parameters that are numbers.
-    real : type
-        Floating-point type, `numpy.longdouble` or `float`.
     """
 
     def __init__(self, path: str, mode: str, numbers: Iterable[str], real: type) -> None:
@@ -128,12 +117,10 @@ class Loop:
         return action, limited, events
 
     def set(self, values: Mapping[str, float]) -> None:
-        """Set runtime values by name."""
         for name, value in values.items():
             self.values[self.place[name]] = value
 
     def get(self, *names: str) -> np.ndarray:
-        """Runtime values by name."""
         return np.array([self.values[self.place[name]] for name in names])
 
     def references(self, times: np.ndarray, coefficients: np.ndarray) -> np.ndarray:

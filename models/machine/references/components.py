@@ -31,11 +31,10 @@ class Ticks:
         self.next = 1
 
     def time(self, k: int) -> real:
-        """Time of tick k in s."""
         return self._start + k * self._period
 
     def until(self, end: real) -> Iterator[int]:
-        """Ticks that come until `end`, which is none itself: then the order would be open."""
+        """Ticks before `end`; none may be at `end`, where the order would be undefined."""
         while self.time(self.next) < end:
             yield self.next
             self.next += 1
@@ -89,10 +88,7 @@ class Sample:
 
 
 class Sensor:
-    """Encoders: counts at ticks, shown `latency` ticks later; velocities from their differences.
-
-    `samples` are those of all ticks, the start included.
-    """
+    """Encoders: counts at ticks (`samples`), shown `latency` ticks later; velocities from them."""
 
     INPUTS = ("q1", "q2")
 

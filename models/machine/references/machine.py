@@ -57,17 +57,16 @@ WIRES: dict[str, dict[str, str]] = {
     "sensor": {"q1": "plant.q1", "q2": "plant.q2"},
     "environment": {name: f"plant.{name}" for name in Environment.INPUTS},
 }
-DISCRETE = ("plant.mode1", "plant.mode2", "sensor.counts1", "sensor.counts2")
-DISCRETE = (*DISCRETE, "trajectory.payload_attached")
+DISCRETE = (
+    *("plant.mode1", "plant.mode2", "sensor.counts1", "sensor.counts2"),
+    "trajectory.payload_attached",
+)
 
 Parameters = Mapping[str, Value]
 
 
 class Plant(Motion):
-    """The plant with held inputs, in the shape of the other components.
-
-    What a new input changes at once, the modes and the payload, changes as the next step begins.
-    """
+    """The plant as a component; a new input changes modes and payload as the next step begins."""
 
     def step(self, inputs: dict[str, real], begin: real, end: real) -> None:
         """The motion until `end`, from event to event."""
@@ -88,16 +87,7 @@ class Plant(Motion):
 
 
 class Machine:
-    """One run.
-
-    Parameters
-    ----------
-    solver : Solver
-    parameters : mapping
-        Values of parameters and initial states, ``component.name``.
-    times : sequence of float
-        Communication points in s, ascending from 0.
-    """
+    """One run, with `parameters` ``component.name`` and communication points in s, from 0."""
 
     def __init__(self, solver: Solver, parameters: Parameters, times: Sequence[float]) -> None:
         self._times = np.asarray(times, real)
@@ -168,7 +158,6 @@ class Machine:
 
 @cache
 def declared() -> dict[str, Model]:
-    """What the FMUs of the components declare."""
     return {
         component: read_model(project.built(MODELS / folder, ".fmu"))
         for component, folder in COMPONENTS.items()
@@ -187,7 +176,7 @@ def completed(parameters: Parameters) -> dict[str, dict[str, Value]]:
 
 
 def columns() -> list[str]:
-    """Real outputs of all components, then states that are none, as `system` compares them."""
+    """All Real outputs, then the states that are not outputs, as `system` compares them."""
     outputs, states = [], []
     for component, model in declared().items():
         outputs += [f"{component}.{name}" for name in model.real_outputs]

@@ -64,18 +64,15 @@ def _tightest(samples: Sequence[Sample]) -> tuple[np.ndarray, dict[str, np.ndarr
     return np.array([samples[k].time for k in kept]), columns
 
 
-def make_continuous(parameters: Mapping[str, Value]) -> Files:
-    """Times and columns of monolithic.csv."""
-    times = communication_points(STOP, STEPS_PER_SECOND)[::KEPT]
-    return {"monolithic.csv": (times, monolithic(parameters, times))}
-
-
 def main() -> None:
     solver, known = Solver(), variants()
 
     def files(name: str) -> Files:
         found = make(solver, known[name])
-        return found | make_continuous(known[name]) if name in CONTINUOUS else found
+        if name in CONTINUOUS:
+            times = communication_points(STOP, STEPS_PER_SECOND)[::KEPT]
+            found["monolithic.csv"] = times, monolithic(known[name], times)
+        return found
 
     system_references.main(FOLDER, known, files)
 

@@ -46,14 +46,7 @@ Columns = dict[str, np.ndarray]
 
 
 class Monolith:
-    """The compiled equations of one variant.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Values of parameters and initial states, ``component.name``. Sample times, delay and the
-        sensor's parameters have no meaning here.
-    """
+    """The compiled equations of one variant; sample times, delay and sensor mean nothing here."""
 
     def __init__(self, parameters: Mapping[str, Value]) -> None:
         values = completed(parameters)
@@ -122,7 +115,6 @@ class Monolith:
         )
 
     def _reference(self) -> dict[str, hy.expression]:
-        """The reference motion as a function of time."""
         known = {
             sp.Symbol(name): self._par(name)
             for name in self._place
@@ -223,7 +215,7 @@ class Monolith:
                 raise UserError(f"{name} reaches its limit {float(self._numbers[limit])!r}")
 
     def _check_wall(self, columns: Columns) -> None:
-        """The wall has no place in the equations either."""
+        """The equations hold without contact with the wall only."""
         sources = (*EFFECTOR, "q1", "dq1")
         for row in zip(*(columns[f"plant.{name}"] for name in sources), strict=True):
             found = self._wall.outputs(dict(zip(Environment.INPUTS, row, strict=True)))

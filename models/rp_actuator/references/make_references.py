@@ -6,15 +6,13 @@ solved from the voltages, one case after the other, and not by clipping currents
 """
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from mpmath import mp, mpf
 
 MODEL_FOLDER = Path(__file__).resolve().parents[1]
-ROOT = MODEL_FOLDER.parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(MODEL_FOLDER.parents[1]))
 
 from rparm.models import reference_files
 from rparm.scenarios.scenario import Scenario
@@ -62,18 +60,10 @@ class Drive:
         return limited + (current - limited) * mp.exp(-h / self.time_constant)
 
 
-def input_table(scenario: Scenario) -> np.ndarray:
-    """Inputs at every communication point, (n + 1, inputs)."""
-    return np.stack([scenario.input(name) for name in INPUTS], 1)
-
-
 def simulate(scenario: Scenario) -> np.ndarray:
-    """Outputs at every communication point, (n + 1, outputs).
-
-    The inputs of row i are those of the step that ends there; row 0 has those of the start.
-    """
+    """Outputs (n + 1, outputs); row i has the inputs of the step before it, row 0 the first."""
     start = {name: mpf(float(value)) for name, value in scenario.start_values.items()}
-    inputs = input_table(scenario)
+    inputs = reference_files.input_table(scenario, INPUTS)
     times = [mpf(float(t)) for t in scenario.times]
     currents = [start["current1"], start["current2"]]
     rows = []
@@ -91,16 +81,9 @@ def simulate(scenario: Scenario) -> np.ndarray:
     return np.array(rows)
 
 
-def prepare() -> Callable[[Scenario, Path], None]:
-    """Return what writes the reference of a scenario to a folder."""
-
-    def write(scenario: Scenario, folder: Path) -> None:
-        outputs = simulate(scenario)[scenario.reference_rows]
-        inputs = input_table(scenario)
-        reference_files.write(scenario, folder, MODEL, (OUTPUTS, outputs), (INPUTS, inputs))
-
-    return write
+def write(scenario: Scenario, folder: Path) -> None:
+    reference_files.write(scenario, folder, MODEL, OUTPUTS, simulate(scenario), INPUTS)
 
 
 if __name__ == "__main__":
-    reference_files.main(MODEL_FOLDER, prepare)
+    reference_files.main(MODEL_FOLDER, lambda: write)

@@ -1,6 +1,6 @@
 """Makes the reference trajectories of the controller, without the code that they check.
 
-sympy derives the arm's equations of motion from the positions of both centers of mass; the laws are
+The equations of motion are those of the plant's references, from positions in sympy; the laws are
 those of the page. Between two communication points the inputs rest, and the integral parts obey
 linear equations that change where an effort meets a limit: their Taylor series, with 40 digits, is
 evaluated at the end of each piece, and the limit is located by bisection. The sampled form is the
@@ -16,15 +16,14 @@ import sympy as sp
 from mpmath import mp, mpf
 
 MODEL_FOLDER = Path(__file__).resolve().parents[1]
-ROOT = MODEL_FOLDER.parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(MODEL_FOLDER.parents[1]))
+
+from rparm.models.rp_plant.references import equations as plant
 
 from rparm.models import reference_files
 from rparm.scenarios.scenario import Scenario
 
 MODEL = "RPController"
-ARM = ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g")
-PAYLOAD = ("payload_mass", "payload_inertia", "payload_x", "payload_z")
 REFERENCES = ("q1_ref", "q2_ref", "dq1_ref", "dq2_ref", "ddq1_ref", "ddq2_ref")
 INPUTS = (*REFERENCES, "q1", "q2", "dq1", "dq2")
 ATTACHED = "payload_attached"
@@ -42,30 +41,16 @@ mp.dps = 40
 def equations_of_the_arm() -> Callable[..., tuple]:
     """Function of parameters, q and dq that gives D, C(q, dq) dq and g(q), by Euler-Lagrange.
 
-    The payload is a third body; it is attached where its mass and inertia are above 0.
+    Of the plant's equations, with the payload, where its mass and inertia are above 0.
     """
-    m1, m2, I1z, I2z, l1, lc1, a, g = sp.symbols(ARM)
-    mass3, Ip, cx, cz = sp.symbols(PAYLOAD)
-    q = sp.Matrix(sp.symbols("q1 q2"))
-    dq = sp.Matrix(sp.symbols("dq1 dq2"))
-    along = sp.Matrix([sp.cos(q[0]), sp.sin(q[0])])  # long side of link 1
-    across = sp.Matrix([-sp.sin(q[0]), sp.cos(q[0])])  # its short side
-    end = (l1 + q[1]) * along + a * across
-    centers = (lc1 * along, end, end + cz * along + cx * across)
-
-    kinetic = (I1z + I2z + Ip) * dq[0] ** 2 / 2
-    potential = sp.Integer(0)
-    for mass, center in zip((m1, m2, mass3), centers, strict=True):
-        velocity = center.jacobian(q) * dq
-        kinetic += mass * velocity.dot(velocity) / 2
-        potential += mass * g * center[1]
-    kinetic = sp.Matrix([sp.simplify(kinetic)])
-    momenta = kinetic.jacobian(dq).T
-    inertia = momenta.jacobian(dq)
-    coriolis = momenta.jacobian(q) * dq - kinetic.jacobian(q).T
-    gravity = sp.Matrix([potential]).jacobian(q).T
-    names = sp.symbols((*ARM, *PAYLOAD))
-    return sp.lambdify((*names, *q, *dq), (inertia, coriolis, gravity), "mpmath")
+    e = plant.derive()
+    unknown = [f"{name}{joint}" for name in plant.PER_JOINT for joint in (1, 2)]
+    alone = dict.fromkeys((*unknown, *plant.INPUTS), 0) | {"attached": 1}
+    forces = e.forces.subs(alone)
+    gravity = -forces.subs({"dq1": 0, "dq2": 0})
+    names = sp.symbols((*plant.ARM, *plant.PAYLOAD, *plant.STATES))
+    terms = e.inertia.subs(alone), -forces - gravity, gravity
+    return sp.lambdify(names, terms, "mpmath")
 
 
 class Law:
@@ -81,12 +66,10 @@ class Law:
                 for i in (1, 2)
             ]
         )
-        payload = [value[name] if value[ATTACHED] else mpf(0) for name in PAYLOAD]
-        inertia, coriolis, gravity = arm(
-            *(value[name] for name in ARM),
-            *payload,
-            *(value[name] for name in ("q1", "q2", "dq1", "dq2")),
-        )
+        payload = [value[name] if value[ATTACHED] else mpf(0) for name in plant.PAYLOAD]
+        known = (value[name] for name in plant.ARM)
+        state = (value[name] for name in plant.STATES)
+        inertia, coriolis, gravity = arm(*known, *payload, *state)
         if value["mode"] == COMPUTED_TORQUE:
             self.gain = inertia
             asked = mp.matrix([value["ddq1_ref"], value["ddq2_ref"]]) + correction
@@ -170,19 +153,14 @@ class Law:
         return [*self.limited(w), *self.error, *self.derror]
 
 
-def input_table(scenario: Scenario) -> tuple[tuple[str, ...], np.ndarray]:
-    """Inputs at every communication point, (n + 1, inputs); that of the payload only if given."""
-    names = (*INPUTS, ATTACHED) if ATTACHED in scenario.inputs else INPUTS
-    return names, np.stack([scenario.input(name).astype(float) for name in names], 1)
-
-
 class Laws:
     """The law of a scenario with the inputs that are held after each communication point."""
 
     def __init__(self, scenario: Scenario, arm: Callable[..., tuple]) -> None:
         self.arm = arm
         self.start = {name: mpf(float(value)) for name, value in scenario.start_values.items()}
-        self.names, self.inputs = input_table(scenario)
+        self.names = (*INPUTS, ATTACHED) if ATTACHED in scenario.inputs else INPUTS
+        self.inputs = reference_files.input_table(scenario, self.names)
         # times of the communication points are exact, their differences need not be
         self.times = [mpf(float(t)) for t in scenario.times]
 
@@ -192,10 +170,7 @@ class Laws:
 
 
 def simulate(laws: Laws) -> np.ndarray:
-    """Outputs at every communication point, (n + 1, outputs).
-
-    The inputs of row i are those of the step that ends there; row 0 has those of the start.
-    """
+    """Outputs (n + 1, outputs); row i has the inputs of the step before it, row 0 the first."""
     times = laws.times
     w = [mpf(0), mpf(0)]
     rows = []
@@ -236,9 +211,7 @@ def prepare() -> Callable[[Scenario, Path], None]:
     def write(scenario: Scenario, folder: Path) -> None:
         laws = Laws(scenario, arm)
         outputs = simulate_samples(laws) if laws.start["sample_time"] > 0 else simulate(laws)
-        rows = outputs[scenario.reference_rows]
-        inputs = laws.names, laws.inputs
-        reference_files.write(scenario, folder, MODEL, (OUTPUTS, rows), inputs)
+        reference_files.write(scenario, folder, MODEL, OUTPUTS, outputs, laws.names)
 
     return write
 

@@ -12,8 +12,7 @@ import numpy as np
 from mpmath import mp, mpf
 
 MODEL_FOLDER = Path(__file__).resolve().parents[1]
-ROOT = MODEL_FOLDER.parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(MODEL_FOLDER.parents[1]))
 
 from rparm.models import reference_files
 from rparm.scenarios.scenario import Scenario
@@ -40,26 +39,19 @@ def outputs(value: Mapping[str, float]) -> list[mpf]:
     return [force.real, force.imag, moment, max(depth, mpf(0)), size]
 
 
-def simulate(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
-    """Outputs (n + 1, outputs) and inputs (n + 1, inputs) at every communication point.
-
-    The inputs of row i of the outputs are those of the step that ends there; row 0 has those of
-    the start.
-    """
-    inputs = np.stack([scenario.input(name) for name in INPUTS], 1)
+def simulate(scenario: Scenario) -> np.ndarray:
+    """Outputs (n + 1, outputs); row i has the inputs of the step before it, row 0 the first."""
+    inputs = reference_files.input_table(scenario, INPUTS)
     rows = []
     with mp.workdps(DIGITS):
         for i in range(len(inputs)):
             held = dict(zip(INPUTS, inputs[max(i - 1, 0)].tolist(), strict=True))
-            rows.append([float(x) for x in outputs(dict(scenario.start_values) | held)])
-    return np.array(rows), inputs
+            rows.append([float(x) for x in outputs(scenario.start_values | held)])
+    return np.array(rows)
 
 
 def write(scenario: Scenario, folder: Path) -> None:
-    """Write the reference of one scenario to `folder`, in the FMI cross-check format."""
-    values, inputs = simulate(scenario)
-    chosen = values[scenario.reference_rows]
-    reference_files.write(scenario, folder, MODEL, (OUTPUTS, chosen), (INPUTS, inputs))
+    reference_files.write(scenario, folder, MODEL, OUTPUTS, simulate(scenario), INPUTS)
 
 
 if __name__ == "__main__":

@@ -16,8 +16,7 @@ import numpy as np
 import sympy as sp
 
 MODEL_FOLDER = Path(__file__).resolve().parents[1]
-ROOT = MODEL_FOLDER.parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(MODEL_FOLDER.parents[1]))
 
 from rparm.errors import UserError
 from rparm.models import reference_files
@@ -119,19 +118,12 @@ class Reference:
             fp_type=real,
         )
 
-    def inputs(self, scenario: Scenario) -> np.ndarray:
-        """Values of tau1 (N.m) and f2 (N) at every communication point, (n + 1, 2)."""
-        return np.stack([scenario.input(name) for name in INPUTS], 1)
-
     def simulate(self, scenario: Scenario) -> np.ndarray:
-        """Real outputs at every communication point, (n + 1, outputs).
-
-        The inputs of row i are those of the step that ends there; row 0 has those of the start.
-        """
+        """Outputs (n + 1, outputs); row i has the inputs of the step before it, row 0 the first."""
         value = scenario.start_values
         # time counts from the start; the differences of the communication points are exact
         elapsed = scenario.times.astype(self.real) - self.real(scenario.start)
-        inputs = self.inputs(scenario)
+        inputs = reference_files.input_table(scenario, INPUTS)
         held = np.concatenate((inputs[:1], inputs[:-1])).astype(self.real)
 
         integrator = self.integrator
@@ -156,11 +148,8 @@ class Reference:
         return self.evaluate(np.ascontiguousarray(states.T), pars=np.ascontiguousarray(runtime.T)).T
 
     def write(self, scenario: Scenario, folder: Path) -> None:
-        """Write the reference of one scenario to `folder`, in the FMI cross-check format."""
-        outputs = self.simulate(scenario)[scenario.reference_rows]
-        reference_files.write(
-            scenario, folder, MODEL, (self.outputs, outputs), (INPUTS, self.inputs(scenario))
-        )
+        values = self.simulate(scenario)
+        reference_files.write(scenario, folder, MODEL, self.outputs, values, INPUTS)
 
 
 if __name__ == "__main__":

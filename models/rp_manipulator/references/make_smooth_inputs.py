@@ -5,7 +5,6 @@ heyoka's Taylor method integrates in long double at its precision.
 """
 
 import argparse
-import functools
 import json
 import sys
 from pathlib import Path
@@ -18,13 +17,11 @@ from make_references import INPUTS, MODEL_FOLDER, PARAMETERS, STATES, derive
 from rparm import project
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import read_model
-from rparm.output_files import whole
+from rparm.output_files import write_text
 from rparm.runs import convergence
 from rparm.scenarios import scenario as scenarios
 from rparm.scenarios.scenario import Scenario
 from rparm.scenarios.signals import Sines
-
-equations = functools.cache(derive)
 
 ON_THE_WAY = 1000  # points at which the largest values are looked for
 
@@ -42,24 +39,12 @@ def signal(sines: Sines, real: type) -> hy.expression:
 def integrator(
     scenario: Scenario, inputs: dict[str, hy.expression], real: type = np.longdouble, pars: int = 0
 ) -> hy.taylor_adaptive:
-    """The motion of `scenario` from time 0 on, driven by `inputs`.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Gives the parameters and the initial states.
-    inputs : dict
-        tau1 (N.m) and f2 (N) as functions of heyoka's time and its parameters.
-    real : type
-        Floating-point type.
-    pars : int
-        How many of heyoka's parameters `inputs` uses.
-    """
+    """The motion from time 0, with tau1 (N.m) and f2 (N) of heyoka's time and `pars` parameters."""
     start = scenario.start_values
     names = {sp.Symbol(name): hy.expression(real(start[name])) for name in PARAMETERS}
     names |= {sp.Symbol(name): inputs[name] for name in INPUTS}
     states = hy.make_vars(*STATES)
-    ddq1, ddq2 = (hy.from_sympy(e, names) for e in equations().accelerations)
+    ddq1, ddq2 = (hy.from_sympy(e, names) for e in derive().accelerations)
     return hy.taylor_adaptive(
         list(zip(states, (states[2], states[3], ddq1, ddq2), strict=True)),
         np.array([start[name] for name in STATES], real),
@@ -89,11 +74,10 @@ def final_state(
 
 def write(scenario: Scenario, folder: Path) -> None:
     """Write the exact final state of `scenario` to `folder`."""
-    folder.mkdir(parents=True, exist_ok=True)
     final, largest = final_state(scenario)
     content = {"time": scenario.stop, "final": final, "largest": largest}
-    with whole(folder / project.exact_state_file(scenario.path).name) as path:
-        path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8", newline="\n")
+    file = project.exact_state_file(scenario.path).name
+    write_text(folder / file, json.dumps(content, indent=2) + "\n")
 
 
 def main() -> None:

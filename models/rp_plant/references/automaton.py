@@ -41,17 +41,10 @@ def accelerations(
     breakaway: np.ndarray,
     closed: Sequence[int],
 ) -> np.ndarray:
-    """Accelerations of both joints by Gauss' principle, (2,).
+    """Accelerations of both joints by Gauss' principle, (2,); joints that are not `at_rest` move.
 
-    Parameters
-    ----------
-    inertia, forces : ndarray, shapes (2, 2) and (2,)
-        Forces are all but those of stops and of dry friction of joints at rest.
-    at_rest : sequence of bool
-        The others move.
-    breakaway : ndarray, shape (2,)
-    closed : sequence of int
-        +1: the joint rests on its lower stop, -1: on its upper one, 0: on none.
+    `forces` are all but those of stops and of dry friction of joints at rest. `closed`: a joint
+    rests on its lower stop (+1), its upper one (-1), or none (0).
     """
     cost = [breakaway[i] if at_rest[i] else real(0) for i in (0, 1)]
     low = [real(0) if at_rest[i] and closed[i] > 0 else -np.inf for i in (0, 1)]

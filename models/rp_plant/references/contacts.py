@@ -1,7 +1,7 @@
 """Compliant stops: which joint is in which, and what it gets from there.
 
 With the penetration d and its rate d' a stop pushes with k d (1 + c d') and never pulls: where
-1 + c d' falls below 0 it lets go.
+1 + c d' falls below 0 it stops pushing.
 """
 
 from collections.abc import Mapping

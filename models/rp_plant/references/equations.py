@@ -99,10 +99,7 @@ def derive() -> Equations:
 
 
 def _dry_friction(s: dict[str, sp.Symbol], joint: int, rate: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Friction at a rate in its direction, and at rest at most.
-
-    `prepared` gives breakaway friction and Stribeck velocity that are never 0 in place of others.
-    """
+    """Friction at a rate in its direction, and at rest at most, of values that are `prepared`."""
     coulomb = s[f"coulomb_friction{joint}"]
     breakaway = s[f"breakaway_friction{joint}"]
     fall = sp.exp(-((rate / s[f"stribeck_velocity{joint}"]) ** 2))
@@ -110,7 +107,7 @@ def _dry_friction(s: dict[str, sp.Symbol], joint: int, rate: sp.Expr) -> tuple[s
 
 
 def prepared(values: dict[str, float]) -> dict[str, float]:
-    """Parameters of these equations from those of the FMU, whose zeros stand for something else."""
+    """Parameters of these equations from those of the FMU, where 0 means a default."""
     result = {name: float(values[name]) for name in PARAMETERS}
     for joint in (1, 2):
         if result[f"breakaway_friction{joint}"] == 0:

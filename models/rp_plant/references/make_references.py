@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 
 MODEL_FOLDER = Path(__file__).resolve().parents[1]
-ROOT = MODEL_FOLDER.parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(MODEL_FOLDER.parents[1]))
 
 from rparm.models.rp_plant.references.equations import INPUTS
 from rparm.models.rp_plant.references.motion import Motion
@@ -54,14 +53,8 @@ def prepare() -> Callable[[Scenario, Path], None]:
 
     def write(scenario: Scenario, folder: Path) -> None:
         names, values, _ = simulate(solver, scenario)
-        inputs = np.stack([scenario.input(name) for name in (*INPUTS, ATTACHED)], 1)
-        reference_files.write(
-            scenario,
-            folder,
-            MODEL,
-            (names, values[scenario.reference_rows]),
-            ((*INPUTS, ATTACHED), inputs),
-        )
+        inputs = (*INPUTS, ATTACHED)
+        reference_files.write(scenario, folder, MODEL, names, values, inputs)
 
     return write
 

@@ -61,7 +61,6 @@ class Motion(Plant):
                     return
 
     def _watch(self) -> np.ndarray:
-        """Numbers of this combination."""
         numbers = self._numbers
         sides = self._sides()
         for i, joint in enumerate((1, 2)):

@@ -29,15 +29,8 @@ class Joints:
 class Plant:
     """State, modes and sums from t = 0.
 
-    Parameters
-    ----------
-    solver : Solver
-    values : mapping
-        Parameters, initial states and inputs by the FMU's names.
-    rates : mapping, optional
-        Of the inputs, per s.
-    rest_height : float, optional
-        Bouncing ends where the next bounce goes no higher (rad, m).
+    `values` are parameters, initial states and inputs by the FMU's names, `rates` those of the
+    inputs per s. Bouncing ends where the next bounce goes no higher than `rest_height` (rad, m).
     """
 
     def __init__(
@@ -149,7 +142,7 @@ class Plant:
     def _judge(
         self, left: np.ndarray, at_rest: Sequence[bool], breakaway: np.ndarray, ddq: np.ndarray
     ) -> None:
-        """Note how near the decision is to another one."""
+        """Record how close the decision is to another one."""
         for i in (0, 1):
             if at_rest[i] and ddq[i] == 0:
                 closed = self._sides()[i]
@@ -161,7 +154,7 @@ class Plant:
                 self.margin = min(self.margin, abs(ddq[i]))
 
     def _decide(self) -> None:
-        """Who is held and who moves from now on."""
+        """Decide which joints are held and which move from now on."""
         ddq = self._gauss()
         breakaway = self._blocks()[3]
         for i in (0, 1):

@@ -6,7 +6,7 @@ could decide a count or the step of a tick is refused.
 """
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 
@@ -14,8 +14,7 @@ import mpmath as mp
 import numpy as np
 
 MODEL_FOLDER = Path(__file__).resolve().parents[1]
-ROOT = MODEL_FOLDER.parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(MODEL_FOLDER.parents[1]))
 
 from rparm.models import reference_files
 from rparm.scenarios.scenario import Scenario
@@ -54,13 +53,7 @@ def noise(seed: int, joint: int, tick: int) -> mp.mpf:
 
 
 class Encoder:
-    """What both joints of the sensor sample and show.
-
-    Parameters
-    ----------
-    value : mapping
-        Values of all parameters of the model by name.
-    """
+    """What both joints of the sensor sample and show, with the parameters `value` by name."""
 
     def __init__(self, value: Mapping[str, float]) -> None:
         self.seed = int(value["seed"])
@@ -103,15 +96,10 @@ class Encoder:
         return positions + rates
 
 
-def input_table(scenario: Scenario) -> np.ndarray:
-    """Inputs at every communication point, (n + 1, inputs)."""
-    return np.stack([scenario.input(name) for name in INPUTS], 1)
-
-
 def simulate(scenario: Scenario) -> np.ndarray:
     """Outputs at every communication point, (n + 1, outputs), with inputs held over each step."""
     encoder = Encoder(scenario.start_values)
-    inputs = input_table(scenario).tolist()
+    inputs = reference_files.input_table(scenario, INPUTS).tolist()
     times = [Fraction(t) for t in scenario.times.tolist()]
     encoder.sample(inputs[0])
     rows = [encoder.outputs()]
@@ -124,16 +112,9 @@ def simulate(scenario: Scenario) -> np.ndarray:
     return np.array([[float(x) for x in row] for row in rows])
 
 
-def prepare() -> Callable[[Scenario, Path], None]:
-    """Return what writes the reference of a scenario to a folder."""
-
-    def write(scenario: Scenario, folder: Path) -> None:
-        outputs = simulate(scenario)[scenario.reference_rows]
-        inputs = input_table(scenario)
-        reference_files.write(scenario, folder, MODEL, (OUTPUTS, outputs), (INPUTS, inputs))
-
-    return write
+def write(scenario: Scenario, folder: Path) -> None:
+    reference_files.write(scenario, folder, MODEL, OUTPUTS, simulate(scenario), INPUTS)
 
 
 if __name__ == "__main__":
-    reference_files.main(MODEL_FOLDER, prepare)
+    reference_files.main(MODEL_FOLDER, lambda: write)

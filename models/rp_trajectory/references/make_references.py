@@ -16,8 +16,7 @@ import numpy as np
 import sympy as sp
 
 MODEL_FOLDER = Path(__file__).resolve().parents[1]
-ROOT = MODEL_FOLDER.parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(MODEL_FOLDER.parents[1]))
 
 from rparm.models import reference_files
 from rparm.scenarios.scenario import Scenario
@@ -128,13 +127,7 @@ def joint_rates(
 
 
 class Motion:
-    """One motion; evaluates it at times that go forward, so that q1 stays continuous.
-
-    Parameters
-    ----------
-    value : dict
-        Values of all parameters of the model by name.
-    """
+    """One motion, with the parameters `value`; its times ascend, so that q1 stays continuous."""
 
     def __init__(self, value: dict[str, float | mp.mpf]) -> None:
         self.value = value
@@ -172,17 +165,15 @@ class Motion:
 
 
 def simulate(scenario: Scenario) -> np.ndarray:
-    """Values of OUTPUTS at every communication point of the reference, (rows, outputs)."""
+    """Values of OUTPUTS at every communication point, (n + 1, outputs)."""
     with mp.workdps(DIGITS):
         motion = Motion(scenario.start_values)
-        rows = [motion.outputs(t) for t in scenario.times[scenario.reference_rows]]
+        rows = [motion.outputs(t) for t in scenario.times]
         return np.array([[float(x) for x in row] for row in rows])
 
 
 def write(scenario: Scenario, folder: Path) -> None:
-    """Write the reference of one scenario to `folder`, in the FMI cross-check format."""
-    no_inputs = (), np.empty((len(scenario.times), 0))
-    reference_files.write(scenario, folder, MODEL, (OUTPUTS, simulate(scenario)), no_inputs)
+    reference_files.write(scenario, folder, MODEL, OUTPUTS, simulate(scenario), ())
 
 
 if __name__ == "__main__":

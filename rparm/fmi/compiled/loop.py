@@ -87,7 +87,6 @@ class Tangent:
 
     @property
     def fields(self) -> tuple[np.ndarray, ...]:
-        """As the loop takes it."""
         return self.derivatives, self.states, self.reals, self.integers, self.deviation
 
     @staticmethod
@@ -160,10 +159,7 @@ def _read(calls, wires, component, function):
 
 @njit(cache=True, nogil=True)
 def set_inputs(calls, reals, switches, always):
-    """Set all inputs, those that are Boolean only if they change or `always`.
-
-    Returns status, function and component.
-    """
+    """Set all inputs, Booleans if they change or `always`; status, function and component."""
     for c in range(len(calls)):
         status = _set(calls, reals, c, SET_REAL, True)
         if status >= DISCARD:

@@ -13,15 +13,7 @@ from rparm.fmi.fmi_instance import Instance
 
 
 class Stepper:
-    """Steps components that are wired to each other and to held inputs.
-
-    Parameters
-    ----------
-    reals, switches : sequence of Part
-        What each component exchanges, of Reals and of Booleans.
-    held_reals, held_switches : int
-        Numbers of inputs with zero-order hold.
-    """
+    """Steps components whose Reals and Booleans are wired to each other and to held inputs."""
 
     def __init__(
         self, reals: Sequence[Part], switches: Sequence[Part], held_reals: int, held_switches: int

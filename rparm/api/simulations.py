@@ -12,15 +12,14 @@ from rparm import project, trajectory_csv
 from rparm.coupling import in_process
 from rparm.errors import UserError, hint
 from rparm.federation import addresses, federation
-from rparm.federation.federation import Record
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Model, Value
+from rparm.output_files import written
 from rparm.proof import proven, prover
 from rparm.runs import given, reference, simulation
 from rparm.runs.given import Input
 from rparm.scenarios import scenario as scenarios
 from rparm.system import comparison, ecos, ssp, study
-from rparm.system.ssp import Ssp
 
 
 class Table(Mapping[str, np.ndarray]):
@@ -61,10 +60,8 @@ class Table(Mapping[str, np.ndarray]):
 
     def to_csv(self, path: str | Path) -> None:
         """Write all columns to a file, with 17 significant digits."""
-        try:
+        with written(path):
             trajectory_csv.write(Path(path), self._times, self._names, self._values)
-        except OSError as error:
-            raise UserError(f"{path}: cannot be written: {error.strerror}") from error
 
     def to_pandas(self) -> Any:
         """The columns as a pandas.DataFrame; pandas must be installed."""
@@ -265,7 +262,11 @@ class System:
             raise UserError(
                 f"{self.path}: has no variant {variant!r}{hint(variant, self.variants)}"
             )
-        engines = {"master": in_process.run, "ecos": ecos.run, "helics": _by_helics}
+        engines = {
+            "master": in_process.run,
+            "ecos": ecos.run,
+            "helics": lambda ssp, variant, _: federation.run(ssp, variant, addresses.free()),
+        }
         if engine not in engines:
             raise UserError(f"engine: expected one of {', '.join(engines)}, got {engine!r}")
         with ssp.unpacked(self.path) as opened:
@@ -292,17 +293,12 @@ class System:
         return known.study_coupling(self.path, Path(output))
 
 
-def _by_helics(opened: Ssp, variant: str, _: Sequence[str]) -> Record:
-    """Each FMU in its own process."""
-    return federation.run(opened, variant, addresses.free())
-
-
 def version(fmi: int) -> str:
     """Version of FMI by its first digit; UserError if it is none of `project.VERSIONS`."""
-    for version in project.VERSIONS:
-        if str(fmi) in (version, version[0]):
-            return version
-    raise UserError(f"fmi: expected 2 or 3, got {fmi!r}")
+    found = project.fmi_version(fmi)
+    if found is None:
+        raise UserError(f"fmi: expected 2 or 3, got {fmi!r}")
+    return found
 
 
 def _units(model: Model) -> dict[str, str | None]:

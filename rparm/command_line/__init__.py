@@ -6,8 +6,8 @@ from importlib import import_module
 from typing import NoReturn
 
 from rparm import project
+from rparm.command_line.options import add_common
 from rparm.errors import UserError, did_you_mean
-from rparm.options import add_common
 from rparm.project import PROGRAM
 
 DEFAULT = "run"  # what names and options without a command are for
@@ -142,7 +142,7 @@ class _Parser(argparse.ArgumentParser):
         raise Answered("help", self.format_help())
 
     def parse_args(self, *arguments, **keywords) -> argparse.Namespace:
-        """Propose the option that is meant by one that there is not."""
+        """Propose the closest option for an unknown one."""
         options, rest = self.parse_known_args(*arguments, **keywords)
         if rest:
             guess = did_you_mean(rest[0].partition("=")[0], self._option_string_actions)

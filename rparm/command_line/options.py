@@ -1,7 +1,8 @@
 """Options that several commands have, and the values that they take."""
 
 import argparse
-from collections.abc import Sequence
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -121,8 +122,23 @@ def names(given: Sequence[str]) -> list[str]:
     return [name.strip() for text in given for name in text.split(",") if name.strip()]
 
 
+def retyped(command: str, positional: Iterable[object], given: Mapping[str, object]) -> str:
+    """What to type for a command again, in the project's folder; without options not given."""
+    parts = [project.PROGRAM, command, *map(_typed, positional)]
+    for name, value in given.items():
+        if value is True:
+            parts.append(f"--{name}")
+        elif value is not None and value is not False and value != "" and value != []:
+            values = value if isinstance(value, list) else [value]
+            parts += [f"--{name}", *map(_typed, values)]
+    return shlex.join(parts)
+
+
+def _typed(value: object) -> str:
+    return str(project.from_root(value) if isinstance(value, Path) else value)
+
+
 def relative_tolerance(text: str) -> float:
-    """A relative tolerance."""
     with suppress(ValueError):
         if 0 < float(text) < 1:
             return float(text)
@@ -140,9 +156,8 @@ def _seconds(text: str) -> float:
 
 
 def _version(text: str) -> str:
-    """Version of FMI from its first digit or in full."""
-    for version in VERSIONS:
-        if text in (version, version[0]):
-            return version
+    version = project.fmi_version(text)
+    if version is not None:
+        return version
     known = " or ".join(version[0] for version in VERSIONS)
     raise argparse.ArgumentTypeError(f"expected {known}, got {text!r}")

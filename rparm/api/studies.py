@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rparm import project
-from rparm.errors import UserError
+from rparm.api.simulations import version
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value
-from rparm.simulations import version
 
 if TYPE_CHECKING:
     from rparm.identification.identify import Identification
@@ -171,5 +170,4 @@ def _needing(extra: str) -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError as error:
-        way_out = project.how_to_install(extra)
-        raise UserError(f"{error.name}: not installed, {way_out} does it") from error
+        raise project.not_installed(str(error.name), extra) from error
