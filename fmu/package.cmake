@@ -128,6 +128,9 @@ function(add_fmu name)
     COMMENT "Generating the interface of ${name}"
     VERBATIM)
   add_custom_target(${name}_generated DEPENDS ${generated})
+  if(ARG_EQUATIONS)
+    add_dependencies(${name}_generated ${name}_equations) # they have a command in common
+  endif()
   add_library(${name}_interface INTERFACE)
   target_include_directories(${name}_interface INTERFACE ${out})
   add_dependencies(${name}_interface ${name}_generated)
@@ -175,6 +178,10 @@ function(add_fmu name)
       VERBATIM)
   endif()
 
+  # make runs a command in each target that needs its output: here once, before the archives
+  add_custom_target(${name}_documents DEPENDS ${out}/documentation/index.html ${references})
+  add_dependencies(${name}_documents ${name}_generated)
+
   # what the archives of all versions and platforms have in common
   set(entries
       ${reference_entries}
@@ -210,6 +217,7 @@ function(add_fmu name)
       COMMENT "Packing ${below}${name}.fmu"
       COMMAND_EXPAND_LISTS VERBATIM)
     add_custom_target(${target}_fmu ALL DEPENDS ${fmu})
+    add_dependencies(${target}_fmu ${name}_documents)
 
     if(OWN_LIBM)
       add_source_code(${target}_sources LIBRARY ${target} FOLDER ${out}/${below}release

@@ -98,6 +98,7 @@ function(add_release_fmu name version)
     COMMENT "Packing release/${below}${name}.fmu"
     COMMAND_EXPAND_LISTS VERBATIM)
   add_custom_target(${target}_release DEPENDS ${fmu})
+  add_dependencies(${target}_release ${name}_documents)
   set_property(GLOBAL APPEND PROPERTY release_libraries ${libraries})
   set_property(GLOBAL APPEND PROPERTY release_files ${fmu})
   set_property(GLOBAL APPEND PROPERTY release_targets ${target}_release)
