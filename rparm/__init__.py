@@ -11,6 +11,7 @@ if TYPE_CHECKING:
         Scenario,
         System,
         Table,
+        build,
         fmu,
         identify,
         linearize,
@@ -19,7 +20,8 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
-    "Scenario", "System", "Table", "fmu", "identify", "linearize", "run_campaign", "simulate",
+    "Scenario", "System", "Table", "build", "fmu", "identify", "linearize", "run_campaign",
+    "simulate",
 ]  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""`rparm build` where it cannot end well: interrupted, without a compiler, in odd places."""
+"""`rparm build`, also from a program: interrupted, without a compiler, in odd places."""
 
 import json
 import os
@@ -8,8 +8,10 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import rparm
 from tests.equations.compiled import ModelFileError, runtime
 from tests.equations.examples import FOLDER
 from tests.support.paths import ROOT
@@ -106,3 +108,11 @@ def test_neither_fmu_nor_lock_file_is_there_if_one_fails(folder: Path) -> None:
 def test_a_folder_with_a_space_is_quoted(folder: Path) -> None:
     with started(folder, "new-model", "Spring", "--output", "and more") as process:
         assert "build 'and more/Spring.toml'" in process.communicate()[0]
+
+
+def test_a_program_builds_and_runs_a_model(folder: Path) -> None:
+    fmus = rparm.build(folder / "-decay.toml", output=folder / "of a program")
+    assert left(folder) == ["-decay.lock.toml", "Dahlquist.fmu", "Dahlquist.fmu"]
+    of_fmi2, of_fmi3 = (rparm.simulate(fmu, stop_time=2.0, step=0.1) for fmu in fmus)
+    assert of_fmi3["x"] == pytest.approx(np.exp(-of_fmi3["time"]), rel=1e-7)
+    assert np.array_equal(of_fmi2["x"], of_fmi3["x"])

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from fmpy.validation import validate_fmu
 
+import rparm
 from rparm import project, shipped
-from rparm.commands import build
 from rparm.errors import UserError
 from tests.platforms import scripts
 from tests.platforms.platforms import PLATFORMS, Missing, Platform, Runner, emulator_of, finish
@@ -170,9 +170,9 @@ def test_what_is_not_installed_is_named(
     (hidden / "__init__.py").unlink()
     hidden.rmdir()
     monkeypatch.setattr(project, "INSTALLED", True)
-    monkeypatch.setattr(build, "find_spec", lambda name: None if name == "pydantic" else True)
+    monkeypatch.setattr(project, "find_spec", lambda name: None if name == "pydantic" else True)
     with pytest.raises(UserError, match=r'^pydantic: not installed, pip install "rparm\[build\]"'):
-        build.run(None)
+        rparm.build(model)
 
 
 # ---- The programs that prove ---------------------------------------------------------------------

@@ -1,0 +1,92 @@
+"""FMUs of own equations: runs the program that makes them, and keeps all of its files or none."""
+
+import errno
+import os
+import shutil
+import subprocess
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+
+from rparm import project
+from rparm.errors import UserError, one_line
+from rparm.interruption import run_group, temporary_folder, uninterrupted
+from rparm.output_files import whole, written
+
+# what the program imports, beside this package
+NEEDED = ("latex2mathml", "markdown_it", "mdit_py_plugins", "pydantic")
+
+
+def build(
+    file: str | Path, *, output: str | Path = "", platforms: bool = False
+) -> tuple[Path, Path]:
+    """Make FMUs of the equations in a file; examples/models/README.md explains it.
+
+    Beside the file, NAME.lock.toml keeps the value references.
+
+    Parameters
+    ----------
+    file : path
+        The file with the equations.
+    output : path
+        Folder for the FMUs; default: the current one.
+    platforms : bool
+        For all platforms, by zig; else for this machine, by gcc, clang or zig.
+
+    Returns
+    -------
+    tuple of path
+        NAME.fmu of FMI 2.0 and fmi3/NAME.fmu of FMI 3.0.
+    """
+    project.check_installed(NEEDED, "build")
+    runtimes = project.runtimes(platforms)
+    with temporary_folder() as work:
+        lock, fmi2, fmi3 = _made(Path(file), runtimes, not platforms, work)
+        paths = Path(output) / fmi2, Path(output) / fmi3
+        targets = (Path(file).with_name(lock), *paths)
+        _put(dict(zip(targets, (work / name for name in (lock, fmi2, fmi3)), strict=True)))
+    return paths
+
+
+def _made(file: Path, runtimes: list[Path], of_this_machine: bool, work: Path) -> list[str]:
+    """Make the lock file and the FMUs in the folder `work`; their names."""
+    tool = project.model_builder()
+    command = [sys.executable, tool, "--output", work, "--runtime", *runtimes]
+    command += ["--of-this-machine"] if of_this_machine else []
+    # zig compiles its C library once; what a program that is killed leaves is in `work`
+    environment = {"ZIG_GLOBAL_CACHE_DIR": str(project.cache_folder("zig"))}
+    environment |= dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(work))
+    environment["PYTHONIOENCODING"] = "utf-8"
+    ended = run_group(
+        [*command, "--", file],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=project.child_environment() | environment,
+        encoding="utf-8",
+        errors="replace",
+    )
+    if ended.returncode:
+        lines = ended.stderr.strip().splitlines() or [f"{tool} ended with {ended.returncode}"]
+        raise UserError(one_line(lines[-1]))
+    return ended.stdout.splitlines()
+
+
+def _put(files: dict[Path, Path]) -> None:
+    """Copy files to the places that are their keys: all, or none if one fails."""
+    for place in files:
+        with written(place):
+            if place.is_dir():  # else the others would be there when it fails
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    with uninterrupted(), ExitStack() as stack:
+        for place, file in files.items():
+            with written(place):
+                place.parent.mkdir(parents=True, exist_ok=True)
+                if file.suffix == ".toml" and place.is_file() and _same(file, place):
+                    continue  # a lock file that has all: its folder may be read-only
+            stack.enter_context(written(place))
+            shutil.copyfile(file, stack.enter_context(whole(place)))
+
+
+def _same(file: Path, other: Path) -> bool:
+    return file.read_bytes() == other.read_bytes()
