@@ -32,8 +32,8 @@ PLATFORM = Path("src", "model", "platform.h")
 ELEMENTARY = "elementary_functions"
 RENAMES = "generated/elementary_functions.h"
 
-# not on every system, and nothing that they define is used
-NOT_NEEDED = {"endian.h", "features.h"}
+# nothing that they define is used; the first two are not on every system
+NOT_NEEDED = {"endian.h", "features.h", "sunmatrix/sunmatrix_sparse.h"}
 # every importer has them, and an FMU must not (FMI 3.0, section 2.5)
 OF_IMPORTERS = {"fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"}
 # behind conditions that never hold: options of SUNDIALS, and C++
