@@ -26,11 +26,11 @@ class Declaration:
 
     @property
     def guid(self) -> str:
-        """Hash of what defines the interface: all but texts, C names, terminals and experiment."""
+        """Hash of the interface: of all but texts, C names, terminals and experiment."""
         return self.token()
 
     def token(self, *versions: str) -> str:
-        """Hash of the interface, and of the names of versions that do not share the GUID."""
+        """Hash of the interface in the form of a GUID, other than `guid` if versions are named."""
         interface = {
             "model": self.model.name,
             "units": {name: unit.model_dump() for name, unit in self.units.items()},

@@ -191,6 +191,6 @@ class Events:
                 offset = at_zero.of(distance)
                 code.lines += at_zero.lines
                 holds, factor, rate = (code.of(v) for v in (relation.mode, factor, rate))
-                return f"relations_of_state({place}, {holds}, {factor}, {offset}, {rate})"
+                return f"relations_state_indicator({place}, {holds}, {factor}, {offset}, {rate})"
         limit = code.of(relation.limit or zero)
         return f"(struct indicator){{.kind = INDICATOR_OF_MODEL, .offset = fabs({limit})}}"

@@ -85,8 +85,8 @@ class Relation:
 class Graph:
     """Makes values, and finds those that exist.
 
-    A relation that compares what moves is a switch: a mode, `relations` has by its name what it
-    follows from. It changes at events only.
+    A relation of values that move is a switch: its result is a mode, which changes at events only.
+    `relations` has the relations by the names of their modes.
     """
 
     known: dict[tuple, Value] = field(default_factory=dict)
@@ -138,13 +138,13 @@ class Graph:
         return found[root]
 
     def relation(self, op: str, left: Value, right: Value) -> Value:
-        """A comparison: plain where nothing moves, else a switch."""
+        """A comparison of two values: a switch if one of them moves and the graph has switches."""
         if self.has_switches and (left.moves or right.moves):
             return self.switch(op, left, right)
         return self.value(op, left, right)
 
     def switch(self, op: str, left: Value, right: Value) -> Value:
-        """A comparison whose result changes at events only."""
+        """The mode of a comparison: its result, which changes at events only."""
         if op in ("<", "<="):
             left, right = right, left
         still = [side for side in (left, right) if not side.moves]

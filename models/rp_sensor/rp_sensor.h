@@ -10,8 +10,8 @@ enum { RP_SENSOR_COUNT_MAX = INT32_MAX };
 
 /* Output n, from 0 on, of the generator SplitMix64 that starts with `state`: Steele, Lea and Flood,
  * Fast splittable pseudorandom number generators, OOPSLA 2014, doi 10.1145/2660193.2660195; its
- * finalizer is variant 13 of Stafford. The generator counts, so each output is a hash of its
- * number.
+ * finalizer is variant 13 of Stafford. The generator's state is a counter, so each output is a hash
+ * of its number.
  */
 uint64_t rp_sensor_hash(uint64_t state, uint64_t n);
 

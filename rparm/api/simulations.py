@@ -122,7 +122,7 @@ def simulate(
     """
     path = Path(fmu)
     times = given.times(start_time, stop_time, step)
-    if not (given.is_number(tolerance) and 0 < tolerance < 1):
+    if not (given.is_finite_number(tolerance) and 0 < tolerance < 1):
         raise UserError(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")
     with Fmu(path) as opened:
         model = opened.model

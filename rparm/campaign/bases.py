@@ -171,7 +171,7 @@ class ScenarioBase(Base):
         return [(v.valueReference, v.derivative.valueReference) for v in found]
 
     def discrete_outputs(self, kind: str) -> list[int]:
-        """Value references of the outputs of a type that change at events only."""
+        """Value references of the discrete outputs of a type, "Real" or "Integer"."""
         return [
             v.reference
             for v in self._model.variables.values()

@@ -79,15 +79,15 @@ class SavedState:
         self._state = c_void_p()
 
     def take(self) -> None:
-        """Keep the present state, in place of the one kept before."""
+        """Save the present state, in place of the one saved before."""
         self._get(self._component, byref(self._state))
 
     def restore(self) -> None:
-        """Bring the instance back to the state kept, as often as wanted."""
+        """Bring the instance back to the saved state; may be called again."""
         self._put(self._component, self._state)
 
     def free(self) -> None:
-        """Free the state, if one is kept."""
+        """Free the saved state, if there is one."""
         if self._state.value is not None:
             self._free(self._component, byref(self._state))
 

@@ -17,26 +17,30 @@ ZERO = 1e-6  # of the fastest pole: smaller ones are 0, but for rounding
 
 POLES = (
     "A deviation along a pole grows or dies out as e to the power of its real part times the time. "
-    "Damping is 1 where nothing swings, 0 where it swings for ever, below 0 where it grows."
+    "Damping is 1 without oscillation, 0 if it does not decay, below 0 if it grows."
 )
 MARGINS = (
-    "Each says by how much one thing alone may change at the break until the loop swings for ever. "
-    "A gain of 2 means twice the effort; the delay is that of computing and transmission."
+    "Each says how far one quantity may change at the break, all else fixed, before the loop "
+    "oscillates without decay. A gain of 2 means twice the effort; the delay is that of computing "
+    "and transmission."
 )
 STEPS = (
     "Up to this communication step a small deviation dies out; beyond it the coupling makes it "
     "grow, though each component is integrated exactly. The frequency is that of the motion that "
     "grows."
 )
-POINT = "Values about which the model is linear. Far from them it says less: compare it with a run."
+POINT = (
+    "Values about which the model is linearized. Far from them it is less accurate: compare it "
+    "with a run."
+)
 EQUILIBRIUM = (
-    "All derivatives are 0, in a steady motion except those of positions. Dry friction or a stop "
-    "holds all from one end to the other, the others staying as they are. The value is in the "
-    "middle."
+    "All derivatives are 0, except those of positions in a steady motion. Where dry friction or a "
+    "stop holds a joint, every value between the two ends is an equilibrium while the others stay "
+    "as they are; the value shown is in the middle."
 )
 PICTURES = (
-    "Bode: by how much an output swings if an input does, and by how much later. "
-    "Dashed and dotted are samples of the same, with inputs held in between."
+    "Bode: amplitude and phase of an output's oscillation relative to an input's. "
+    "Dashed and dotted: the same, sampled, with inputs held between samples."
 )
 MATRICES = (
     "A row for each derivative of a state and each output, a column for each state and input. "
@@ -49,8 +53,8 @@ def notes(found: Study) -> list[str]:
     linear, texts = found.linear, []
     if linear.held:
         texts.append(
-            f"Held: {_names(linear.held)}. They stand still whatever the inputs do at first, by "
-            "friction, a stop or a gain of 0, and are left out."
+            f"Held: {_names(linear.held)}. They do not respond to small changes of the inputs, "
+            "because of friction, a stop or a gain of 0, and are left out."
         )
     if linear.left_out:
         texts.append(f"Left out, as they are discrete: {_names(linear.left_out)}.")

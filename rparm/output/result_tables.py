@@ -53,7 +53,7 @@ def _error(run: Run | None) -> str:
 
 
 def _count(number: int) -> str:
-    """A number of at most six characters."""
+    """A count in at most six characters: 1234567 as 1.23M."""
     return str(number) if number < 1_000_000 else f"{number / 1e6:.3g}M"
 
 

@@ -14,15 +14,15 @@ Input = float | bool | np.ndarray | Sequence[float] | tuple[Any, Any] | Callable
 WHOLE = 1e-9  # of a step: largest distance of the stop time from a communication point
 
 
-def is_number(given: object) -> bool:
-    """Whether it is a finite number."""
+def is_finite_number(given: object) -> bool:
+    """Whether it is a real number, neither infinite nor nan; a Boolean is none."""
     return isinstance(given, Real) and not isinstance(given, bool) and bool(np.isfinite(given))
 
 
 def times(start: float, stop: float, step: float) -> np.ndarray:
     """Communication points in s; UserError if no whole number of steps leads to the stop time."""
     for name, value in (("start_time", start), ("stop_time", stop), ("step", step)):
-        if not is_number(value):
+        if not is_finite_number(value):
             raise UserError(f"{name}: expected a finite number, got {value!r}")
     if start < 0 or stop <= start or step <= 0:
         raise UserError(
@@ -53,7 +53,11 @@ def start_values(model: Model, given: Mapping[str, Any]) -> dict[str, Value]:
 
 
 def input_values(model: Model, name: str, given: Any, times: np.ndarray) -> np.ndarray:
-    """Values of an input at all communication points, (n + 1,); UserError if one is wrong."""
+    """Values of an input at all communication points `times` (s), of their shape.
+
+    `given` is a number, a value for each point, a pair (times, values) to interpolate, or a
+    function of the time. UserError if a value is not finite or not in the input's range.
+    """
     with placed(f"inputs: {name}"):
         variable = model.find(name, INPUTS)
     boolean = variable.type == "Boolean"

@@ -208,7 +208,10 @@ def _components(ssp: "Ssp", fmu: str) -> str:
 def _check_values(
     ssp: "Ssp", variant: str, names: Sequence[str], times: np.ndarray, values: np.ndarray
 ) -> None:
-    """Refuse values that are not finite: names the component that the first of them is from."""
+    """UserError if a value is not finite: it names the component that the first of them is from.
+
+    `values` are (times, names); each name is component.variable.
+    """
     bad_rows = np.flatnonzero(~np.isfinite(values).all(axis=1))
     if not len(bad_rows):
         return

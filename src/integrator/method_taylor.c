@@ -29,7 +29,7 @@ struct taylor {
     bool is_searched;     /* for events, since the restart */
     double longest_scale; /* s: of the next step of the running advance */
     double last_length;   /* s: of the last step, or the one that a restart gave; 0: none */
-    double *end_x;        /* the state there */
+    double *end_x;        /* the state at the end of the last step */
     double *end_dx;       /* the derivative of the polynomial there, by its argument */
     double passed; /* s since the restart: where the step ended that goes past requested times;
                       -INFINITY: there is none */
@@ -83,7 +83,9 @@ static enum status restart(void *memory, const double x[]) {
 
 /* ---- Check ---------------------------------------------------------------------------------- */
 
-/* Makes the polynomial fit the equations at the end of the step: adds orders, or shortens it. */
+/* Makes the polynomial fit the equations at the end of the step, *step time scales long: adds
+ * orders, or halves *step, which counts as a failed step. is_long: the largest order is in use.
+ * Writes end_x and end_dx. */
 static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
                             struct method_work *work) {
     struct taylor_series *series = &taylor->series;
@@ -91,6 +93,7 @@ static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
         double defect;
         enum status status =
             taylor_series_measure_defect(series, *step, taylor->end_x, taylor->end_dx, &defect);
+        // within the bound, the first term left out is about a tolerance at most
         if (status != STATUS_OK || defect <= series->order + 1) {
             return status;
         }
@@ -123,12 +126,13 @@ static double longest_step_in_scales(const struct problem *problem, double t, do
     return longest < most ? longest : most;
 }
 
-/* Expands the solution about the state x at the time t. is_long: for a step as long as possible;
- * otherwise for one of `length` (s) at most, which is the time scale unless terms overflow. */
+/* Expands the solution about the state x at the time t (s since the restart). The time scale is
+ * `length` (s), or shorter where terms overflow. is_long: for a step as long as the largest order
+ * allows; otherwise for one of a time scale at most. */
 static enum status expand(struct taylor *taylor, double t, double length, bool is_long,
                           const double x[], struct method_work *work) {
-    const double first = taylor->longest_scale < length ? taylor->longest_scale : length;
-    for (double time_scale = first; time_scale >= DBL_MIN; time_scale *= shrinking) {
+    const double first_scale = taylor->longest_scale < length ? taylor->longest_scale : length;
+    for (double time_scale = first_scale; time_scale >= DBL_MIN; time_scale *= shrinking) {
         const double longest =
             is_long ? longest_step_in_scales(taylor->series.problem, t, time_scale) : 0.0;
         const enum status status = taylor_series_expand(&taylor->series, t, time_scale, x, longest);

@@ -227,6 +227,7 @@ ALWAYS_INLINE void sum_vectors(sunindextype n, int count, double a, N_Vector *X,
 
 /* ---- Tables of operations ------------------------------------------------------------------- */
 
+/* Constant lengths, for which the compiler unrolls the loops. */
 ALWAYS_INLINE sunindextype two(N_Vector x) {
     return 2;
 }

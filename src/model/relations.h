@@ -66,10 +66,11 @@ enum status relations_update(const struct relations *model, struct relations_roo
 const void *relations_followed(const struct relations *model, struct relations_room room,
                                const void *values, double t, void *copy);
 
-/* An indicator that is offset + factor x[state], before the sign of its mode; rate: of the state.
- */
-static inline struct indicator relations_of_state(size_t state, int holds, double factor,
-                                                  double offset, double rate) {
+/* The indicator of a relation whose distance is offset + factor x[state]: the distance where the
+ * relation holds, else its negative, so that it falls to 0 where the mode changes. rate: derivative
+ * of the state by the time; 0: unknown. */
+static inline struct indicator relations_state_indicator(size_t state, int holds, double factor,
+                                                         double offset, double rate) {
     const double sign = holds ? 1.0 : -1.0;
     return (struct indicator){.kind = INDICATOR_OF_STATE,
                               .state = state,

@@ -113,6 +113,7 @@ static struct jet scaled(struct ball factor, struct jet x) {
     return x;
 }
 
+/* The coefficient of an order of a row, with its derivatives; store writes it there. */
 static struct jet coefficient(const struct arm_series *s, int row, int order) {
     struct jet x;
     x.n = s->directions;

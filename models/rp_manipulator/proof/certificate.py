@@ -129,12 +129,14 @@ def read_problem(lines: Iterable[str]) -> Problem:
 
 
 def read_certificate(lines: Iterable[str], start_radii: list[fmpq]) -> Iterator[Step | fmpq]:
-    """Steps, and after those of each communication step the time of its end.
+    """The steps; after the last one of each communication step, the time of its end (s).
+
+    WrongClaim if a line is missing or out of order, or a number is not finite.
 
     Parameters
     ----------
     start_radii : list of fmpq
-        Those of the sides after the frame, which stay the same.
+        Radii of the sides after the frame, the same at the end of every step.
     """
     rows = map(str.split, lines)
 

@@ -93,7 +93,7 @@ struct rp_plant_motion {
     double reaction[2]; /* N.m, N: of a stuck joint friction - rigid stop, else 0 */
 };
 
-/* Friction of a joint at rest at most (N.m, N). */
+/* Breakaway friction: the largest of a joint at rest, N.m (joint 0) or N (joint 1). */
 double rp_plant_breakaway(const struct rp_plant_parameters *p, int joint);
 
 /* Friction of a joint that slides at a speed >= 0, by Stribeck's law. Its value at 0 is the

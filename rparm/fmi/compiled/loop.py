@@ -184,8 +184,11 @@ def read_outputs(calls, reals, switches):
 
 
 @njit(cache=True, nogil=True)
-def _growth(calls, derivatives, states, deviation, rate):
-    """Rate of change of a deviation of the first component's states; the status of the FMU."""
+def _deviation_rate(calls, derivatives, states, deviation, rate):
+    """Write the derivative by time of a deviation of the first component's states to `rate`.
+
+    Returns the status of the FMU.
+    """
     return directional_derivative(
         calls[0, 1 + DERIVATIVE],
         calls[0, 0],
@@ -276,7 +279,7 @@ def advance(
         if status >= DISCARD:
             return status, function, c, i
         if carried:
-            status = _growth(calls, derivatives, states, deviation, before)
+            status = _deviation_rate(calls, derivatives, states, deviation, before)
             if status >= DISCARD:
                 return status, DERIVATIVE, 0, i
         for c in range(len(calls)):
@@ -291,7 +294,7 @@ def advance(
         if carried:  # Heun's method
             for k in range(len(deviation)):
                 before[k] = deviation[k] + length * before[k]
-            status = _growth(calls, derivatives, states, before, after)
+            status = _deviation_rate(calls, derivatives, states, before, after)
             if status >= DISCARD:
                 return status, DERIVATIVE, 0, i
             for k in range(len(deviation)):

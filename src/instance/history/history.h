@@ -34,7 +34,8 @@ NONNULL double instance_horizon(const struct instance_state *state, struct clock
 /* Times since the restart count from the present time on. */
 NONNULL void instance_end_history(struct instance *instance);
 
-/* Prepares the integrator for an advance to the time end by this continuation. */
+/* Prepares the integrator to advance to the time end: replays its history, restarts it, or does
+ * nothing, as the continuation says. */
 MUST_CHECK NONNULL enum status instance_prepare_history(struct instance *instance,
                                                         struct clock_time end,
                                                         enum continuation continuation);

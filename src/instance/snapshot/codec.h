@@ -29,7 +29,8 @@ void codec_end(struct codec *codec);
  * length: bytes expected in all. */
 const char *codec_check(struct codec *codec, const char *guid, size_t length);
 
-/* One field, 8 bytes. The name is static text, of a field whose type does not have all values. */
+/* Read, write or count one field, 8 bytes. If the value read is none of the type, *value stays and
+ * the field is the bad one, unless there is one already. name: static text. */
 void codec_real(struct codec *codec, double *value);
 void codec_int64(struct codec *codec, int64_t *value);
 void codec_int(struct codec *codec, const char *name, int *value);

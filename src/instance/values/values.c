@@ -13,8 +13,8 @@ enum array { VALUE_TYPE_LIST(ARRAY_OF) };
 
 _Static_assert(sizeof(bool) == 1, "a bool is read as a byte");
 
-/* Element i. Every int is exact as a double; an int64_t that is not is no item of an enumeration. A
- * bool is read as a byte: one that is neither 0 nor 1 is refused, not undefined. */
+/* Element i as a double: exact for every int, and for every int64_t that is an item of an
+ * enumeration. A bool is read as a byte, so that one which is neither 0 nor 1 can be refused. */
 ALWAYS_INLINE double element(enum array array, const void *values, size_t i) {
     switch (array) {
     case ARRAY_OF_REAL:
