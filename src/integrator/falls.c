@@ -29,10 +29,10 @@ static double fall_behind(const struct roots_polynomial *p, double s) {
 /* The first s at which p, below the level before, is above it; INFINITY: it stays below. */
 static double first_rise(const struct roots_polynomial *p, double level) {
     double c[ROOTS_LENGTH];
-    for (int k = 0; k <= p->degree; k++) {
+    c[0] = level - p->c[0];
+    for (int k = 1; k <= p->degree; k++) {
         c[k] = -p->c[k];
     }
-    c[0] += level;
     const struct roots_polynomial below = {.c = c, .degree = p->degree, .noise = -1.0};
     return roots_first(&below);
 }

@@ -219,7 +219,8 @@ static enum status sample_between(struct location *location, struct piece *piece
     const int count = 2 * piece->count - 1;
     for (size_t i = 0; i < location->ode->indicator_count; i++) {
         for (int k = piece->count - 1; k > 0; k--) {
-            location->samples[i][2 * k] = location->samples[i][k];
+            const int twice = 2 * k;
+            location->samples[i][twice] = location->samples[i][k];
         }
     }
     enum status status = STATUS_OK;

@@ -131,8 +131,8 @@ static double longest_step_in_scales(const struct problem *problem, double t, do
  * allows; otherwise for one of a time scale at most. */
 static enum status expand(struct taylor *taylor, double t, double length, bool is_long,
                           const double x[], struct method_work *work) {
-    const double first_scale = taylor->longest_scale < length ? taylor->longest_scale : length;
-    for (double time_scale = first_scale; time_scale >= DBL_MIN; time_scale *= shrinking) {
+    double time_scale = taylor->longest_scale < length ? taylor->longest_scale : length;
+    while (time_scale >= DBL_MIN) {
         const double longest =
             is_long ? longest_step_in_scales(taylor->series.problem, t, time_scale) : 0.0;
         const enum status status = taylor_series_expand(&taylor->series, t, time_scale, x, longest);
@@ -142,6 +142,7 @@ static enum status expand(struct taylor *taylor, double t, double length, bool i
             return status;
         }
         work->failed_steps++;
+        time_scale *= shrinking;
     }
     return STATUS_NOT_FINITE;
 }

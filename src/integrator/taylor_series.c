@@ -42,9 +42,10 @@ void taylor_series_destroy(struct taylor_series *series) {
 void taylor_series_configure(struct taylor_series *series) {
     const double e = 2.718281828459045;
     int order = 8; // at a tolerance of 1
-    for (double left = series->problem->settings.relative_tolerance;
-         left < 1.0 && order < SERIES_LENGTH - 1; left *= e * e) {
+    double left = series->problem->settings.relative_tolerance;
+    while (left < 1.0 && order < SERIES_LENGTH - 1) {
         order++;
+        left *= e * e;
     }
     series->largest_order = order + 1 - order % 2;
     series->expected_order = LEAST_ORDER;

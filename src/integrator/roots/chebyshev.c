@@ -29,12 +29,13 @@ double chebyshev_point(int count, int k) {
  */
 static void transform(int count, const double values[], double coefficients[]) {
     const int last = count - 1;
+    const int spacing = LAST / last;
     double weighted[CHEBYSHEV_LENGTH];
     for (int k = 1; k <= last; k++) {
         weighted[k] = (k == last ? 0.5 : 1.0) * (values[k] - values[0]);
     }
     for (int i = 0; i <= last; i++) {
-        const unsigned step = (unsigned)(i * (LAST / last));
+        const unsigned step = (unsigned)(i * spacing);
         double sum = 0.0;
         for (int k = last; k > 0; k--) {
             sum += weighted[k] * cosine((unsigned)(last - k) * step);

@@ -61,11 +61,11 @@ NONNULL static inline bool roots_is_above(const struct roots_polynomial *p) {
     // more than the rounding here and that of Horner's scheme, as parts of each coefficient
     const double slack = 0x1p-45;
     const bool is_at_root = fabs(p->c[0]) <= p->noise;
-    const double *c = is_at_root ? p->c + 1 : p->c;
-    const int degree = is_at_root ? p->degree - 1 : p->degree;
-    if (degree < 2) {
+    if (p->degree < (is_at_root ? 3 : 2)) {
         return false;
     }
+    const double *c = is_at_root ? p->c + 1 : p->c;
+    const int degree = is_at_root ? p->degree - 1 : p->degree;
     double odd = 0.0;
     double even = 0.0;
     int k = 3;
