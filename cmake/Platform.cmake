@@ -67,7 +67,7 @@ if(PLATFORM MATCHES "^x86_64")
   # gcc would copy and clear structures by rep movs and rep stos, which start slowly: FMI 3.0 took up to 1.13 of 2.0 by that
   foreach(function memcpy memset)
     list(APPEND language_options
-      $<$<C_COMPILER_ID:GNU>:-m${function}-strategy=unrolled_loop:512:noalign,libcall:-1:noalign>)
+      $<$<C_COMPILER_ID:GNU>:-m${function}-strategy=unrolled_loop:128:noalign,libcall:-1:noalign>)
   endforeach()
 endif()
 set(FMU_LIBRARY_NAME NO_SONAME ON)
