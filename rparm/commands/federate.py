@@ -32,6 +32,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> Ended:
     screen.apart()
     addresses.check_form(options.broker)
+    addresses.check_host()
     if KEY not in os.environ:
         raise UserError(f"{KEY}: not in the environment, copy the whole line of the federation")
     key()

@@ -13,8 +13,22 @@ LOCAL = "127.0.0.1"
 PAUSE = 0.2  # s, before the next attempt to connect
 
 
+def check_host() -> None:
+    """UserError where HELICS finds no address, not even 127.0.0.1: with no other one of IPv4."""
+    try:
+        # as HELICS asks: glibc does not count loopback
+        flags = socket.AI_ADDRCONFIG
+        socket.getaddrinfo(LOCAL, None, socket.AF_INET, socket.SOCK_STREAM, 0, flags)
+    except socket.gaierror as error:
+        raise UserError(
+            f"HELICS needs an IPv4 address besides {LOCAL}: connect to a network, or, on "
+            "Linux as root: ip address add 192.0.2.1/32 dev lo"
+        ) from error
+
+
 def free() -> str:
-    """An address on this machine at which nothing listens."""
+    """An address on this machine at which nothing listens; UserError if HELICS finds none."""
+    check_host()
     with socket.socket() as probe:
         probe.bind((LOCAL, 0))
         return f"tcp://{LOCAL}:{probe.getsockname()[1]}"
@@ -30,6 +44,7 @@ def check_form(address: str) -> tuple[str, int]:
 
 def check_free(address: str) -> None:
     """UserError if no broker can listen at `address`."""
+    check_host()
     refusal = _refusal(*check_form(address))
     if refusal:
         raise UserError(f"nothing can listen at {address}: {refusal}")

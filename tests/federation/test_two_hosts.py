@@ -1,9 +1,10 @@
-"""A federation over two hosts, network namespaces with a link between them."""
+"""A federation over two hosts, network namespaces with a link between them, and on one offline."""
 
+import subprocess
 from pathlib import Path
 
 from tests.federation.processes import Process, Start, federation, wait_for_steps
-from tests.support.hosts import Network
+from tests.support.hosts import DEVICE, Network
 from tests.support.ssp_files import SSP, edited, replace
 
 LIMIT = 90.0  # s
@@ -41,3 +42,12 @@ def test_a_lost_link_ends_both(start: Start, apart: Network, tmp_path: Path) -> 
         text, _ = process.communicate(timeout=LIMIT)
         assert process.returncode == 2, text
         assert f"{words} for 10 s" in text.splitlines()[-1]
+
+
+def test_what_a_host_without_a_network_lacks_is_said(start: Start, apart: Network) -> None:
+    command = ("ip", "address", "flush", "dev", DEVICE)
+    subprocess.run([*apart.here.enter, *command], check=True)
+    offline = federation(start, system=SSP, host=apart.here)
+    text, _ = offline.communicate(timeout=LIMIT)
+    assert offline.returncode == 2
+    assert "needs an IPv4 address besides 127.0.0.1" in text.splitlines()[-1]
