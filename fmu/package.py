@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import struct
 import sys
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from atomic_write import atomic_write
 from program import program
-from universal import universal
 
 FIXED_DATE = (1980, 1, 1, 0, 0, 0)
 UNIX = 3
+
+LIBRARY = b"\xcf\xfa\xed\xfe"  # magic of a file for one processor with 64 bits
+UNIVERSAL = 0xCAFEBABE  # of one for several
+# by the first number of the processor: pages have 2**n bytes
+PAGES = {0x01000007: 12, 0x0100000C: 14}  # x86_64, Arm
 
 
 def collect(entries: list[str]) -> list[tuple[str, Path]]:
@@ -55,6 +61,30 @@ def pack(archive: Path, files: list[tuple[str, Path]]) -> None:
             # the level of the archive would not hold for a ZipInfo
             content = parts[0] if len(parts) == 1 else universal(parts)
             target.writestr(info, content, compresslevel=9)
+
+
+def universal(libraries: Sequence[bytes]) -> bytes:
+    """One library with the code of several processors, as lipo makes it.
+
+    ValueError if one is not for macOS, or two are for one processor.
+    """
+    parts = {}
+    for library in libraries:
+        processor, kind = struct.unpack_from("<II", library.ljust(12, b"\0"), 4)
+        if not library.startswith(LIBRARY) or processor not in PAGES or processor in parts:
+            raise ValueError("only libraries for macOS, each for another processor, can be joined")
+        parts[processor] = (kind, library)
+    head = struct.pack(">II", UNIVERSAL, len(parts))
+    end = len(head) + 20 * len(parts)
+    body = b""
+    for processor, (kind, library) in sorted(parts.items()):
+        page = PAGES[processor]
+        gap = -(end + len(body)) % 2**page
+        body += bytes(gap) + library
+        head += struct.pack(
+            ">IIIII", processor, kind, end + len(body) - len(library), len(library), page
+        )
+    return head + body
 
 
 @program(ValueError)
