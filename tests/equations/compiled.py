@@ -21,7 +21,6 @@ __all__ = [
 ]  # fmt: skip
 
 BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).parent
-RUNTIME = BUILD / "runtime" / "runtime.json"
 LENGTH = 32  # SERIES_LENGTH
 WORDS = ["size"] + [f"{part}_{key}" for part in "puxd" for key in ("offset", "size")]
 WORDS += ["right_hand_side", "jacobian", "series", "outputs", "propagate", "check", "events"]

@@ -7,7 +7,7 @@
  *   - HALF_ULP times every rounded value, for its rounding,
  *   - TINY, where products may underflow,
  * and is enlarged by OUTWARD for the roundings of that sum itself, fewer than 30 of 2^-53 each.
- * What overflows has an infinite radius or parts that are no numbers: `ball_largest` tells. */
+ * What overflows has an infinite radius or parts that are not numbers; `ball_largest` shows it. */
 #ifndef BALL_H
 #define BALL_H
 
