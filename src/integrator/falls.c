@@ -26,6 +26,19 @@ static double fall_behind(const struct roots_polynomial *p, double s) {
     return INFINITY;
 }
 
+/* The first s at which p falls to 0, or 1 if it ends there: a touch is no fall. INFINITY: neither.
+ */
+static double fall_or_end(const struct roots_polynomial *p) {
+    struct root roots[ROOTS_LENGTH];
+    const int count = roots_find(p, roots);
+    for (int i = 0; i < count; i++) {
+        if (roots[i].kind == ROOT_FALLS || roots[i].s == 1.0) {
+            return roots[i].s;
+        }
+    }
+    return INFINITY;
+}
+
 /* The first s at which p, below the level before, is above it; INFINITY: it stays below. */
 static double first_rise(const struct roots_polynomial *p, double level) {
     double c[ROOTS_LENGTH];
@@ -98,12 +111,16 @@ double fall_first(const struct roots_polynomial *p, double error, double latest,
     if (!*is_armed) {
         double within = fmax(error, *noise);
         if (p->c[0] <= -within) {
-            within = -2.0 * p->c[0];
+            within -= (1.0 + 0x1p-10) * p->c[0]; // doubled, fall after fall would lead far below
             *noise = within;
         }
         return first_fall_from_zero(p, within, is_armed);
     }
     // from below 0 it can only rise by the error of the polynomial
     const bool rises = p->degree > 0 && p->c[0] <= 0.0 && p->c[1] > 0.0;
-    return rises ? fall_behind(p, 0.0) : roots_first(p);
+    if (rises) {
+        return fall_behind(p, 0.0);
+    }
+    const double s = roots_first(p);
+    return s > 0.0 && s < 1.0 ? fall_or_end(p) : s;
 }

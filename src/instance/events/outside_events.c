@@ -7,25 +7,39 @@
 #include <math.h>
 #include <string.h>
 
-/* In the unit of an indicator: how far from its root integrators stop. */
+/* Of the size of an indicator: how far from its root integrators stop. */
 static const double near_root = 1e-10;
 
-/* What is added to an indicator: it falls to 0 only this far beyond its root. A mode may begin at
- * the root, and integrators miss falls that begin at 0. For an indicator of a state: far above the
- * rounding of its two parts, which are the state's nominal value and the offset, and far below the
- * error of integrators. For one of the model: so large that the force is past its limit wherever an
- * integrator stops, however the inputs move. */
-static double band_of(const struct instance *instance, const struct indicator *indicator) {
-    if (indicator->kind == INDICATOR_UNUSED) {
-        return 0.0;
+/* The size of an indicator of a state. */
+static double size_of(const struct instance *instance, const struct indicator *indicator) {
+    return fabs(indicator->factor) * instance_nominal(instance, indicator->state) +
+           fabs(indicator->offset);
+}
+
+/* Writes what is added to each indicator: it falls to 0 only this far beyond its root. A mode may
+ * begin at the root, and integrators miss falls that begin at 0. For an indicator of a state: far
+ * above the rounding of its two parts, which are the state's nominal value and the offset, and far
+ * below the error of integrators. For one of the model: so large that the force is past its limit
+ * wherever an integrator stops, however the inputs move. Writes the kinds of indicators, too. */
+static void write_bands(struct instance *instance, double bands[]) {
+    const struct model_events *events = instance->model->events;
+    events->describe(instance->memory.values, instance->indicators);
+    if (events->errors != NULL) {
+        double *errors = doubles_of(instance->first_derivatives, instance->model->states);
+        instance_write_location_errors(instance, errors);
+        events->errors(instance->memory.values, instance->state.time.s, errors, 1e-12, bands);
     }
-    if (indicator->kind == INDICATOR_OF_MODEL) {
-        return 2.0 * near_root + 1e-9 * fabs(indicator->offset);
+    for (size_t i = 0; i < events->indicator_count; i++) {
+        const struct indicator *indicator = &instance->indicators[i];
+        if (indicator->kind == INDICATOR_UNUSED) {
+            bands[i] = 0.0;
+        } else if (indicator->kind == INDICATOR_OF_STATE) {
+            const double nominal = instance_nominal(instance, indicator->state);
+            bands[i] = 1e-12 * fabs(indicator->factor) * nominal + 1e-14 * fabs(indicator->offset);
+        } else if (events->errors == NULL) {
+            bands[i] = 2.0 * near_root + 1e-9 * fabs(indicator->offset);
+        }
     }
-    const double relative = instance->state.own.effective_relative_tolerance;
-    const double nominal =
-        instance->absolute_tolerances[indicator->state] / (INSTANCE_ABSOLUTE_FRACTION * relative);
-    return 1e-12 * fabs(indicator->factor) * nominal + 1e-14 * fabs(indicator->offset);
 }
 
 void instance_add_bands(struct instance *instance) {
@@ -33,24 +47,30 @@ void instance_add_bands(struct instance *instance) {
     if (description->indicator_count == 0) {
         return;
     }
-    instance->model->events->describe(instance->memory.values, instance->indicators);
+    write_bands(instance, instance->z);
     for (size_t i = 0; i < description->indicator_count; i++) {
         double *z = instance_field(instance, variable_of(description, description->indicators[i]));
-        *z += band_of(instance, &instance->indicators[i]);
+        *z += instance->z[i];
     }
 }
 
 /* s: the slope of an indicator is its difference over this time. */
 static const double slope_time = 1e-7;
 
-/* Indicator i has come to 0 and does not rise; z_ahead: after slope_time. Where a mode has just
+/* An indicator has come to 0 and does not rise; z_ahead: after slope_time. Where a mode has just
  * begun at 0, rounding may let it fall, but not past the band. */
-static bool has_triggered(const struct instance *instance, size_t i, double z, double z_ahead) {
-    const struct indicator *indicator = &instance->indicators[i];
-    if (indicator->kind == INDICATOR_OF_MODEL) {
+static bool has_triggered(const struct instance *instance, const struct indicator *indicator,
+                          double z, double z_ahead, double band) {
+    switch (indicator->kind) {
+    case INDICATOR_UNUSED:
+        return false;
+    case INDICATOR_OF_MODEL:
         return z < 0.0;
+    case INDICATOR_OF_STATE:
+        break;
     }
-    return z <= near_root && z_ahead <= z && z_ahead + band_of(instance, indicator) <= 0.0;
+    const bool is_near = z <= near_root * size_of(instance, indicator);
+    return is_near && z_ahead <= z && z_ahead + band <= 0.0;
 }
 
 /* Writes all indicators, and their kinds. */
@@ -81,8 +101,13 @@ static enum status find_triggered(struct instance *instance, bool triggered[], b
     if (status == STATUS_OK) {
         status = evaluate(instance, ahead, z_ahead);
     }
+    double *bands = z_ahead + model->events->indicator_count;
+    if (status == STATUS_OK) {
+        write_bands(instance, bands);
+    }
     for (size_t i = 0; status == STATUS_OK && i < model->events->indicator_count; i++) {
-        triggered[i] = has_triggered(instance, i, z[i], z_ahead[i]);
+        triggered[i] =
+            has_triggered(instance, &instance->indicators[i], z[i], z_ahead[i], bands[i]);
         *is_any |= triggered[i];
     }
     return status;
