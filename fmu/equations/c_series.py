@@ -135,7 +135,8 @@ class Series:
         else:
             found = self._of_operation(value)
         if value not in self.rows:
-            return found if " " not in found else self.later.constant(found)
+            is_plain = " " not in found and not found.startswith("-")
+            return found if is_plain else self.later.constant(found)
         target = f"row[{self.rows[value]}][k]"
         self.later.lines.append(f"{target} = {found};")
         return target

@@ -1,6 +1,7 @@
 """Random equations against mpmath: values, Jacobians, derivatives along a curve, Taylor series."""
 
 import random
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -121,6 +122,41 @@ def test_series_fits_the_equations(case: tuple) -> None:
             expected = mpmath.taylor(side, 0, order - 1)
             for k in range(order):
                 close((k + 1) * polynomials[name][k + 1], expected[k])
+
+
+def minus(chance: random.Random, depth: int) -> str:
+    """Text of nothing but signs and differences."""
+    if depth == 0:
+        return chance.choice(["p", "u", "time", "0.5", f"x{chance.randrange(24)}"])
+    inner = minus(chance, depth - 1)
+    left = minus(chance, chance.randrange(2))
+    return chance.choice([f"-{inner}", f"-({inner})", f"{left} - {inner}", f"{left} - ({inner})"])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_signs_and_differences_nest(tmp_path: Path, seed: int) -> None:
+    """Coefficients are as linear as differences: Python takes these of arrays."""
+    chance = random.Random(seed)
+    texts = {f"x{i}": minus(chance, 1 + i // 3) for i in range(24)}
+    states = "".join(f'{name} = {{ derivative = "{text}" }}\n' for name, text in texts.items())
+    head = 'name = "Minus"\n[parameters]\np = { start = 1 }\n[inputs]\nu = {}\n[states]\n'
+    model = Model(tmp_path, head + states)
+    point = {name: chance.uniform(-1, 1) for name in (*texts, "p", "u", "time")}
+    scale, inputs = 0.5, np.array([[point["u"], 0.3, -0.2, 0.1]])
+    values = model.values(**point)
+    rows = model.series(values, point["time"], scale, inputs, 6)
+    rest = np.zeros(6)
+    known = {name: rows[i, :6] for i, name in enumerate(texts)} | {
+        "u": np.array([*inputs[0], 0, 0])
+    }
+    known |= {"p": rest, "time": np.array([0, scale, 0, 0, 0, 0])}
+    model.outputs(values, point["time"])
+    for i, (name, text) in enumerate(texts.items()):
+        value = eval(text, dict(point))
+        assert values[model.names.index(f"d_{name}")] == value
+        expected = eval(re.sub(r"\b0\.5\b", "rest", text), known | {"rest": rest})
+        expected = np.array([value, *np.asarray(expected)[1:]]) * scale / np.arange(1, 7)
+        np.testing.assert_allclose(rows[i, 1:], expected, rtol=0, atol=1e-14)
 
 
 def test_a_branch_that_is_not_taken_may_be_undefined(tmp_path: Path) -> None:
