@@ -20,6 +20,8 @@ Leaves = Mapping[tuple[str, str], str]  # where C has a leaf, by its operation a
 
 def number(value: float) -> str:
     """A double that reads back as the same."""
+    if math.isnan(value):
+        return "NAN"
     return f"({value!r})" if math.copysign(1.0, value) < 0 else repr(value)
 
 
