@@ -1,0 +1,211 @@
+"""Impacts in every method and kind of run: random models against an event loop, and closed forms.
+
+HYBRID_MODELS: how many random models, and with all of their runs if there are more than 100.
+"""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.equations.hybrid import failures
+from tests.equations.hybrid_models import FORMS, KINDS, Polynomial
+from tests.equations.hybrid_runs import (
+    METHODS,
+    Run,
+    Unit,
+    co_simulation,
+    early_return,
+    model_exchange,
+)
+
+COUNT = int(os.environ.get("HYBRID_MODELS", "30"))
+G = 9.81
+EACH_METHOD = pytest.mark.parametrize("method", METHODS)
+
+
+def test_random_models_follow_the_event_loop() -> None:
+    """All kinds in turn; what fails is named with the command that repeats it."""
+    seeds, judged = range(COUNT), partial(failures, is_full=COUNT > 100)
+    with ProcessPoolExecutor(os.cpu_count()) as pool:
+        found = [failure for each in pool.map(judged, seeds) for failure in each]
+    assert len(KINDS) <= COUNT
+    assert not found, "\n".join(f"{failure}\n    {failure.command}" for failure in found)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_forms_of_a_condition_make_the_same_events(form: str) -> None:
+    found = failures(1, is_full=False, form=form)
+    assert not found, "\n".join(map(str, found))
+
+
+@pytest.fixture(scope="module")
+def unit(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Unit]:
+    """Makes the FMUs of a text, once."""
+    made: dict[str, Unit] = {}
+
+    def find(text: str) -> Unit:
+        if text not in made:
+            folder = tmp_path_factory.mktemp("unit")
+            made[text] = Unit(folder, text, ("fmi2", "fmi3"))
+        return made[text]
+
+    return find
+
+
+RISING = """name = "Rising"
+[states]
+h = { start = 1.0, derivative = "v" }
+v = { derivative = "-9.81" }
+[events.hit]
+when = "h < 0.1 * time"
+reinit = { h = "0.1 * time", v = "0.2 - v" }
+"""
+
+
+@pytest.mark.parametrize("step", [0.01, 0.003])
+@EACH_METHOD
+def test_a_ball_does_not_fall_through_a_rising_floor(
+    unit: Callable, method: str, step: float
+) -> None:
+    """Above the floor it flies with the same speed after each impact."""
+    run = co_simulation(unit(RISING), method, 1e-8, step, round(3 / step), {})
+    speed = np.sqrt(0.1**2 + 2 * G)
+    impacts = [(speed - 0.1) / G + 2 * speed / G * k for k in range(3)]
+    assert impacts == pytest.approx([0.4414, 1.3447, 2.2480], abs=1e-4)
+    assert not run.failure
+    assert run.counts == [sum(impact < t for impact in impacts) for t in run.times]
+    assert run.x[-1][0] == pytest.approx(0.857995, abs=1e-6)
+    assert run.last_event == pytest.approx(impacts[-1], abs=1e-9)
+
+
+BOUNCING = """name = "Ball"
+[states]
+h = {{ start = {unit!r}, derivative = "v", nominal = {unit!r} }}
+v = {{ derivative = "{g!r}", nominal = {unit!r} }}
+[events.impact]
+when = "h < 0"
+reinit = {{ {reinit} }}
+"""
+
+
+def nine_impacts(run: Run, unit: float = 1.0) -> None:
+    """From a height of 1 it hits at sqrt(2 / G), then after twice that time each."""
+    first = np.sqrt(2 / G)
+    assert not run.failure
+    assert run.counts[-1] == 9
+    flown = np.mod(np.array(run.times) + first, 2 * first) - first  # since it was highest
+    expected = 1 - G * flown**2 / 2
+    assert np.max(np.abs(np.array(run.x)[:, 0] / unit - expected)) < 1e-6
+
+
+@pytest.mark.parametrize("reinit", ['h = "0", v = "-v"', 'v = "-v"'])
+@EACH_METHOD
+def test_nine_impacts_are_nine_events(unit: Callable, method: str, reinit: str) -> None:
+    ball = unit(BOUNCING.format(unit=1.0, g=-G, reinit=reinit))
+    nine_impacts(co_simulation(ball, method, 1e-8, 0.01, 800, {}))
+    run = early_return(ball, method, 1e-8, 0.01, 800)
+    nine_impacts(run)
+    assert len(run.events) == 9
+
+
+@pytest.mark.parametrize("reinit", ['h = "0", v = "-v"', 'v = "-v"'])
+@pytest.mark.parametrize("size", [1.0, 1e-12])
+def test_nine_impacts_in_model_exchange(unit: Callable, reinit: str, size: float) -> None:
+    ball = unit(BOUNCING.format(unit=size, g=-G * size, reinit=reinit))
+    nine_impacts(model_exchange(ball, 1e-8, 0.01, 800, {}), size)
+
+
+@EACH_METHOD
+def test_a_ball_as_small_as_its_nominal(unit: Callable, method: str) -> None:
+    ball = unit(BOUNCING.format(unit=1e-12, g=-G * 1e-12, reinit='h = "0", v = "-v"'))
+    nine_impacts(co_simulation(ball, method, 1e-8, 0.01, 800, {}), 1e-12)
+
+
+@pytest.mark.parametrize("reinit", ['h = "0", v = "-0.5 * v"', 'v = "-0.5 * v"'])
+@pytest.mark.parametrize("kind", [*METHODS, "model_exchange"])
+def test_impacts_without_end_do_not_let_it_fall_through(
+    unit: Callable, kind: str, reinit: str
+) -> None:
+    """They accumulate at 3 sqrt(2 / G), 1.355 s."""
+    ball = unit(BOUNCING.format(unit=1.0, g=-G, reinit=reinit))
+    if kind == "model_exchange":
+        run = model_exchange(ball, 1e-8, 0.01, 200, {})
+    else:
+        run = co_simulation(ball, kind, 1e-8, 0.01, 200, {})
+    assert min(x[0] for x in run.x) > -1e-6
+    assert run.times[-1] > 1.34
+    assert run.failure or run.counts[-1] > 10
+
+
+TOUCH = """name = "Touch"
+[states]
+h = {{ start = 1.0, derivative = "v" }}
+v = {{ start = -2.0, derivative = "2" }}
+n = {{ derivative = "0" }}
+[events.touch]
+when = "{when}"
+reinit = {{ n = "n + 1" }}
+"""
+
+
+@pytest.mark.parametrize("when", ["h < 0", "0 > h", "h <= 0", "0 >= h"])
+def test_a_touch_is_one_for_all_methods(unit: Callable, when: str) -> None:
+    """h = (t - 1)**2 is exactly 0 at 1 s, which is not below 0."""
+    found = {}
+    for method in METHODS:
+        run = co_simulation(unit(TOUCH.format(when=when)), method, 1e-8, 0.125, 16, {})
+        assert not run.failure
+        found[method] = run.x[-1][2]
+    assert found == dict.fromkeys(METHODS, 1.0 if "=" in when else 0.0)
+
+
+INPUT = """name = "Input"
+[inputs]
+f = { start = 99 }
+[states]
+x = { start = 100, derivative = "0" }
+n = { derivative = "0" }
+[events.above]
+when = "x < f"
+reinit = { n = "n + 1" }
+"""
+
+
+class Sine(Polynomial):
+    """An input that passes 100 once upward in each period of 1 s."""
+
+    def at(self, t: float) -> tuple[float, float, float]:
+        size, w = self.value, 2 * np.pi
+        return (
+            100 - size * np.cos(w * t), size * w * np.sin(w * t), size * w**2 * np.cos(w * t),
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-2])
+@pytest.mark.parametrize("kind", [*METHODS, "model_exchange"])
+def test_an_input_that_moves_makes_an_event_a_period(
+    unit: Callable, kind: str, size: float
+) -> None:
+    inputs = {"f": Sine(size, 0.0, 0.0)}
+    if kind == "model_exchange":
+        run = model_exchange(unit(INPUT), 1e-5, 0.01, 500, inputs)
+    else:
+        run = co_simulation(unit(INPUT), kind, 1e-5, 0.01, 500, inputs)
+    assert not run.failure
+    assert run.x[-1][1] == 5.0
+
+
+def test_what_a_motion_is(tmp_path: Path) -> None:
+    """The event loop itself, against the closed form of the rising floor."""
+    from tests.equations.event_loop import EventLoop
+
+    motion = EventLoop(RISING).run(np.linspace(0.0, 3.0, 31))
+    speed = np.sqrt(0.1**2 + 2 * G)
+    impacts = [(speed - 0.1) / G + 2 * speed / G * k for k in range(3)]
+    assert [i.t for i in motion.impacts] == pytest.approx(impacts, abs=1e-11)
+    assert motion.horizon == 3.0 and motion.x[-1][0] == pytest.approx(0.857995, abs=1e-6)
