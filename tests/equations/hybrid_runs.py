@@ -312,8 +312,14 @@ def model_exchange(
                     run.events.append(t)
                     assert len(run.events) < MOST_EVENTS
                     fmu.enterEventMode()
+                    saved = fmu.getFMUState() if len(run.events) < 8 else None
                     x = master.settle(x)
                     signs = master.signs(t, x)
+                    if saved:
+                        fmu.setFMUState(fmu.deserializeFMUState(fmu.serializeFMUState(saved)))
+                        again = master.settle(np.array(end))
+                        if (again != x).any() or (master.signs(t, x) != signs).any():
+                            run.differences.append(f"at the event at {t}: {again} for {x}")
             run.times.append(t)
             run.x.append(list(x))
             run.counts.append(fmu.getInteger(unit.of("event_count"))[0])
