@@ -5,6 +5,7 @@ A module each; a module imports only from lines above its own:
     graph         operations on values and conditions, and their derivatives
     model_file    the graph of a file, which equations_file reads
     c_code        a graph as statements in C
+    errors        by how much values in C may be wrong
     guards        when a relation matters
     c_series      the Taylor series of the states
     c_events      modes and events

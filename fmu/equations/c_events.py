@@ -8,6 +8,7 @@ comes to hold in its modes. What all models do with that is in src/model/relatio
 from equations_file.tables import Event, ModelFile
 
 from equations.c_code import Code, Leaves, filled, indented, text
+from equations.errors import NONE, Errors
 from equations.graph import MOVING, Relation, Value
 from equations.guards import guards
 
@@ -105,6 +106,7 @@ class Events:
             relations=len(self.relations),
             events=len(file.events),
             states=len(states),
+            inputs=len(file.of("inputs")),
             state_offset=f"offsetof(struct equations_values, {FIELD.format(states[0].name)})"
             if states
             else "0",
@@ -127,23 +129,25 @@ class Events:
         ).splitlines()
 
     def _compare(self) -> list[str]:
-        graph, code, lines = self.graph, Code(leaves(self.file)), []
-        time, states = graph.value("time"), self.file.of("states")
-        motion = {x.leaf: x.value for x in states} | {time: graph.number(1.0)}
-        errors = {x.leaf: f"fabs({{}}) * tolerance[{i}]" for i, x in enumerate(states)}
-        errors[time] = "1e-12 * fabs({}) * fmax(1.0, fabs(t))"
+        graph, states, inputs = self.graph, self.file.of("states"), self.file.of("inputs")
+        moving = {("first", v.name): f"given->du[{i}]" for i, v in enumerate(inputs)}
+        code, lines = Code({**leaves(self.file), **moving}), []
+        motion = {x.leaf: x.value for x in states} | {graph.value("time"): graph.number(1.0)}
+        motion |= {u.leaf: graph.value("first", name=u.name) for u in inputs}
+        given = {("state", x.name): f"given->state_errors[{i}]" for i, x in enumerate(states)}
+        given |= {
+            leaf: f"given->relative * fabs({code.leaves[leaf]})"
+            for leaf in [("time", ""), *(("input", u.name) for u in inputs)]
+        }
+        errors = Errors(code, given)
         for k, relation in enumerate(self.relations):
             distance, used = relation.distance, self.used[relation.name]
-            noise = [
-                error.format(code.of(graph.derivative(distance, x)))
-                for x, error in errors.items()
-                if relation.time is None and x.leaves <= distance.leaves
-            ]
+            error = errors.of(distance) if relation.time is None else NONE
             (slope,) = graph.derivatives([distance], motion)
             lines += [
                 f"compared[{k}].distance = {code.of(distance)};",
                 f"compared[{k}].slope = {code.of(slope)};",
-                f"compared[{k}].noise = {' + '.join(noise) or '0.0'};",
+                f"compared[{k}].noise = {error};",
                 f"compared[{k}].used = {'1' if used is None else code.of(used) + ' != 0'};",
             ]
         return code.lines + lines

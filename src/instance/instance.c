@@ -117,7 +117,7 @@ static bool setup_events(struct instance *instance) {
     const size_t state_count = count_of(model->states);
     const size_t count = model->events->indicator_count;
     instance->absolute_tolerances =
-        calloc(2 * state_count + count_of(model->inputs) + 2 * count + 1, sizeof(double));
+        calloc(2 * state_count + count_of(model->inputs) + 3 * count + 1, sizeof(double));
     instance->indicators = calloc(count + 1, sizeof *instance->indicators);
     instance->triggered = calloc(count + 1, sizeof *instance->triggered);
     if (instance->absolute_tolerances == NULL || instance->indicators == NULL ||
@@ -129,6 +129,7 @@ static bool setup_events(struct instance *instance) {
     instance->z = instance->du + count_of(model->inputs);
     instance->ode.indicator_count = model->events->indicator_count;
     instance->ode.indicators = instance_indicators;
+    instance->ode.rounding = model->events->errors != NULL ? instance_rounding : NULL;
     instance->ode.reach = model->events->reach != NULL ? instance_reach : NULL;
     return true;
 }

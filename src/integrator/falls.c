@@ -1,5 +1,6 @@
 #include "falls.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -20,6 +21,34 @@ static double fall_behind(const struct roots_polynomial *p, double s) {
     const int count = roots_find(p, roots);
     for (int i = 0; i < count; i++) {
         if (roots[i].s > s && roots[i].kind == ROOT_FALLS) {
+            return roots[i].s;
+        }
+    }
+    return INFINITY;
+}
+
+/* Between two roots, p is no farther from 0 than the rounding of its coefficients. */
+static bool is_touch(const struct roots_polynomial *p, double begin, double end) {
+    const double s = 0.5 * (begin + end);
+    double value = 0.0;
+    double size = 0.0;
+    for (int k = p->degree; k >= 0; k--) {
+        value = value * s + p->c[k];
+        size = size * s + fabs(p->c[k]);
+    }
+    return fabs(value) <= 16.0 * DBL_EPSILON * size;
+}
+
+/* The first s at which p falls to 0, or 1 if it ends there: a touch is no fall. INFINITY: neither.
+ */
+static double fall_or_end(const struct roots_polynomial *p) {
+    struct root roots[ROOTS_LENGTH];
+    const int count = roots_find(p, roots);
+    for (int i = 0; i < count; i++) {
+        const bool rises_again = i + 1 < count && roots[i + 1].kind == ROOT_RISES;
+        const bool falls = roots[i].kind == ROOT_FALLS &&
+                           !(rises_again && is_touch(p, roots[i].s, roots[i + 1].s));
+        if (falls || roots[i].s == 1.0) {
             return roots[i].s;
         }
     }
@@ -98,12 +127,16 @@ double fall_first(const struct roots_polynomial *p, double error, double latest,
     if (!*is_armed) {
         double within = fmax(error, *noise);
         if (p->c[0] <= -within) {
-            within = -2.0 * p->c[0];
+            within -= (1.0 + 0x1p-10) * p->c[0]; // doubled, fall after fall would lead far below
             *noise = within;
         }
         return first_fall_from_zero(p, within, is_armed);
     }
     // from below 0 it can only rise by the error of the polynomial
     const bool rises = p->degree > 0 && p->c[0] <= 0.0 && p->c[1] > 0.0;
-    return rises ? fall_behind(p, 0.0) : roots_first(p);
+    if (rises) {
+        return fall_behind(p, 0.0);
+    }
+    const double s = roots_first(p);
+    return s > 0.0 && s < 1.0 ? fall_or_end(p) : s;
 }

@@ -22,13 +22,14 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
     location->samples = calloc(count, sizeof *location->samples);
     location->x = calloc(2 * states, sizeof *location->x);
     location->z = calloc(count, sizeof *location->z);
+    location->has_row = calloc(count, sizeof *location->has_row);
     location->is_armed = calloc(count, sizeof *location->is_armed);
     location->noise = calloc(count, sizeof *location->noise);
     location->triggered = calloc(count, sizeof *location->triggered);
     if (location->rows == NULL || location->step.indicator_row == NULL || location->used == NULL ||
         location->first == NULL || location->samples == NULL || location->x == NULL ||
-        location->z == NULL || location->is_armed == NULL || location->noise == NULL ||
-        location->triggered == NULL) {
+        location->z == NULL || location->has_row == NULL || location->is_armed == NULL ||
+        location->noise == NULL || location->triggered == NULL) {
         location_destroy(location);
         return false;
     }
@@ -40,6 +41,7 @@ void location_destroy(struct location *location) {
     free(location->triggered);
     free(location->noise);
     free(location->is_armed);
+    free(location->has_row);
     free(location->z);
     free(location->x);
     free(location->samples);
@@ -75,11 +77,31 @@ static enum status evaluate_one(struct location *location, size_t i, double t, c
     return status;
 }
 
+/* The same for indicators of the model, whose noise follows from their limits so far. */
+static enum status restart_model(struct location *location, const double x[]) {
+    const struct ode *ode = location->ode;
+    const enum status status = evaluate(location, 0.0, x);
+    if (ode->rounding != NULL) {
+        ode->rounding(location->first, ode->context);
+    }
+    for (size_t k = 0; status == STATUS_OK && k < location->used_count; k++) {
+        const size_t i = location->used[k];
+        if (location->indicators[i].kind != INDICATOR_OF_MODEL) {
+            continue;
+        }
+        location->is_armed[i] = location->z[i] > 0.0;
+        if (ode->rounding != NULL) {
+            location->noise[i] = larger(location->first[i], DBL_MIN);
+            location->is_armed[i] = location->z[i] > location->noise[i];
+        }
+    }
+    return status;
+}
+
 enum status location_restart(struct location *location, const struct indicator *indicators,
                              const double x[]) {
     location->indicators = indicators;
     location->time = INFINITY;
-    location->step.has_indicators = false;
     if (indicators == NULL) {
         return STATUS_OK;
     }
@@ -87,7 +109,9 @@ enum status location_restart(struct location *location, const struct indicator *
     location->used_count = 0;
     for (size_t i = 0; i < location->ode->indicator_count; i++) {
         const struct indicator *indicator = &indicators[i];
-        if (indicator->kind == INDICATOR_UNUSED) {
+        location->has_row[i] = false;
+        const bool is_fixed = indicator->kind == INDICATOR_OF_STATE && indicator->factor == 0.0;
+        if (indicator->kind == INDICATOR_UNUSED || is_fixed) {
             continue;
         }
         location->used[location->used_count] = i;
@@ -95,7 +119,6 @@ enum status location_restart(struct location *location, const struct indicator *
         const double rounding = 2.0 * DBL_EPSILON * fabs(indicator->offset);
         if (indicator->kind == INDICATOR_OF_MODEL) {
             needs_model = true;
-            location->is_armed[i] = false;
             location->noise[i] = larger(2.0 * rounding, DBL_MIN);
         } else {
             const double z = at_state(indicator, x);
@@ -105,12 +128,7 @@ enum status location_restart(struct location *location, const struct indicator *
             location->noise[i] = is_sure ? rounding : larger(rounding, miss);
         }
     }
-    const enum status status = needs_model ? evaluate(location, 0.0, x) : STATUS_OK;
-    for (size_t i = 0; needs_model && status == STATUS_OK && i < location->ode->indicator_count;
-         i++) {
-        location->is_armed[i] |= indicators[i].kind == INDICATOR_OF_MODEL && location->z[i] > 0.0;
-    }
-    return status;
+    return needs_model ? restart_model(location, x) : STATUS_OK;
 }
 
 /* ---- Indicators of states ------------------------------------------------------------------- */
@@ -284,8 +302,8 @@ static enum status search_model_in(struct location *location, double begin, doub
     size_t i = from;
     while (status == STATUS_OK && i < location->ode->indicator_count) {
         const bool is_last_try = piece.count == CHEBYSHEV_LENGTH && length <= shortest_piece;
-        const bool is_wanted =
-            location->indicators[i].kind == INDICATOR_OF_MODEL && location->first[i] > begin;
+        const bool is_wanted = location->indicators[i].kind == INDICATOR_OF_MODEL &&
+                               !location->has_row[i] && location->first[i] > begin;
         if (!is_wanted || search_piece(location, &piece, i, is_last_try)) {
             i++;
         } else if (piece.count < CHEBYSHEV_LENGTH) {
@@ -303,6 +321,35 @@ static enum status search_model_in(struct location *location, double begin, doub
 
 /* ---- Steps ---------------------------------------------------------------------------------- */
 
+/* The last terms are small, and at the end of the step the sum has the value z. */
+static bool is_converged(const double c[], int degree, double z, double relative_tolerance) {
+    double sum = 0.0;
+    double size = 0.0;
+    for (int k = degree; k >= 0; k--) {
+        sum += c[k];
+        size += fabs(c[k]);
+    }
+    const double last = degree > 0 ? fabs(c[degree - 1]) + fabs(c[degree]) : 0.0;
+    return last + fabs(sum - z) <= relative_tolerance * size;
+}
+
+void location_check_rows(struct location *location, const double x[], double relative_tolerance) {
+    const struct step_polynomial *step = &location->step;
+    bool has_any = false;
+    for (size_t k = 0; k < location->used_count; k++) {
+        has_any |= location->has_row[location->used[k]];
+    }
+    if (!has_any || evaluate(location, step->end, x) != STATUS_OK) {
+        return;
+    }
+    for (size_t k = 0; k < location->used_count; k++) {
+        const size_t i = location->used[k];
+        location->has_row[i] =
+            location->has_row[i] &&
+            is_converged(step->indicator_row[i], step->degree, location->z[i], relative_tolerance);
+    }
+}
+
 /* Roots of several indicators within this part of a step are one event. */
 static const double same_time = 4.0 * 0x1p-52;
 
@@ -316,11 +363,11 @@ enum status location_search(struct location *location) {
         location->first[i] = INFINITY;
         if (indicator->kind == INDICATOR_OF_STATE) {
             location->first[i] = first_of_state(location, i, s + same_time);
-        } else if (indicator->kind == INDICATOR_OF_MODEL && step->has_indicators) {
+        } else if (location->has_row[i]) {
             location->first[i] = first_of_model(location, i, s + same_time);
         }
         s = location->first[i] < s ? location->first[i] : s;
-        needs_model |= indicator->kind == INDICATOR_OF_MODEL && !step->has_indicators;
+        needs_model |= indicator->kind == INDICATOR_OF_MODEL && !location->has_row[i];
     }
     const enum status status = needs_model ? search_model_in(location, 0.0, 1.0, 0) : STATUS_OK;
     if (status != STATUS_OK) {
@@ -377,24 +424,26 @@ void location_write_cubic(struct location *location, double begin, const double 
 }
 
 bool location_correction(struct location *location, double t, const double x[], const double dx[],
-                         double *correction) {
-    // over this part of the step the derivative of an indicator hardly changes
-    const double ahead = 0x1p-20 * (location->step.end - location->step.begin);
+                         double *z, double *correction) {
     size_t i = 0;
     while (!location->triggered[i]) {
         i++;
     }
-    double z;
-    double z_ahead;
-    if (evaluate_one(location, i, t, x, &z) != STATUS_OK) {
+    if (evaluate_one(location, i, t, x, z) != STATUS_OK) {
         return false;
     }
-    for (size_t j = 0; j < location->ode->state_count; j++) {
-        location->x[j] = x[j] + ahead * dx[j];
+    // over so small a part of the step the derivative of an indicator hardly changes; it is longer
+    // where the difference is lost in rounding
+    double z_ahead = *z;
+    for (double part = 0x1p-20; z_ahead == *z && part <= 0x1p-8; part *= 0x1p4) {
+        const double ahead = part * (location->step.end - location->step.begin);
+        for (size_t j = 0; j < location->ode->state_count; j++) {
+            location->x[j] = x[j] + ahead * dx[j];
+        }
+        if (evaluate_one(location, i, t + ahead, location->x, &z_ahead) != STATUS_OK) {
+            return false;
+        }
+        *correction = -*z * ahead / (z_ahead - *z);
     }
-    if (evaluate_one(location, i, t + ahead, location->x, &z_ahead) != STATUS_OK) {
-        return false;
-    }
-    *correction = -z * ahead / (z_ahead - z);
     return isfinite(*correction);
 }

@@ -19,10 +19,9 @@ struct step_polynomial {
     double end;
     bool is_from_end;
     int degree;
-    double (*row)[SERIES_LENGTH]; /* in `rows` of struct location, or of the method */
-    bool has_indicators;
-    double (*indicator_row)[SERIES_LENGTH]; /* where `has_indicators`: those of the model, over s as
-                                               the states; else they are interpolated */
+    double (*row)[SERIES_LENGTH];           /* in `rows` of struct location, or of the method */
+    double (*indicator_row)[SERIES_LENGTH]; /* where `has_row` of struct location: indicators of the
+                                               model, over s as the states */
 };
 
 struct location {
@@ -32,11 +31,12 @@ struct location {
     const struct ode *ode;
     size_t *used; /* those of them that are not INDICATOR_UNUSED */
     size_t used_count;
-    const double *tolerances;            /* absolute ones, of the states */
-    bool *is_armed;                      /* by indicator: it has been above 0 since the restart */
-    double *noise;                       /* by indicator of a state: one that is 0 at the restart
-                                            may have either sign as long as it is within this */
-    bool *triggered;                     /* by indicator: it is at 0 at `time` */
+    const double *tolerances; /* absolute ones, of the states */
+    bool *has_row;            /* by indicator: step.indicator_row has it; else it is interpolated */
+    bool *is_armed;           /* by indicator: it has been above 0 since the restart */
+    double *noise;            /* by indicator of a state: one that is 0 at the restart
+                                 may have either sign as long as it is within this */
+    bool *triggered;          /* by indicator: it is at 0 at `time` */
     struct step_polynomial step;         /* the last one; methods write it */
     double (*rows)[SERIES_LENGTH];       /* by state: room for its rows */
     double *x;                           /* at one point */
@@ -61,6 +61,12 @@ static inline bool location_is_active(const struct location *location) {
     return location->indicators != NULL;
 }
 
+/* Drops the rows of location->step that are not the indicators that they should be, up to the
+ * relative tolerance: of a series that ends before an indicator of fast motion has converged.
+ * x: the states at the end of the step. */
+NONNULL void location_check_rows(struct location *location, const double x[],
+                                 double relative_tolerance);
+
 /* Searches location->step. If there is an event in it, writes its time and what has triggered. */
 MUST_CHECK NONNULL enum status location_search(struct location *location);
 
@@ -74,9 +80,10 @@ NONNULL void location_write_cubic(struct location *location, double begin, const
                                   const double begin_dx[], double end, const double x[],
                                   const double dx[]);
 
-/* Newton's correction (s) of the event's time, from the state x and its derivative dx at the time
- * t: -z / z' of the first indicator that has triggered. False where it has none. */
+/* Writes z, the value of the first indicator that has triggered, and Newton's correction (s) of the
+ * event's time, -z / z', from the state x and its derivative dx at the time t. False where it has
+ * none. */
 MUST_CHECK NONNULL bool location_correction(struct location *location, double t, const double x[],
-                                            const double dx[], double *correction);
+                                            const double dx[], double *z, double *correction);
 
 #endif

@@ -15,7 +15,7 @@ static const ARKODE_ERKTableID table = ARKODE_DORMAND_PRINCE_7_4_5;
 static const int order = 5;
 
 /* Of the time of an event. */
-enum { MOST_CORRECTIONS = 20 };
+enum { MOST_CORRECTIONS = 60 };
 
 /* s: ARKODE multiplies lengths of steps with each other, and with one that it keeps over a restart.
  * Where that underflows, what it does would depend on the step before. */
@@ -285,24 +285,36 @@ static int step_to(struct erk *erk, double t, double x[]) {
 }
 
 /* The polynomial of the search is less accurate than the step: Newton's method leads from its root
- * to that of the steps which end there. */
+ * to that of the steps which end there. The indicator may be 0 where the step begins, too: a
+ * correction that leads out of where the fall must be divides this part in two. */
 static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
     struct location *location = &erk->base.problem->location;
-    const double begin = erk->step_begin;
-    const double end = erk->watched;
+    double low = erk->step_begin;
+    double high = erk->watched;
+    bool is_below = false; // at `high`
     double t = location->time;
     int flag = ERKStepSetPostprocessStepFn(erk->solver, NULL);
     for (int i = 0; flag >= 0 && i < MOST_CORRECTIONS; i++) {
         flag = step_to(erk, t, x);
+        double z = 0.0;
         double correction = 0.0;
-        if (flag < 0 || !location_correction(location, t, x, erk->dx, &correction)) {
+        if (flag < 0 || !location_correction(location, t, x, erk->dx, &z, &correction)) {
             break;
         }
-        const double next = fmin(fmax(t + correction, begin), end);
-        if (fabs(next - t) <= 2.0 * DBL_EPSILON * end) {
+        if (z > 0.0) {
+            low = t;
+        } else {
+            high = t;
+            is_below = true;
+        }
+        double next = t + correction;
+        if (next > high && !is_below) {
+            next = high;
+        }
+        if (fabs(next - t) <= 2.0 * DBL_EPSILON * erk->watched) {
             break;
         }
-        t = next;
+        t = next > low && next <= high ? next : 0.5 * (low + high);
     }
     location->time = t;
     *stopped_at = t;

@@ -254,13 +254,14 @@ static enum status search(struct taylor *taylor, double end) {
     for (size_t i = 0; length != 1.0 && i < series->problem->ode.state_count; i++) {
         copy_row(taylor, series->row[i], length, step->row[i]);
     }
-    step->has_indicators = row_of_indicator != NULL;
-    for (size_t k = 0; step->has_indicators && k < location->used_count; k++) {
+    for (size_t k = 0; row_of_indicator != NULL && k < location->used_count; k++) {
         const size_t i = location->used[k];
-        if (location->indicators[i].kind == INDICATOR_OF_MODEL) {
+        location->has_row[i] = location->indicators[i].kind == INDICATOR_OF_MODEL;
+        if (location->has_row[i]) {
             copy_row(taylor, series->row[row_of_indicator[i]], length, step->indicator_row[i]);
         }
     }
+    location_check_rows(location, taylor->end_x, series->problem->settings.relative_tolerance);
     return location_search(location);
 }
 

@@ -24,6 +24,9 @@ typedef enum status ode_series(double t, double time_scale, int first, int last,
 /* Writes all indicators at the time t and the state x to z. As ode_rhs else. */
 typedef enum status ode_indicators(double t, const double x[], double z[], void *context);
 
+/* Writes by how much rounding may change each indicator of the model, at a restart. */
+typedef void ode_rounding(double rounding[], void *context);
+
 /* Writes how far each state may move from x within an internal step, as struct model_events does.
  */
 typedef void ode_reach(const double x[], double reach[], void *context);
@@ -37,7 +40,8 @@ struct ode {
     const size_t *row_of_indicator; /* as in struct series */
     size_t indicator_count;         /* 0: no events */
     ode_indicators *indicators;
-    ode_reach *reach; /* NULL: any way; asked where events are looked for */
+    ode_rounding *rounding; /* NULL: it follows from the limits of the indicators */
+    ode_reach *reach;       /* NULL: any way; asked where events are looked for */
     void *context;
 };
 

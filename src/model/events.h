@@ -29,7 +29,8 @@ struct indicator {
     /* of INDICATOR_OF_STATE */
     size_t state;
     double factor;
-    double offset; /* of INDICATOR_OF_MODEL: the size of the limit that it is the distance to */
+    double offset; /* of INDICATOR_OF_MODEL: the size of the limit that it is the distance to, from
+                      which its error follows where the model has no `errors` */
     bool rises;    /* of INDICATOR_OF_STATE: it may be 0 now, and its slope is above 0 */
 };
 
@@ -83,6 +84,12 @@ struct model_events {
      * read from values, states and inputs from x and u. */
     enum status (*indicators)(const void *values, double t, const double x[], const double u[],
                               double z[]);
+
+    /* Writes by how much each indicator of the model may be wrong where the states have these
+     * errors (in their units), the time and the inputs the relative error `relative`, and where all
+     * operations are rounded. NULL: errors follow from the limits that describe gives. */
+    void (*errors)(const void *values, double t, const double state_errors[], double relative,
+                   double errors[]);
 
     /* Writes how far each state may move from x within one internal step, INFINITY for any way: on
      * a longer one the right-hand side could change and change back between the points at which it

@@ -4,8 +4,10 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Of a state's size: how far from its limit it may be where its event is located. */
+/* Of a state's size: how far from its limit it may be where its event is located; and of the time.
+ */
 static const double location_error = 1e-11;
+static const double time_error = 1e-12;
 
 /* What is called on the way of one event: a model, its values, and memory. */
 struct call {
@@ -14,6 +16,7 @@ struct call {
     void *values;
     int *is_begun, *holds, *active; /* its modes */
     double t;                       /* s */
+    const double *du;               /* derivative of each input by the time */
 };
 
 static const int *modes_in(const struct relations *model, const void *values) {
@@ -21,25 +24,38 @@ static const int *modes_in(const struct relations *model, const void *values) {
 }
 
 static struct call call_of(const struct relations *model, struct relations_room room, void *values,
-                           double t) {
+                           double t, const double du[]) {
     int *modes = (int *)(void *)((char *)values + model->modes.offset);
     int *holds = modes + 1;
-    return (struct call){model, room, values, modes, holds, holds + model->relation_count, t};
+    return (struct call){model, room, values, modes, holds, holds + model->relation_count, t, du};
+}
+
+/* state_errors: of each state where it may have been located, in its unit. */
+static void compare(const struct call *call, const double state_errors[],
+                    struct compared compared[]) {
+    const struct given given = {state_errors, time_error, call->du};
+    call->model->compare(call->values, call->t, &given, compared);
 }
 
 static bool holds_at(const struct relation *relation, double distance) {
     return relation->includes_zero ? distance >= 0.0 : distance > 0.0;
 }
 
-/* A relation near its limit keeps its mode: where it was located, rounding says nothing. */
-static bool settle(const struct call *call) {
+/* The distance says nothing of the mode: the relation is at its limit, or not defined. */
+static bool is_near(const struct compared *compared) {
+    return fabs(compared->distance) < compared->noise || isnan(compared->distance);
+}
+
+/* Lets relations follow from their distances; near its limit a relation keeps its mode. True: some
+ * have changed. is_exact: distances are what they are to the last bit. */
+static bool settle(const struct call *call, bool is_exact) {
     const struct relation *relation = call->model->relation;
     struct compared *compared = call->room.compared;
     bool changes = false;
-    call->model->compare(call->values, call->t, call->room.tolerance, compared);
+    compare(call, call->room.tolerance, compared);
     for (int k = 0; k < call->model->relation_count; k++) {
         const int holds = holds_at(&relation[k], compared[k].distance);
-        const bool is_sure = !compared[k].used || fabs(compared[k].distance) >= compared[k].noise;
+        const bool is_sure = is_exact || !compared[k].used || !is_near(&compared[k]);
         if (is_sure && !relation[k].is_timed && call->holds[k] != holds) {
             call->holds[k] = holds;
             changes = true;
@@ -49,8 +65,8 @@ static bool settle(const struct call *call) {
 }
 
 /* Modes may depend on each other, in a circle even: then the last ones stay. */
-static void settle_all(const struct call *call) {
-    for (int count = 0; count <= call->model->relation_count && settle(call); count++) {
+static void settle_all(const struct call *call, bool is_exact) {
+    for (int count = 0; count <= call->model->relation_count && settle(call, is_exact); count++) {
     }
 }
 
@@ -58,17 +74,14 @@ static void settle_all(const struct call *call) {
 static void follow(const struct call *call, bool only_of_inputs) {
     const struct relations *model = call->model;
     const struct compared *compared = call->room.compared;
-    for (int i = 0; i < model->state_count; i++) {
-        call->room.tolerance[i] = 0.0;
-    }
-    model->compare(call->values, call->t, call->room.tolerance, call->room.compared);
+    compare(call, call->room.zeros, call->room.compared);
     for (int k = 0; k < model->relation_count; k++) {
         if (model->relation[k].is_of_inputs || !only_of_inputs) {
             call->holds[k] = holds_at(&model->relation[k], compared[k].distance);
         }
     }
     if (!only_of_inputs) {
-        settle_all(call);
+        settle_all(call, true);
     }
 }
 
@@ -79,7 +92,7 @@ const void *relations_followed(const struct relations *model, struct relations_r
         return values;
     }
     memcpy(copy, values, model->values_size);
-    const struct call call = call_of(model, room, copy, t);
+    const struct call call = call_of(model, room, copy, t, room.zeros);
     follow(&call, is_begun);
     return copy;
 }
@@ -97,6 +110,36 @@ double relations_next_time(const struct relations *model, struct relations_room 
     return next;
 }
 
+/* Slope of the distance with the sign of the mode. */
+static double signed_slope(const struct compared *compared, int holds) {
+    return holds ? compared->slope : -compared->slope;
+}
+
+/* After a change: relations at their limits that it has made fall switch, or their next events
+ * would be due at once; one that it has placed at its limit, at rest, holds if it includes zero.
+ * How inputs move may not be known, but it is part of the slopes before the change and after it.
+ *
+ * call->room.before: the relations before the change. */
+static void turn(const struct call *call) {
+    const struct relations *model = call->model;
+    const struct compared *before = call->room.before;
+    struct compared *after = call->room.compared;
+    compare(call, call->room.tolerance, after);
+    for (int k = 0; k < model->relation_count; k++) {
+        const double slope = signed_slope(&after[k], call->holds[k]);
+        const bool falls = slope < 0.0 && slope < signed_slope(&before[k], call->holds[k]);
+        const bool may_turn = after[k].used && !model->relation[k].is_timed && is_near(&after[k]);
+        call->holds[k] ^= may_turn && falls;
+    }
+    compare(call, call->room.zeros, after);
+    for (int k = 0; k < model->relation_count; k++) {
+        const bool rests = after[k].slope == 0.0 && signed_slope(&before[k], call->holds[k]) > 0.0;
+        if (after[k].used && !model->relation[k].is_timed && is_near(&after[k]) && rests) {
+            call->holds[k] = model->relation[k].includes_zero;
+        }
+    }
+}
+
 /* Runs the events that have become due, in their order; false: there was none. */
 static bool fire(const struct call *call) {
     const struct relations *model = call->model;
@@ -105,8 +148,11 @@ static bool fire(const struct call *call) {
     for (int i = 0; i < model->event_count; i++) {
         model->find_due(call->values, call->t, due);
         if (due[i] && !call->active[i]) {
+            compare(call, call->room.tolerance, call->room.before);
             model->change(call->values, call->t, i, call->room.tolerance);
-            settle_all(call);
+            settle_all(call, false);
+            turn(call);
+            settle_all(call, false);
             call->active[i] = 1;
             fires = true;
         }
@@ -120,9 +166,7 @@ static bool fire(const struct call *call) {
 
 /* Relations with the same limit switch at one event: those on it that are about to pass it. */
 static bool joins(const struct compared *compared, int holds) {
-    const double slope = holds ? compared->slope : -compared->slope;
-    const bool is_near = fabs(compared->distance) < compared->noise;
-    return compared->used && is_near && slope < 0.0;
+    return compared->used && is_near(compared) && signed_slope(compared, holds) < 0.0;
 }
 
 static void pass(const struct call *call, const struct event *event) {
@@ -130,7 +174,7 @@ static void pass(const struct call *call, const struct event *event) {
     const struct relations_room room = call->room;
     const double next = relations_next_time(model, room, call->values); /* writes all times */
     const double passed = event->is_timed ? next : -INFINITY;
-    model->compare(call->values, call->t, room.tolerance, room.compared);
+    compare(call, room.tolerance, room.compared);
     for (int k = 0; k < model->relation_count; k++) {
         const struct relation *relation = &model->relation[k];
         if (relation->is_timed) {
@@ -141,12 +185,12 @@ static void pass(const struct call *call, const struct event *event) {
             call->holds[k] ^= event->triggered[relation->indicator] || is_on_it;
         }
     }
-    settle_all(call);
+    settle_all(call, false);
 }
 
 enum status relations_update(const struct relations *model, struct relations_room room,
                              void *values, const struct event *event) {
-    const struct call call = call_of(model, room, values, event->t);
+    const struct call call = call_of(model, room, values, event->t, event->du);
     const double *x = (const double *)(const void *)((const char *)values + model->states);
     double *tolerance = room.tolerance;
     const int was_begun = *call.is_begun;
@@ -172,6 +216,17 @@ enum status relations_update(const struct relations *model, struct relations_roo
                        event->max_events);
     }
     return STATUS_INTERNAL;
+}
+
+void relations_errors(const struct relations *model, struct relations_room room, const void *values,
+                      double t, const double state_errors[], double relative, double errors[]) {
+    const struct given given = {state_errors, relative, room.zeros};
+    model->compare(values, t, &given, room.compared);
+    for (int k = 0; k < model->relation_count; k++) {
+        if (!model->relation[k].is_timed) {
+            errors[model->relation[k].indicator] = room.compared[k].noise;
+        }
+    }
 }
 
 bool relations_are_plausible(const struct relations *model, const void *values) {

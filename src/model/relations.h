@@ -8,6 +8,8 @@
 
 #include "events.h"
 
+#include <math.h>
+
 /* Of a relation what does not change. */
 struct relation {
     bool includes_zero; /* it holds at its limit */
@@ -19,9 +21,16 @@ struct relation {
 
 struct compared {
     double distance; /* above 0 where it holds */
-    double slope;    /* 1/s: of the distance, while inputs rest */
-    double noise;    /* of the distance, from the error of the states */
+    double slope;    /* 1/s: derivative of the distance by the time */
+    double noise;    /* how far the distance may be wrong, by errors and rounding */
     int used;        /* by a value that is needed */
+};
+
+/* Errors of the values that distances follow from, and how inputs move. */
+struct given {
+    const double *state_errors; /* of each state, in its unit */
+    double relative;            /* error of the time and of inputs */
+    const double *du;           /* derivative of each input by the time */
 };
 
 struct relations {
@@ -35,8 +44,7 @@ struct relations {
     const struct relation *relation;
     const double *nominal; /* of each state */
 
-    /* tolerance: of each state, in its unit */
-    void (*compare)(const void *values, double t, const double tolerance[],
+    void (*compare)(const void *values, double t, const struct given *given,
                     struct compared compared[]);
     /* Of each timed relation, s. */
     void (*write_times)(const void *values, double times[]);
@@ -48,10 +56,11 @@ struct relations {
 
 /* Memory for one call. */
 struct relations_room {
-    struct compared *compared; /* one per relation */
-    double *times;             /* one per relation */
-    int *due;                  /* one per event */
-    double *tolerance;         /* one per state */
+    struct compared *compared, *before; /* one per relation each */
+    double *times;                      /* one per relation */
+    int *due;                           /* one per event */
+    double *tolerance;                  /* one per state */
+    const double *zeros;                /* one per state and input */
 };
 
 /* Functions of struct model_events. */
@@ -60,6 +69,16 @@ double relations_next_time(const struct relations *model, struct relations_room 
 bool relations_are_plausible(const struct relations *model, const void *values);
 enum status relations_update(const struct relations *model, struct relations_room room,
                              void *values, const struct event *event);
+
+/* errors of struct model_events. */
+void relations_errors(const struct relations *model, struct relations_room room, const void *values,
+                      double t, const double state_errors[], double relative, double errors[]);
+
+/* How far a function y of an argument with an error may be wrong, from its values at the ends of
+ * what the argument may be. One that is not defined there does not count. */
+static inline double relations_spread(double y, double at_begin, double at_end) {
+    return fmax(fabs(at_begin - y), fabs(at_end - y));
+}
 
 /* The values whose modes have followed inputs and parameters that were set since the last event:
  * they themselves, or `copy`. */

@@ -1,5 +1,7 @@
 #include "model_modes.h"
 
+#include "settings.h"
+
 #include <limits.h>
 #include <math.h>
 
@@ -23,13 +25,34 @@ const struct indicator *instance_describe_indicators(struct instance *instance) 
     return instance->indicators;
 }
 
-/* Error that the integrator allows for each state. */
-static void write_tolerances(struct instance *instance) {
+double instance_nominal(const struct instance *instance, size_t state) {
+    const double relative = instance->state.own.effective_relative_tolerance;
+    return instance->absolute_tolerances[state] / (INSTANCE_ABSOLUTE_FRACTION * relative);
+}
+
+void instance_write_location_errors(const struct instance *instance, double errors[]) {
     const struct range states = instance->model->states;
     const double *x = doubles_of(instance->memory.values, states);
     for (size_t i = 0; i < count_of(states); i++) {
-        instance->tolerances[i] = instance->absolute_tolerances[i] +
-                                  instance->state.own.effective_relative_tolerance * fabs(x[i]);
+        errors[i] = 2e-10 * (instance_nominal(instance, i) + fabs(x[i]));
+    }
+}
+
+/* Error of each state at an event: what the integrator allows or, outside, twice the error of the
+ * location, since indicators fall to 0 beyond their roots. */
+static void write_tolerances(struct instance *instance) {
+    const struct range states = instance->model->states;
+    const double *x = doubles_of(instance->memory.values, states);
+    const bool is_located_outside =
+        instance->is_integrated_outside && instance->model->events->errors != NULL;
+    double *tolerances = instance->tolerances;
+    if (is_located_outside) {
+        instance_write_location_errors(instance, tolerances);
+    }
+    for (size_t i = 0; i < count_of(states); i++) {
+        const double allowed = instance->absolute_tolerances[i] +
+                               instance->state.own.effective_relative_tolerance * fabs(x[i]);
+        tolerances[i] = is_located_outside ? fmax(allowed, 2.0 * tolerances[i]) : allowed;
     }
 }
 

@@ -18,6 +18,13 @@ NONNULL double instance_next_time(const struct instance *instance);
 /* No state moves in the present modes. */
 NONNULL bool instance_is_at_rest(const struct instance *instance);
 
+/* Of a state, in its unit. */
+NONNULL double instance_nominal(const struct instance *instance, size_t state);
+
+/* Writes how far each state may be from its limit where an integrator outside stops, in its unit.
+ */
+NONNULL void instance_write_location_errors(const struct instance *instance, double errors[]);
+
 /* Updates modes, states and discrete states after a change of inputs and parameters and, where
  * `triggered` is not NULL, after the event at the current time. */
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status

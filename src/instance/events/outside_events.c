@@ -7,25 +7,39 @@
 #include <math.h>
 #include <string.h>
 
-/* In the unit of an indicator: how far from its root integrators stop. */
+/* Of the size of an indicator: how far from its root integrators stop. */
 static const double near_root = 1e-10;
 
-/* What is added to an indicator: it falls to 0 only this far beyond its root. A mode may begin at
- * the root, and integrators miss falls that begin at 0. For an indicator of a state: far above the
- * rounding of its two parts, which are the state's nominal value and the offset, and far below the
- * error of integrators. For one of the model: so large that the force is past its limit wherever an
- * integrator stops, however the inputs move. */
-static double band_of(const struct instance *instance, const struct indicator *indicator) {
-    if (indicator->kind == INDICATOR_UNUSED) {
-        return 0.0;
+/* The size of an indicator of a state. */
+static double size_of(const struct instance *instance, const struct indicator *indicator) {
+    return fabs(indicator->factor) * instance_nominal(instance, indicator->state) +
+           fabs(indicator->offset);
+}
+
+/* Writes what is added to each indicator: it falls to 0 only this far beyond its root. A mode may
+ * begin at the root, and integrators miss falls that begin at 0. For an indicator of a state: far
+ * above the rounding of its two parts, which are the state's nominal value and the offset, and far
+ * below the error of integrators. For one of the model: so large that the force is past its limit
+ * wherever an integrator stops, however the inputs move. Writes the kinds of indicators, too. */
+static void write_bands(struct instance *instance, double bands[]) {
+    const struct model_events *events = instance->model->events;
+    events->describe(instance->memory.values, instance->indicators);
+    if (events->errors != NULL) {
+        double *errors = doubles_of(instance->first_derivatives, instance->model->states);
+        instance_write_location_errors(instance, errors);
+        events->errors(instance->memory.values, instance->state.time.s, errors, 1e-12, bands);
     }
-    if (indicator->kind == INDICATOR_OF_MODEL) {
-        return 2.0 * near_root + 1e-9 * fabs(indicator->offset);
+    for (size_t i = 0; i < events->indicator_count; i++) {
+        const struct indicator *indicator = &instance->indicators[i];
+        if (indicator->kind == INDICATOR_UNUSED) {
+            bands[i] = 0.0;
+        } else if (indicator->kind == INDICATOR_OF_STATE) {
+            const double nominal = instance_nominal(instance, indicator->state);
+            bands[i] = 1e-12 * fabs(indicator->factor) * nominal + 1e-14 * fabs(indicator->offset);
+        } else if (events->errors == NULL) {
+            bands[i] = 2.0 * near_root + 1e-9 * fabs(indicator->offset);
+        }
     }
-    const double relative = instance->state.own.effective_relative_tolerance;
-    const double nominal =
-        instance->absolute_tolerances[indicator->state] / (INSTANCE_ABSOLUTE_FRACTION * relative);
-    return 1e-12 * fabs(indicator->factor) * nominal + 1e-14 * fabs(indicator->offset);
 }
 
 void instance_add_bands(struct instance *instance) {
@@ -33,56 +47,78 @@ void instance_add_bands(struct instance *instance) {
     if (description->indicator_count == 0) {
         return;
     }
-    instance->model->events->describe(instance->memory.values, instance->indicators);
+    write_bands(instance, instance->z);
     for (size_t i = 0; i < description->indicator_count; i++) {
         double *z = instance_field(instance, variable_of(description, description->indicators[i]));
-        *z += band_of(instance, &instance->indicators[i]);
+        *z += instance->z[i];
     }
 }
 
 /* s: the slope of an indicator is its difference over this time. */
 static const double slope_time = 1e-7;
 
-/* Indicator i has come to 0 and does not rise; z_ahead: after slope_time. Where a mode has just
- * begun at 0, rounding may let it fall, but not past the band. */
-static bool has_triggered(const struct instance *instance, size_t i, double z, double z_ahead) {
-    const struct indicator *indicator = &instance->indicators[i];
-    if (indicator->kind == INDICATOR_OF_MODEL) {
-        return z < 0.0;
-    }
-    return z <= near_root && z_ahead <= z && z_ahead + band_of(instance, indicator) <= 0.0;
+/* An indicator that has come to 0. */
+struct arrival {
+    double z;
+    double slope; /* 1/s, while the inputs stay */
+    double band;
+};
+
+/* It falls. Where a mode has just begun at 0, rounding may let it fall, but not past the band. */
+static bool has_state_fallen(const struct arrival *at, double size) {
+    const double ahead = at->z + slope_time * at->slope;
+    return at->z <= near_root * size && ahead <= at->z && ahead + at->band <= 0.0;
+}
+
+/* It is below 0. How inputs move is not known, so that it may fall though it seems to rise; but one
+ * that rises since the last event, from not far below 0, has not fallen. since: s. */
+static bool has_model_fallen(const struct arrival *at, double since) {
+    const bool has_risen = at->slope > 0.0 && at->z - at->slope * since > -4.0 * at->band;
+    return at->z < 0.0 && !has_risen;
 }
 
 /* Writes all indicators, and their kinds. */
-static enum status evaluate(struct instance *instance, const double x[], double z[]) {
+static enum status evaluate(struct instance *instance, double t, const double x[], double z[]) {
     const struct model *model = instance->model;
     const double *u = doubles_of(instance->memory.values, model->inputs);
     model->events->describe(instance->memory.values, instance->indicators);
-    return model->events->indicators(instance->memory.values, instance->state.time.s, x, u, z);
+    return model->events->indicators(instance->memory.values, t, x, u, z);
 }
 
 /* Writes which indicators have triggered while the inputs stay. */
 static enum status find_triggered(struct instance *instance, bool triggered[], bool *is_any) {
     const struct model *model = instance->model;
     char *values = instance->memory.values;
+    const double now = instance->state.time.s;
     const double *x = doubles_of(values, model->states);
     const double *u = doubles_of(values, model->inputs);
     double *dx = doubles_of(instance->first_derivatives, model->derivatives);
     double *ahead = doubles_of(instance->second_derivatives, model->states);
     double *z = instance->z;
     double *z_ahead = z + model->events->indicator_count;
-    enum status status = model->right_hand_side(values, instance->state.time.s, x, u, dx);
+    double *bands = z_ahead + model->events->indicator_count;
+    enum status status = model->right_hand_side(values, now, x, u, dx);
     for (size_t i = 0; i < count_of(model->states); i++) {
         ahead[i] = x[i] + slope_time * dx[i];
     }
     if (status == STATUS_OK) {
-        status = evaluate(instance, x, z);
+        status = evaluate(instance, now, x, z);
     }
     if (status == STATUS_OK) {
-        status = evaluate(instance, ahead, z_ahead);
+        status = evaluate(instance, now + slope_time, ahead, z_ahead);
     }
+    if (status == STATUS_OK) {
+        write_bands(instance, bands);
+    }
+    const double since = now - instance->state.own.last_event_time;
     for (size_t i = 0; status == STATUS_OK && i < model->events->indicator_count; i++) {
-        triggered[i] = has_triggered(instance, i, z[i], z_ahead[i]);
+        const struct indicator *indicator = &instance->indicators[i];
+        const struct arrival at = {z[i], (z_ahead[i] - z[i]) / slope_time, bands[i]};
+        if (indicator->kind == INDICATOR_OF_STATE) {
+            triggered[i] = has_state_fallen(&at, size_of(instance, indicator));
+        } else {
+            triggered[i] = indicator->kind == INDICATOR_OF_MODEL && has_model_fallen(&at, since);
+        }
         *is_any |= triggered[i];
     }
     return status;
@@ -114,7 +150,7 @@ static enum status forget_past_forces(struct instance *instance, bool triggered[
         return STATUS_OK;
     }
     double *x = doubles_of(instance->memory.values, instance->model->states);
-    if (evaluate(instance, x, instance->z) != STATUS_OK) {
+    if (evaluate(instance, instance->state.time.s, x, instance->z) != STATUS_OK) {
         return instance_not_finite(instance, "an event indicator");
     }
     for (size_t i = 0; i < instance->model->events->indicator_count; i++) {

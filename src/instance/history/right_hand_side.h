@@ -13,6 +13,7 @@ ode_rhs instance_rhs;
 ode_jacobian instance_jacobian;
 ode_series instance_series;
 ode_indicators instance_indicators;
+ode_rounding instance_rounding;
 ode_reach instance_reach;
 
 #endif

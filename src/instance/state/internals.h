@@ -107,7 +107,7 @@ struct instance {
     double *tolerances;           /* one per state, at its value at the last event */
     struct indicator *indicators; /* one per indicator, since the last restart */
     double *du;                   /* derivative of each input by the time */
-    double *z;                    /* two per indicator */
+    double *z;                    /* three per indicator */
     bool *triggered;              /* one per indicator: it falls to 0; last: a time event */
     double *nodes;           /* POLYNOMIAL_NODES values per input, of the step that asks for them */
     char *first_derivatives; /* value structures, along a curve (struct model) */
