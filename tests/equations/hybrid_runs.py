@@ -212,6 +212,15 @@ def early_return(
     return run
 
 
+def _copied(fmu: FMU2Model, state: Any, run: Run) -> Any:
+    """A state written as bytes and read again, or itself if it is refused."""
+    try:
+        return fmu.deserializeFMUState(fmu.serializeFMUState(state))
+    except FMICallException as error:
+        run.differences.append(_said(error))
+        return state
+
+
 class Exchange:
     """A small importer for Model Exchange: Runge-Kutta of order 4, events by bisection."""
 
@@ -316,7 +325,7 @@ def model_exchange(
                     x = master.settle(x)
                     signs = master.signs(t, x)
                     if saved:
-                        fmu.setFMUState(fmu.deserializeFMUState(fmu.serializeFMUState(saved)))
+                        fmu.setFMUState(_copied(fmu, saved, run))
                         again = master.settle(np.array(end))
                         if (again != x).any() or (master.signs(t, x) != signs).any():
                             run.differences.append(f"at the event at {t}: {again} for {x}")
