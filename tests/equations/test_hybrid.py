@@ -88,7 +88,7 @@ def test_a_ball_does_not_fall_through_a_rising_floor(
     assert not run.failure
     assert run.counts == [sum(impact < t for impact in impacts) for t in run.times]
     assert run.x[-1][0] == pytest.approx(0.857995, abs=1e-6)
-    assert run.last_event == pytest.approx(impacts[-1], abs=1e-8)
+    assert run.last_event == pytest.approx(impacts[-1], abs=1e-7)
 
 
 BOUNCING = """name = "Ball"
