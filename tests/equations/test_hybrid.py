@@ -96,9 +96,18 @@ BOUNCING = """name = "Ball"
 h = {{ start = {unit!r}, derivative = "v", nominal = {unit!r} }}
 v = {{ derivative = "{g!r}", nominal = {unit!r} }}
 [events.impact]
-when = "h < 0"
+when = "{when}"
 reinit = {{ {reinit} }}
 """
+IMPACTS = pytest.mark.parametrize(
+    ("when", "reinit"),
+    [(when, reinit + 'v = "-v"') for when in ("h < 0", "0 >= h") for reinit in ('h = "0", ', "")],
+)
+
+
+def ball(size: float = 1.0, when: str = "h < 0", reinit: str = 'h = "0", v = "-v"') -> str:
+    """The file of a ball that falls from this height."""
+    return BOUNCING.format(unit=size, g=-G * size, when=when, reinit=reinit)
 
 
 def nine_impacts(run: Run, unit: float = 1.0) -> None:
@@ -111,27 +120,28 @@ def nine_impacts(run: Run, unit: float = 1.0) -> None:
     assert np.max(np.abs(np.array(run.x)[:, 0] / unit - expected)) < 1e-6
 
 
-@pytest.mark.parametrize("reinit", ['h = "0", v = "-v"', 'v = "-v"'])
+@IMPACTS
 @EACH_METHOD
-def test_nine_impacts_are_nine_events(unit: Callable, method: str, reinit: str) -> None:
-    ball = unit(BOUNCING.format(unit=1.0, g=-G, reinit=reinit))
-    nine_impacts(co_simulation(ball, method, 1e-8, 0.01, 800, {}))
-    run = early_return(ball, method, 1e-8, 0.01, 800)
+def test_nine_impacts_are_nine_events(unit: Callable, method: str, when: str, reinit: str) -> None:
+    bouncing = unit(ball(1.0, when, reinit))
+    nine_impacts(co_simulation(bouncing, method, 1e-8, 0.01, 800, {}))
+    run = early_return(bouncing, method, 1e-8, 0.01, 800)
     nine_impacts(run)
     assert len(run.events) == 9
 
 
-@pytest.mark.parametrize("reinit", ['h = "0", v = "-v"', 'v = "-v"'])
+@IMPACTS
 @pytest.mark.parametrize("size", [1.0, 1e-12])
-def test_nine_impacts_in_model_exchange(unit: Callable, reinit: str, size: float) -> None:
-    ball = unit(BOUNCING.format(unit=size, g=-G * size, reinit=reinit))
-    nine_impacts(model_exchange(ball, 1e-8, 0.01, 800, {}), size)
+def test_nine_impacts_in_model_exchange(
+    unit: Callable, size: float, when: str, reinit: str
+) -> None:
+    run = model_exchange(unit(ball(size, when, reinit)), 1e-8, 0.01, 800, {})
+    nine_impacts(run, size)
 
 
 @EACH_METHOD
 def test_a_ball_as_small_as_its_nominal(unit: Callable, method: str) -> None:
-    ball = unit(BOUNCING.format(unit=1e-12, g=-G * 1e-12, reinit='h = "0", v = "-v"'))
-    nine_impacts(co_simulation(ball, method, 1e-8, 0.01, 800, {}), 1e-12)
+    nine_impacts(co_simulation(unit(ball(1e-12)), method, 1e-8, 0.01, 800, {}), 1e-12)
 
 
 @pytest.mark.parametrize("reinit", ['h = "0", v = "-0.5 * v"', 'v = "-0.5 * v"'])
@@ -140,11 +150,11 @@ def test_impacts_without_end_do_not_let_it_fall_through(
     unit: Callable, kind: str, reinit: str
 ) -> None:
     """They accumulate at 3 sqrt(2 / G), 1.355 s."""
-    ball = unit(BOUNCING.format(unit=1.0, g=-G, reinit=reinit))
+    losing = unit(ball(1.0, reinit=reinit))
     if kind == "model_exchange":
-        run = model_exchange(ball, 1e-8, 0.01, 200, {})
+        run = model_exchange(losing, 1e-8, 0.01, 200, {})
     else:
-        run = co_simulation(ball, kind, 1e-8, 0.01, 200, {})
+        run = co_simulation(losing, kind, 1e-8, 0.01, 200, {})
     assert min(x[0] for x in run.x) > -1e-6
     assert run.times[-1] > 1.34
     assert run.failure or run.counts[-1] > 10
