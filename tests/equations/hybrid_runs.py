@@ -212,6 +212,15 @@ def early_return(
     return run
 
 
+def _copied(fmu: FMU2Model, state: Any, run: Run) -> Any:
+    """A state written as bytes and read again, or itself if it is refused."""
+    try:
+        return fmu.deserializeFMUState(fmu.serializeFMUState(state))
+    except FMICallException as error:
+        run.differences.append(_said(error))
+        return state
+
+
 class Exchange:
     """A small importer for Model Exchange: Runge-Kutta of order 4, events by bisection."""
 
@@ -312,8 +321,14 @@ def model_exchange(
                     run.events.append(t)
                     assert len(run.events) < MOST_EVENTS
                     fmu.enterEventMode()
+                    saved = fmu.getFMUState() if len(run.events) < 8 else None
                     x = master.settle(x)
                     signs = master.signs(t, x)
+                    if saved:
+                        fmu.setFMUState(_copied(fmu, saved, run))
+                        again = master.settle(np.array(end))
+                        if (again != x).any() or (master.signs(t, x) != signs).any():
+                            run.differences.append(f"at the event at {t}: {again} for {x}")
             run.times.append(t)
             run.x.append(list(x))
             run.counts.append(fmu.getInteger(unit.of("event_count"))[0])
