@@ -139,8 +139,8 @@ def simulate(
         run = scenarios.Scenario(
             name=path.stem, model=model.name, path=path, title=path.stem, description="",
             parameters=values, initial={}, start=times[0], stop=times[-1], steps=(step,),
-            tolerance=tolerance, times=times, signals={}, inputs=signals, reference_every=1,
-            defaults=model.start_values,
+            tolerance=tolerance, times=times, elapsed=times - times[0], signals={}, inputs=signals,
+            reference_every=1, defaults=model.start_values,
         )  # fmt: skip
         result = simulation.simulate(opened, run, compiled=True)
         columns = [result.names.index(name) for name in names]
