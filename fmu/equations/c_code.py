@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,7 +20,9 @@ Leaves = Mapping[tuple[str, str], str]  # where C has a leaf, by its operation a
 
 def number(value: float) -> str:
     """A double that reads back as the same."""
-    return f"({value!r})" if value < 0 else repr(value)
+    if math.isnan(value):
+        return "NAN"
+    return f"({value!r})" if math.copysign(1.0, value) < 0 else repr(value)
 
 
 def text(value: str) -> str:
@@ -33,7 +36,7 @@ def _character(byte: int) -> str:
 
 
 def formula(op: str, *given: str) -> str:
-    """An operation on C expressions without operators."""
+    """An operation on C expressions without operators: "-" in front of another would be "--"."""
     return FORMULAS[op].format(*given) if op in FORMULAS else f"{op}({', '.join(given)})"
 
 

@@ -85,8 +85,8 @@ class Events:
             *(f"int {MODE.format(mode)};" for mode in self.file.modes),
         ]
 
-    def functions(self) -> list[str]:
-        """Text of all functions and of the struct model_events."""
+    def functions(self, in_domain: str = "") -> list[str]:
+        """Text of all functions and of the struct model_events; in_domain: behind their names."""
         if not self:
             return []
         file, timed = self.file, [r for r in self.relations if r.time is not None]
@@ -105,6 +105,7 @@ class Events:
             "events.c.in",
             relations=len(self.relations),
             events=len(file.events),
+            in_domain=in_domain,
             states=len(states),
             inputs=len(file.of("inputs")),
             state_offset=f"offsetof(struct equations_values, {FIELD.format(states[0].name)})"

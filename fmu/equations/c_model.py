@@ -1,5 +1,6 @@
 """The model in C: equations.h with its value structure, equations.c with its struct model."""
 
+from collections.abc import Mapping
 from itertools import chain
 
 from equations_file.tables import ModelFile
@@ -7,6 +8,8 @@ from equations_file.tables import ModelFile
 from equations.c_code import Code, filled, text
 from equations.c_events import FIELD, Events, arrays, leaves
 from equations.c_series import Series
+from equations.graph import FALLIBLE, Value
+from rparm.expressions.tree import in_order
 
 RATE = "d_{}"  # fields have prefixes, so that any name of a variable will do
 STRUCTURE = "struct equations_values"
@@ -30,19 +33,18 @@ def header(file: ModelFile) -> str:
 def source(file: ModelFile) -> str:
     """Text of equations.c."""
     events = Events(file)
+    series = Series(file.graph, *_followed(file, events), leaves(file))
+    has_domains = bool(events.located) and _may_end(file)
     return filled(
         "equations.c.in",
         **_smooth(file),
-        **_series(file, events),
+        **_series(series, has_domains),
         **_calculated(file, events),
-        events=events.functions(),
+        **_domains(file, events, series, has_domains),
+        events=events.functions("_in_domain" * has_domains),
         followed=[f"{STRUCTURE} copy;", f"values = {FOLLOWED};"] if events else [],
         checks=_checks(file),
-        ranges=[
-            f".{name} = {{offsetof({STRUCTURE}, {fields[0]}), {len(fields)} * sizeof(double)}},"
-            for name, fields in _ranges(file).items()
-            if fields
-        ],
+        ranges=_range_lines(_ranges(file)),
         model_events=[".events = &events,"] if events else [],
     )
 
@@ -54,6 +56,15 @@ def _ranges(file: ModelFile) -> dict[str, list[str]]:
         for section in ("parameters", "inputs", "states")
     }
     return ranges | {"derivatives": [RATE.format(state.name) for state in file.of("states")]}
+
+
+def _range_lines(ranges: Mapping[str, list[str]]) -> list[str]:
+    """Initializers of struct range, of fields that follow each other."""
+    return [
+        f".{name} = {{offsetof({STRUCTURE}, {fields[0]}), {len(fields)} * sizeof(double)}},"
+        for name, fields in ranges.items()
+        if fields
+    ]
 
 
 def _smooth(file: ModelFile) -> dict[str, list[str]]:
@@ -68,15 +79,59 @@ def _smooth(file: ModelFile) -> dict[str, list[str]]:
     }
 
 
-def _series(file: ModelFile, events: Events) -> dict[str, object]:
+def _followed(file: ModelFile, events: Events) -> tuple[dict[Value, Value], list[Value]]:
+    """Of what there is a series: rates of the states and, signed, distances."""
     rates = {state.leaf: state.value for state in file.of("states")}
-    followed = [events.signed(relation) for relation in events.located]
-    series = Series(file.graph, rates, followed, leaves(file))
+    return rates, [events.signed(relation) for relation in events.located]
+
+
+def _series(series: Series, has_domains: bool) -> dict[str, object]:
     rows = [str(row) for row in series.row_of_followed]
     return {
         **series.parts(),
-        "row_count": len(series.rows),
+        "row_count": len(series.rows) + has_domains,
         "row_of_indicator": ", ".join(rows or ["0"]),
+    }
+
+
+def _may_end(file: ModelFile) -> bool:
+    """Whether there are values beyond an event that are not finite."""
+    roots = [v.value for v in file.of("states", "where", "outputs")]
+    roots += [relation.distance for relation in file.graph.located]
+    return any(v.op in FALLIBLE and v.arguments[-(v.op == "/")].moves for v in in_order(roots))
+
+
+def _domains(
+    file: ModelFile, events: Events, series: Series, has_domains: bool
+) -> dict[str, object]:
+    """The parts that keep values finite beyond an event (src/model/domains.h), if that is asked."""
+    if not has_domains:
+        names = ("domains_header", "domains_declared", "domains")
+        return {"in_domain": "", **{name: [] for name in names}}
+    ranges = _ranges(file)
+    calculated = ranges["derivatives"] + [FIELD.format(v.name) for v in file.of("where", "outputs")]
+    groups = {key: ranges[key] for key in ("states", "inputs")}
+    groups |= {"calculated": calculated, "indicators": list(events.indicators())}
+    distances = {f"distance[{i}]": r.distance for i, r in enumerate(events.relations)}
+    text = filled(
+        "domains.c.in",
+        distances=Code(leaves(file)).assign(distances).lines,
+        ranges=_range_lines(groups),
+        own_row=len(series.rows),
+        located=len(events.located),
+    )
+    declared = [
+        "static enum status indicators_in_domain(const void *values, double t, const double x[],",
+        "                                        const double u[], double z[]);",
+        "static enum status extend_in_domain(const struct series_origin *origin, int first,",
+        "                                    int last, double row[][SERIES_LENGTH]);",
+        "",
+    ]
+    return {
+        "in_domain": "_in_domain",
+        "domains_header": ['#include "domains.h"'],
+        "domains_declared": declared,
+        "domains": text.splitlines(),
     }
 
 

@@ -10,7 +10,17 @@ from collections.abc import Mapping
 from functools import partial, reduce
 
 from equations.c_code import Code, Leaves, formula
-from equations.graph import DERIVATIVES, Graph, Value, unsigned, with_partials
+from equations.graph import (
+    CONDITIONS,
+    DERIVATIVES,
+    GROWING,
+    STEEP,
+    Graph,
+    Value,
+    is_unknown,
+    unsigned,
+    with_partials,
+)
 from rparm.expressions.tree import in_order
 
 
@@ -38,7 +48,7 @@ class Series:
         self.start.known |= {value: f"row[{self.rows[value]}][0]" for value in needed}
         self.later = Code(self._own_leaves("k"), "c", self.still)
         self.integrals = ["const double h = origin->time_scale / k;"] if rates else []
-        self._coefficients: dict[Value, str] = {}
+        self._coefficients = {value: "" for value in values if value.op in CONDITIONS}
         for value in self.rows:
             self._at(value)
         for i, rate in enumerate(roots[: len(rates)]):
@@ -84,6 +94,7 @@ class Series:
         read = []
         if value.op in DERIVATIVES:
             read = [v for x, g, _ in self._pairs(value) for v in (x, g)]
+            read += [value] * (value.op == "pow")
         elif value.op == "*" and a.moves and b.moves:
             read = [a, b]
         elif value.op == "/" and b.moves:
@@ -135,7 +146,8 @@ class Series:
         else:
             found = self._of_operation(value)
         if value not in self.rows:
-            return found if " " not in found else self.later.constant(found)
+            is_plain = " " not in found and not found.startswith("-")
+            return found if is_plain else self.later.constant(found)
         target = f"row[{self.rows[value]}][k]"
         self.later.lines.append(f"{target} = {found};")
         return target
@@ -147,14 +159,34 @@ class Series:
             if g.moves:
                 found += f" {relative} {self._sum(x, g, 'i * ')}"
             found += f" {relative} k * {self._at(x)} * {self.start.of(g)}"
-        return f"{pairs[0][2]}({found.removeprefix(' + ')}) / k"
+        found = f"{pairs[0][2]}({found.removeprefix(' + ')}) / k"
+        if value.op not in (*STEEP, *GROWING):
+            return found
+        are_finite = reduce(
+            partial(self.graph.value, "and"),
+            (self.graph.value("isfinite", g) for _, g, _ in pairs),
+        )
+        return f"{self.start.of(are_finite)} ? {found} : {self._where_steep(value)}"
+
+    def _where_steep(self, value: Value) -> str:
+        """Coefficient of a function whose derivative is not finite: as if it stayed the same.
+
+        The method sees at the end of a step whether this fits. Some powers have a series.
+        """
+        x, exponent = value.arguments[0], value.arguments[-1]
+        if value.op != "pow" or exponent.moves:
+            return "0.0"
+        factor, varying = self._varying(x)
+        rows = [f"row[{self.rows[v]}]" for v in (varying, value)]
+        given = (rows[0], self.still.of(factor), self.still.of(exponent), "k", rows[1])
+        return formula("slopes_power", *given)
 
     def _of_operation(self, value: Value) -> str:
         a, b = value.arguments[0], value.arguments[-1]
         match value.op:
             case "if":
-                chosen = map(self._at, value.arguments[1:])
-                return formula("if", self.still.of(a), *chosen)
+                chosen = [self._at(x) for x in value.arguments[1:]]
+                return chosen[1] if is_unknown(value) else formula("if", self.still.of(a), *chosen)
             case "+" | "-" if not b.moves:
                 return self._at(a)
             case "+" | "-" if not a.moves:

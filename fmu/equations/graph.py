@@ -1,14 +1,16 @@
 """A graph of operations on doubles and conditions: each operation once, in the order of the text.
 
 Operations on numbers: number, the leaves of `LEAVES`, + - * / negative, pow, "if" and functions of
-one or two arguments. Conditions: the leaf mode, relations, and, or, not. abs, min, max and squares
-have become others.
+one or two arguments; in derivatives also the functions of src/model/slopes.h. Conditions: the leaf
+mode, relations, and, or, not, isnan, isfinite. abs, min, max and squares have become others.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial, reduce
 
 from rparm.expressions.parser import parse
 from rparm.expressions.tree import RELATIONS, Node, in_order
@@ -16,7 +18,8 @@ from rparm.expressions.tree import RELATIONS, Node, in_order
 # along a curve, "first" and "second" are the derivatives of the other leaves
 LEAVES = ("parameter", "input", "state", "time", "mode", "first", "second")
 MOVING = ("input", "state", "time")
-CONDITIONS = ("mode", "and", "or", "not", *RELATIONS)
+RUNTIME = ("first", "second")  # derivatives that may be 0 in one call and not in another
+CONDITIONS = ("mode", "and", "or", "not", "isnan", "isfinite", *RELATIONS)
 PRODUCTS_UP_TO = 8  # whole exponents that are repeated multiplication
 WHOLE_UP_TO = 64  # whole exponents whose derivatives are defined at 0
 # derivatives of y = f(x) or f(x, z) by each argument
@@ -36,6 +39,11 @@ DERIVATIVES = {
     "sqrt": ["0.5 / y"],
     "pow": ["z * (y / x)", "y * log(x)"],
 }
+# of finite arguments, some results are not finite
+FALLIBLE = ("/", "sqrt", "log", "asin", "acos", "pow", "exp", "sinh", "cosh")
+UNDEFINED = ("/", "sqrt", "log", "asin", "acos", "pow")  # some are not a number
+GROWING = ("exp", "sinh", "cosh")  # results overflow
+STEEP = ("sqrt", "log", "asin", "acos", "pow", "atan2")  # slopes may be infinite or undefined
 RULES = {function: [parse(rule) for rule in rules] for function, rules in DERIVATIVES.items()}
 
 
@@ -48,6 +56,7 @@ class Value:
     name: str
     number: float
     leaves: frozenset[tuple[str, str]]  # operation and name of all leaves that it follows from
+    functions: frozenset[str]  # of FALLIBLE and STEEP, those that it follows from
 
     @property
     def moves(self) -> bool:
@@ -104,7 +113,9 @@ class Graph:
         if key not in self.known:
             own = [(op, name)] if op in LEAVES else []
             leaves = frozenset(own).union(*(argument.leaves for argument in arguments))
-            self.known[key] = Value(op, arguments, name, number, leaves)
+            used = {op}.intersection((*FALLIBLE, *STEEP))
+            functions = frozenset(used).union(*(argument.functions for argument in arguments))
+            self.known[key] = Value(op, arguments, name, number, leaves, functions)
         return self.known[key]
 
     def number(self, number: float) -> Value:
@@ -131,11 +142,42 @@ class Graph:
                     value = self.value("if", is_negative, self.negative(given[0]), given[0])
                 case "min" | "max":
                     is_first = compare("<" if node.op == "min" else ">", *given)
-                    value = self.value("if", is_first, *given)
+                    value = self._choice(is_first, *given)
+                case "if":
+                    value = self._choice(*given)
                 case op:
                     value = (compare if op in RELATIONS else self.value)(op, *given)
             found[node] = value
         return found[root]
+
+    def _choice(self, condition: Value, first: Value, second: Value) -> Value:
+        """The "if" of a text: not a number where a relation that decides is not defined."""
+        chosen, unknown = self.value("if", condition, first, second), self._unknown(condition)
+        return (
+            chosen if unknown is None else self.value("if", unknown, self.number(math.nan), chosen)
+        )
+
+    def _unknown(self, condition: Value) -> Value | None:
+        """Whether a relation that decides on a condition has no value; None: all have one."""
+        if condition.name in self.relations:
+            sides = self.relations[condition.name].distance.arguments
+        elif condition.op in RELATIONS:
+            sides = condition.arguments
+        else:
+            unknown = [self._unknown(argument) for argument in condition.arguments]
+            if condition.op in ("and", "or") and unknown[1] is not None:  # if it is looked at
+                first = condition.arguments[0]
+                passes = first if condition.op == "and" else self.value("not", first)
+                unknown[1] = self.value("and", passes, unknown[1])
+            return self._any(unknown)
+        return self._any(
+            self.value("isnan", side) if side.functions.intersection(UNDEFINED) else None
+            for side in sides
+        )
+
+    def _any(self, conditions: Iterable[Value | None]) -> Value | None:
+        found = [condition for condition in conditions if condition is not None]
+        return reduce(partial(self.value, "or"), found) if found else None
 
     def relation(self, op: str, left: Value, right: Value) -> Value:
         """A comparison of two values: a switch if one of them moves and the graph has switches."""
@@ -195,13 +237,22 @@ class Graph:
     def partials(self, y: Value) -> list[Value]:
         """Derivatives of a function by each of its arguments."""
         x, z = y.arguments[0], y.arguments[-1]
-        if y.op == "pow" and z.op == "number":  # of whole exponents it is defined at x = 0, too
-            is_whole = z.number in range(WHOLE_UP_TO + 1)
-            lower = self._power(x, self.number(z.number - 1.0)) if is_whole else None
-            by_base = self.simple("*", z, lower or self.value("/", y, x))
-            return [by_base, self.number(0.0)]
-        names = {"x": x, "y": y, "z": z}
-        return [self.of_tree(rule, names) for rule in RULES[y.op]]
+        if y.op == "pow" and z.op == "number":
+            lower = self._lower_power(y) or self.value("/", y, x)
+            return [self.simple("*", z, lower), self.number(0.0)]
+        return [self.of_tree(rule, {"x": x, "y": y, "z": z}) for rule in RULES[y.op]]
+
+    def _less(self, z: Value) -> Value:
+        """z - 1."""
+        if z.op == "number":
+            return self.number(z.number - 1.0)
+        return self.value("-", z, self.number(1.0))
+
+    def _lower_power(self, y: Value) -> Value | None:
+        """The power whose exponent is less by 1, if that is a whole number."""
+        x, z = y.arguments
+        is_whole = z.op == "number" and z.number in range(WHOLE_UP_TO + 1)
+        return self._power(x, self._less(z)) if is_whole else None
 
     def derivatives(self, roots: Iterable[Value], seeds: Mapping[Value, Value]) -> list[Value]:
         """Derivatives where each leaf has its own in `seeds`, or 0 if it is not there."""
@@ -222,20 +273,73 @@ class Graph:
         return self.derivatives([y], {x: self.number(1.0)})[0]
 
     def _chain(self, y: Value, d: list[Value]) -> Value:
-        if y.op in ("+", "-"):
-            return self.simple(y.op, *d)
-        if y.op == "negative":
-            return self.negative(d[0])
-        if y.op == "if":
-            return d[1] if d[1] is d[2] else self.value("if", y.arguments[0], *d[1:])
-        if y.op == "/":
-            rest = self.simple("-", d[0], self.simple("*", y, d[1]))
-            return self.simple("/", rest, y.arguments[1])
-        partials = y.arguments[::-1] if y.op == "*" else self.partials(y)
-        total = self.number(0.0)
-        for partial, of_argument in zip(partials, d, strict=True):
-            total = self.simple("+", total, self.simple("*", partial, of_argument))
+        a, b = y.arguments[0], y.arguments[-1]
+        match y.op:
+            case "+" | "-":
+                return self.simple(y.op, *d)
+            case "negative":
+                return self.negative(d[0])
+            case "if":
+                of_first = y.arguments[1] if is_unknown(y) else d[1]
+                return of_first if of_first is d[2] else self.value("if", a, of_first, d[2])
+            case "/" | "slopes_over":
+                rest = self.simple("-", d[0], self._scaled(y, d[1], is_runtime(d[1])))
+                is_plain = b.op == "number" or not is_runtime(rest)
+                return self.simple("/", rest, b) if is_plain else self.value("slopes_over", rest, b)
+            case "*" | "slopes_product":
+                b = y.arguments[1]
+                return self.simple("+", self._product(b, d[0], d[1]), self._product(a, d[1], d[0]))
+            case "slopes_bounded":
+                return d[0]
+            case "slopes_scaled":
+                return self.simple("+", self._scaled(d[0], b), self._scaled(a, d[1]))
+        total, is_steep = self.number(0.0), y.op in STEEP or y.op.startswith("slopes_")
+        for slope, of_argument in zip(self._slopes(y), d, strict=True):
+            total = self.simple("+", total, self._scaled(slope, of_argument, is_steep))
         return total
+
+    def _scaled(self, slope: Value, d: Value, is_steep: bool = True) -> Value:
+        """slope d; is_steep: it may not be finite, and is 0 where d is 0."""
+        is_plain = not is_steep or "number" in (slope.op, d.op)
+        return self.simple("*", slope, d) if is_plain else self.value("slopes_scaled", slope, d)
+
+    def _product(self, a: Value, of_b: Value, of_a: Value) -> Value:
+        """a db, in the derivative of the product a b."""
+        known = a.functions.intersection(FALLIBLE) | of_b.functions.intersection(STEEP)
+        is_plain = known <= {"/"} if not is_runtime(of_b) else not known
+        if "number" in (a.op, of_b.op) or is_plain:
+            return self.simple("*", a, of_b)
+        return self.value("slopes_product", a, of_b, of_a)
+
+    def _slopes(self, y: Value) -> list[Value]:
+        """Derivatives as `partials`, which are finite where they exist."""
+        if y.op in GROWING:
+            return [self.value("slopes_bounded", *self.partials(y))]
+        if y.op == "pow":
+            x, z = y.arguments
+            lower = self._lower_power(y) or self.value("slopes_reduced", y, x, z)
+            return [self.simple("*", z, lower), self.value("slopes_logged", y, x, z)]
+        if y.op == "slopes_reduced":
+            _, x, z = y.arguments
+            less = self._less(z)
+            by_base = self.simple("*", less, self.value("slopes_reduced", y, x, less))
+            return [self.number(0.0), by_base, self.value("slopes_logged", y, x, less)]
+        if y.op == "slopes_logged":
+            p, x, z = y.arguments
+            lower, log = self.value("slopes_reduced", p, x, z), self.value("log", x)
+            by_base = self.value("+", self.value("*", lower, self.value("*", z, log)), lower)
+            return [self.number(0.0), by_base, self.value("*", y, log)]
+        return self.partials(y)
+
+
+def is_runtime(value: Value) -> bool:
+    """Whether it may be 0 in one call and not in another."""
+    return any(op in RUNTIME for op, _ in value.leaves)
+
+
+def is_unknown(value: Value) -> bool:
+    """Whether it is an "if" whose first branch says that a relation is not defined."""
+    return value.op == "if" and math.isnan(value.arguments[1].number)
 
 
 def is_number(value: Value, number: float) -> bool:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from equations.graph import Graph, Value
+from equations.graph import Graph, Value, is_unknown
 from rparm.expressions.tree import in_order
 
 Guards = dict[Value, Value | None]  # conditions; None: always
@@ -26,7 +26,7 @@ def guards(graph: Graph, roots: Iterable[tuple[Value, Value | None]]) -> Guards:
         if value not in found:
             continue
         conditions = [found[value]] * len(value.arguments)
-        if value.op == "if":
+        if value.op == "if" and not is_unknown(value):
             condition = value.arguments[0]
             for i, chosen in enumerate((condition, graph.value("not", condition)), 1):
                 own = found[value]

@@ -119,14 +119,14 @@ static bool is_above_until(const struct roots_polynomial *p, double s, double no
 
 /* An indicator that is below 0 at a restart has not fallen: the modes have just been found valid,
  * and one event would come again and again. */
-double fall_first(const struct roots_polynomial *p, double error, double latest, bool *is_armed,
-                  double *noise) {
+double fall_first(const struct roots_polynomial *p, double error, double latest, bool is_restart,
+                  bool *is_armed, double *noise) {
     if (latest <= 1.0 && is_above_until(p, latest, *is_armed ? -1.0 : *noise)) {
         return INFINITY;
     }
     if (!*is_armed) {
         double within = fmax(error, *noise);
-        if (p->c[0] <= -within) {
+        if (is_restart && p->c[0] <= -within) {
             within -= (1.0 + 0x1p-10) * p->c[0]; // doubled, fall after fall would lead far below
             *noise = within;
         }

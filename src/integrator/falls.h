@@ -10,8 +10,8 @@
  * p represents it over the step, up to an error. A fall counts only once the indicator is armed,
  * that is, has been above 0 since the restart: rounding may leave it on either side at a restart.
  * is_armed is set where it rises. noise: how far from 0 it may still be one that has not risen; it
- * grows where the indicator begins farther below 0. */
+ * grows where the indicator is farther below 0 at the restart. */
 MUST_CHECK NONNULL double fall_first(const struct roots_polynomial *p, double error, double latest,
-                                     bool *is_armed, double *noise);
+                                     bool is_restart, bool *is_armed, double *noise);
 
 #endif

@@ -20,7 +20,7 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
     location->used = calloc(count, sizeof *location->used);
     location->first = calloc(count, sizeof *location->first);
     location->samples = calloc(count, sizeof *location->samples);
-    location->x = calloc(2 * states, sizeof *location->x);
+    location->x = calloc(3 * states, sizeof *location->x);
     location->z = calloc(count, sizeof *location->z);
     location->has_row = calloc(count, sizeof *location->has_row);
     location->is_armed = calloc(count, sizeof *location->is_armed);
@@ -34,6 +34,7 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
         return false;
     }
     location->dx = location->x + states;
+    location->ahead_x = location->dx + states;
     return true;
 }
 
@@ -186,7 +187,8 @@ static double first_of_state(struct location *location, size_t i, double latest)
         shift(c, step->degree);
     }
     const struct roots_polynomial p = {c, step->degree, -1.0};
-    return fall_first(&p, 0.0, latest, &location->is_armed[i], &location->noise[i]);
+    return fall_first(&p, 0.0, latest, step->begin == 0.0, &location->is_armed[i],
+                      &location->noise[i]);
 }
 
 /* ---- Indicators of the model ---------------------------------------------------------------- */
@@ -202,12 +204,12 @@ static double first_of_model(struct location *location, size_t i, double latest)
     for (int k = 0; k <= step->degree; k++) {
         size += fabs(p.c[k]);
     }
-    return fall_first(&p, representation * size, latest, &location->is_armed[i],
+    return fall_first(&p, representation * size, latest, step->begin == 0.0, &location->is_armed[i],
                       &location->noise[i]);
 }
 
-/* Writes all indicators at s, of the whole step, to column k of samples. */
-static enum status sample(struct location *location, double s, int k) {
+/* Writes the states at s, of the whole step, to location->x; returns the time. */
+static double evaluate_states(struct location *location, double s) {
     const struct step_polynomial *step = &location->step;
     const double at = step->is_from_end ? s - 1.0 : s;
     for (size_t i = 0; i < location->ode->state_count; i++) {
@@ -217,7 +219,12 @@ static enum status sample(struct location *location, double s, int k) {
         }
         location->x[i] = x;
     }
-    const double t = step->begin + s * (step->end - step->begin);
+    return step->begin + s * (step->end - step->begin);
+}
+
+/* Writes all indicators at s, of the whole step, to column k of samples. */
+static enum status sample(struct location *location, double s, int k) {
+    const double t = evaluate_states(location, s);
     const enum status status = evaluate(location, t, location->x);
     for (size_t i = 0; status == STATUS_OK && i < location->ode->indicator_count; i++) {
         location->samples[i][k] = location->z[i];
@@ -274,7 +281,8 @@ static bool search_piece(struct location *location, const struct piece *piece, s
                          bool is_last_try) {
     double c[ROOTS_LENGTH] = {0};
     const double error = chebyshev_interpolate(piece->count, location->samples[i], c);
-    const double noise = representation * largest(location->samples[i], piece->count);
+    const double noise =
+        larger(representation * largest(location->samples[i], piece->count), location->noise[i]);
     const bool is_exact = error <= noise;
     const int degree = piece->count - 1;
     if (!is_exact && !is_last_try) {
@@ -285,7 +293,9 @@ static bool search_piece(struct location *location, const struct piece *piece, s
         return is_above;
     }
     const struct roots_polynomial p = {c, degree, -1.0};
-    const double s = fall_first(&p, noise, INFINITY, &location->is_armed[i], &location->noise[i]);
+    const bool is_restart = location->step.begin == 0.0 && piece->begin == 0.0;
+    const double s =
+        fall_first(&p, noise, INFINITY, is_restart, &location->is_armed[i], &location->noise[i]);
     location->first[i] = fmin(location->first[i], piece->begin + piece->length * s);
     return true;
 }
@@ -353,8 +363,8 @@ void location_check_rows(struct location *location, const double x[], double rel
 /* Roots of several indicators within this part of a step are one event. */
 static const double same_time = 4.0 * 0x1p-52;
 
-enum status location_search(struct location *location) {
-    const struct step_polynomial *step = &location->step;
+/* Writes where each indicator falls first, at least of those that do so first, and that place. */
+static enum status search(struct location *location, double *place) {
     bool needs_model = false;
     double s = INFINITY; // of the first event so far: none behind it is located
     for (size_t k = 0; k < location->used_count; k++) {
@@ -377,9 +387,67 @@ enum status location_search(struct location *location) {
         const double first = location->first[location->used[k]];
         s = first < s ? first : s;
     }
-    if (!(s <= 1.0)) {
-        return STATUS_OK;
+    *place = s;
+    return STATUS_OK;
+}
+
+/* z of indicator i at the time t and the state x with the derivative dx, and z a little later,
+ * after `ahead` (s). False: not both are known. Over so small a part of the step the derivative of
+ * an indicator hardly changes; the part is longer where the difference is lost in rounding. */
+static bool look_ahead(struct location *location, size_t i, double t, const double x[],
+                       const double dx[], double z[2], double *ahead) {
+    if (evaluate_one(location, i, t, x, &z[0]) != STATUS_OK) {
+        return false;
     }
+    z[1] = z[0];
+    for (double part = 0x1p-20; z[1] == z[0] && part <= 0x1p-8; part *= 0x1p4) {
+        *ahead = part * (location->step.end - location->step.begin);
+        for (size_t j = 0; j < location->ode->state_count; j++) {
+            location->ahead_x[j] = x[j] + *ahead * dx[j];
+        }
+        if (evaluate_one(location, i, t + *ahead, location->ahead_x, &z[1]) != STATUS_OK) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Indicator i seems to fall to 0 at s but rises there: the polynomials of the states do not fit
+ * each other as well as that. Then it counts as not having been above 0, and may be as far below.
+ */
+static bool has_risen(struct location *location, size_t i, double s) {
+    const struct ode *ode = location->ode;
+    const double t = evaluate_states(location, s);
+    double z[2];
+    double ahead;
+    if (ode->rhs(t, location->x, location->dx, ode->context) != STATUS_OK ||
+        !look_ahead(location, i, t, location->x, location->dx, z, &ahead) || !(z[1] > z[0])) {
+        return false;
+    }
+    location->is_armed[i] = false;
+    location->noise[i] = larger(2.0 * location->noise[i], -2.0 * z[0]);
+    return true;
+}
+
+/* Whether this happened to an indicator that seems to fall at s. */
+static bool is_misled(struct location *location, double s) {
+    bool found = false;
+    for (size_t k = 0; k < location->used_count; k++) {
+        const size_t i = location->used[k];
+        found |= location->first[i] <= s + same_time && has_risen(location, i, location->first[i]);
+    }
+    return found;
+}
+
+enum status location_search(struct location *location) {
+    const struct step_polynomial *step = &location->step;
+    double s;
+    do {
+        const enum status status = search(location, &s);
+        if (status != STATUS_OK || !(s <= 1.0)) {
+            return status;
+        }
+    } while (is_misled(location, s));
     memset(location->triggered, 0, location->ode->indicator_count * sizeof *location->triggered);
     for (size_t k = 0; k < location->used_count; k++) {
         const size_t i = location->used[k];
@@ -424,26 +492,18 @@ void location_write_cubic(struct location *location, double begin, const double 
 }
 
 bool location_correction(struct location *location, double t, const double x[], const double dx[],
-                         double *z, double *correction) {
+                         struct correction *found) {
     size_t i = 0;
     while (!location->triggered[i]) {
         i++;
     }
-    if (evaluate_one(location, i, t, x, z) != STATUS_OK) {
+    double z[2];
+    double ahead;
+    if (!look_ahead(location, i, t, x, dx, z, &ahead)) {
         return false;
     }
-    // over so small a part of the step the derivative of an indicator hardly changes; it is longer
-    // where the difference is lost in rounding
-    double z_ahead = *z;
-    for (double part = 0x1p-20; z_ahead == *z && part <= 0x1p-8; part *= 0x1p4) {
-        const double ahead = part * (location->step.end - location->step.begin);
-        for (size_t j = 0; j < location->ode->state_count; j++) {
-            location->x[j] = x[j] + ahead * dx[j];
-        }
-        if (evaluate_one(location, i, t + ahead, location->x, &z_ahead) != STATUS_OK) {
-            return false;
-        }
-        *correction = -*z * ahead / (z_ahead - *z);
-    }
-    return isfinite(*correction);
+    found->is_before = z[0] > 0.0 || z[1] > z[0];
+    found->rises = z[1] > z[0];
+    found->time = -z[0] * ahead / (z[1] - z[0]);
+    return isfinite(found->time);
 }

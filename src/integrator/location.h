@@ -41,6 +41,7 @@ struct location {
     double (*rows)[SERIES_LENGTH];       /* by state: room for its rows */
     double *x;                           /* at one point */
     double *dx;                          /* room for another one */
+    double *ahead_x;                     /* a little later */
     double *z;                           /* by indicator, at one point */
     double *first;                       /* by indicator: s of its first root in the step */
     double (*samples)[CHEBYSHEV_LENGTH]; /* by indicator */
@@ -80,10 +81,15 @@ NONNULL void location_write_cubic(struct location *location, double begin, const
                                   const double begin_dx[], double end, const double x[],
                                   const double dx[]);
 
-/* Writes z, the value of the first indicator that has triggered, and Newton's correction (s) of the
- * event's time, -z / z', from the state x and its derivative dx at the time t. False where it has
- * none. */
+/* Newton's correction of the time of an event. */
+struct correction {
+    double time;    /* s: -z / z' of the first indicator that has triggered */
+    bool is_before; /* it has not fallen yet */
+    bool rises;
+};
+
+/* From the state x with its derivative dx at the time t. False where there is none. */
 MUST_CHECK NONNULL bool location_correction(struct location *location, double t, const double x[],
-                                            const double dx[], double *z, double *correction);
+                                            const double dx[], struct correction *found);
 
 #endif

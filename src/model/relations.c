@@ -41,13 +41,19 @@ static bool holds_at(const struct relation *relation, double distance) {
     return relation->includes_zero ? distance >= 0.0 : distance > 0.0;
 }
 
-/* The distance says nothing of the mode: the relation is at its limit, or not defined. */
+/* The relation is at its limit, as far as is known. */
 static bool is_near(const struct compared *compared) {
-    return fabs(compared->distance) < compared->noise || isnan(compared->distance);
+    return fabs(compared->distance) <= compared->noise;
 }
 
-/* Lets relations follow from their distances; near its limit a relation keeps its mode. True: some
- * have changed. is_exact: distances are what they are to the last bit. */
+/* The distance says which mode is right. */
+static bool is_sure(const struct compared *compared) {
+    return !compared->used || fabs(compared->distance) >= compared->noise;
+}
+
+/* Lets relations follow from their distances; at its limit a relation keeps its mode, as does one
+ * that has turned. True: some have changed. is_exact: distances are what they are to the last bit.
+ */
 static bool settle(const struct call *call, bool is_exact) {
     const struct relation *relation = call->model->relation;
     struct compared *compared = call->room.compared;
@@ -55,8 +61,8 @@ static bool settle(const struct call *call, bool is_exact) {
     compare(call, call->room.tolerance, compared);
     for (int k = 0; k < call->model->relation_count; k++) {
         const int holds = holds_at(&relation[k], compared[k].distance);
-        const bool is_sure = is_exact || !compared[k].used || !is_near(&compared[k]);
-        if (is_sure && !relation[k].is_timed && call->holds[k] != holds) {
+        const bool follows = is_exact || (is_sure(&compared[k]) && !call->room.turned[k]);
+        if (follows && !relation[k].is_timed && call->holds[k] != holds) {
             call->holds[k] = holds;
             changes = true;
         }
@@ -129,12 +135,14 @@ static void turn(const struct call *call) {
         const double slope = signed_slope(&after[k], call->holds[k]);
         const bool falls = slope < 0.0 && slope < signed_slope(&before[k], call->holds[k]);
         const bool may_turn = after[k].used && !model->relation[k].is_timed && is_near(&after[k]);
+        call->room.turned[k] = may_turn && falls;
         call->holds[k] ^= may_turn && falls;
     }
     compare(call, call->room.zeros, after);
     for (int k = 0; k < model->relation_count; k++) {
         const bool rests = after[k].slope == 0.0 && signed_slope(&before[k], call->holds[k]) > 0.0;
         if (after[k].used && !model->relation[k].is_timed && is_near(&after[k]) && rests) {
+            call->room.turned[k] = 1;
             call->holds[k] = model->relation[k].includes_zero;
         }
     }
@@ -153,6 +161,7 @@ static bool fire(const struct call *call) {
             settle_all(call, false);
             turn(call);
             settle_all(call, false);
+            memset(call->room.turned, 0, (size_t)model->relation_count * sizeof *call->room.turned);
             call->active[i] = 1;
             fires = true;
         }

@@ -59,6 +59,7 @@ struct relations_room {
     struct compared *compared, *before; /* one per relation each */
     double *times;                      /* one per relation */
     int *due;                           /* one per event */
+    int *turned;                        /* one per relation; zeros */
     double *tolerance;                  /* one per state */
     const double *zeros;                /* one per state and input */
 };

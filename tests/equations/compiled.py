@@ -61,7 +61,7 @@ class Model:
         warnings = ["-Wall", "-Wextra", "-Wconversion", "-Werror", "-Wno-unused-parameter"]
         command = ["cc", "-std=c17", "-O1", "-ffp-contract=off", "-shared", "-fPIC", *warnings]
         shared = ROOT / "src" / "model"
-        sources = [folder / "equations.c", shared / "relations.c"]
+        sources = [folder / "equations.c", shared / "relations.c", shared / "domains.c"]
         subprocess.run([*command, f"-I{shared}", *sources, "-o", library, "-lm"], check=True)
         self.library = ctypes.CDLL(str(library))
         self.words = Words.in_dll(self.library, "equations_model")

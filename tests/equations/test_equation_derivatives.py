@@ -1,6 +1,7 @@
 """Random equations against mpmath: values, Jacobians, derivatives along a curve, Taylor series."""
 
 import random
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -123,6 +124,41 @@ def test_series_fits_the_equations(case: tuple) -> None:
                 close((k + 1) * polynomials[name][k + 1], expected[k])
 
 
+def minus(chance: random.Random, depth: int) -> str:
+    """Text of nothing but signs and differences."""
+    if depth == 0:
+        return chance.choice(["p", "u", "time", "0.5", f"x{chance.randrange(24)}"])
+    inner = minus(chance, depth - 1)
+    left = minus(chance, chance.randrange(2))
+    return chance.choice([f"-{inner}", f"-({inner})", f"{left} - {inner}", f"{left} - ({inner})"])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_signs_and_differences_nest(tmp_path: Path, seed: int) -> None:
+    """Coefficients are as linear as differences: Python takes these of arrays."""
+    chance = random.Random(seed)
+    texts = {f"x{i}": minus(chance, 1 + i // 3) for i in range(24)}
+    states = "".join(f'{name} = {{ derivative = "{text}" }}\n' for name, text in texts.items())
+    head = 'name = "Minus"\n[parameters]\np = { start = 1 }\n[inputs]\nu = {}\n[states]\n'
+    model = Model(tmp_path, head + states)
+    point = {name: chance.uniform(-1, 1) for name in (*texts, "p", "u", "time")}
+    scale, inputs = 0.5, np.array([[point["u"], 0.3, -0.2, 0.1]])
+    values = model.values(**point)
+    rows = model.series(values, point["time"], scale, inputs, 6)
+    rest = np.zeros(6)
+    known = {name: rows[i, :6] for i, name in enumerate(texts)} | {
+        "u": np.array([*inputs[0], 0, 0])
+    }
+    known |= {"p": rest, "time": np.array([0, scale, 0, 0, 0, 0])}
+    model.outputs(values, point["time"])
+    for i, (name, text) in enumerate(texts.items()):
+        value = eval(text, dict(point))
+        assert values[model.names.index(f"d_{name}")] == value
+        expected = eval(re.sub(r"\b0\.5\b", "rest", text), known | {"rest": rest})
+        expected = np.array([value, *np.asarray(expected)[1:]]) * scale / np.arange(1, 7)
+        np.testing.assert_allclose(rows[i, 1:], expected, rtol=0, atol=1e-14)
+
+
 def test_a_branch_that_is_not_taken_may_be_undefined(tmp_path: Path) -> None:
     """Where p = 0 all derivatives are those of the other branch."""
     found = []
@@ -142,3 +178,59 @@ def test_a_branch_that_is_not_taken_may_be_undefined(tmp_path: Path) -> None:
     for branch, alone in zip(*found, strict=True):
         np.testing.assert_array_equal(branch, alone)
         assert np.all(np.isfinite(branch))
+
+
+ENDS = [  # of domains: x' with the point, and its derivatives by x, y and p from calculus
+    ("x**p", {"x": -2, "p": 3}, (12, 0, None)),
+    ("x**p", {"x": 0, "p": 3}, (0, 0, 0)),
+    ("x**p", {"x": 0, "p": 1}, (1, 0, 0)),
+    ("x**p", {"x": 0, "p": 0}, (0, 0, None)),
+    ("x**1.5 + y", {"x": 0}, (0, 1, 0)),
+    ("x**p / (y**p + x**p)", {"x": 0, "y": 2, "p": 3}, (0, 0, 0)),
+    ("x * sqrt(x * x + y * y)", {"x": 0, "y": 0}, (0, 0, 0)),
+    ("p * (x * x + y * y)**1.5", {"p": 2}, (0, 0, 0)),
+    ("x * sqrt(x) + p", {"x": 0}, (0, 0, 1)),
+    ("sqrt(x) * sqrt(x)", {"x": 0}, (None, 0, 0)),  # 1, which no product rule finds: not 0
+    ("y * sqrt(x)", {"x": 0, "y": 2}, (None, 0, 0)),
+    ("y * sqrt(1 - x)", {"x": 1, "y": 0}, (0, 0, 0)),
+    ("1 / (1 + exp(-500 * x))", {"x": -2}, (0, 0, 0)),
+    ("1 / (1 + p * exp(-500 * x))", {"x": -2, "p": 3}, (0, 0, 0)),
+    ("p / cosh(900 * x) + y", {"x": 2, "p": 3}, (0, 1, 0)),
+    ("1 / (1 + 10**(-500 * x))", {"x": -2}, (0, 0, 0)),
+    ("exp(-exp(900 * x)) + tanh(exp(900 * x))", {"x": 2}, (0, 0, 0)),
+    ("1 / (1 / x + 1 / p)", {"x": 0, "p": 2}, (None, 0, 0)),  # 1, which infinities do not say
+]
+
+
+@pytest.mark.parametrize(("rate", "point", "expected"), ENDS, ids=[text for text, *_ in ENDS])
+def test_derivatives_where_plain_rules_give_none(
+    tmp_path: Path, rate: str, point: dict[str, float], expected: tuple[float | None, ...]
+) -> None:
+    """Finite ones are found; others are not finite, never a wrong number."""
+    head = 'name = "M"\n[parameters]\np = { start = 1 }\n[states]\n'
+    model = Model(tmp_path, head + f'x = {{ derivative = "{rate}" }}\ny = {{ derivative = "0" }}\n')
+    values = model.values(**point)
+    model.outputs(values, 0.0)
+    at = model.names.index("d_x")
+    assert np.isfinite(values[at])
+    J = model.jacobian(values, 0.0)[0]
+    for i, (by, slope) in enumerate(zip("xyp", expected, strict=True)):
+        first = model.values(**{by: 1.0})
+        model.propagate(values, 0.0, 0.0, first, model.values())
+        for found in (first[at], *J[i : i + 1]):
+            assert found == slope if slope is not None else not np.isfinite(found)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 2.0, 3.0, 5.0, 17.0])
+def test_a_series_of_a_power_begins_at_0(tmp_path: Path, exponent: float) -> None:
+    """Of an exponent that is a parameter: a whole one, or half a one of a square."""
+    head = 'name = "M"\n[parameters]\nn = { start = 1 }\n[states]\n'
+    text = 'x = { derivative = "2 + time" }\ny = { derivative = "(3 * x)**n" }\n'
+    text += 'z = { derivative = "(x * x)**(0.5 + n / 2)" }\n'
+    model = Model(tmp_path, head + text)
+    rows = model.series(model.values(n=exponent), 0.0, 0.7, np.zeros((1, 4)), 20)
+    x, n = np.polynomial.Polynomial([0.0, 2.0, 0.5]), int(exponent)
+    for row, side in ((rows[1], (3 * x) ** n), (rows[2], x ** (n + 1))):
+        known = side.integ().coef[:21]
+        scaled = known * 0.7 ** np.arange(len(known))
+        np.testing.assert_allclose(row[: len(known)], scaled, rtol=1e-13, atol=1e-300)

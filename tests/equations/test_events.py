@@ -116,6 +116,76 @@ def test_a_one_sided_spring_swings_in_two_halves(folder: Path, method: int) -> N
     assert run["event_count"][-1] == crossings
 
 
+TANKS = """
+[parameters]
+pump = { start = 0 }
+[states]
+a = { start = 1, derivative = "-0.1 * sqrt(a) - pump if a > 0 else 0" }
+b = { start = 1, derivative = "-0.1 * sqrt(max(b, 0)) - (pump if b > 0 else 0)" }
+c = { start = 1, derivative = "0 if c <= 0 else -0.1 * (c**0.5 if c > 0.25 else sqrt(c)) - pump" }
+[outputs]
+speed = { value = "sqrt(a) if a > 0 else 0" }
+"""
+
+
+@pytest.mark.parametrize("pump", [0.0, 0.05])
+@EACH_METHOD
+def test_tanks_run_empty(folder: Path, method: int, pump: float) -> None:
+    """By Torricelli's law, whose root ends where the guard does; s is the root of the height."""
+    run = simulated(
+        made(folder / "tanks", TANKS), 24.0, 0.7, {"solver_method": method, "pump": pump},
+        relative_tolerance=1e-9, also=["event_count", "last_event_time"],
+    )  # fmt: skip
+    s = np.linspace(1, 0, 100001)
+    times = 20 * (1 - s)
+    if pump:
+        times -= 200 * pump * np.log((0.1 + pump) / (0.1 * s + pump))
+    height = np.interp(run["time"], times, s) ** 2
+    for tank in "abc":
+        assert np.max(np.abs(run[tank] - height)) < 1e-8
+    np.testing.assert_allclose(run["speed"], np.sqrt(height), rtol=0, atol=1e-4)
+    assert run["last_event_time"][-1] == pytest.approx(times[-1], abs=1e-7 if pump else 1e-3)
+
+
+UNDEFINED = """
+[states]
+x = { start = 1, derivative = "1" }
+[where]
+root = "sqrt(x - 2)"
+[outputs]
+small = { value = "min(sqrt(-1), 2)" }
+sign = { value = "1 if sqrt(-1) > 0 else 0" }
+large = { value = "max(3, root)" }
+both = { value = "1 if x > 0 and not root > 5 else 2" }
+guarded = { value = "1 if x > 2 and root > 0.5 else 2" }
+either = { value = "1 if x <= 2 or root < 0.5 else 2" }
+"""
+
+
+@pytest.mark.parametrize(
+    ("x", "defined"),
+    [
+        (1.5, {"guarded": 2, "either": 1}),
+        (2.5, {"large": 3, "both": 1, "guarded": 1, "either": 2}),
+    ],
+)
+def test_what_follows_from_an_undefined_relation_is_not_finite(
+    folder: Path, tmp_path: Path, x: float, defined: dict[str, float]
+) -> None:
+    """A relation that is not looked at need not be defined."""
+    fmu = made(folder / "undefined", UNDEFINED)
+    unit = opened(fmu, tmp_path)
+    unit.setReal([reference(fmu, "x")], [x])
+    unit.exitInitializationMode()
+    for name in ("small", "sign", "large", "both", "guarded", "either"):
+        if name in defined:
+            assert unit.getReal([reference(fmu, name)]) == [defined[name]]
+        else:
+            with pytest.raises(fmpy.fmi1.FMICallException, match="discard"):
+                unit.getReal([reference(fmu, name)])
+    unit.freeInstance()
+
+
 BRANCHES = """
 [parameters]
 p = { start = 1 }

@@ -238,7 +238,7 @@ static bool is_possible_event_point(const struct instance *instance,
         {"the number of causes of the unhandled event", count, is_unhandled == (count > 0)},
         {"the end of the step cut short", end.s, isfinite(end.s)},
         {"the rest of the end of the step cut short", end.rest,
-         is_rest_of(end) && (state->event_point == NO_EVENT ||
+         is_rest_of(end) && (state->event_point == NO_EVENT || instance->is_integrated_outside ||
                              clock_difference(end, state->time) >= -clock_spacing(state->time.s))},
     };
     return are_possible(instance, values, COUNT(values));

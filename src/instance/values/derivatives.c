@@ -221,6 +221,37 @@ static double *double_in(char *structure, const struct variable *variable) {
     return (double *)(void *)(structure + variable->offset);
 }
 
+/* Of a value that is not finite there is no derivative. direction: what the derivative is taken
+ * along, behind "by". */
+static enum status check_derivative(const struct instance *instance, const struct variable *unknown,
+                                    const char *direction) {
+    if (unknown->owner == VARIABLE_OF_MODEL &&
+        !isfinite(derivative_in(instance->memory.values, unknown))) {
+        return instance_not_finite(instance, unknown->name);
+    }
+    if (!isfinite(derivative_in(instance->first_derivatives, unknown))) {
+        message_write(&instance->sink, STATUS_NOT_FINITE,
+                      "the derivative of %s by %s at t = %.17g is not finite", unknown->name,
+                      direction, instance->state.time.s);
+        return STATUS_NOT_FINITE;
+    }
+    return STATUS_OK;
+}
+
+/* The variable that a direction is along, or what to say for several. */
+static const char *direction_name(const struct instance *instance, const unsigned knowns[],
+                                  size_t count, const double v[]) {
+    const char *name = "nothing";
+    size_t moving = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (v[i] != 0.0) {
+            name = variable_of(instance->description, knowns[i])->name;
+            moving++;
+        }
+    }
+    return moving > 1 ? "all that moves" : name;
+}
+
 enum status instance_get_directional_derivative(struct instance *instance, enum known_kinds kinds,
                                                 const unsigned unknowns[], size_t unknown_count,
                                                 const unsigned knowns[], size_t known_count,
@@ -244,19 +275,16 @@ enum status instance_get_directional_derivative(struct instance *instance, enum 
     if (status != STATUS_OK) {
         return status;
     }
-    for (int writing = 0; writing < 2; writing++) {
-        for (size_t i = 0; i < unknown_count; i++) {
-            const struct variable *variable = variable_of(instance->description, unknowns[i]);
-            const double value = derivative_in(instance->first_derivatives, variable);
-            if (!isfinite(value)) {
-                return instance_not_finite(instance, variable->name);
-            }
-            if (writing) {
-                result[i] = value;
-            }
-        }
+    const char *direction = direction_name(instance, knowns, known_count, v);
+    for (size_t i = 0; status == STATUS_OK && i < unknown_count; i++) {
+        status =
+            check_derivative(instance, variable_of(instance->description, unknowns[i]), direction);
     }
-    return STATUS_OK;
+    for (size_t i = 0; status == STATUS_OK && i < unknown_count; i++) {
+        const struct variable *variable = variable_of(instance->description, unknowns[i]);
+        result[i] = derivative_in(instance->first_derivatives, variable);
+    }
+    return status;
 }
 
 /* v^T times the column of J that belongs to a known. */
@@ -266,16 +294,19 @@ static enum status multiply_column(struct instance *instance, const unsigned unk
     memset(instance->first_derivatives, 0, instance->model->values_size);
     double dt = 0.0;
     *(is_time(known) ? &dt : double_in(instance->first_derivatives, known)) = 1.0;
-    const enum status status = propagate(instance, dt, NULL);
-    if (status != STATUS_OK) {
-        return status;
-    }
+    enum status status = propagate(instance, dt, NULL);
     *product = 0.0;
-    for (size_t i = 0; i < unknown_count; i++) {
+    for (size_t i = 0; status == STATUS_OK && i < unknown_count; i++) {
         const struct variable *unknown = variable_of(instance->description, unknowns[i]);
-        *product += v[i] * derivative_in(instance->first_derivatives, unknown);
+        if (v[i] != 0.0) {
+            status = check_derivative(instance, unknown, known->name);
+            *product += v[i] * derivative_in(instance->first_derivatives, unknown);
+        }
     }
-    return isfinite(*product) ? STATUS_OK : instance_not_finite(instance, known->name);
+    if (status == STATUS_OK && !isfinite(*product)) {
+        return instance_not_finite(instance, known->name);
+    }
+    return status;
 }
 
 enum status instance_get_adjoint_derivative(struct instance *instance, enum known_kinds kinds,

@@ -1,0 +1,95 @@
+/* Models that are made from their equations (fmu/equations), beyond the events at which their
+ * branches end.
+ *
+ * Within a step modes stay as they are, and the right-hand side is smooth: a trial state, or the
+ * end of a step in which an event will be located, may be beyond the event. What is not finite
+ * there is evaluated in the modes that follow from the states: sqrt(h) if h > 0 else 0 is 0 where h
+ * < 0. */
+#ifndef DOMAINS_H
+#define DOMAINS_H
+
+#include "model.h"
+#include "relations.h"
+
+/* A model as it would be without this, and its values. */
+struct domains {
+    size_t values_size;
+    struct range states;
+    struct range inputs;
+    struct range calculated; /* double[]: all calculated fields but the indicators */
+    struct range indicators; /* double[] */
+    size_t modes;            /* offset of int[]: the mode of each relation */
+    int relation_count;
+    const struct relation *relation;
+    const size_t *row_of_indicator;
+    size_t own_row; /* of the series: 1 in order 0 where it is not in the modes of its values */
+    void (*write_distances)(const void *values, double t, double distance[]);
+
+    /* as in struct model, struct model_events and struct series */
+    enum status (*right_hand_side)(const void *values, double t, const double x[], const double u[],
+                                   double dx[]);
+    enum status (*jacobian)(const void *values, double t, const double x[], const double u[],
+                            double J[]);
+    enum status (*write_indicators)(const void *values, double t, const double x[],
+                                    const double u[], double z[]);
+    enum status (*outputs)(void *values, double t);
+    enum status (*propagate)(const void *values, double t, double dt, void *first, void *second);
+    enum status (*extend)(const struct series_origin *origin, int first, int last,
+                          double row[][SERIES_LENGTH]);
+};
+
+/* Memory for one call: value structures, and doubles. */
+struct domains_room {
+    void *values, *first, *second;
+    double *distance; /* one per relation */
+    double *result;   /* one per state or indicator */
+};
+
+static inline bool domains_are_finite(const double value[], size_t count) {
+    double sum = 0.0;
+    for (size_t i = 0; i < count; i++) {
+        sum += 0.0 * value[i];
+    }
+    return sum == 0.0;
+}
+
+/* Whether all calculated fields are finite. */
+static inline bool domains_are_calculated(const struct domains *model, const void *values) {
+    const char *begin = values;
+    return domains_are_finite((const double *)(const void *)(begin + model->calculated.offset),
+                              model->calculated.size / sizeof(double)) &&
+           domains_are_finite((const double *)(const void *)(begin + model->indicators.offset),
+                              model->indicators.size / sizeof(double));
+}
+
+/* Whether the states' coefficients of order 1 are finite, of a series from order 0 to last. */
+static inline bool domains_has_begun(const struct domains *model, int last,
+                                     double row[][SERIES_LENGTH]) {
+    double sum = 0.0;
+    for (size_t i = 0; last > 0 && i < model->states.size / sizeof(double); i++) {
+        sum += 0.0 * row[i][1];
+    }
+    return sum == 0.0;
+}
+
+/* After the function of this name, where not all results are finite: completes them. */
+enum status domains_right_hand_side(const struct domains *model, struct domains_room room,
+                                    const void *values, double t, const double x[],
+                                    const double u[], double dx[]);
+enum status domains_jacobian(const struct domains *model, struct domains_room room,
+                             const void *values, double t, const double x[], const double u[],
+                             double J[]);
+enum status domains_indicators(const struct domains *model, struct domains_room room,
+                               const void *values, double t, const double x[], const double u[],
+                               double z[]);
+enum status domains_outputs(const struct domains *model, struct domains_room room, void *values,
+                            double t);
+enum status domains_propagate(const struct domains *model, struct domains_room room,
+                              const void *values, double t, double dt, void *first, void *second);
+
+/* extend, where domains_has_begun said no of the orders from 0 on. */
+enum status domains_extend(const struct domains *model, struct domains_room room,
+                           const struct series_origin *origin, int first, int last,
+                           double row[][SERIES_LENGTH]);
+
+#endif
