@@ -1,6 +1,6 @@
 /* Encloses the arm's motion: reads a problem from standard input, writes balls that contain states
  * and outputs at all communication points, and what each step claims to a file, if one is named. */
-#include "outputs.h"
+#include "arm_outputs.h"
 
 #include <stdio.h>
 #include <stdlib.h>

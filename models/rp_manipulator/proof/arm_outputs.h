@@ -1,6 +1,6 @@
 /* The arm's outputs, in balls that follow from those of its states. */
-#ifndef OUTPUTS_H
-#define OUTPUTS_H
+#ifndef ARM_OUTPUTS_H
+#define ARM_OUTPUTS_H
 
 #include "step.h"
 
@@ -10,12 +10,12 @@ enum { OUTPUTS = 10 }; /* ddq1 ddq2, position and velocity of the end effector, 
 static void arm_efforts_at(const struct arm_problem *problem, double point, struct ball after,
                            struct ball found[EFFORTS]) {
     struct ball efforts[EFFORTS][ORDERS];
-    const struct step_times times = {
+    const struct step_times when = {
         .length = ball_exact(1.0),
         .within = ball_exact(0.0),
         .elapsed = ball_of_sum(point, -problem->start),
     };
-    arm_efforts(problem, &times, after, efforts);
+    arm_efforts(problem, &when, after, efforts);
     for (int e = 0; e < EFFORTS; e++) {
         found[e] = efforts[e][0];
     }
