@@ -208,13 +208,13 @@ class Scenario:
         """
         program = prover.of_scenario(self.path)
         with self._opened(2) as (opened, loaded):
-            enclosure = program.enclose(loaded)
+            enclosure = program.enclose(loaded).of(program.states)
             if enclosure.stopped is not None:
                 raise UserError(f"{self.path}: the proof holds up to {enclosure.stopped!r} s only")
             used = method or opened.model.method(loaded.parameters)
             (used,) = proven.methods(opened, used)
             found = proven.bounds(opened, loaded, enclosure, used, tolerance or loaded.tolerance)
-        return dict(zip(enclosure.states, found.max(axis=0).tolist(), strict=True))
+        return dict(zip(enclosure.names, found.max(axis=0).tolist(), strict=True))
 
     @contextmanager
     def _opened(self, fmi: int) -> Iterator[tuple[Fmu, scenarios.Scenario]]:
