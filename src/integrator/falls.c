@@ -39,15 +39,32 @@ static bool is_touch(const struct roots_polynomial *p, double begin, double end,
     return fabs(value) <= fmax(touch, 16.0 * DBL_EPSILON * size);
 }
 
-/* The first s at which p falls to 0, or 1 if it ends there: a touch is no fall. INFINITY: neither.
- */
-static double fall_or_end(const struct roots_polynomial *p, double touch) {
+/* p ends at 0, up to `touch`, and hardly moves there. */
+static bool is_touch_at_end(const struct roots_polynomial *p, double touch) {
+    double value = p->c[0];
+    double slope = 0.0;
+    for (int k = 1; k <= p->degree; k++) {
+        value += p->c[k];
+        slope += k * p->c[k];
+    }
+    return fabs(value) <= touch && fabs(slope) <= 0x1p10 * touch;
+}
+
+/* The first s at which p, of an armed indicator, falls to 0, or 1 if it ends there: a touch is no
+ * fall. INFINITY: neither; where the step ends within a touch, the indicator is no longer armed. */
+static double fall_or_end(const struct roots_polynomial *p, const struct fall *fall) {
     struct root roots[ROOTS_LENGTH];
     const int count = roots_find(p, roots);
     for (int i = 0; i < count; i++) {
-        const bool rises_again = i + 1 < count && roots[i + 1].kind == ROOT_RISES;
+        const bool is_last = i + 1 == count;
+        if (is_last && is_touch_at_end(p, fall->touch)) {
+            *fall->is_armed = false;
+            *fall->noise = fmax(*fall->noise, 2.0 * fall->touch);
+            return INFINITY;
+        }
+        const bool rises_again = !is_last && roots[i + 1].kind == ROOT_RISES;
         const bool falls = roots[i].kind == ROOT_FALLS &&
-                           !(rises_again && is_touch(p, roots[i].s, roots[i + 1].s, touch));
+                           !(rises_again && is_touch(p, roots[i].s, roots[i + 1].s, fall->touch));
         if (falls || roots[i].s == 1.0) {
             return roots[i].s;
         }
@@ -139,5 +156,5 @@ double fall_first(const struct roots_polynomial *p, const struct fall *fall) {
         return fall_behind(p, 0.0);
     }
     const double s = roots_first(p);
-    return s > 0.0 && s < 1.0 ? fall_or_end(p, fall->touch) : s;
+    return s > 0.0 && s <= 1.0 ? fall_or_end(p, fall) : s;
 }

@@ -128,7 +128,7 @@ enum status location_restart(struct location *location, const struct indicator *
         } else {
             const double z = at_state(indicator, x);
             const bool is_sure = indicator->rises || z > 0.0;
-            location->is_armed[i] = is_sure && (z > rounding || rounding == 0.0);
+            location->is_armed[i] = is_sure && (z > rounding || (rounding == 0.0 && z >= 0.0));
             const double miss = fabs(indicator->factor) * location->tolerances[indicator->state];
             location->noise[i] = is_sure ? rounding : larger(rounding, miss);
             const double size = fabs(indicator->offset) + fabs(z - indicator->offset);
