@@ -28,7 +28,8 @@
 #   --json         print one JSON document, and all else on standard error
 #   --quiet        print the last line only, and what is wrong
 #
-# Exit codes: 0 all well, 1 a result is bad, 2 wrong use or failure, 130 Ctrl-C.
+# Exit codes: 0 all well, 1 a result is bad, 2 wrong use or failure, 130 Ctrl-C,
+# 141 whoever read the output has left, as head does.
 set -euo pipefail
 unset PYTHONPATH PYTHONHOME  # may lead to other modules than those tested here
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)

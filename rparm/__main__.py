@@ -24,8 +24,9 @@ LONGEST_MESSAGE = 2000  # characters; some quote what a file says
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code, as `command_line.EXIT_CODES` says."""
-    if isinstance(sys.stdout, TextIOWrapper):  # names that it cannot encode are no reason to stop
-        sys.stdout.reconfigure(errors="backslashreplace")
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # names that it cannot encode are no reason to stop
+            stream.reconfigure(errors="backslashreplace")
     project.set_library_caches()
     given = list(sys.argv[1:] if arguments is None else arguments)
     options = given[: given.index("--")] if "--" in given else given
@@ -39,9 +40,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130
-    except BrokenPipeError:  # whoever read the output has left
+    except BrokenPipeError:  # whoever read the output has left: as if SIGPIPE had ended it
         _drop_output()
-        return 1
+        return command_line.NO_READER
     except OSError as error:
         _drop_output()
         return _refuse(f"{error.filename or 'output or temporary files'}: {reason(error)}")
@@ -51,6 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _ended(arguments: Sequence[str]) -> Ended:
     try:
+        project.check_current_folder()
         options = command_line.parsed(arguments)
         # imported here because it takes long: so Ctrl-C during the import leaves no traceback
         ended = import_module(f"rparm.commands.{options.command.replace('-', '_')}").run(options)

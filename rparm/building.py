@@ -56,7 +56,7 @@ def _made(file: Path, runtimes: list[Path], of_this_machine: bool, work: Path) -
     # zig compiles its C library once; what a program that is killed leaves is in `work`
     environment = {"ZIG_GLOBAL_CACHE_DIR": str(project.cache_folder("zig"))}
     environment |= dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(work))
-    environment["PYTHONIOENCODING"] = "utf-8"
+    environment["PYTHONIOENCODING"] = "utf-8:surrogateescape"  # names of files may be no UTF-8
     ended = run_group(
         [*command, "--", file],
         stdin=subprocess.DEVNULL,
@@ -64,7 +64,7 @@ def _made(file: Path, runtimes: list[Path], of_this_machine: bool, work: Path) -
         stderr=subprocess.PIPE,
         env=project.child_environment() | environment,
         encoding="utf-8",
-        errors="replace",
+        errors="surrogateescape",
     )
     if ended.returncode:
         lines = ended.stderr.strip().splitlines() or [f"{tool} ended with {ended.returncode}"]

@@ -1,6 +1,7 @@
 """Errors whose text is meant for the user, and functions that form such texts."""
 
 import difflib
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -46,9 +47,17 @@ def closest(name: str, known: Iterable[str]) -> str:
     """The one of `known` that `name` may be meant for, or nothing."""
     known = list(known)
     close = difflib.get_close_matches(name, known, n=1)
+    if not close:
+        plain = {_plain(other): other for other in reversed(known)}
+        close = [plain[found] for found in difflib.get_close_matches(_plain(name), plain, n=1)]
     if not close and len(name) >= SHORTEST_PART:
         close = [other for other in known if name.lower() in other.lower()]
     return close[0] if close else ""
+
+
+def _plain(name: str) -> str:
+    """A name without what is easily mistaken: case, underscores, hyphens and blanks."""
+    return re.sub("[_ -]", "", name).casefold()
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

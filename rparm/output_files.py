@@ -10,6 +10,10 @@ from tempfile import TemporaryFile
 from rparm.errors import UserError, reason
 from rparm.interruption import uninterrupted
 
+# what no file can be called on Windows, with any suffix
+DEVICES = {"CON", "PRN", "AUX", "NUL", "CONIN$", "CONOUT$"}
+DEVICES |= {f"{port}{number}" for port in ("COM", "LPT") for number in "123456789\xb9\xb2\xb3"}
+
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
@@ -34,10 +38,13 @@ def written(path: str | Path) -> Iterator[None]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text; its folder is made, and the file appears complete or not at all."""
+    """Write a text; its folder is made, and the file appears complete or not at all.
+
+    What stands for the bytes of a file name that is not UTF-8 is escaped, as JSON does it.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+        temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 def create(path: Path, text: str) -> None:
@@ -63,6 +70,15 @@ def copied(file: Path, path: Path) -> Path:
         with whole(path) as temporary:
             shutil.copyfile(file, temporary)
     return path
+
+
+def check_for_windows(name: str) -> None:
+    """Refuse the name of a file that Windows cannot have, so that the file can go there."""
+    if name.partition(".")[0].rstrip().upper() in DEVICES:
+        raise UserError(f"{name!r}: Windows keeps this name for a device, choose another one")
+    wrong = next((character for character in name if character in '<>:"|?*'), "")
+    if wrong:
+        raise UserError(f"{name!r}: no file of Windows has {wrong} in its name, choose another one")
 
 
 def check_writable(folder: Path) -> None:

@@ -7,6 +7,7 @@ models/MODEL/references/scales.toml     sums that errors are divided by, instead
 models/SYSTEM/SystemStructure.ssd       connects models to a system
 models/SYSTEM/references/VARIANT/       ecos.csv of a variant of the system
 models/SYSTEM/study.py                  what to measure, draw and study there
+models/*/campaigns/NAME.toml            a campaign
 models/SYSTEM/system.svg                its components and the signals between them
 models/*/animation.py                   what of a run the report animates
 models/SYSTEM/identification.py         makes a log of the system, to identify parameters from
@@ -35,7 +36,8 @@ from pathlib import Path
 import platformdirs
 
 from rparm import fmu_tools, shipped
-from rparm.errors import UserError, did_you_mean, hint
+from rparm.errors import UserError, did_you_mean, reason
+from rparm.input_files import is_file
 
 PACKAGE = Path(__file__).resolve().parent
 INSTALLED = shipped.SHARE.is_dir()  # else the package is that of a checkout
@@ -51,6 +53,16 @@ PROOF = "proof"  # folder of a model with the program that encloses its motions
 SCENARIO_FOLDERS = ("scenarios", "convergence")
 BUILD_FOLDERS = {"2.0": "build", "3.0": "build/fmi3"}  # by version of FMI
 VERSIONS = tuple(BUILD_FOLDERS)
+
+
+def check_current_folder() -> None:
+    """UserError if the current folder has been removed: most paths then lead nowhere."""
+    try:
+        Path.cwd()
+    except OSError as error:
+        raise UserError(
+            f"the current folder cannot be used: {reason(error)}; change to another one"
+        ) from None
 
 
 def fmi_version(given: object) -> str | None:
@@ -81,6 +93,23 @@ def scenario_file(name: str) -> Path:
     return found[name]
 
 
+def campaign_files() -> dict[str, Path]:
+    """All campaigns of models and systems by name."""
+    found = {path.stem: path for path in models_folder().glob("*/campaigns/*.toml")}
+    return dict(sorted(found.items()))
+
+
+def campaign_file(given: str | Path) -> Path:
+    """A campaign: a file, or one of the project by its name; UserError if there is none."""
+    path, known = Path(given), campaign_files()
+    if path.suffix or is_file(path):
+        return path
+    if str(given) not in known:
+        guess = did_you_mean(str(given), known)
+        raise UserError(f"no campaign {str(given)!r}{guess} ({PROGRAM} campaign --list names them)")
+    return known[str(given)]
+
+
 def models() -> dict[str, Path]:
     """Folders of all models that have scenarios, by name."""
     folders = sorted({path.parents[1] for path in models_folder().glob("*/scenarios/*.toml")})
@@ -93,7 +122,8 @@ def model(name: str) -> Path:
     for folder in known.values():
         if name == folder.name or is_built_from(name, folder):
             return folder
-    raise UserError(f"no model {name!r}{hint(name, known)}")
+    guess = did_you_mean(name, [*known, *built_names(".fmu")])
+    raise UserError(f"no model {name!r}{guess} (known: {', '.join(known) or 'none'})")
 
 
 def is_in_model(file: Path) -> bool:
@@ -168,6 +198,15 @@ def systems() -> dict[str, Path]:
 def is_built_from(name: str, folder: Path) -> bool:
     """Whether an FMU or SSP called `name` is that of the folder of a model or system."""
     return name.lower() == folder.name.replace("_", "").lower()
+
+
+def built_names(suffix: str) -> list[str]:
+    """Names of the FMUs (.fmu) or systems (.ssp) that are there, without suffix."""
+    if INSTALLED:
+        files = [Path(name) for name in shipped.names() if name.startswith(VERSIONS[0])]
+    else:
+        files = sorted((ROOT / BUILD_FOLDERS[VERSIONS[0]]).glob(f"*{suffix}"))
+    return [file.stem for file in files if file.suffix == suffix]
 
 
 def built(folder: Path, suffix: str, option: str = "", version: str = VERSIONS[0]) -> Path:

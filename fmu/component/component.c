@@ -21,26 +21,43 @@ const char *component_category_name(enum log_category category) {
     return category_names[category];
 }
 
-void component_make_harmless(const char *text, char out[LOG_TEXT_SIZE]) {
+static bool continues_character(char c) {
+    return ((unsigned char)c & 0xc0) == 0x80;
+}
+
+/* Length of a text in UTF-8 without a last character that has been cut. */
+static size_t whole_length(const char *text, size_t length) {
+    size_t begin = length;
+    while (begin > 0 && continues_character(text[begin - 1])) {
+        begin--;
+    }
+    const unsigned char first = begin > 0 ? (unsigned char)text[begin - 1] : 0;
+    const size_t needed = first >= 0xf0 ? 3 : first >= 0xe0 ? 2 : first >= 0xc0 ? 1 : 0;
+    return length - begin < needed ? begin - 1 : length;
+}
+
+void component_make_harmless(const struct adapter *adapter, const char *text,
+                             char out[LOG_TEXT_SIZE]) {
     size_t length = 0;
     for (; *text != '\0' && length < LOG_TEXT_SIZE - 2; text++) {
-        char c = *text;
-        if (c == '%' || (unsigned char)c < ' ' || c == 0x7f) {
-            c = '?';
+        const bool is_blank = strchr("\t\n\r", *text) != NULL;
+        const bool is_control = (unsigned char)*text < ' ' || *text == 0x7f;
+        out[length] = *text;
+        if (is_blank || is_control) {
+            out[length] = is_blank ? ' ' : '?';
+        } else if (strchr(adapter->doubled, *text) != NULL) {
+            out[++length] = *text;
         }
-        out[length++] = c;
-        if (c == '#') {
-            out[length++] = '#';
-        }
+        length++;
     }
-    out[length] = '\0';
+    out[whole_length(out, length)] = '\0';
 }
 
 static void send_one(const struct component *component, enum component_status status,
                      enum log_category category, const char *raw) {
     if (component->is_logged[category]) {
         char text[LOG_TEXT_SIZE];
-        component_make_harmless(raw, text);
+        component_make_harmless(component->adapter, raw, text);
         component->adapter->send(component, status, category_names[category], text);
     }
 }

@@ -41,6 +41,7 @@ struct adapter {
     unsigned always_logged;        /* categories sent by an instance made with logging off, too */
     unsigned never_silent;         /* categories that component_set_logging cannot switch off */
     enum known_kinds knowns;       /* of directional and adjoint derivatives */
+    const char *doubled;           /* characters of a text that stand for themselves only twice */
 
     /* In intermediate update mode: whether these values may be read or set; if not, it fails as
      * component_fail. NULL: the version has no such mode. */
@@ -136,8 +137,9 @@ NONNULL_ARGUMENTS(1)
 enum component_status component_set_logging(struct component *component, bool on, size_t count,
                                             const char *const names[]);
 
-/* Makes a text harmless that importers may pass to printf or search for #r<reference>#: '%' and
- * control characters become '?', '#' is doubled. */
-NONNULL void component_make_harmless(const char *text, char out[LOG_TEXT_SIZE]);
+/* Makes a text harmless that importers search for references to variables, or pass to printf:
+ * doubles what means something to them. Line ends become blanks, other control characters '?'. */
+NONNULL void component_make_harmless(const struct adapter *adapter, const char *text,
+                                     char out[LOG_TEXT_SIZE]);
 
 #endif

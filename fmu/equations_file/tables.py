@@ -21,8 +21,11 @@ from rparm.expressions.units import ANGLE, BASE, exponents
 
 LARGEST = 10**6  # bytes
 MOST_VARIABLES = 1000
-LONGEST_TEXT = 1000  # characters of a description or a message
+LONGEST_TEXT = 1000  # characters of a description
+LONGEST_MESSAGE = 500  # bytes: src/instance/state/settings.c has no room for more
 NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,99}", re.ASCII)
+# files that Windows cannot have, with any suffix
+DEVICE = re.compile("(?i:con|prn|aux|nul|com[1-9]|lpt[1-9])")
 CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 RESERVED = {*FUNCTIONS, *NO_NAMES, "pi", "time", "GUID", "NAME", "TOKEN_FMI3"}
 
@@ -253,6 +256,8 @@ def read_tables(
 ) -> ModelFile:
     """What the tables say, without the meaning of the expressions."""
     head = _entries(tables, HEAD, "name", "section")
+    if DEVICE.fullmatch(head["name"]):
+        raise ModelFileError("name: Windows keeps this name for a device, choose another one")
     with placed("[experiment]"):
         experiment = _experiment(_entries(head.get("experiment", {}), EXPERIMENT))
     reserved = RESERVED | set(solver_names)
@@ -275,6 +280,8 @@ def read_tables(
         place = ("[check]", shown(message))
         with placed(*place):
             message = _text(message)
+            if len(message.encode()) > LONGEST_MESSAGE:
+                raise ModelFileError(f"expected a message of at most {LONGEST_MESSAGE} bytes")
         file.checks[message] = Expression(place, condition, CONDITION)
     return file
 

@@ -37,6 +37,7 @@ static const struct adapter adapter = {
     .after_error = STATE_ERROR,
     .always_logged = ~(1u << LOG_EVENTS | 1u << LOG_ALL),
     .knowns = KNOWN_MOTION,
+    .doubled = "#%", // references to variables, formats of printf (section 2.1.5)
     .send = send_text,
 };
 
@@ -53,7 +54,7 @@ static void refuse_instance(const fmi2CallbackFunctions *functions, fmi2String n
     va_start(arguments, format);
     (void)vsnprintf(raw, sizeof raw, format, arguments);
     va_end(arguments);
-    component_make_harmless(raw, text);
+    component_make_harmless(&adapter, raw, text);
     functions->logger(functions->componentEnvironment, name != NULL ? name : "", fmi2Error,
                       component_category_name(LOG_STATUS_ERROR), text);
 }

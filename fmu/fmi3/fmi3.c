@@ -37,6 +37,7 @@ static const struct adapter adapter = {
     .always_logged = ERRORS,
     .never_silent = ERRORS,
     .knowns = KNOWN_ARGUMENTS,
+    .doubled = "#", // references to variables: the text is no format
     .may_access = fmi3_may_access,
     .send = send_text,
 };
@@ -78,7 +79,7 @@ static fmi3Instance refuse_instance(const struct receiver *receiver, const char 
         va_start(arguments, format);
         (void)vsnprintf(raw, sizeof raw, format, arguments);
         va_end(arguments);
-        component_make_harmless(raw, text);
+        component_make_harmless(&adapter, raw, text);
         receiver->logger(receiver->environment, fmi3Error,
                          component_category_name(LOG_STATUS_ERROR), text);
     }

@@ -99,7 +99,8 @@ class Fmu {
 
   // ---- calls
 
-  #log(status, text) {
+  #log(status, sent) {
+    const text = sent.replace(/##|%%/g, (twice) => twice[0]); // FMI 2.0, section 2.1.5
     if (status === Fmu.WARNING) this.onWarning(text);
     else this.#messages.push(text);
   }

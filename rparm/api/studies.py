@@ -38,9 +38,10 @@ def linearize(
         A file, or a name of the project; a name is taken from version `fmi` of FMI.
     at : mapping, optional
         States, inputs and parameters by name, as numbers or texts with a unit ("30 deg"); with
-        `trim` also outputs. In a system names are "component.variable".
+        `trim` also outputs, and first guesses of what is moved. In a system names are
+        "component.variable".
     time : float, optional
-        s; default: 0, or the start of the system.
+        s; default: the start of the FMU's default experiment, or of the system.
     trim : sequence of str
         States and inputs to move until the point is an equilibrium.
     inputs, outputs : sequence of str, optional
@@ -137,7 +138,7 @@ def run_campaign(
 
     Parameters
     ----------
-    file : path
+    file : path or str
         The campaign, as the command takes it.
     output : path, optional
         Folder for the results; default: that in the file, or that of the command.
@@ -154,7 +155,9 @@ def run_campaign(
     """
     with _needing("campaign"):
         from rparm.campaign import cluster, work
-    with work.opened(Path(file), fmu and Path(fmu), output and Path(output)) as made:
+    with work.opened(
+        project.campaign_file(file), fmu and Path(fmu), output and Path(output)
+    ) as made:
         if blocks := made.begin():
             with (
                 made.results.workers_folder() as files,

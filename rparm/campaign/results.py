@@ -26,6 +26,7 @@ from rparm.campaign.job import Job
 from rparm.campaign.planning import FAILURE, RUN, columns_of
 from rparm.campaign.runs import Rows
 from rparm.errors import UserError, reason
+from rparm.interruption import temporary_folder
 from rparm.output_files import check_writable, whole, written
 
 MANIFEST, BLOCKS, TRAJECTORIES = "manifest.json", "blocks", "trajectories"
@@ -78,7 +79,13 @@ class Results:
     @contextmanager
     def workers_folder(self) -> Iterator[Path]:
         """Folder for the files of workers on this machine, which is removed at the end."""
-        folder = self.folder / WORKERS.format(os.getpid())
+        folder = self.folder.absolute() / WORKERS.format(os.getpid())
+        try:
+            str(folder).encode()
+        except UnicodeEncodeError:  # Dask cannot send its name to the workers
+            with temporary_folder() as elsewhere:
+                yield elsewhere
+            return
         try:
             yield folder
         finally:
@@ -126,7 +133,8 @@ class Results:
         """Refuse blocks of another campaign, whose manifest has been lost."""
         for path in sorted(self.folder.glob(f"{BLOCKS}/block_*.parquet")):
             try:
-                found = (pq.read_schema(path).metadata or {}).get(CAMPAIGN)
+                with path.open("rb") as file:  # Parquet opens no name that is not UTF-8
+                    found = (pq.read_schema(file).metadata or {}).get(CAMPAIGN)
             except DAMAGE:  # is run again
                 continue
             if found != self._hash:
@@ -176,8 +184,8 @@ class Results:
     def _read(self, path: Path, schema: pa.Schema, part: str) -> pa.Table | None:
         """A part of the results; None if it is missing or damaged."""
         try:
-            with pq.ParquetFile(path, page_checksum_verification=True) as file:
-                table = file.read()
+            with path.open("rb") as source:  # Parquet opens no name that is not UTF-8
+                table = pq.ParquetFile(source, page_checksum_verification=True).read()
             if not table.schema.equals(schema):
                 return None
             right = self._marked(table, part).schema

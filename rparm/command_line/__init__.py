@@ -44,7 +44,11 @@ COMMON = ("--json", "--quiet")
 HELP = ("help", "--help", "-h")
 VERSION = "--version"
 
-EXIT_CODES = "exit codes: 0 all well, 1 a result is bad, 2 wrong use or failure, 130 Ctrl-C"
+NO_READER = 141  # 128 + SIGPIPE, which not every system has
+EXIT_CODES = (
+    "exit codes: 0 all well, 1 a result is bad, 2 wrong use or failure, 130 Ctrl-C,\n"
+    f"{NO_READER} whoever read the output has left, as head does"
+)
 EPILOG = f"""With --json, standard output has one JSON document and nothing else. "exit_code" is in
 it, and "error" with the message if there is one. A command that is interrupted prints none.
 {EXIT_CODES}."""

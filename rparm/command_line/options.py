@@ -134,6 +134,11 @@ def retyped(command: str, positional: Iterable[object], given: Mapping[str, obje
     return shlex.join(parts)
 
 
+def file_or_name(given: str, suffixes: Iterable[str]) -> str | Path:
+    """What was typed where a file is expected or a name of the project, for `retyped`."""
+    return Path(given) if Path(given).suffix.lower() in suffixes else given
+
+
 def _typed(value: object) -> str:
     return str(project.from_root(value) if isinstance(value, Path) else value)
 

@@ -15,6 +15,7 @@ from rparm.interruption import arrived
 from rparm.output import console
 from rparm.output.progress import Progress
 from rparm.output_files import from_here, written
+from rparm.scenarios.scenario import title
 
 if TYPE_CHECKING:
     from distributed import Security
@@ -29,7 +30,12 @@ NEEDED = ("SALib", "cryptography", "distributed", "numba", "pyarrow", "scipy")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, metavar="FILE.toml", help="the campaign")
+    parser.add_argument(
+        "file", nargs="?", metavar="FILE.toml", help="the campaign, or the name of one of --list"
+    )
+    parser.add_argument(
+        "--list", action="store_true", help="name the project's campaigns, run nothing"
+    )
     parser.add_argument(
         "--fmu", type=Path, metavar="PATH", help="the FMU or SSP (default: that in build/)"
     )
@@ -69,6 +75,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Ended:
     """Run what is missing of the campaign; 0 when all runs are there, failed ones among them."""
+    if options.list:
+        found = [
+            {"name": name, "title": title(path)} for name, path in project.campaign_files().items()
+        ]
+        return Ended(0, console.titles(found), {"campaigns": found})
+    if options.file is None:
+        raise UserError("expected the file of a campaign, or a name (--help explains)")
+    file = project.campaign_file(options.file)
     project.check_installed(NEEDED, "campaign")
     # imported here: what a campaign needs may not be installed
     from rparm.campaign import page, planning, replay, work
@@ -76,9 +90,9 @@ def run(options: argparse.Namespace) -> Ended:
     security = _security(options)
 
     def ask(questions: Sequence[str]) -> None:
-        console.messages(f"warning: {options.file}", questions)
+        console.messages(f"warning: {file}", questions)
 
-    with work.opened(options.file, options.fmu, options.output, ask) as made:
+    with work.opened(file, options.fmu, options.output, ask) as made:
         campaign, results, folder = made.campaign, made.results, made.results.folder
         if options.replay is not None:
             results.check()
@@ -129,7 +143,9 @@ def _security(options: argparse.Namespace) -> "Security | None":
 
 
 def _command(options: argparse.Namespace) -> str:
-    return retyped("campaign", [options.file], {"fmu": options.fmu, "output": options.output})
+    path = Path(options.file)
+    file = path if project.campaign_file(path) == path else options.file
+    return retyped("campaign", [file], {"fmu": options.fmu, "output": options.output})
 
 
 def _run_missing(options: argparse.Namespace, security: "Security | None", made: "Work") -> None:

@@ -74,6 +74,7 @@ def _values() -> dict[str, dict[str, Any]]:
         "MODEL": models,
         "SCENARIO": _words("scenarios", project.scenario_files()),
         "VARIANT": _words("variants", all_variants),
+        "campaign FILE.toml": _words("campaigns", project.campaign_files(), "*.toml"),
         "fmu NAME": models,
         "run NAME": _words("scenario_files", project.scenario_files(), "*.toml"),
         "system NAME": _words("systems", [*variants, *all_variants]),

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rparm import project
-from rparm.command_line.options import add_report, names, pairs, retyped
+from rparm.command_line.options import add_report, file_or_name, names, pairs, retyped
 from rparm.commands import Ended
 from rparm.errors import UserError, placed
 from rparm.input_files import number_in
@@ -140,7 +140,7 @@ def _fmu(given: str) -> Path:
 
 
 def _again(options: argparse.Namespace) -> str:
-    files = map(Path, [options.fmu, *options.logs] if options.fmu else [])
+    files = [file_or_name(options.fmu, (".fmu",)), *options.logs] if options.fmu else []
     given = {name: getattr(options, name) for name in (*SEVERAL, "validate")}
     given["segment"] = options.segment if options.segment != SEGMENT else None
     return retyped("identify", files, given | {"delay": options.delay, "demo": options.demo})

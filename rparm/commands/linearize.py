@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from rparm import project
-from rparm.command_line.options import add_fmi, add_report, names, pairs, retyped
+from rparm.command_line.options import add_fmi, add_report, file_or_name, names, pairs, retyped
 from rparm.commands import Ended
 from rparm.errors import WrongValueError
 from rparm.output import console
@@ -12,6 +12,7 @@ from rparm.output_files import check_writable, from_here, written
 from rparm.units import SECONDS, typed_quantity
 
 MOST_COLUMNS, MOST_ROWS = 6, 12  # of matrices in the terminal
+SUFFIXES = (".fmu", ".ssp")
 SHORTEST = 1e-9  # s, of samples: pictures of much shorter ones overflow
 DESCRIPTION = (
     "Finds an equilibrium, and A, B, C and D about it; of a system also the margins of a loop that "
@@ -25,7 +26,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--variant", default="", metavar="NAME", help="parameter set of a system")
     parser.add_argument(
         "--at", nargs="+", default=[], metavar="NAME=VALUE", action="extend",
-        help="states, inputs and parameters, with units as in 30deg; with --trim also outputs",
+        help="states, inputs and parameters, with units as in 30deg; with --trim also outputs, and "
+        "first guesses of what it moves",
     )  # fmt: skip
     parser.add_argument("--time", type=_seconds, help="time of the point (default: the start)")
     for option, text in (
@@ -98,7 +100,7 @@ def _command(options: argparse.Namespace) -> str:
     given = {"fmi": options.fmi if options.fmi != project.VERSIONS[0] else None}
     for name in ("variant", "at", "time", "trim", "inputs", "outputs", "without", "cut", "step"):
         given["break" if name == "cut" else name] = getattr(options, name)
-    return retyped("linearize", [options.what], given)
+    return retyped("linearize", [file_or_name(options.what, SUFFIXES)], given)
 
 
 def _seconds(text: str) -> float:

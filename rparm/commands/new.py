@@ -1,6 +1,7 @@
 """`new`: write a scenario with comments, for a user to start from."""
 
 import argparse
+import shlex
 from pathlib import Path
 
 from rparm import project
@@ -8,15 +9,13 @@ from rparm.command_line.options import add_output
 from rparm.commands import Ended
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import read_model
-from rparm.output_files import create, from_folder, written
+from rparm.output_files import check_for_windows, create, from_folder, written
 from rparm.scenarios import template
 
 DESCRIPTION = (
     f"Writes NAME.toml, a scenario with comments that runs as it is: {project.PROGRAM} NAME.toml."
 )
 SUFFIX = ".toml"
-# what no file can be called on Windows, with any suffix
-RESERVED = {"CON", "PRN", "AUX", "NUL"} | {f"{x}{i}" for x in ("COM", "LPT") for i in range(1, 10)}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -45,7 +44,7 @@ def run(options: argparse.Namespace) -> Ended:
         with written(path):
             options.output.mkdir(parents=True, exist_ok=True)
     create(path, text)
-    verdict = f"{path}: written; run it by {project.PROGRAM} '{path}'"
+    verdict = f"{path}: written; run it by {project.PROGRAM} {shlex.quote(str(path))}"
     return Ended(0, verdict, {"file": path.absolute(), "model": name}, page=path)
 
 
@@ -58,8 +57,7 @@ def _path(name: str) -> Path:
         raise UserError(f"{name!r}: a name has printable characters only")
     if path.name.startswith("-"):
         raise UserError(f"{name!r}: a name begins with no hyphen, it would be an option")
-    if path.name.partition(".")[0].rstrip().upper() in RESERVED:
-        raise UserError(f"{name!r}: Windows keeps this name for a device, choose another one")
+    check_for_windows(path.name)
     return path if path.suffix.lower() == SUFFIX else path.with_name(path.name + SUFFIX)
 
 

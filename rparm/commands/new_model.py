@@ -9,7 +9,7 @@ from rparm import project
 from rparm.command_line.options import add_output
 from rparm.commands import Ended
 from rparm.errors import UserError
-from rparm.output_files import create, written
+from rparm.output_files import check_for_windows, create, written
 
 DESCRIPTION = (
     f"Writes NAME.toml, a model of one's own with comments: {project.PROGRAM} build NAME.toml "
@@ -55,6 +55,7 @@ def run(options: argparse.Namespace) -> Ended:
         raise UserError(
             f"{options.name!r} is no name for a model: a letter, then letters, digits, _"
         )
+    check_for_windows(options.name)
     path = (options.output or Path()) / f"{options.name}.toml"
     with written(path):
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -23,6 +23,7 @@ class Fmi2Instance(Instance):
     PLATFORMS = (fmpy.platform_tuple, fmpy.platform)
     LIBRARY = fmi2.FMU2Slave
     INSTANTIATE = "fmi2Instantiate"
+    MARKS = r"##|%%|#([ribs])(\d+)#"  # references and formats: FMI 2.0, section 2.1.5
     SETTERS = {
         "Real": "setReal",
         "Integer": "setInteger",

@@ -28,6 +28,7 @@ class Fmi3Instance(Instance):
     PLATFORMS = (fmpy.platform_tuple,)
     LIBRARY = fmi3.FMU3Slave
     INSTANTIATE = "fmi3InstantiateCoSimulation"
+    MARKS = r"##|#()(\d+)#"  # references: FMI 3.0, section 2.2.3
     SETTERS = {
         "Real": "setFloat64",
         "Integer": "setInt32",

@@ -5,6 +5,7 @@ Functions that are called in long loops raise fmpy's FMICallException, which `fa
 the user's error; those that are called now and then raise the user's error themselves.
 """
 
+import re
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,10 +20,13 @@ from fmpy.fmi1 import FMICallException
 
 from rparm.errors import UserError, one_line
 from rparm.fmi.model import Model, Value
+from rparm.project import check_current_folder
 
 OK, ERROR, FATAL = 0, 3, 4
 STATUS_NAMES = ("OK", "warning", "discard", "error", "fatal", "pending")  # the last: FMI 2.0
 MESSAGES_KEPT = 20
+# types of the variables that messages of FMI 2.0 refer to, by a letter
+REFERRED = {"r": ("Real",), "i": ("Integer", "Enumeration"), "b": ("Boolean",), "s": ("String",)}
 
 Call = Callable[[], object]  # of a function of an FMU; FMICallException if it fails
 
@@ -104,6 +108,7 @@ class Instance(ABC):
     LIBRARY: ClassVar[type]  # fmpy's class for co-simulation
     INSTANTIATE: ClassVar[str]  # name of the function
     SETTERS: ClassVar[Mapping[str, str]]  # methods of LIBRARY, by type of the variable
+    MARKS: ClassVar[str]  # what in a message does not stand for itself, as a regular expression
 
     def __init__(self, fmu: UnpackedFmu, name: str, smooth_inputs: Sequence[str] = ()) -> None:
         self.fmu = fmu
@@ -115,13 +120,15 @@ class Instance(ABC):
         self.fmi = self._load()
 
     def _load(self) -> Any:
+        check_current_folder()
         try:
             with chdir("."):  # fmpy leaves the folder changed if it cannot load the library
                 return self.LIBRARY(
                     guid=self.fmu.guid,
                     modelIdentifier=self.fmu.identifier,
                     unzipDirectory=str(self.fmu.folder),
-                    instanceName=self.name,
+                    # of a file whose name is not UTF-8, perhaps
+                    instanceName=self.name.encode(errors="backslashreplace").decode(),
                     libraryPath=str(self.fmu.library),
                 )
         except Exception as error:  # fmpy raises bare exceptions
@@ -158,7 +165,21 @@ class Instance(ABC):
     def _keep_unless_ok(self, status: int, message: bytes | None) -> None:
         """Keep a message of the FMU as one line in `messages`, but none of status OK."""
         if status != OK:
-            self.messages.append(one_line((message or b"").decode("utf-8", errors="replace")))
+            self.messages.append(self._read_text((message or b"").decode(errors="replace")))
+
+    def _read_text(self, text: str) -> str:
+        """A text of the FMU in one line, with the names of variables that it refers to."""
+
+        def written(found: re.Match) -> str:
+            if not found[2]:
+                return found[0][0]  # it is there twice, and stands for itself
+            for variable in self.fmu.model.variables.values():
+                types = REFERRED.get(found[1], (variable.type,))
+                if str(variable.reference) == found[2] and variable.type in types:
+                    return variable.name
+            return found[0]
+
+        return one_line(re.sub(self.MARKS, written, text))
 
     def _last_message(self) -> str:
         return f": {self.messages[-1]}" if self.messages else " and gave no message"

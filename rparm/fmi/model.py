@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
-from fmpy.model_description import ModelDescription, ModelVariable, SimpleType
+from fmpy.model_description import DefaultExperiment, ModelDescription, ModelVariable, SimpleType
 
 from rparm.errors import WrongValueError, did_you_mean, hint
 from rparm.input_files import show
@@ -112,6 +112,16 @@ class Variable:
 
 
 @dataclass(frozen=True)
+class Experiment:
+    """What an FMU proposes to simulate; None: nothing."""
+
+    start: float | None = None  # s
+    stop: float | None = None  # s
+    step: float | None = None  # s
+    tolerance: float | None = None  # relative
+
+
+@dataclass(frozen=True)
 class Model:
     name: str
     fmi_version: str  # one of `project.VERSIONS`
@@ -125,6 +135,7 @@ class Model:
     derivatives: tuple[str, ...] = field(default=(), compare=False)  # of `states`
     # of outputs and derivatives: what each may depend on, by name; absent: on everything
     dependencies: Mapping[str, tuple[str, ...]] = field(default_factory=dict, compare=False)
+    experiment: Experiment = Experiment()
 
     @property
     def asks_for_inputs(self) -> bool:
@@ -207,6 +218,19 @@ def described(description: ModelDescription) -> Model:
             for unknown in (*description.derivatives, *description.outputs)
             if unknown.dependencies is not None
         },
+        experiment=_experiment(description.defaultExperiment),
+    )
+
+
+def _experiment(given: DefaultExperiment | None) -> Experiment:
+    """The default experiment of a description, without what is not finite."""
+    texts = given or DefaultExperiment()
+
+    def number(text: str | None) -> float | None:
+        return float(text) if text and math.isfinite(float(text)) else None
+
+    return Experiment(
+        *map(number, (texts.startTime, texts.stopTime, texts.stepSize, texts.tolerance))
     )
 
 

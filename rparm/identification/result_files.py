@@ -12,6 +12,7 @@ from rparm.identification.identify import Identification
 from rparm.identification.parameters import DELAY
 from rparm.input_files import difference
 from rparm.output_files import from_folder, whole
+from rparm.scenarios.template import quoted
 
 SCENARIO, PARAMETERS, PARAMETER_SET = "scenario.toml", "parameters.toml", "parameters.ssv"
 TYPES = ("Real", "Integer", "Boolean")  # of an SSV that all engines read
@@ -37,7 +38,7 @@ def _parameters(values: dict[str, Value], model: Model) -> str:
 
 
 def _toml(value: Value) -> str:
-    return json.dumps(value, ensure_ascii=False)  # numbers have all their digits
+    return quoted(value) if isinstance(value, str) else json.dumps(value)  # with all digits
 
 
 def _set(values: dict[str, Value], model: Model) -> str:

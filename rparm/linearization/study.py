@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rparm import project
-from rparm.errors import UserError, hint
+from rparm.errors import UserError, did_you_mean
 from rparm.fmi.fmu_file import CO_SIMULATION, MODEL_EXCHANGE, Fmu
 from rparm.linearization import point
 from rparm.linearization.connections import connected
@@ -31,9 +31,10 @@ class Request:
         An FMU or SSP, or the name of one of the project.
     at : mapping
         Values of states, inputs and parameters, with `free` also of outputs: numbers in the
-        variables' units, or texts with a unit; by name, in a system "component.variable".
+        variables' units, or texts with a unit; by name, in a system "component.variable". Of what
+        is in `free`, the first guess.
     time : float, optional
-        s; default: 0, or the start of the system.
+        s; default: the start of the FMU's default experiment, or of the system.
     free : sequence of str
         States and inputs that are moved until the point is an equilibrium.
     inputs, outputs : sequence of str, optional
@@ -109,7 +110,9 @@ def study(request: Request) -> Study:
             raise UserError(f"{option}: is for systems, and {path} is an FMU")
     with ExitStack() as stack:
         fmu = stack.enter_context(_opened(path, request.kind))
-        subject = stack.enter_context(FmuSubject(fmu, request.time or 0.0))
+        start = fmu.model.experiment.start or 0.0
+        time = start if request.time is None else request.time
+        subject = stack.enter_context(FmuSubject(fmu, time))
         trimmed = _point(subject, request)
         found = subject.at(trimmed.values)
         subject.check(found)
@@ -149,8 +152,11 @@ def _path(request: Request) -> Path:
     for folder in models.values():
         if name == folder.name or project.is_built_from(name, folder):
             return project.built(folder, ".fmu", version=request.version)
-    known = hint(name, [*models, *systems])
-    raise UserError(f"{name}: expected a file .fmu or .ssp, or a name{known}")
+    known = [*models, *systems]
+    guess = did_you_mean(name, [*known, *project.built_names(".fmu"), *project.built_names(".ssp")])
+    raise UserError(
+        f"{name}: expected a file .fmu or .ssp, or a name{guess} (known: {', '.join(known)})"
+    )
 
 
 def _opened(path: Path, kind: str) -> Fmu:
@@ -164,9 +170,6 @@ def _opened(path: Path, kind: str) -> Fmu:
 
 
 def _point(subject: FmuSubject | SystemSubject, request: Request) -> Trimmed:
-    for name in request.free:
-        if name in request.at:
-            raise UserError(f"--trim: {name} has a value in --at: expected one or the other")
     values, targets = point.checked(subject, request.at, bool(request.free))
     if not request.free:
         return Trimmed(values, {})

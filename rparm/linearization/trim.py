@@ -23,6 +23,7 @@ SINGULAR = 1e-10  # of the largest singular value
 PROBE = 1e-6  # by so much of itself, or of 1, a free variable is moved to see whether it matters
 DOUBLINGS = 60
 BISECTIONS = 100
+GUESS = "; --at NAME=VALUE begins elsewhere"
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,7 @@ def trim(
     free: Sequence[str],
     targets: Mapping[str, float],
 ) -> Trimmed:
-    """Find an equilibrium by moving the variables `free`, from `values` or their start values.
+    """Find an equilibrium by moving the variables `free`, from `values` or else start values.
 
     UserError if there is none, or the equations leave it open where it is.
     """
@@ -162,7 +163,9 @@ class _Problem:
             else f"the derivative of {name} stays at {left[worst]:.6g}"
         )
         few = f"; free at most {self.count} variables" if len(self.free) > self.count else ""
-        raise UserError(f"--trim: no equilibrium found by {', '.join(self.free)}: {what}{few}")
+        raise UserError(
+            f"--trim: no equilibrium found by {', '.join(self.free)}: {what}{few or GUESS}"
+        )
 
     def interval(self, point: np.ndarray, i: int) -> tuple[float, float] | None:
         """Values of a free variable at which all stays in equilibrium, if there is more than one.

@@ -9,13 +9,15 @@ from rparm.output import streams
 from rparm.texts import counted, shortened
 
 WIDTH = 80  # columns that a terminal has, if it has no fewer
+LEAST = 20  # columns: in fewer, lines are left to the terminal to wrap
 NARROWEST = 8  # a column of names
 INDENT = "  "
 NAMED = 5  # failed things in the last line
 
 
 def width() -> int:
-    return min(WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
+    """Columns to fill: those of the terminal, within limits."""
+    return max(min(WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns), LEAST)
 
 
 def stage(text: str) -> None:
@@ -28,6 +30,18 @@ def messages(label: str, texts: Iterable[str]) -> None:
     """Print what an FMU or an engine has to say, to standard error."""
     for text in dict.fromkeys(texts):
         print(f"{label}: {text}", file=sys.stderr)
+
+
+def titles(named: Sequence[Mapping[str, str]]) -> str:
+    """Lines with the "name" and the "title" of each thing."""
+    room = width()
+    column = min(max((len(entry["name"]) for entry in named), default=0), room // 2)
+    lines = []
+    for entry in named:
+        wrapped = textwrap.wrap(entry["title"], room - column - 2) or [""]
+        lines.append(f"{shortened(entry['name'], column):<{column}}  {wrapped[0]}")
+        lines += [" " * (column + 2) + more for more in wrapped[1:]]
+    return "\n".join(lines)
 
 
 def verdict_line(failed: Iterable[str], done: Sized, name: str) -> str:

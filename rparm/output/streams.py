@@ -26,7 +26,9 @@ def of_results(as_json: bool, quiet: bool) -> Iterator[TextIO | None]:
         with ExitStack() as stack:
             if real is not None and (as_json or quiet):
                 null = stack.enter_context(
-                    Path(os.devnull).open("w", encoding="utf-8", newline="\n")
+                    Path(os.devnull).open(
+                        "w", encoding="utf-8", errors="backslashreplace", newline="\n"
+                    )
                 )
                 elsewhere = null if quiet or sys.stderr is None else sys.stderr
                 real = stack.enter_context(_apart(real, elsewhere))

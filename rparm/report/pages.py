@@ -1,5 +1,6 @@
 """HTML pages, made from the templates beside this file."""
 
+import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +24,7 @@ _templates = Environment(
     lstrip_blocks=True,
 )
 _templates.filters |= {
-    "address": quote,
+    "address": lambda path: quote(os.fsencode(path)),
     "minus": texts.minus,
     "number": texts.number,
     "short": texts.short,

@@ -5,10 +5,14 @@ import math
 import textwrap
 from collections.abc import Iterator
 
+from rparm.errors import UserError
 from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, Model, Value, Variable
 from rparm.project import PROGRAM
+from rparm.scenarios.scenario import MAX_STEPS
 
 WIDTH = 100
+USUAL_STOP, USUAL_TOLERANCE = 2.0, 1e-8  # s; relative
+STEPS = 200  # to the stop time, where the FMU proposes none
 
 HEAD = """\
 # A scenario. Run it by {program} FILE.toml. Numbers are in SI units; in quotation marks a value may
@@ -17,15 +21,15 @@ HEAD = """\
 {key} = {model}
 title = {title}
 description = "What happens, in a sentence or two."
-tolerance = 1e-8  # of the integrator, relative: between 0 and 1
+tolerance = {tolerance}  # of the integrator, relative: between 0 and 1
 
 # Results have every k-th communication point:
 # reference_every = 5
 {panels}
 [time]
-start = 0.0  # s
-stop = 2.0  # s
-step = 0.01  # s; or a pattern that is repeated until stop: [0.01, 0.002]
+start = {start}  # s
+stop = {stop}  # s
+step = {step}  # s; or a pattern that is repeated until stop: [{step}, {shorter}]
 """
 INPUT_HELP = """\
 # An input is one of
@@ -50,6 +54,7 @@ def text(name: str, key: str, subject: str, model: Model) -> str:
     panels = "# Further plots, each of variables of one unit:\n"
     panels += f"# panels = {json.dumps([[output] for output in outputs])}\n"
     given = {"key": key, "model": quoted(subject), "title": quoted(name), "panels": panels}
+    given |= {name: _short(number) for name, number in _times(model).items()}
     parts = [HEAD.format(program=PROGRAM, **given)]
     parts += _values(PARAMETERS, "Parameters.", model)
     parts += _values(INITIAL, "State at the start.", model)
@@ -59,8 +64,41 @@ def text(name: str, key: str, subject: str, model: Model) -> str:
     return "\n".join(parts)
 
 
+def _times(model: Model) -> dict[str, float]:
+    """The default experiment of the FMU, as far as a scenario can have it."""
+    given = model.experiment
+    start = 0.0 if given.start is None else given.start
+    stop = given.stop
+    if stop is None or not start < stop or not math.isfinite(stop - start):
+        stop = start + USUAL_STOP
+    step = given.step
+    if step is None or not (stop - start) / MAX_STEPS <= step <= stop - start:
+        step = float(f"{(stop - start) / STEPS:.0e}")
+    if start + step == start or stop - step == stop:  # lost in rounding
+        start, stop, step = 0.0, USUAL_STOP, USUAL_STOP / STEPS
+    tolerance = given.tolerance
+    if tolerance is None or not 0 < tolerance < 1:
+        tolerance = USUAL_TOLERANCE
+    return {
+        "start": start,
+        "stop": stop,
+        "step": step,
+        "shorter": float(f"{step / 5:.6g}"),
+        "tolerance": max(tolerance, model.smallest_tolerance({})),
+    }
+
+
+def _short(number: float) -> str:
+    """A number as TOML has it, with all its digits."""
+    return repr(number).replace("e-0", "e-")
+
+
 def quoted(content: str) -> str:
-    """A text as TOML writes it."""
+    """A text as TOML writes it; UserError for the name of a file that is not UTF-8."""
+    try:
+        content.encode()
+    except UnicodeEncodeError:
+        raise UserError(f"{content}: TOML has no such name, which is not UTF-8") from None
     return json.dumps(content, ensure_ascii=False)
 
 

@@ -87,7 +87,7 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     statistics = said_at_end(ssp)
     with temporary_folder() as folder:
         plan = {
-            "ssp": str(ssp.path.resolve()),
+            "ssp": str(_as_ecos_opens(ssp.path.resolve(), folder)),
             "variant": variant if system.has_sets else None,
             "variables": _to_read(ssp, names),
             "statistics": _to_read(ssp, statistics),
@@ -161,6 +161,15 @@ def _check_parameters(ssp: "Ssp", variant: str) -> None:
                     f"{ssp.path}: parameter set {variant!r}: component {component!r}: {name!r} is "
                     "an Enumeration, which Ecos does not set"
                 )
+
+
+def _as_ecos_opens(path: Path, folder: Path) -> Path:
+    """The file, or a copy of it in a folder: Ecos opens no name that is not UTF-8."""
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        return Path(shutil.copy(path, folder / "system.ssp"))
+    return path
 
 
 def _start(folder: Path) -> int:

@@ -142,6 +142,7 @@ enum status integrator_restart(struct integrator *integrator, const double x[],
     struct problem *problem = &integrator->problem;
     integrator->statistics.restarts++;
     integrator->internal_end = -INFINITY;
+    problem->origin = start->origin;
     problem->horizon = start->horizon;
     problem->first_step = start->first_step;
     problem->continues = start->continues;

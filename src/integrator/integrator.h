@@ -87,6 +87,7 @@ MUST_CHECK NONNULL enum status integrator_configure(struct integrator *integrato
 
 /* Times in s after the restart. */
 struct integrator_start {
+    double origin;  /* time of the simulation at the restart, s: for messages only */
     double horizon; /* > 0: the right-hand side is not evaluated beyond, nor may integrator_advance
                     go there; INFINITY: no limit */
     double first_step; /* what integrator_next_step gave for a solution like this one; 0: none is

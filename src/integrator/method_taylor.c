@@ -287,8 +287,9 @@ static enum status take_steps(struct taylor *taylor, double t, int64_t max_steps
     while (*stopped_at < t) {
         if (work->steps == max_steps) {
             message_write(&problem->sink, STATUS_TOO_MANY_STEPS,
-                          "%s: %lld internal steps end at %g s of %g s", integrator_taylor.name,
-                          (long long)max_steps, *stopped_at, t);
+                          "%s: %lld internal steps end at t = %.12g, before t = %.12g",
+                          integrator_taylor.name, (long long)max_steps,
+                          problem->origin + *stopped_at, problem->origin + t);
             return STATUS_TOO_MANY_STEPS;
         }
         double end;

@@ -11,6 +11,7 @@ struct problem {
     struct ode ode;
     struct message_sink sink;
     struct integrator_settings settings;
+    double origin;            /* time of the simulation at the restart, s: for messages only */
     double horizon;           /* the right-hand side is not evaluated beyond */
     double first_step;        /* length of the first internal step, s; 0: the method finds one */
     bool continues;           /* as in struct integrator_start */

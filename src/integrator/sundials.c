@@ -5,6 +5,8 @@
 #include <arkode/arkode.h>
 #include <cvode/cvode.h>
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* What cvode_bdf takes where pointers have 64 bits, measured, and 0.2 kB: 6.4 kB for 4 states, 187
@@ -76,12 +78,48 @@ static const char *explained(const char *text) {
     return text;
 }
 
+/* Length of the name of a time, with what stands between it and its value, in front of text; 0:
+ * there is none. */
+static size_t time_name_length(const char *text) {
+    static const char *const names[] = {"t = ", "tcur = ", "tout = ", "tstop = "};
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        const size_t length = strlen(names[i]);
+        if (strncmp(text, names[i], length) == 0) {
+            return length;
+        }
+    }
+    return 0;
+}
+
+/* Writes text with times of the simulation: SUNDIALS counts them from the last restart. */
+static void write_times(const char *text, double origin, char *to, size_t size) {
+    size_t length = 0;
+    char last = ' ';
+    while (*text != '\0' && length + 1 < size) {
+        const size_t name_length = last == ' ' ? time_name_length(text) : 0;
+        char *end = NULL;
+        const double t = name_length > 0 ? strtod(text + name_length, &end) : 0.0;
+        if (name_length > 0 && end != text + name_length) {
+            const int written = snprintf(to + length, size - length, "%.*s%.12g", (int)name_length,
+                                         text, origin + t);
+            length += (size_t)written < size - length ? (size_t)written : size - length - 1;
+            text = end;
+        } else {
+            to[length++] = *text++;
+        }
+        last = to[length - 1];
+    }
+    to[length] = '\0';
+}
+
 void sundials_text(int error_code, const char *module, const char *function, char *text,
                    void *sundials_pointer) {
     const struct sundials *sundials = sundials_pointer;
     const struct problem *problem = sundials->problem;
+    char with_times[400]; // SUNDIALS writes 255 characters at most
+    write_times(explained(text), problem->origin, with_times, sizeof with_times);
     message_write(&problem->sink, sundials_status(problem, error_code), "%s: %s",
-                  sundials->method->name, explained(text));
+                  sundials->method->name, with_times);
 }
 
 void *sundials_create(size_t size, struct problem *problem, const struct method *method) {

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -80,6 +81,19 @@ def test_its_commands_work_in_the_projects_folder(tmp_path: Path) -> None:
     for command in (first, second):
         subprocess.run([*program, *command[1:]], cwd=ROOT, env=ENVIRONMENT, check=True)
     assert page.exists() and len(list(page.parent.glob("replays/run_?.csv"))) == 1
+
+
+def test_its_folder_may_have_any_name(tmp_path: Path) -> None:
+    """Dask gives workers their folder, and Parquet takes the names of files, in UTF-8 only."""
+    folder = tmp_path / os.fsdecode(b"caf\xe9")
+    try:
+        folder.mkdir()
+    except OSError:
+        pytest.skip("this system has no such names")
+    file = write(folder, changes=[("runs = 40", "runs = 2"), ("[3, 17]", "[0]")])
+    for there in ("2 runs in", "complete: 2 runs"):  # the second time it reads what is there
+        code, out, err = finish(start(file, folder / "output", "--workers", 1))
+        assert code == 0 and there in out, err
 
 
 def test_commands_of_files_of_the_project_have_short_paths(monkeypatch: pytest.MonkeyPatch) -> None:

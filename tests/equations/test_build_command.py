@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import rparm
+from rparm.errors import UserError
 from tests.equations.compiled import ModelFileError, runtime
 from tests.equations.examples import FOLDER
 from tests.support.paths import ROOT
@@ -116,3 +117,18 @@ def test_a_program_builds_and_runs_a_model(folder: Path) -> None:
     of_fmi2, of_fmi3 = (rparm.simulate(fmu, stop_time=2.0, step=0.1) for fmu in fmus)
     assert of_fmi3["x"] == pytest.approx(np.exp(-of_fmi3["time"]), rel=1e-7)
     assert np.array_equal(of_fmi2["x"], of_fmi3["x"])
+
+
+MESSAGE = 'at most 50 % of it #1 (%d %s%n) "größer" 🙂 ??/'
+
+
+def test_the_message_of_a_check_arrives_as_it_is(folder: Path) -> None:
+    """Also one that is as long as it may be; with a line end it is still one line."""
+    long = MESSAGE + "x" * (500 - len(MESSAGE.encode()))
+    for given, expected in ((MESSAGE, MESSAGE), (long, long), ("of two\nlines", "of two lines")):
+        check = f"\n[check]\n{json.dumps(given, ensure_ascii=False)} = 'k > -50'\n"
+        (folder / "-decay.toml").write_text(TEXT + check, encoding="utf-8")
+        for fmu in rparm.build(folder / "-decay.toml", output=folder):
+            with pytest.raises(UserError) as refused:
+                rparm.simulate(fmu, stop_time=1.0, step=0.1, start_values={"k": -60.0})
+            assert str(refused.value).endswith(f"failed (error): {expected}")

@@ -4,7 +4,7 @@ import random
 import re
 import time
 import tomllib
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 
 import pytest
 
@@ -32,6 +32,10 @@ MISTAKES = {
     "no TOML": ("name = ", "is not valid TOML"),
     "no name": ("[states]\nx = { derivative = \"1\" }", "name is missing"),
     "bad name": ('name = "a b"', "name: expected a letter"),
+    "device": (STATE.replace("M", "cOn"), "line 1: name: Windows keeps this name for a device"),
+    "long message": (
+        STATE + f'[check]\n"{"ä" * 251}" = "1 > 0"', "expected a message of at most 500 bytes",
+    ),
     "nothing": (HEAD, "has no variables"),
     "section": (HEAD + "[state]\n", "line 2: [state]: unknown section 'state'"),
     "odd key at the top": ("de- = 'x'\n" + STATE, "line 1: [de-]: unknown section 'de-'"),
@@ -151,6 +155,17 @@ def test_a_mistake_is_one_line_with_its_place(name: str, tmp_path: Path) -> None
     message = str(refused.value)
     assert message.startswith(f"{tmp_path / 'model.toml'}: ")
     assert expected in message and "\n" not in message and len(message) < 500
+
+
+def test_names_are_refused_that_no_file_of_windows_has(tmp_path: Path) -> None:
+    """As Python knows them for itself."""
+    ports = [f"{port}{number}" for port in ("com", "LPT") for number in range(12)]
+    for name in ["con", "PRN", "Aux", "nul", "conout", "null", "auxiliary", "coma", "lpt", *ports]:
+        if PureWindowsPath(f"{name}.fmu").is_reserved():
+            with pytest.raises(ModelFileError, match="for a device"):
+                read_text(tmp_path, STATE.replace("M", name))
+        else:
+            read_text(tmp_path, STATE.replace("M", name))
 
 
 def test_a_file_of_an_editor_for_windows_is_read(tmp_path: Path) -> None:

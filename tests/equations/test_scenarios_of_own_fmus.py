@@ -1,14 +1,18 @@
 """Scenarios that name an FMU of own equations: every command takes them like any other."""
 
 import json
+import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import rparm
+from rparm.fmi.fmu_file import read_model
+from rparm.scenarios import scenario as scenarios
 from tests.equations.examples import example
-from tests.support.rparm_project import assert_one_line, call
+from tests.support.rparm_project import assert_one_line, call, repacked
 
 SCENARIO = """fmu = "{fmu}"
 title = "Decay"
@@ -43,6 +47,55 @@ def scenario(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path.parent.mkdir()
     path.write_text(SCENARIO.format(fmu=f"../{fmu.relative_to(folder).as_posix()}"))
     return path
+
+
+def with_experiment(fmu: Path, path: Path, attributes: str) -> Path:
+    """A copy of an FMU with another default experiment."""
+
+    def changed(xml: str) -> str:
+        return re.sub(r"<DefaultExperiment[^>]*/>", f"<DefaultExperiment {attributes}/>", xml)
+
+    return repacked(fmu, path, changed)
+
+
+@pytest.mark.parametrize(
+    ("attributes", "expected"),
+    [
+        (
+            'startTime="3" stopTime="5" stepSize="0.25" tolerance="1e-6"',
+            {"start": 3.0, "stop": 5.0, "step": 0.25, "tolerance": 1e-6},
+        ),
+        ('stopTime="40"', {"start": 0.0, "stop": 40.0, "step": 0.2, "tolerance": 1e-8}),
+        ('startTime="-1"', {"start": -1.0, "stop": 1.0, "step": 0.01, "tolerance": 1e-8}),
+        ("", {"start": 0.0, "stop": 2.0, "step": 0.01, "tolerance": 1e-8}),
+        # what no scenario can have
+        (
+            'startTime="1" stopTime="1" tolerance="1"',
+            {"start": 1.0, "stop": 3.0, "tolerance": 1e-8},
+        ),
+        ('stopTime="1e9" stepSize="1e-9"', {"stop": 1e9, "step": 5e6}),
+        ('startTime="1e300" stopTime="INF" stepSize="NaN"', {"start": 0.0, "stop": 2.0}),
+        ('stopTime="-1" stepSize="-1" tolerance="1e-14"', {"stop": 2.0, "tolerance": 5e-12}),
+    ],
+)
+@pytest.mark.parametrize("version", ["", "fmi3"])
+def test_a_new_scenario_has_the_default_experiment(
+    scenario: Path,
+    tmp_path: Path,
+    attributes: str,
+    expected: dict[str, float],
+    version: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    built = fmu_of(scenario).parent / version / "Dahlquist.fmu"
+    fmu = with_experiment(built, tmp_path / "other.fmu", attributes)
+    path = tmp_path / "new.toml"
+    code, _, err = call(capsys, "new", path, "--model", fmu)
+    assert code == 0, err
+    content = tomllib.loads(path.read_text(encoding="utf-8"))
+    found = content["time"] | {"tolerance": content["tolerance"]}
+    assert {name: found[name] for name in expected} == expected
+    scenarios.load(path, read_model(fmu))  # which refuses what cannot be run
 
 
 def fmu_of(scenario: Path) -> Path:

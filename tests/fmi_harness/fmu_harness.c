@@ -64,7 +64,8 @@ static void keep(char *to, size_t size, const char *text) {
 static void receive(fmi2ComponentEnvironment environment, fmi2String instance_name,
                     fmi2Status status, fmi2String category, fmi2String message, ...) {
     struct fmu_log *log = environment;
-    log->malformed += instance_name == NULL || category == NULL || !fmu_is_harmless(message);
+    log->malformed += instance_name == NULL || category == NULL ||
+                      !fmu_is_harmless(message, fmu_version == 2 ? "#%" : "#");
     log->count[status]++;
     for (size_t i = 0; category != NULL && i < FMU_COUNT(log->categories); i++) {
         if (log->categories[i].count == 0) {

@@ -48,14 +48,15 @@ void *fmu3_library_open(const char *path, struct fmu3_functions *functions) {
     return fmu_library_load(path, fmu3_function_names, offsets, FMU3_FUNCTION_COUNT, functions);
 }
 
-bool fmu_is_harmless(const char *text) {
+bool fmu_is_harmless(const char *text, const char *doubled) {
     if (text == NULL || text[0] == '\0') {
         return false;
     }
     for (; *text != '\0'; text++) {
-        if (*text == '%' || (*text == '#' && *++text != '#')) {
+        if (strchr(doubled, *text) != NULL && *text != *(text + 1)) {
             return false;
         }
+        text += strchr(doubled, *text) != NULL;
     }
     return true;
 }

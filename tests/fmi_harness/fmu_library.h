@@ -34,9 +34,9 @@ void *fmu_library_load(const char *path, const char *const names[], const size_t
  * the functions is not found. */
 void *fmu_library_open(const char *path, struct fmu_functions *functions);
 
-/* Importers may pass a message to printf, or resolve variables named as #r<reference># in it
- * (FMI 2.0, section 2.1.5): false where it is NULL or empty, or has a '%', or a '#' that is not
- * doubled. */
-bool fmu_is_harmless(const char *text);
+/* Importers resolve variables named as #r<reference># in a message, and in FMI 2.0 pass it to
+ * printf (section 2.1.5): false where it is NULL or empty, or one of the characters that mean
+ * something to them is not doubled. */
+bool fmu_is_harmless(const char *text, const char *doubled);
 
 #endif

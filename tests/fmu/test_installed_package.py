@@ -95,6 +95,14 @@ def test_a_file_of_ones_own_runs_from_anywhere(installed: Installed) -> None:
     assert (ran.returncode, ran.stdout.splitlines()[-1]) == (0, "ran: 1 scenario, errors estimated")
 
 
+def test_campaigns_and_fmus_have_names(installed: Installed) -> None:
+    ran = installed.run("campaign", "tolerance", "--replay", "0", "--json")
+    assert ran.returncode == 0, ran.stderr
+    assert json.loads(ran.stdout)["exit_code"] == 0
+    assert (installed.work / "rparm-output/campaigns/tolerance/replays").is_dir()
+    assert "'RPPlnt', did you mean 'RPPlant'?" in installed.run("fmu", "RPPlnt").stderr
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_no_help_names_what_only_a_checkout_has(installed: Installed, command: str) -> None:
     ran = installed.run("help", command)

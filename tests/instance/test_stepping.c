@@ -7,6 +7,7 @@
 #include "snapshot.h"
 
 #include <stdint.h>
+#include <stdlib.h>
 
 /* The oscillator, with a note of how far the integrator has gone. */
 static double latest; /* s: latest time that the right-hand side was evaluated at */
@@ -325,4 +326,34 @@ EACH_CVODE_METHOD static void test_a_restart_finds_its_first_step_without_evalua
     ASSERT_OK(instance_get_integer(fresh, &reference, 1, &evaluations));
     TEST_ASSERT_LESS_THAN_INT(evaluations, restarted);
     instance_destroy(fresh);
+}
+
+/* ---- Messages ------------------------------------------------------------------------------- */
+
+static unsigned times_said;
+
+/* Times of a step from 1000 s to 1100 s, which an integrator counts from its last restart. */
+static void note_times(void *context, enum status status, const char *text) {
+    static const char name[] = "t = ";
+    for (const char *at = strstr(text, name); at != NULL; at = strstr(at + 1, name)) {
+        const double t = strtod(at + strlen(name), NULL);
+        TEST_ASSERT_TRUE_MESSAGE(t >= 1000.0 && t <= 1100.0, text);
+        times_said += strstr(text, integrator_method_name((enum integrator_method)method)) == text;
+    }
+}
+
+EACH_METHOD static void test_messages_have_the_time_of_the_simulation(void) {
+    const struct message_sink sink = {.write = note_times};
+    const struct model_description *description = instance->description;
+    tearDown();
+    times_said = 0;
+    ASSERT_OK(instance_create(description, &sink, &instance));
+    set_int(OSCILLATOR_SOLVER_METHOD, method);
+    set_int(OSCILLATOR_MAX_STEPS, 12);
+    initialize_at(1000.0);
+    ASSERT_OK(instance_do_step(instance, 1000.0, 1e-6));
+    set(OSCILLATOR_U, 1.0); // a restart
+    const double t = instance_time(instance);
+    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, instance_do_step(instance, t, 99.0));
+    TEST_ASSERT_GREATER_THAN_UINT(0, times_said);
 }

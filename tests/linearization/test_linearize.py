@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 from pathlib import Path
 
 import control
@@ -190,6 +191,16 @@ def test_a_system_says_its_largest_steps(
     assert "Largest stable communication step" in (tmp_path / "index.html").read_text()
 
 
+@pytest.mark.parametrize("turns", [0.0, 0.5, 1.0, -0.5])
+def test_at_gives_a_first_guess_of_what_is_trimmed(turns: float) -> None:
+    """Without a torque the arm hangs or stands, its center of mass below or above the joint."""
+    m1, m2, lc1, l1, a, q2 = 2.0, 1.0, 0.25, 0.5, 0.1, 0.1
+    exact = math.atan2(m1 * lc1 + m2 * (l1 + q2), m2 * a) + 2 * math.pi * turns
+    guess = {"q1": exact + 0.2, "q2": q2, "f2": 20.0}
+    found = rparm.linearize("RPPlant", at=guess, trim=["q1", "f2"])
+    assert found.at["q1"] == pytest.approx(exact, abs=1e-9)
+
+
 @pytest.mark.parametrize(
     "command, message",
     [
@@ -200,7 +211,7 @@ def test_a_system_says_its_largest_steps(
         (["RPPlant", "--at", "q1=1x"], "q1: unknown unit 'x'"),
         (["RPPlant", "--at", "mode1=2"], "mode1: is"),
         (["RPPlant", "--at", "ee_x=1"], "ee_x: is an output, which --trim leads to a value"),
-        (["RPPlant", "--at", "tau1=1", "--trim", "tau1"], "--trim: tau1 has a value in --at"),
+        (["RPPlant", "--trim", "q1", "q2"], "--at NAME=VALUE begins elsewhere"),
         (["RPPlant", "--at", "stops1=rigid", "q1=3"], "q1 = 3 is refused: a start must be within"),
         (["RPPlant", "--save", "nowhere/m.json"], "--save: nowhere/m.json: cannot be written"),
         (["RPPlant", "--inputs", "tua1"], "inputs: no input 'tua1' to linearize, did you mean"),

@@ -142,7 +142,7 @@ def test_a_mistake_is_one_line(arm: Path, change: dict[str, object], words: str)
 def test_what_is_not_there_is_named(tmp_path: Path) -> None:
     (tmp_path / "no.fmu").write_bytes(b"no archive")
     for wrong, words in (
-        (lambda: rparm.fmu("RPPlnt"), "no model 'RPPlnt' \\(known: rp_actuator"),
+        (lambda: rparm.fmu("RPPlnt"), r"'RPPlnt', did you mean 'RPPlant'\? \(known: rp_actuator"),
         (lambda: rparm.fmu("RPPlant", fmi=1), "fmi: expected 2 or 3, got 1"),
         (lambda: rparm.simulate(tmp_path / "no.fmu", **RUN), "not an FMU"),
         (lambda: rparm.simulate(tmp_path / "none.fmu", **RUN), "none.fmu"),
@@ -173,7 +173,7 @@ def test_what_stands_on_the_page_runs(tmp_path: Path) -> None:
         cwd=tmp_path, env={"PYTHONPATH": str(ROOT)}, text=True, capture_output=True, check=True,
     )  # fmt: skip
     lines = made.stdout.splitlines()
-    assert lines[0].endswith(" rad") and lines[-1].startswith("no model 'RPPlnt' (known: ")
+    assert lines[0].endswith(" rad") and lines[-1].startswith("no model 'RPPlnt', did you")
     assert (tmp_path / "fall.csv").is_file() and (tmp_path / "payload/manifest.json").is_file()
 
 

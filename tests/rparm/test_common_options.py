@@ -155,6 +155,7 @@ def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (["run", "--output", "m"], ["my folder"]),
         (["system", "pick_and_place_"], ["pick_and_place_untold"]),
         (["fmu", "rp_pl"], ["rp_plant"]),
+        (["campaign", "toler"], ["tolerance"]),
         (["completion", ""], list(SHELLS)),
         (["help", "fed"], ["federation", "federate"]),
     ],

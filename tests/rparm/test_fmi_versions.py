@@ -121,3 +121,20 @@ def test_a_wrong_twin_is_reported_before_anything_runs(
 ) -> None:
     change(built / "fmi3" / NAME)
     assert reason in console.refused("run", SHORT)
+
+
+# ---- messages ------------------------------------------------------------------------------------
+
+SAID = {  # what the standards say of a message, and what a user reads
+    "2.0": {"#r20# > 5 %%, bus ##4, 100 %%%%": "tau1 > 5 %, bus #4, 100 %%", "#i20# #r9999#": ""},
+    "3.0": {"#20# > 5 %, bus ##4, 100 %%": "tau1 > 5 %, bus #4, 100 %%", "#r20# #9999#": ""},
+}
+
+
+@pytest.mark.parametrize("version", SAID)
+def test_a_message_names_the_variables_that_it_refers_to(fmu: Path, version: str) -> None:
+    path = fmu if version == "2.0" else fmi3_fmu(fmu)
+    with Fmu(path) as opened, opened.instance("one") as instance:
+        for text, expected in SAID[version].items():
+            instance._keep_unless_ok(1, text.encode())
+            assert instance.messages[-1] == (expected or text)

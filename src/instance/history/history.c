@@ -52,7 +52,8 @@ void instance_update_next_step(struct instance *instance) {
 
 static struct integrator_start start_of(struct instance *instance) {
     const struct instance_state *state = &instance->state;
-    return (struct integrator_start){.horizon = state->horizon,
+    return (struct integrator_start){.origin = state->restart_time.s,
+                                     .horizon = state->horizon,
                                      .first_step = state->restart_step,
                                      .continues = state->restart_continues,
                                      .indicators = instance->model->events != NULL

@@ -32,7 +32,7 @@ enum status instance_check_parameters(struct instance *instance) {
     if (instance->parameters_are_valid) {
         return STATUS_OK;
     }
-    char text[256]; // written where the parameters are refused
+    char text[512]; // written where the parameters are refused
     const enum status status =
         instance->model->check_parameters(instance->memory.values, text, sizeof text);
     if (status != STATUS_OK) {

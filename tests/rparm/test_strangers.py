@@ -1,0 +1,157 @@
+"""The command line as strangers use it: odd folders, narrow terminals, readers that leave."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rparm import project
+from rparm.command_line import NO_READER
+from rparm.command_line.options import file_or_name, retyped
+from tests.support.paths import ROOT
+from tests.support.rparm_project import BUILD, Console
+
+COMMAND = [sys.executable, "-P", "-m", "rparm"]
+
+
+def started(*arguments: str, folder: Path = ROOT, **options: object) -> subprocess.Popen:
+    return subprocess.Popen(
+        [*COMMAND, *arguments], cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stderr=subprocess.PIPE, **options,
+    )  # fmt: skip
+
+
+# ---- Names ---------------------------------------------------------------------------------------
+
+REFUSED = {
+    "FMU to copy": (["fmu", "RPPlnt"], "no model 'RPPlnt', did you mean 'RPPlant'? (known: rp_"),
+    "FMU in small letters": (["fmu", "rpplnt"], "did you mean 'rp_plant'?"),
+    "FMU of a scenario": (["new", "x", "--model", "RPManipulater"], "mean 'RPManipulator'?"),
+    "FMU to identify": (["identify", "RPPlnt", "log.csv"], "did you mean 'RPPlant'?"),
+    "FMU to linearize": (["linearize", "RPPlnt"], "a name, did you mean 'RPPlant'? (known: rp_"),
+    "system to linearize": (["linearize", "ClosdLoop"], "did you mean 'ClosedLoop'?"),
+    "system": (["system", "ClosdLoop"], "did you mean 'closed_loop'?"),
+    "scenario": (["run", "Sine-Eforts"], "did you mean 'sine_efforts'?"),
+    "campaign": (["campaign", "tolerence"], "mean 'tolerance'? (./run.sh campaign --list names"),
+    "no campaign": (["campaign"], "expected the file of a campaign, or a name"),
+    "device": (["new", "Con.toml"], "'Con.toml': Windows keeps this name for a device"),
+    "device of a model": (["new-model", "lpt1"], "'lpt1': Windows keeps this name for a device"),
+    "superscript": (["new", "com\xb2"], "Windows keeps this name for a device"),
+    "character": (["new", "what?"], "no file of Windows has ? in its name"),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_a_name_that_is_wrong_gets_a_guess_or_a_reason(what: str, console: Console) -> None:
+    arguments, words = REFUSED[what]
+    assert words in console.refused(*arguments)
+
+
+def test_campaigns_of_the_project_have_names(console: Console) -> None:
+    code, out, _ = console("campaign", "--list")
+    assert code == 0 and [line.split()[0] for line in out.splitlines()] == [
+        path.stem for path in sorted(ROOT.glob("models/*/campaigns/*.toml"), key=lambda x: x.stem)
+    ]
+    assert project.campaign_file("tolerance").parent.parent.name == "machine"
+
+
+def test_what_to_type_again_leads_there_from_the_projects_folder(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(ROOT / "models")
+    for given, typed in (("mine/X.FMU", "models/mine/X.FMU"), ("RPPlant", "RPPlant")):
+        again = retyped("linearize", [file_or_name(given, (".fmu", ".ssp"))], {})
+        assert again == f"./run.sh linearize {typed}"
+
+
+# ---- Folders whose names are not UTF-8 ----------------------------------------------------------
+
+ODD = os.fsdecode(b"caf\xe9")  # in Latin-1
+
+
+@pytest.fixture
+def odd_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with FMUs and a system."""
+    folder = tmp_path / ODD
+    try:
+        folder.mkdir()
+    except OSError:
+        pytest.skip("this system has no such names")
+    for name in ("RPPlant.fmu", "ClosedLoop.ssp"):
+        shutil.copy(BUILD / name, folder)
+    monkeypatch.chdir(folder)
+    return folder
+
+
+IN_ODD_FOLDERS = {
+    "nothing shown": ["run", f"{ODD}.toml", "--output", "out", "--json", "--quiet"],
+    "scenario": ["run", f"{ODD}.toml", "--output", "out", "--json"],
+    "scenario elsewhere": ["run", "{}/" + f"{ODD}.toml", "--output", "{}/out", "--json"],
+    "system in Ecos": ["system", "nominal", "--ssp", "ClosedLoop.ssp", "--output", "out", "--json"],
+    "linear": ["linearize", "{}/ClosedLoop.ssp", "--output", "out", "--save", "{}/a.mat", "--json"],
+    "model": ["build", f"{ODD}-model.toml", "--output", "{}", "--json"],
+    "copy": ["fmu", "rp_plant", "--output", "{}/new", "--json"],
+    "document": ["list", "--output", "{}", "--json"],
+}
+
+
+@pytest.mark.parametrize("what", IN_ODD_FOLDERS)
+def test_a_folder_may_have_any_name(what: str, odd_folder: Path, console: Console) -> None:
+    assert console("new", "mine", "--model", "RPPlant.fmu")[0] == 0
+    (odd_folder / "mine.toml").rename(odd_folder / f"{ODD}.toml")
+    text = (ROOT / "examples" / "models" / "dahlquist.toml").read_text(encoding="utf-8")
+    (odd_folder / f"{ODD}-model.toml").write_text(text, encoding="utf-8")
+    code, out, err = console(*(text.format(odd_folder) for text in IN_ODD_FOLDERS[what]))
+    assert (code, json.loads(out)["exit_code"]) == (0, 0), err
+    assert "Traceback" not in err
+
+
+def test_toml_names_no_such_file(odd_folder: Path, console: Console) -> None:
+    error = console.refused("new", "x", "--model", "RPPlant.fmu", "--output", odd_folder.parent)
+    assert "TOML has no such name, which is not UTF-8" in error
+    assert not (odd_folder.parent / "x.toml").exists()
+
+
+# ---- Terminals and readers -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("columns", [1, 2, 3, 9, 0, -1])
+def test_a_terminal_may_be_narrow(
+    columns: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, console: Console
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    for arguments in (["list"], ["help", "campaign"], ["fmu", "rp_plant", "--output", tmp_path]):
+        code, out, _ = console(*arguments)
+        assert code == 0 and out.strip()
+    assert console("linearize", "RPPlant", "--output", tmp_path)[0] == 0
+    assert console("run", "free_fall", "--tolerance", "1e-6", "--output", tmp_path)[0] == 0
+
+
+@pytest.mark.parametrize(
+    "arguments", [["list"], ["list", "--json", "--quiet"], ["help", "run"]], ids=" ".join
+)
+def test_it_ends_as_by_a_signal_where_nobody_reads(arguments: list[str]) -> None:
+    """As other programs do: `rparm list | head -1` is no bad result."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    with started(*arguments, stdout=writing) as process:
+        os.close(writing)
+        assert process.stderr is not None
+        assert process.stderr.read() == b""
+    assert process.returncode == NO_READER == 128 + 13
+
+
+@pytest.mark.parametrize("arguments", [["list"], ["linearize", "RPPlant"], ["--json", "--version"]])
+def test_a_current_folder_that_is_gone_is_named(arguments: list[str], tmp_path: Path) -> None:
+    script = 'mkdir gone && cd gone && rmdir ../gone && exec "$@"'
+    command = ["sh", "-c", script, "sh", *COMMAND, *arguments]
+    done = subprocess.run(
+        command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, text=True,
+        capture_output=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2 and "the current folder cannot be used: " in done.stderr
+    assert done.stderr.count("error:") == 1
