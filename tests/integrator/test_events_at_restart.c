@@ -77,7 +77,7 @@ static void test_only_a_fall_from_where_it_was_counts(void) {
             TEST_ASSERT_TRUE(run(method, kinds[k]) == 1.0);
             rate = -0.1;
             const double fallen = run(method, kinds[k]);
-            TEST_ASSERT_TRUE(fallen > 1e-6 && fallen < 1.001e-5);
+            TEST_ASSERT_TRUE(fallen > 1e-9 && fallen < 1.001e-5);
         }
     }
 }
