@@ -25,6 +25,7 @@ FLATTEST = 0.1  # height of a picture of poles, of its width
 POINTS = 600
 MOST_DOTS = 10 * POINTS  # of samples, on one curve: more would only hide it
 FARTHEST = 3.0  # from the origin that a Nyquist diagram shows
+ON_AXIS = 1e-7  # damping below which the peak of a pole is infinite: its height says nothing
 POLE = 1e6  # gain beyond which a Nyquist diagram breaks its line: a pole may be on the axis
 
 
@@ -196,7 +197,8 @@ def _grid(model: Linear, found: Margins | None = None) -> np.ndarray:
     low, high = every.min(initial=np.inf), every.max(initial=0.0)
     channels = [zeros(one.A, one.B, one.C, one.D) for _, one in _channels(model)]
     between = [p for some in channels for p in some if low <= abs(p) <= high]
-    return frequencies([*poles, *between], crossings, AROUND)
+    steep = [p for p in (*poles, *between) if abs(p.real) > ON_AXIS * abs(p)]
+    return frequencies(steep, [*every, *crossings], AROUND)
 
 
 def _below(grid: np.ndarray, model: Linear, step: float) -> np.ndarray:

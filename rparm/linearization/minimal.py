@@ -69,23 +69,38 @@ class _Rule:
 def _rule(A: np.ndarray, B: np.ndarray) -> _Rule | None:
     """Sums of states that are 0 for ever if they are at first, if there are any.
 
-    Such a sum is a left eigenvector of A that B is orthogonal to: w^T [A - p, B] = 0. Columns are
-    taken relative to their sizes, so that slow states count as fast ones do.
+    Such a sum is a left eigenvector of A that B is orthogonal to: w^T [A - p, B] = 0. Rows and
+    columns of this matrix are scaled, as a fast mode behind a chain of slow states moves them
+    little, but not by rounding.
     """
+    one = np.eye(len(A))
     for found in eigenvalues(A):
         p = found if abs(found.imag) > SPREAD * abs(found) else found.real
         for _ in range(REFINEMENTS):
-            whole = np.hstack([A - p * np.eye(len(A)), B])
-            sizes = np.linalg.norm(whole, axis=0)
-            whole = whole[:, sizes > 0] / sizes[sizes > 0]
+            moved = cleared(A - p * one, np.abs(A) + abs(p) * one)
+            whole, rows = _equilibrated(np.hstack([moved, B]))
             left, values, _ = np.linalg.svd(whole)
             w = left[:, -1].conj()
-            if whole.shape[1] < len(A) or values[-1] < ROUNDING:
-                w = np.where(np.abs(w) > ROUNDING * np.abs(w).max(), w, 0)
+            w = np.where(np.abs(w) > ROUNDING * np.abs(w).max(), w, 0) * rows
+            w /= np.linalg.norm(w)
+            if values[-1] < ROUNDING * values[0]:
                 parts = [w.real, w.imag] if np.iscomplex(p) else [w]
                 return _Rule(np.column_stack(parts), np.array([p, np.conj(p)][: len(parts)]))
             p = w @ A @ w.conj()
     return None
+
+
+def _equilibrated(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A matrix with entries as near to 1 as factors of rows and columns make them; those of rows.
+
+    The squares of their logarithms are least.
+    """
+    i, j = np.nonzero(matrix)
+    count, n = len(i), len(matrix)
+    places = np.zeros((count, sum(matrix.shape)))
+    places[np.arange(count), i] = places[np.arange(count), n + j] = 1.0
+    factors = np.exp(np.linalg.lstsq(places, -np.log(np.abs(matrix[i, j])), rcond=None)[0])
+    return matrix * factors[:n, None] * factors[n:], factors[:n]
 
 
 def _ruled(

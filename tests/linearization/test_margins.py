@@ -172,6 +172,13 @@ def test_a_heavy_mass_behind_a_fast_drive_is_part_of_the_loop(mass: float, rate:
     assert found.delay == pytest.approx(lag / w, rel=1e-6)
 
 
+def test_a_fast_mode_behind_slow_states_is_part_of_the_loop() -> None:
+    """Seen a millionth of a millionth as much as they are, but not by rounding."""
+    A = np.diag([-100.0, -1.0, -2.0, -3.0, -4.0, -5.0]) + np.diag([1e-4] * 5, -1)
+    loop = linear(A, np.eye(6)[:, [0, 1]].sum(axis=1, keepdims=True), np.eye(6)[[5]])
+    assert minimal(loop).states == loop.states
+
+
 def test_what_is_dropped_is_named_and_its_growth_is_known() -> None:
     """A state that nothing moves, one that nothing sees, and one that copies another."""
     A = np.array([[-1.0, 0, 0, 1.0], [0, 0.5, 0, 0], [1.0, 0, -3.0, 0], [0, 0, 0, -2.0]])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rparm.errors import UserError
-from rparm.linearization.connections import connected
+from rparm.linearization.connections import connected, looped
 from rparm.linearization.linear import Linear
 from rparm.linearization.margins import margins, open_loop
 from rparm.linearization.study import Request, study
@@ -79,6 +79,24 @@ def test_an_algebraic_loop_is_refused_with_its_path() -> None:
         connected(parts, ring)
     chain = connected(parts, ring[:2])
     assert chain.D[2, 0] == 0.125
+
+
+def test_rounding_connects_nothing_and_a_small_entry_does() -> None:
+    """0.1 + 0.2 - 0.3 leaves 5.6e-17; the inverse of a mass of 1e18 is as small and counts."""
+
+    def mass(back: list[float]) -> Linear:
+        A = np.array([[0.0, 1.0], [0.0, 0.0]])
+        B, C = np.array([[0, 0, 0], [1e-18, 1e-18, 1e-18]]), np.outer(back, [1.0, 0.0])
+        x, u, y = np.zeros(2), np.zeros(3), np.zeros(len(back))
+        names = ("x", "v"), ("u0", "u1", "u2"), ("y0", "y1", "y2")
+        return Linear(*names, A, B, C, np.zeros((3, 3)), x=x, u=u, y=y, rates=x)
+
+    wires = [Connection("m", f"y{i}", "m", f"u{i}") for i in range(3)]
+    cancelling, pulling = (
+        connected({"m": mass(k)}, wires).A[1] for k in ([0.1, 0.2, -0.3], [-1.0] * 3)
+    )
+    assert cancelling.tolist() == [0.0, 0.0] and pulling == pytest.approx([-3e-18, 0.0], rel=1e-12)
+    assert looped({"m": mass([-1.0] * 3)}, wires).parts["m"].states == ("x", "v")
 
 
 @pytest.mark.parametrize(
