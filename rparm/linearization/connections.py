@@ -7,9 +7,10 @@ import numpy as np
 
 from rparm.errors import UserError
 from rparm.linearization.linear import Linear
+from rparm.linearization.matrices import cleared, closure
 from rparm.system.structure import Connection
 
-NEGLIGIBLE = 1e-14  # of the largest entry of a matrix: rounding
+NEGLIGIBLE = 1e-14  # of the largest entries of row and column: rounding
 
 
 def connected(parts: Mapping[str, Linear], connections: Iterable[Connection]) -> Linear:
@@ -21,17 +22,18 @@ def connected(parts: Mapping[str, Linear], connections: Iterable[Connection]) ->
     inputs = [f"{name}.{u}" for name, part in parts.items() for u in part.inputs]
     outputs = [f"{name}.{y}" for name, part in parts.items() for y in part.outputs]
     fed = _feeding(inputs, outputs, connections)
-    A, B, C, D = (_diagonal([getattr(part, key) for part in parts.values()]) for key in "ABCD")
+    A, B, C, D = map(_diagonal, zip(*map(_clear, parts.values()), strict=True))
     _refuse_algebraic_loop(outputs, D @ fed)
-    solved = np.linalg.inv(np.eye(len(outputs)) - D @ fed)
+    solved, terms = _solved(D @ fed), _solved(np.abs(D) @ fed)
+    back, back_terms = B @ fed @ solved, np.abs(B) @ fed @ terms
     return Linear(
         states=tuple(f"{name}.{x}" for name, part in parts.items() for x in part.states),
         inputs=tuple(inputs),
         outputs=tuple(outputs),
-        A=A + B @ fed @ solved @ C,
-        B=B + B @ fed @ solved @ D,
-        C=solved @ C,
-        D=solved @ D,
+        A=cleared(A + back @ C, np.abs(A) + back_terms @ np.abs(C)),
+        B=cleared(B + back @ D, np.abs(B) + back_terms @ np.abs(D)),
+        C=cleared(solved @ C, terms @ np.abs(C)),
+        D=cleared(solved @ D, terms @ np.abs(D)),
         **{
             key: np.concatenate([getattr(part, key) for part in parts.values()])
             for key in ("x", "u", "y", "rates")
@@ -53,6 +55,27 @@ def _feeding(
         if start in outputs and end in inputs:
             fed[inputs.index(end), outputs.index(start)] = 1.0
     return fed
+
+
+def _clear(part: Linear) -> tuple[np.ndarray, ...]:
+    """A, B, C and D of a component with 0 for rounding.
+
+    An entry is compared with its row and its column, as units may make a whole row or column small.
+    """
+    n = len(part.A)
+    whole = np.block([[part.A, part.B], [part.C, part.D]])
+    size = np.abs(whole)
+    largest = [size.max(axis=i, keepdims=True, initial=0.0) for i in (0, 1)]
+    whole = np.where(size > NEGLIGIBLE * np.minimum(*largest), whole, 0.0)
+    return whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:]
+
+
+def _solved(direct: np.ndarray) -> np.ndarray:
+    """The inverse of 1 - direct, which has no loops: 1 + direct + direct^2 + ..."""
+    solved = term = np.eye(len(direct))
+    while (term := term @ direct).any():
+        solved = solved + term
+    return solved
 
 
 def _diagonal(blocks: Sequence[np.ndarray]) -> np.ndarray:
@@ -111,14 +134,14 @@ def looped(parts: Mapping[str, Linear], connections: Iterable[Connection]) -> Lo
     index = {node: i for i, node in enumerate(nodes)}
     arrows = np.zeros((len(nodes), len(nodes)), bool)
     for name, part in parts.items():
+        A, B, C, D = _clear(part)
         for cause, effect, matrix in (
-            ("states", "states", part.A),
-            ("inputs", "states", part.B),
-            ("states", "outputs", part.C),
-            ("inputs", "outputs", part.D),
+            ("states", "states", A),
+            ("inputs", "states", B),
+            ("states", "outputs", C),
+            ("inputs", "outputs", D),
         ):
-            least = NEGLIGIBLE * np.abs(matrix).max(initial=0.0)
-            for i, j in np.argwhere(np.abs(matrix) > least).tolist():
+            for i, j in np.argwhere(matrix).tolist():
                 start = index[name, cause, getattr(part, cause)[j]]
                 arrows[start, index[name, effect, getattr(part, effect)[i]]] = True
     kept = []
@@ -128,7 +151,7 @@ def looped(parts: Mapping[str, Linear], connections: Iterable[Connection]) -> Lo
         if start is not None and end is not None:
             arrows[start, end] = True
             kept.append((c, start, end))
-    reached = _closure(arrows)
+    reached = closure(arrows)
     on_loop = [(c, start) for c, start, end in kept if reached[end, start]]
     on_some = [start for _, start in on_loop]
     both = reached & reached.T
@@ -143,13 +166,3 @@ def looped(parts: Mapping[str, Linear], connections: Iterable[Connection]) -> Lo
             others = [state for state in part.states if state not in chosen["states"]]
             reduced[name] = part.without(others).select(chosen["inputs"], chosen["outputs"])
     return Looped(reduced, [c for c, _ in on_loop])
-
-
-def _closure(arrows: np.ndarray) -> np.ndarray:
-    """Which nodes can be reached from which, (nodes, nodes), in no step or more."""
-    reached = arrows | np.eye(len(arrows), dtype=bool)
-    while True:
-        further = reached @ reached
-        if np.array_equal(further, reached):
-            return reached
-        reached = further

@@ -13,7 +13,6 @@ from rparm.texts import milliseconds
 NONE = "–"
 LISTED = 12  # names in a sentence
 REAL = 1e-6  # of a pole: a smaller real or imaginary part is rounding, as of poles that are equal
-ZERO = 1e-6  # of the fastest pole: smaller ones are 0, but for rounding
 
 POLES = (
     "A deviation along a pole grows or dies out as e to the power of its real part times the time. "
@@ -58,6 +57,18 @@ def notes(found: Study) -> list[str]:
         )
     if linear.left_out:
         texts.append(f"Left out, as they are discrete: {_names(linear.left_out)}.")
+    if found.loop is not None and found.loop.dropped:
+        texts.append(
+            f"Not in the loop: {_names(found.loop.dropped)}. The break does not move them, or they "
+            "do not come back to it, or others stand for them."
+        )
+        hidden = found.loop.hidden
+        growing = hidden[hidden.real > REAL * np.abs(hidden)]
+        if len(growing):
+            texts.append(
+                f"They grow by e^({_short(float(growing.real.max()))} t) whatever the loop does: "
+                "the margins do not say so."
+            )
     if found.margins is not None and not found.margins.stable:
         texts.append("The closed loop is unstable here: it has no margins.")
     moving = [
@@ -103,8 +114,7 @@ def poles(found: Study) -> Table:
     """Poles, conjugate pairs in one row."""
     values = found.linear.poles
     rows = []
-    least = ZERO * np.abs(values).max(initial=0.0)
-    for exact in np.where(np.abs(values) > least, values, 0.0):
+    for exact in values:
         size = abs(exact)
         pole = complex(
             *(part if abs(part) > REAL * size else 0.0 for part in (exact.real, exact.imag))

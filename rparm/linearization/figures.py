@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 
 import matplotlib as mpl
 import numpy as np
@@ -10,14 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rparm.linearization.linear import Linear, hold
-from rparm.linearization.margins import (
-    Margins,
-    Response,
-    closed_poles,
-    frequencies,
-    frequency_response,
-    sizes,
-)
+from rparm.linearization.margins import Margins, closed, searched
+from rparm.linearization.matrices import eigenvalues, zeros
+from rparm.linearization.responses import frequencies, frequency_response, sampled_response
 from rparm.report.style import DASHED, ERRORS, INK, MUTED, RUN, STYLE
 from rparm.texts import milliseconds
 
@@ -31,6 +25,8 @@ FLATTEST = 0.1  # height of a picture of poles, of its width
 POINTS = 600
 MOST_DOTS = 10 * POINTS  # of samples, on one curve: more would only hide it
 FARTHEST = 3.0  # from the origin that a Nyquist diagram shows
+ON_AXIS = 1e-7  # damping below which the peak of a pole is infinite: its height says nothing
+POLE = 1e6  # gain beyond which a Nyquist diagram breaks its line: a pole may be on the axis
 
 
 def bode(model: Linear, step: float | None, found: Margins | None = None) -> Figure:
@@ -38,14 +34,14 @@ def bode(model: Linear, step: float | None, found: Margins | None = None) -> Fig
     with mpl.rc_context(TEXTS):
         figure = Figure(figsize=(9, 6), layout="constrained")
         gain, phase = figure.subplots(2, 1, sharex=True)
-        grid = _grid(model, closed_poles(model) if found else model.poles)
+        grid = _grid(model, found)
         answers = [(label, one, frequency_response(one)(grid)) for label, one in _channels(model)]
         largest = max((np.abs(values).max() for _, _, values in answers), default=0.0)
         shown = [each for each in answers if np.abs(each[2]).max() > ROUNDING * largest]
         for (label, one, values), color in zip(shown, _colors(), strict=False):
             _bode(gain, phase, values, grid, color, label)
             if step is not None:
-                below = grid[grid < math.pi / step]
+                below = _below(grid, one, step)
                 name = f"{label}, held for {milliseconds(step)}"
                 response = sampled_response(one, step)(below)
                 _bode(gain, phase, response, below, color, name, DASHED)
@@ -72,6 +68,7 @@ def _bode(
     label: str,
     line: object = "-",
 ) -> None:
+    grid, values = grid[np.isfinite(values)], values[np.isfinite(values)]
     with np.errstate(divide="ignore"):
         decibels = 20 * np.log10(np.abs(values))
     hertz = grid / (2 * math.pi)
@@ -87,10 +84,10 @@ def nyquist(loop: Linear, step: float | None) -> Figure:
     with mpl.rc_context(TEXTS):
         figure = Figure(figsize=(6, 6), layout="constrained")
         axes = figure.subplots()
-        grid = frequencies(loop)
+        grid = searched(loop)
         _nyquist(axes, frequency_response(loop)(grid), "-", "continuous")
         if step is not None:
-            below = grid[grid < math.pi / step]
+            below = _below(grid, loop, step)
             name = f"held for {milliseconds(step)}"
             _nyquist(axes, sampled_response(loop, step)(below), DASHED, name)
         circle = np.exp(1j * np.linspace(0, 2 * math.pi, 200))
@@ -106,6 +103,7 @@ def nyquist(loop: Linear, step: float | None) -> Figure:
 
 
 def _nyquist(axes: Axes, values: np.ndarray, line: object, label: str) -> None:
+    values = np.where(np.abs(values) < POLE, values, np.nan)
     axes.plot(values.real, values.imag, color=RUN, linestyle=line, label=label)
     axes.plot(values.real, -values.imag, color=RUN, linestyle=line, alpha=0.35)
 
@@ -140,7 +138,7 @@ def _step(model: Linear, length: float, end: float) -> tuple[np.ndarray, np.ndar
     return length * np.arange(count), values
 
 
-def poles(model: Linear, step: float | None, closed: Linear | None = None) -> Figure:
+def poles(model: Linear, step: float | None, loop: Linear | None = None) -> Figure:
     """Poles in the plane of s, and of the sampled model in the plane of z."""
     with mpl.rc_context(TEXTS):
         figure = Figure(figsize=(9, 4.2), layout="constrained")
@@ -150,8 +148,8 @@ def poles(model: Linear, step: float | None, closed: Linear | None = None) -> Fi
         height = FLATTEST * np.abs(model.poles).max(initial=1.0)
         low, high = plain.get_ylim()
         plain.set_ylim(min(low, -height), max(high, height))
-        if closed is not None:
-            found = closed_poles(closed)
+        if loop is not None:
+            found = closed(loop).poles
             style = {"color": ERRORS[0], "label": "when it is closed", "markersize": 11}
             plain.plot(found.real, found.imag, "+", **style)
         plain.set_xlabel("real part (1/s): left of 0 dies out")
@@ -169,33 +167,9 @@ def poles(model: Linear, step: float | None, closed: Linear | None = None) -> Fi
     return figure
 
 
-def closed(loop: Linear) -> Linear:
-    """From what is asked for at the break to what is there, when the loop is closed."""
-    rest = 1 + loop.D[0, 0]
-    return replace(
-        loop,
-        A=loop.A - loop.B @ loop.C / rest,
-        B=loop.B / rest,
-        C=loop.C / rest,
-        D=loop.D / rest,
-    )
-
-
-def sampled_response(model: Linear, step: float) -> Response:
-    """As `frequency_response`, of the model that is sampled, with inputs held in between."""
-    transition, forced, _ = hold(model.A, model.B, step)
-    one = np.eye(len(model.A))
-
-    def at(w: np.ndarray) -> np.ndarray:
-        z = np.exp(1j * step * np.asarray(w))[:, None, None]
-        return (model.C @ np.linalg.solve(z * one - transition, forced + 0 * z) + model.D)[:, 0, 0]
-
-    return at
-
-
 def drawn(model: Linear) -> Linear:
     """What of a model pictures show: the first outputs that respond, and inputs they respond to."""
-    s = 1j * _grid(model, np.empty(0))[:, None, None]
+    s = 1j * frequencies(model.poles, (), AROUND)[:, None, None]
     states = np.linalg.solve(s * np.eye(len(model.A)) - model.A, model.B + 0 * s)
     answers = np.abs(model.C @ states + model.D).max(axis=0)  # (outputs, inputs)
     responds = answers > ROUNDING * answers.max(initial=0.0)
@@ -215,16 +189,30 @@ def _colors() -> Iterator[str]:
         yield from (RUN, *ERRORS)
 
 
-def _grid(model: Linear, further: np.ndarray) -> np.ndarray:
-    """Frequencies around the poles of a model and others, rad/s."""
-    rates = sizes([*model.poles, *further])
-    low, high = math.log10(rates.min()) - AROUND, math.log10(rates.max()) + AROUND
-    return np.logspace(low, high, POINTS)
+def _grid(model: Linear, found: Margins | None = None) -> np.ndarray:
+    """Frequencies around the poles of a model, in rad/s: of a loop also when it is closed."""
+    crossings = [x.frequency for x in (found.gain_crossings if found else ())]
+    poles = np.array([*model.poles, *(closed(model).poles if found else ())])
+    every = np.abs([*poles[poles != 0], *crossings])
+    low, high = every.min(initial=np.inf), every.max(initial=0.0)
+    channels = [zeros(one.A, one.B, one.C, one.D) for _, one in _channels(model)]
+    between = [p for some in channels for p in some if low <= abs(p) <= high]
+    steep = [p for p in (*poles, *between) if abs(p.real) > ON_AXIS * abs(p)]
+    return frequencies(steep, [*every, *crossings], AROUND)
+
+
+def _below(grid: np.ndarray, model: Linear, step: float) -> np.ndarray:
+    """Frequencies below half of that of the samples, dense where sampled poles are."""
+    z = eigenvalues(hold(model.A, model.B, step)[0])
+    own = frequencies(np.log(z[z != 0]) / step, (), 0.0)
+    every = np.union1d(grid, own)
+    return every[(every >= grid[0]) & (every < math.pi / step)]
 
 
 def _end(model: Linear, step: float | None) -> float:
     """How long a step is shown, s: until the slowest pole has settled."""
-    end = SETTLED / sizes(model.poles).min()
+    rates = np.abs(model.poles[model.poles != 0])
+    end = SETTLED / rates.min(initial=1.0 if not len(rates) else np.inf)
     fastest = model.poles.real.max(initial=0.0)
     end = min(end, GROWN / fastest) if fastest > 0 else end
     return max(end, 20 * step) if step is not None else end

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rparm.errors import UserError, hint
+from rparm.linearization.matrices import eigenvalues
 
 if TYPE_CHECKING:
     from control import StateSpace
@@ -37,6 +38,10 @@ class Linear:
         Discrete outputs: they have no derivatives.
     intervals : dict of str to (float, float)
         Where dry friction lets what was trimmed lie anywhere in between.
+    dropped : tuple of str
+        States that are left out as they play no part between inputs and outputs.
+    hidden : ndarray
+        Poles that are left out with them, 1/s.
     """
 
     states: tuple[str, ...]
@@ -54,11 +59,13 @@ class Linear:
     held: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    dropped: tuple[str, ...] = ()
+    hidden: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))
 
     @property
     def poles(self) -> np.ndarray:
         """Eigenvalues of A in 1/s, the slowest first, shape (n,)."""
-        found = np.linalg.eigvals(self.A)
+        found = eigenvalues(self.A)
         return found[np.lexsort((found.imag, np.abs(found)))]
 
     @property

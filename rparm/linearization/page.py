@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from rparm.linearization import explained, figures
+from rparm.linearization.margins import closed
 from rparm.linearization.study import Study
 from rparm.report import assets
 from rparm.report.pages import INDEX, Table, write_page
@@ -49,7 +50,7 @@ def _pictures(folder: Path, found: Study, step: float | None) -> list[Picture]:
     if found.loop is not None:
         save(figures.bode(found.loop, step, found.margins), folder / "bode.png")
         save(figures.nyquist(found.loop, step), folder / "nyquist.png")
-        save(figures.steps(figures.closed(found.loop), None), folder / "steps.png")
+        save(figures.steps(closed(found.loop), None), folder / "steps.png")
         return [
             ("bode", "Bode diagram of the loop"),
             ("nyquist", "Nyquist diagram of the loop"),

@@ -55,7 +55,8 @@ def document(found: Study, step: float | None) -> Document:
     if found.margins is not None:
         names = ("gain_up", "gain_down", "phase", "delay")
         numbers = {name: finite(getattr(found.margins, name)) for name in names}
-        result["margins"] = {"stable": found.margins.stable, **numbers}
+        dropped = list(found.loop.dropped) if found.loop is not None else []
+        result["margins"] = {"stable": found.margins.stable, **numbers, "dropped": dropped}
     return result
 
 

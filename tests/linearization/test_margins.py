@@ -1,0 +1,404 @@
+"""Margins of loops with one input and one output, in any units and with any damping.
+
+Compared with python-control, with roots of polynomials, and with eigenvalues of the closed loop on
+both sides of each margin.
+"""
+
+import os
+from dataclasses import dataclass
+from math import factorial
+from pathlib import Path
+
+import control
+import numpy as np
+import pytest
+from scipy.linalg import block_diag
+
+from rparm.linearization import explained, figures
+from rparm.linearization.linear import Linear
+from rparm.linearization.margins import Margins, margins
+from rparm.linearization.minimal import minimal
+from rparm.linearization.study import Study
+
+LOOPS = int(os.environ.get("MARGIN_LOOPS", "60"))
+ORDER = 10  # of the rational delay: exact within rounding up to frequency * delay = 2 pi
+SHOWN = 1e-7  # of its size: the least real part that says whether a pole is stable
+
+
+def linear(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: float = 0.0) -> Linear:
+    n, zero = len(A), np.zeros(1)
+    names = tuple(f"x{i}" for i in range(n))
+    x = np.zeros(n)
+    return Linear(names, ("u",), ("y",), A, B, C, np.full((1, 1), D), x, zero, zero, x)
+
+
+def rational(num: list[float], den: list[float]) -> Linear:
+    """A loop from its transfer function."""
+    made = control.tf2ss(num, den)
+    return linear(made.A, made.B, made.C)
+
+
+# ---- Loops whose margins are known ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_margins_are_those_of_python_control(seed: int) -> None:
+    """Random stable loops of order 3 to 5; and what the margins mean: at them it oscillates."""
+    source = np.random.default_rng(seed)
+    n = int(source.integers(3, 6))
+    A = source.normal(size=(n, n)) * 10
+    A -= (np.linalg.eigvals(A).real.max() + 1) * np.eye(n)
+    B, C = source.normal(size=(n, 1)), source.normal(size=(1, n)) * 20
+    loop = linear(A, B, C)
+    found = margins(loop)
+    gain, _, _, w_phase, w_gain, _ = control.stability_margins(loop.ss(), returnall=True)
+    ours = sorted(x.frequency for x in found.gain_crossings)
+    assert ours == pytest.approx(sorted(w_gain), rel=1e-6)
+    ours = sorted(1 / abs(x.value) for x in found.phase_crossings)
+    assert len(gain) == len(w_phase) and ours == pytest.approx(sorted(gain), rel=1e-6)
+    if found.stable and np.isfinite(found.gain_up):
+        edge = np.linalg.eigvals(A - found.gain_up * B @ C)
+        assert abs(edge.real.max()) < 1e-6 * np.abs(edge).max()
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_loop_is_stable_up_to_its_gain_margins_and_not_beyond(seed: int) -> None:
+    """Random loops, whose poles may be on both sides; with margins at frequency 0, as gravity's."""
+    source = np.random.default_rng(seed)
+    while True:
+        n = int(source.integers(1, 5))
+        A, B = 3 * source.normal(size=(n, n)), source.normal(size=(n, 1))
+        C = source.normal(size=(1, n)) * source.choice([1, 10, 100])
+
+        def is_stable(gain: float, A: np.ndarray = A, B: np.ndarray = B, C: np.ndarray = C) -> bool:
+            return bool(np.linalg.eigvals(A - gain * B @ C).real.max() < 0)
+
+        if is_stable(1.0):
+            break
+    found = margins(linear(A, B, C))
+    assert found.stable
+    up, down = min(found.gain_up, 1e5), max(found.gain_down, 1e-5)
+    assert all(map(is_stable, np.geomspace(0.999 * up, 1.001 * down, 400)))
+    assert found.gain_up == np.inf or not is_stable(1.001 * up)
+    assert found.gain_down == 0.0 or not is_stable(0.999 * down)
+
+
+def test_margins_at_round_numbers() -> None:
+    """1/s has the gain 1 at 1 rad/s; 1/s^2 swings for ever, 4/(s - 1)^2 grows: no margins."""
+    one, double = np.ones((1, 1)), np.array([[0.0, 1.0], [0.0, 0.0]])
+    found = margins(linear(0 * one, one, one))
+    assert found.phase == pytest.approx(90.0) and found.delay == pytest.approx(np.pi / 2)
+    enters, leaves = np.array([[0.0], [1.0]]), np.array([[1.0, 0.0]])
+    for A in (double, double + np.eye(2)):
+        found = margins(linear(A, enters, 4 * leaves))
+        assert not found.stable
+        assert np.isnan([found.gain_up, found.gain_down, found.phase, found.delay]).all()
+
+
+def product(*factors: list[float]) -> list[float]:
+    """Coefficients of a product of polynomials."""
+    result = np.ones(1)
+    for factor in factors:
+        result = np.polymul(result, factor)
+    return result.tolist()
+
+
+W = 60.0  # rad/s
+MODE = [1.0, 2 * 0.001 * W, W**2]
+FAINT = [1.0, 2 * 0.0001 * W, W**2]
+LAG = product([1.0, 0.0], [1 / 500, 1.0])
+LOOPS_BY_NAME = {  # a mode adds its answer to that of a rigid body
+    "mode of damping 0.001": (0.9 * np.polyadd(MODE, [0.2 * W, 0]), product(LAG, MODE)),
+    "mode that turns": (0.9 * np.polyadd(FAINT, [0.00945 * W**2]), product(LAG, FAINT)),
+    "slow zero": ([3.9e-4, 3.9e-5], [1.0, 2e-4, 1.0, 0.0]),
+    "slow crossing": ([5.0, 5 * 37.1], [1.0, 0.742, 371.0**2, 0.0]),
+    "unstable alone": ([120.0, 1.2, 120 * 49.0**2], product([1, -1], [1, 40], [1, 1e-2, 2500])),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LOOPS_BY_NAME)
+def test_margins_are_those_of_the_polynomials(name: str) -> None:
+    """N and D of L = N / D: |N|^2 = |D|^2 where the gain is 1, Im N / D = 0 where it turns."""
+    num, den = (np.asarray(each, float) for each in LOOPS_BY_NAME[name])
+
+    def mirrored(p: np.ndarray) -> np.ndarray:
+        return p * (-1.0) ** np.arange(len(p) - 1, -1, -1)
+
+    def at(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        roots = np.roots(np.trim_zeros(p, "f"))
+        w = roots.imag[(np.abs(roots.real) < 1e-9 * np.abs(roots)) & (roots.imag > 0)]
+        return w, np.polyval(num, 1j * w) / np.polyval(den, 1j * w)
+
+    n, d = np.polymul(num, mirrored(num)), np.polymul(den, mirrored(den))
+    w, values = at(np.polysub(n, d))
+    cross = np.polymul(num, mirrored(den))
+    factors = [1 / abs(x) for x in at(np.polysub(cross, mirrored(cross)))[1] if x.real < 0]
+    if den[-1] and num[-1] / den[-1] < 0:
+        factors.append(-den[-1] / num[-1])
+    lags = (np.pi + np.angle(values)) % (2 * np.pi)
+    found = margins(rational(num, den))
+    assert found.stable and np.roots(np.polyadd(num, den)).real.max() < 0
+    assert sorted(x.frequency for x in found.gain_crossings) == pytest.approx(sorted(w), rel=1e-6)
+    assert found.phase == pytest.approx(np.degrees(lags.min()), rel=1e-6)
+    assert found.delay == pytest.approx((lags / w).min(), rel=1e-6)
+    assert found.gain_up == pytest.approx(min((f for f in factors if f > 1), default=np.inf))
+    assert found.gain_down == pytest.approx(max((f for f in factors if f < 1), default=0.0))
+
+
+def test_limits_at_0_and_infinity_count() -> None:
+    """-(s + 4) / (2 s + 16): -1/4 at 0 and -1/2 at infinity; above 1 there, no delay is borne."""
+    A, B = np.array([[-8.0]]), np.ones((1, 1))
+    for gain, up in ((1.0, 2.0), (-0.5, np.inf)):
+        loop = linear(A, gain * B, 2 * B, -0.5 * gain)
+        found = margins(loop)
+        assert found.stable and found.gain_up == pytest.approx(up) and found.delay == np.inf
+    assert margins(linear(A, B, -2 * B, 3.0)).delay == 0.0
+    assert margins(linear(A, -8 * B, 0.5 * B)).gain_up == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("rate", [1.0, 1e-3])
+@pytest.mark.parametrize("mass", [1.0, 1e5, 1e12])
+def test_a_heavy_mass_behind_a_fast_drive_is_part_of_the_loop(mass: float, rate: float) -> None:
+    """x'' = F / m, F' = 1e4 (u - F), u = -k x - d x'."""
+    k, d, drive = mass * rate**2, 1.4 * mass * rate, 1e4
+    A = np.array([[0, 1, 0], [0, 0, 1 / mass], [0, 0, -drive]])
+    loop = minimal(linear(A, np.array([[0], [0], [drive]]), np.array([[k, d, 0]])))
+    assert len(loop.states) == 3 and loop.dropped == ()
+    found = margins(loop)
+    w = rate * np.sqrt((1.4**2 + np.sqrt(1.4**4 + 4)) / 2)
+    lag = np.arctan(1.4 * w / rate) - w / drive
+    assert [x.frequency for x in found.gain_crossings] == pytest.approx([w], rel=1e-6)
+    assert found.phase == pytest.approx(np.degrees(lag), rel=1e-6)
+    assert found.delay == pytest.approx(lag / w, rel=1e-6)
+
+
+def test_a_fast_mode_behind_slow_states_is_part_of_the_loop() -> None:
+    """Seen a millionth of a millionth as much as they are, but not by rounding."""
+    A = np.diag([-100.0, -1.0, -2.0, -3.0, -4.0, -5.0]) + np.diag([1e-4] * 5, -1)
+    loop = linear(A, np.eye(6)[:, [0, 1]].sum(axis=1, keepdims=True), np.eye(6)[[5]])
+    assert minimal(loop).states == loop.states
+
+
+def test_what_is_dropped_is_named_and_its_growth_is_known() -> None:
+    """A state that nothing moves, one that nothing sees, and one that copies another."""
+    A = np.array([[-1.0, 0, 0, 1.0], [0, 0.5, 0, 0], [1.0, 0, -3.0, 0], [0, 0, 0, -2.0]])
+    A = np.block([[A, np.zeros((4, 1))], [1e-7 * A[:1], 0.0]])
+    B, C = np.array([[0, 0, 0, 1.0, 0]]).T, np.array([[1.0, 1.0, 0, 0, 1e7]])
+    loop = minimal(linear(A, B, C))
+    assert loop.dropped in (("x1", "x2", "x4"), ("x0", "x1", "x2"))
+    assert sorted(loop.hidden.real) == pytest.approx([-3.0, 0.0, 0.5], abs=1e-12)
+    at_rest = loop.C @ np.linalg.solve(-loop.A, loop.B)  # twice x0, which is half of the input
+    assert at_rest == pytest.approx(1.0)
+
+
+def test_poles_at_0_are_0_and_slow_ones_are_not() -> None:
+    """Two masses and a spring: the pole at 0 is double, and 0; a slow pole beside a fast is not."""
+    A = np.zeros((4, 4))
+    A[0, 1] = A[2, 3] = 1.0
+    A[1], A[3] = [-1e6, 0, 1e6, 0], [3e4, 0, -3e4, 0]
+    poles = linear(A, np.eye(4)[:, [1]], np.eye(4)[[2]]).poles
+    assert np.count_nonzero(poles) == 2 and np.abs(poles[2:]) == pytest.approx(np.sqrt(1.03e6))
+    slow = linear(np.array([[-1e-7, 1.0], [0.0, -1e4]]), np.eye(2)[:, [1]], np.eye(2)[[0]])
+    table = explained.poles(Study(Path(), slow, {}))
+    assert [row[0] for row in table.rows] == ["-1e-07", "-10000"]
+
+
+def test_pictures_draw_the_peaks() -> None:
+    """Bode to a hundredth of a dB, and Nyquist as a round loop."""
+    loop = rational(*LOOPS_BY_NAME["mode of damping 0.001"])
+    w = np.linspace(0.999, 1.001, 20001) * W
+    peak = np.abs(loop.ss()(1j * w)).max()
+    drawn = figures.bode(loop, None, margins(loop)).axes[0].lines[0]
+    hertz, decibels = drawn.get_data()
+    near = np.abs(2 * np.pi * hertz / W - 1) < 0.1
+    assert decibels[near].max() == pytest.approx(20 * np.log10(peak), abs=0.01)
+    real, imag = figures.nyquist(loop, None).axes[0].lines[0].get_data()
+    steps = np.hypot(np.diff(real), np.diff(imag))[np.hypot(real, imag)[1:] < 3]
+    assert steps.max() < 0.15 * peak
+    sampled = figures.bode(loop, 0.07).axes[0].lines[1].get_data()  # the mode folds to 29.8 rad/s
+    near = np.abs(2 * np.pi * sampled[0] / (2 * np.pi / 0.07 - W) - 1) < 0.01
+    assert sampled[1][near].max() > 20 * np.log10(0.3)
+
+
+def test_minimal_keeps_the_response_and_drops_what_plays_no_part() -> None:
+    source = np.random.default_rng(1)
+    A, B, C = source.normal(size=(4, 4)), source.normal(size=(4, 1)), source.normal(size=(1, 4))
+    whole = np.block([[A, np.zeros((4, 2))], [source.normal(size=(2, 6))]])
+    mixed = source.normal(size=(6, 6))
+    big = linear(
+        mixed @ whole @ np.linalg.inv(mixed),
+        mixed @ np.vstack([B, np.ones((2, 1))]),
+        np.hstack([C, np.zeros((1, 2))]) @ np.linalg.inv(mixed),
+    )
+    small = minimal(big)
+    assert len(small.states) == 4
+    for w in (0.1, 1.0, 10.0):
+        s = 1j * w
+        expected = C @ np.linalg.solve(s * np.eye(4) - A, B)
+        found = small.C @ np.linalg.solve(s * np.eye(4) - small.A, small.B)
+        assert found == pytest.approx(expected, rel=1e-8)
+
+
+# ---- Random loops --------------------------------------------------------------------------------
+
+
+@dataclass
+class Loop:
+    """A random L in s and plain units, and the same in other units of time and states."""
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    second: float  # how long it is in the other unit of time
+    other: Linear
+
+    def growth(self, gain: float = 1.0, delay: float = 0.0) -> float:
+        """The largest real part of a pole of the closed loop, of the pole's size."""
+        poles = np.linalg.eigvals(closed_matrix(self.A, gain * self.B, self.C, delay))
+        return float((poles.real / np.abs(poles)).max())
+
+
+def closed_matrix(A: np.ndarray, B: np.ndarray, C: np.ndarray, delay: float) -> np.ndarray:
+    """The closed loop; with a delay by Pade, whose gain is 1 at all frequencies."""
+    whole = A, B, C, np.zeros((1, 1))
+    factors = [
+        factorial(2 * ORDER - k) / factorial(k) / factorial(ORDER - k) for k in range(ORDER + 1)
+    ]
+    for pole in np.roots(factors[::-1]):
+        if delay and pole.imag > 0:  # a section of the second order, of gain 1
+            size = abs(pole) / delay
+            section = np.array([[0.0, size], [-size, 2 * pole.real / delay]])
+            leaves = np.array([[0.0, 4 * pole.real / delay]])
+            whole = series(whole, (section, np.array([[0.0], [1.0]]), leaves, np.ones((1, 1))))
+    return whole[0] - whole[1] @ whole[2]
+
+
+def series(first: tuple, second: tuple) -> tuple:
+    """A, B, C and D of one model behind another."""
+    (A, B, C, D), (E, F, G, H) = first, second
+    return (
+        np.block([[A, np.zeros((len(A), len(E)))], [F @ C, E]]),
+        np.vstack([B, F @ D]),
+        np.hstack([H @ C, G]),
+        H @ D,
+    )
+
+
+def random_loop(seed: int) -> Loop:
+    """Chains, flexible modes of damping 1e-5 to 1, filters; unstable by itself now and then."""
+    source = np.random.default_rng(seed)
+
+    def rate(low: float = -2, high: float = 2) -> float:
+        return float(10 ** source.uniform(low, high))
+
+    blocks = [
+        np.array([[source.choice([0.0, -rate(), -rate(), 0.3 * rate()], p=[0.4, 0.3, 0.2, 0.1])]])
+    ]
+    enters, leaves = [np.ones((1, 1))], [np.array([[rate()]])]
+    for _ in range(source.integers(0, 4)):
+        w, damping = rate(), rate(-5, 0)
+        blocks.append(np.array([[0.0, w], [-w, -2 * damping * w]]))
+        enters.append(np.array([[0.0], [1.0]]))
+        leaves.append(
+            source.choice([-1, 1]) * rate(-3, 1) * np.roll([[w, 0.0]], source.integers(2))
+        )
+    A = block_diag(*blocks)
+    whole = A, np.vstack(enters), np.hstack(leaves), np.zeros((1, 1))
+    for _ in range(source.integers(0, 4)):  # an integrator, a lag, or a lead
+        pole = -source.choice([0.0, rate(), rate()])
+        zero, one = source.choice([0.0, rate()]), np.ones((1, 1))
+        lead = (pole * one, one, (zero + pole) * one, one)
+        whole = series(whole, lead if zero else (pole * one, one, one, 0 * one))
+    A, B, C, _ = whole
+    for _ in range(20):  # tries: most gains make the loop unstable
+        w = rate(-2.5, 2.5)
+        size = abs((C @ np.linalg.solve(1j * w * np.eye(len(A)) - A, B))[0, 0])
+        C = source.choice([1, 1, 1, -1]) * C / size
+        if np.linalg.eigvals(A - B @ C).real.max() < 0 or source.random() < 0.02:
+            break
+    second = rate(-6, 6)
+    units = 10 ** source.uniform(-6, 6, len(A))
+    other = [A * units[:, None] / units / second, B * units[:, None] / second, C / units]
+    if source.random() < 0.3:  # a state that moves as another one does
+        k, n = source.integers(len(A)), len(A)
+        factor, share = rate(-6, 6), source.random()
+        other[0] = np.block([[other[0], np.zeros((n, 1))], [factor * other[0][k], 0.0]])
+        other[1] = np.vstack([other[1], factor * other[1][k]])
+        other[2] = np.hstack([other[2], share * other[2][:, [k]] / factor])
+        other[2][0, k] *= 1 - share
+    return Loop(A, B, C, second, linear(*other))
+
+
+@pytest.fixture(scope="module")
+def random_loops() -> list[tuple[int, Loop, Margins]]:
+    """Loops by their seeds, with their margins in the other units; none is at the verge."""
+    made = [(seed, random_loop(seed)) for seed in range(LOOPS)]
+    return [
+        (seed, loop, margins(minimal(loop.other)))
+        for seed, loop in made
+        if abs(loop.growth()) > SHOWN
+    ]
+
+
+def test_a_state_that_moves_as_another_is_dropped_in_all_units() -> None:
+    for seed in range(LOOPS):
+        loop = random_loop(seed)
+        assert len(minimal(loop.other).states) == len(loop.A), seed
+
+
+def test_random_loops_are_stable_up_to_their_gains_and_not_beyond(random_loops: list) -> None:
+    """Eigenvalues in plain units, between and on both sides of the margins."""
+    seen = {"up": 0, "down": 0, "unstable": 0}
+    for seed, loop, found in random_loops:
+        assert found.stable == (loop.growth() < 0), seed
+        if not found.stable:
+            seen["unstable"] += 1
+            continue
+        up, down = found.gain_up, found.gain_down
+        inside = np.geomspace(max(1.02 * down, 1e-4), min(0.98 * up, 1e4), 60)
+        assert all(loop.growth(gain=gain) < SHOWN for gain in inside), seed
+        factors = [1 / abs(x.value) for x in found.phase_crossings]
+        if up < np.inf:
+            after = min((x for x in factors if x > up * (1 + 1e-9)), default=np.inf)
+            assert loop.growth(gain=min(1.02 * up, np.sqrt(up * after))) > 0, seed
+            seen["up"] += 1
+        if down > 0:
+            after = max((x for x in factors if x < down * (1 - 1e-9)), default=0.0)
+            assert loop.growth(gain=max(0.98 * down, np.sqrt(down * after))) > 0, seed
+            seen["down"] += 1
+    assert all(count > LOOPS / 30 for count in seen.values()), seen
+
+
+def test_random_loops_are_stable_up_to_their_delay_and_not_beyond(random_loops: list) -> None:
+    seen = 0
+    for seed, loop, found in random_loops:
+        if not found.stable:
+            continue
+        delay = found.delay / loop.second
+        inside = [part * min(delay, 1e3) for part in (0.05, 0.2, 0.5, 0.8, 0.98)]
+        assert all(loop.growth(delay=x) < SHOWN for x in inside), seed
+        if delay < np.inf:
+            after = [
+                (np.angle(-x.value) % (2 * np.pi) + turn) / x.frequency / loop.second
+                for x in found.gain_crossings
+                for turn in (0.0, 2 * np.pi)
+            ]
+            after = min((x for x in after if x > delay * (1 + 1e-9)), default=np.inf)
+            assert loop.growth(delay=min(1.02 * delay, (delay + after) / 2)) > 0, seed
+            seen += 1
+    assert seen > LOOPS / 3
+
+
+def test_crossings_of_random_loops_are_those_of_python_control(random_loops: list) -> None:
+    """In plain units, where its polynomials do well."""
+    for seed, loop, found in random_loops:
+        plain = linear(loop.A, loop.B, loop.C).ss()
+        gains, _, _, turns, ones, _ = control.stability_margins(plain, returnall=True)
+        ours = np.array([x.frequency for x in found.gain_crossings]) * loop.second
+        for w in ones:
+            if abs(abs(plain(1j * w)) - 1) < 1e-6:
+                assert np.abs(ours / w - 1).min(initial=1.0) < 1e-5, seed
+        ours = np.array([x.frequency for x in found.phase_crossings]) * loop.second
+        for w, gain in zip(turns, gains, strict=True):
+            if abs(plain(1j * w) * gain + 1) < 1e-6 and 1e-6 < gain < 1e6:
+                assert np.abs(ours - w).min(initial=np.inf) <= 1e-5 * w, seed
