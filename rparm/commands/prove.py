@@ -1,7 +1,7 @@
 """`prove`: how far runs and references are from the exact motion at most, by theorem."""
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict
 from pathlib import Path
 
@@ -16,20 +16,21 @@ from rparm.output import console
 from rparm.output.progress import Progress
 from rparm.output_files import check_writable, from_here, written
 from rparm.proof import proven, prover
-from rparm.proof.proven import ASSUMED
+from rparm.proof.proven import ASSUMED, ProvenReference
 from rparm.proof.prover import Enclosure, Prover
 from rparm.report import proof_page
 from rparm.scenarios import scenario as scenarios
 from rparm.scenarios.scenario import Scenario
-from rparm.texts import counted, rounded_up
+from rparm.texts import counted, rounded_up, verdict
 from rparm.units import typed_quantity
 
 DESCRIPTION = (
     "Encloses the exact motion of a scenario in intervals, by validated integration, and prints "
     "how far the states in a run of the FMU are from it at most, for each method of integration. "
-    f"Without a scenario, does so for all references. Assumed are {ASSUMED}."
+    "Every value of the scenario's reference must be the double nearest to the exact one. Without "
+    f"a scenario, checks all references. Assumed are {ASSUMED}."
 )
-COLUMNS = {"values": 8, "nearest doubles": 8, "error beyond": 9, "interval": 9}
+COLUMNS = {"values": 8, "nearest doubles": 8, "interval": 9}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -76,10 +77,15 @@ def run(options: argparse.Namespace) -> Ended:
                 f"failed: the proof holds up to {enclosure.stopped!r} s, no further",
                 {"holds_up_to": enclosure.stopped},
             )
-        found, courses = _runs(fmu, scenario, enclosure, methods, options.tolerance)
+        good = None
+        if _has_reference(path):
+            exact = _enclosure(program, scenario, {}) if within else enclosure
+            good = _reference(fmu, scenario, exact)
+        states = enclosure.of(program.states)
+        found, courses = _runs(fmu, scenario, states, methods, options.tolerance)
         with written(options.report):
             page = proof_page.write(
-                options.report, scenario, fmu.model, enclosure, courses, _command(options)
+                options.report, scenario, fmu.model, states, courses, good, _command(options)
             )
     print(f"page: {from_here(page)}")
     checked = _checked(program, {scenario: enclosure}) if options.check else {}
@@ -87,10 +93,33 @@ def run(options: argparse.Namespace) -> Ended:
     document = {
         "methods": {m: {n: asdict(e) for n, e in errors.items()} for m, errors in found.items()}
     }
-    document |= {"page": page.absolute()}
-    return Ended(
-        0, f"largest proven error: {rounded_up(largest, 2)}", document | checked, page=page
-    )
+    document |= {"reference": asdict(good)} if good else {}
+    document |= {"page": page.absolute()} | checked
+    if good and not good.passed:
+        return Ended(1, _verdict([good]), document, page=page)
+    return Ended(0, f"largest proven error: {rounded_up(largest, 2)}", document, page=page)
+
+
+def _has_reference(path: Path) -> bool:
+    """Whether it is the file of one of the project's scenarios, which all have references."""
+    return path.resolve() in {file.resolve() for file in project.scenario_files().values()}
+
+
+def _reference(fmu: Fmu, scenario: Scenario, enclosure: Enclosure) -> ProvenReference:
+    """How good a scenario's reference is; prints what is wrong with it."""
+    if enclosure.stopped is not None:
+        raise UserError(f"{scenario.path}: proven up to {enclosure.stopped} s only")
+    good = proven.of_reference(fmu, scenario, enclosure)
+    for wrong in good.wrong:
+        print(wrong)
+    return good
+
+
+def _verdict(references: Collection[ProvenReference]) -> str:
+    """The last line where values are wrong: where the first one is, and how many there are."""
+    wrong = [value for good in references for value in good.wrong]
+    count = sum(good.values - good.nearest for good in references)
+    return f"failed: {wrong[0]}" + (f"; {count} values are wrong" if count > 1 else "")
 
 
 def _command(options: argparse.Namespace) -> str:
@@ -135,8 +164,8 @@ def _runs(
     tolerance: float | None,
 ) -> tuple[dict[str, dict[str, proven.ProvenError]], dict[str, np.ndarray]]:
     """Print the largest errors of runs by each method; return these, and all errors by run."""
-    units = [fmu.model.variables[name].unit for name in enclosure.states]
-    heads = {f"{n} {u or ''}".strip(): 10 for n, u in zip(enclosure.states, units, strict=True)}
+    units = [fmu.model.variables[name].unit for name in enclosure.names]
+    heads = {f"{n} {u or ''}".strip(): 10 for n, u in zip(enclosure.names, units, strict=True)}
     print(f"{scenario.name}: largest distance from the exact motion at communication points")
     names = [f"{m} at {proven.tolerance_of(m, tolerance or scenario.tolerance):g}" for m in methods]
     table = console.Table("method", [*names, "interval"], heads, result=0)
@@ -156,39 +185,34 @@ def _runs(
 def _references(options: argparse.Namespace) -> Ended:
     """How good the references of all models with a prover are."""
     check_writable(options.report)
-    found, everything, rows = {}, {}, []
+    found: dict[str, ProvenReference] = {}
+    everything, rows = {}, []
     for program in prover.provers().values():
         files = [x for x in project.scenario_files().values() if x.parents[1] == program.folder]
-        table = console.Table("reference", [x.stem for x in files], COLUMNS, result=0)
+        table = console.Table("reference", [x.stem for x in files], COLUMNS)
         with Fmu(project.built(program.folder, ".fmu")) as fmu:
             proofs = {}
             for scenario in [scenarios.load(path, fmu.model) for path in files]:
                 enclosure = proofs[scenario] = _enclosure(program, scenario, {})
-                if enclosure.stopped is not None:
-                    raise UserError(f"{scenario.path}: proven up to {enclosure.stopped} s only")
-                good = proven.of_reference(fmu, scenario, enclosure)
-                share = f"{100 * good.nearest / good.values:.1f} %"
-                cells = [
-                    str(good.values),
-                    share,
-                    rounded_up(good.error, 1),
-                    rounded_up(good.radius, 1),
-                ]
-                table.row(scenario.name, cells)
-                rows.append((scenario.name, *cells))
-                found[scenario.name] = asdict(good)
+                good = found[scenario.name] = _reference(fmu, scenario, enclosure)
+                cells = [str(good.values), str(good.nearest), rounded_up(good.radius, 1)]
+                table.row(scenario.name, cells, verdict(good.passed))
+                rows.append((scenario.name, *cells, verdict(good.passed)))
         if options.check:
             everything |= _checked(program, proofs)
     console.remark(
-        "nearest doubles: of the states, proven; error beyond: more than half a unit in the last "
-        "place; interval: the widest one that contains an exact state"
+        "nearest doubles: values, of all columns, that are proven to be the doubles nearest to the "
+        "exact ones; interval: radius of the widest one that contains an exact value"
     )
     with written(options.report):
         page = proof_page.write_references(
-            options.report, ("reference", *COLUMNS), rows, _command(options)
+            options.report, ("reference", *COLUMNS, "result"), rows, found, _command(options)
         )
     print(f"page: {from_here(page)}")
-    document = {"references": found, "page": page.absolute()} | everything
+    good = {name: asdict(reference) for name, reference in found.items()}
+    document = {"references": good, "page": page.absolute()} | everything
+    if not all(reference.passed for reference in found.values()):
+        return Ended(1, _verdict(found.values()), document, page=page)
     return Ended(0, f"proven: {counted(found, 'reference')}", document, page=page)
 
 

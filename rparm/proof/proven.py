@@ -2,41 +2,66 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from rparm.errors import UserError, hint
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import METHOD, SMALLEST_TOLERANCES
+from rparm.output_files import from_here
 from rparm.proof import prover
-from rparm.proof.prover import Enclosure, distances, is_nearest
+from rparm.proof.prover import Enclosure, distances
 from rparm.runs import reference, simulation
 from rparm.runs.simulation import Result
 from rparm.scenarios.scenario import Scenario
+from rparm.texts import rounded_up
 
 # of a scenario that is proven where nobody asks for it: communication steps, time that it takes
 MOST_STEPS = 20_000
 SECONDS = 10.0
+SHOWN = 5  # wrong values of a reference
 ASSUMED = "the equations of motion, exact parameters and inputs as given, and IEEE doubles"
 
 
 @dataclass(frozen=True)
 class ProvenError:
-    """Of one state in one run."""
+    """Of one variable in one run."""
 
-    error: float  # largest |run - exact motion| at communication points, in the state's unit
+    error: float  # largest |run - exact motion| at communication points, in its unit
     at: float  # s, where
-    radius: float  # of the widest interval that contains the exact state
+    radius: float  # of the widest interval that contains the exact value
+
+
+@dataclass(frozen=True)
+class WrongValue:
+    """A value of a reference that is not proven to be the double nearest to the exact one."""
+
+    file: Path
+    line: int
+    column: str
+    value: float
+    exact: float  # rounded to a double
+    within: float  # how far the exact value is from that at most
+
+    def __str__(self) -> str:
+        where = f"{from_here(self.file)}, line {self.line}, column {self.column}"
+        exact = f"the exact value is within {rounded_up(self.within, 1)} of {self.exact!r}"
+        return f"{where}: found {self.value!r}, {exact}"
 
 
 @dataclass(frozen=True)
 class ProvenReference:
     """How good the reference of a scenario is."""
 
-    values: int  # of states
+    values: int  # of all columns
     nearest: int  # those that are proven to be the doubles nearest to the exact ones
-    error: float  # largest distance from the exact value, beyond half a unit in the last place
     radius: float  # of the widest interval
+    wrong: tuple[WrongValue, ...]  # the first ones of the others, at most `SHOWN`
+
+    @property
+    def passed(self) -> bool:
+        return self.nearest == self.values
 
 
 def methods(fmu: Fmu, chosen: str | None = None) -> list[str]:
@@ -61,14 +86,14 @@ def bounds(
     tolerance: float,
     progress: Callable[[int], object] | None = None,
 ) -> np.ndarray:
-    """Proven errors in a run, shape (communication points, states), in the states' units."""
+    """Proven errors in a run, (communication points, names of the enclosure), in their units."""
     run = replace(
         scenario,
         parameters=scenario.parameters | {METHOD: fmu.model.variables[METHOD].items[method]},
         reference_every=1,
     )
     result = simulation.simulate(fmu, run, tolerance_of(method, tolerance), progress)
-    values = _columns(result.names, result.values, enclosure.states)
+    values = _columns(result.names, result.values, enclosure.names)
     return distances(values, enclosure, np.arange(len(enclosure.times)))
 
 
@@ -89,8 +114,9 @@ def of_run(
         return None
     if enclosure.stopped is not None:
         return None
+    enclosure = enclosure.of(program.states)
     rows = scenario.reference_rows
-    values = _columns(result.names, result.values, enclosure.states)
+    values = _columns(result.names, result.values, enclosure.names)
     rows = rows[: len(values)]
     return largest(distances(values[: len(rows)], enclosure, rows), enclosure, rows)
 
@@ -98,11 +124,11 @@ def of_run(
 def largest(
     errors: np.ndarray, enclosure: Enclosure, rows: np.ndarray | None = None
 ) -> dict[str, ProvenError]:
-    """Largest proven errors of all states, by name.
+    """Largest proven errors of all variables of an enclosure, by name.
 
     Parameters
     ----------
-    errors : ndarray, shape (points, states)
+    errors : ndarray, shape (points, names)
     rows : ndarray of int, shape (points,), optional
         Communication points of the errors; default: all.
     """
@@ -112,22 +138,30 @@ def largest(
         name: ProvenError(
             float(errors[worst[i], i]), float(times[worst[i]]), float(enclosure.radius[:, i].max())
         )
-        for i, name in enumerate(enclosure.states)
+        for i, name in enumerate(enclosure.names)
     }
 
 
 def of_reference(fmu: Fmu, scenario: Scenario, enclosure: Enclosure) -> ProvenReference:
-    """How good the reference of a scenario is; UserError if it has none."""
+    """How good the reference of a scenario is, in all columns; UserError if it has none."""
     expected = reference.load(scenario, fmu.model)
-    values = _columns(expected.names, expected.values, enclosure.states)
     rows = scenario.reference_rows
-    beyond = distances(values, enclosure, rows) - np.spacing(np.abs(values)) / 2
-    return ProvenReference(
-        values.size,
-        int(is_nearest(values, enclosure, rows).sum()),
-        max(float(beyond.max()), 0.0),
-        float(enclosure.radius[rows].max()),
+    around = enclosure.of(expected.names)
+    nearest = prover.is_nearest(expected.values, around, rows)
+    within = distances(around.high[rows], around, rows)
+    wrong = tuple(
+        WrongValue(
+            expected.path,
+            int(row) + 2,
+            expected.names[i],
+            float(expected.values[row, i]),
+            float(around.high[rows[row], i]),
+            float(within[row, i]),
+        )
+        for row, i in np.argwhere(~nearest)[:SHOWN]
     )
+    radius = float(around.radius[rows].max())
+    return ProvenReference(nearest.size, int(nearest.sum()), radius, wrong)
 
 
 def _columns(names: Sequence[str], values: np.ndarray, wanted: Sequence[str]) -> np.ndarray:

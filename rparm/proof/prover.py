@@ -1,16 +1,16 @@
 """Programs that enclose the motions of a model: what they are asked, and what they answer.
 
 The folder of a model that has one has a folder proof/. There, proof.toml names the parameters,
-states and inputs of the program, in its order; README.md has the format of problems and answers;
-check.py checks certificates, and check_operations.py single operations.
+states, inputs and outputs of the program, in its order; README.md has the format of problems and
+answers; check.py checks certificates, and check_operations.py single operations.
 """
 
 import math
 import subprocess
 import tempfile
 import threading
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import reduce
 from importlib import import_module
 from pathlib import Path
@@ -25,6 +25,7 @@ from rparm.scenarios import scenario as scenarios
 from rparm.scenarios.scenario import Scenario
 
 STOPPED = 1  # exit code: the proof could not go on
+UNDERFLOW = 2.0**-800  # in SI units: above all that intervals around 0 allow for underflow
 HALVINGS = 6  # of starts that are too broad to be proven at once
 
 Start = Mapping[str, tuple[float, float]]  # value of each state, and by how much it may be off
@@ -32,16 +33,16 @@ Start = Mapping[str, tuple[float, float]]  # value of each state, and by how muc
 
 @dataclass(frozen=True, eq=False)
 class Enclosure:
-    """Intervals that contain the exact states: |state - (high + low)| <= radius.
+    """Intervals that contain the exact motion: |exact - (high + low)| <= radius.
 
     Attributes
     ----------
     times : ndarray, shape (n + 1,)
         Communication points in s; fewer than asked for if the proof stopped.
-    states : tuple of str
-        Names.
-    high, low, radius : ndarrays, shape (n + 1, states)
-        In the units of the states.
+    names : tuple of str
+        States and outputs; outputs have the inputs of the step before, first ones those after.
+    high, low, radius : ndarrays, shape (n + 1, names)
+        In the units of the variables.
     stopped : float or None
         Time in s up to which the proof holds, if it does not to the end.
     starts : tuple of Start
@@ -49,12 +50,18 @@ class Enclosure:
     """
 
     times: np.ndarray
-    states: tuple[str, ...]
+    names: tuple[str, ...]
     high: np.ndarray
     low: np.ndarray
     radius: np.ndarray
     stopped: float | None
     starts: tuple[Start, ...]
+
+    def of(self, names: Sequence[str]) -> "Enclosure":
+        """Intervals of these variables."""
+        places = [self.names.index(name) for name in names]
+        parts = {part: getattr(self, part)[:, places] for part in ("high", "low", "radius")}
+        return replace(self, names=tuple(names), **parts)
 
 
 @dataclass(frozen=True)
@@ -65,6 +72,7 @@ class Prover:
     parameters: tuple[str, ...]
     states: tuple[str, ...]
     inputs: tuple[str, ...]
+    outputs: tuple[str, ...]  # besides the states
 
     def enclose(
         self,
@@ -156,9 +164,10 @@ class Prover:
             else:
                 times.append(float.fromhex(time))
                 rows.append([float.fromhex(number) for number in numbers])
-        parts = np.array(rows).reshape(len(rows), len(self.states), 3)
+        names = self.states + self.outputs
+        parts = np.array(rows).reshape(len(rows), len(names), 3)
         high, low, radius = np.moveaxis(parts, 2, 0)
-        return Enclosure(np.array(times), self.states, high, low, radius, stopped, (start,))
+        return Enclosure(np.array(times), names, high, low, radius, stopped, (start,))
 
     def check(
         self,
@@ -258,12 +267,13 @@ def hull(one: Enclosure, other: Enclosure) -> Enclosure:
     room = 8 * np.spacing(np.maximum(np.abs(least), np.abs(greatest)))
     radius = (greatest - least) / 2 + room
     starts = one.starts + other.starts
-    return Enclosure(one.times, one.states, middle, 0 * middle, radius, None, starts)
+    return Enclosure(one.times, one.names, middle, 0 * middle, radius, None, starts)
 
 
 def _load(folder: Path) -> Prover:
     content = read_toml(project.proof_file(folder))
-    return Prover(folder, *(tuple(content[key]) for key in ("parameters", "states", "inputs")))
+    keys = ("parameters", "states", "inputs", "outputs")
+    return Prover(folder, *(tuple(content[key]) for key in keys))
 
 
 def _line(name: str, numbers: Iterable[float]) -> str:
@@ -278,23 +288,24 @@ def _watched(lines: Iterable[str], progress: Callable[[int], object] | None) -> 
 
 
 def is_nearest(values: np.ndarray, enclosure: Enclosure, rows: np.ndarray) -> np.ndarray:
-    """Which values are proven to be the doubles nearest to the exact states.
+    """Which values are proven to be the doubles nearest to the exact ones.
+
+    0 is so up to `UNDERFLOW`, because intervals are no narrower there.
 
     Parameters
     ----------
-    values : ndarray, shape (rows, states)
+    values : ndarray, shape (rows, names)
     rows : ndarray of int, shape (rows,)
         Communication points of the values.
     """
     distance = distances(values, enclosure, rows)
-    magnitude = np.abs(values)
-    # below a power of two, doubles are twice as dense
-    gap = np.minimum(np.spacing(magnitude), magnitude - np.nextafter(magnitude, -math.inf))
-    return distance < gap / 2
+    side = (enclosure.high[rows] - values) + enclosure.low[rows]  # where the exact value is
+    gap = np.abs(np.nextafter(values, np.copysign(math.inf, side)) - values)
+    return (distance < gap / 2) | ((values == 0.0) & (distance < UNDERFLOW))
 
 
 def distances(values: np.ndarray, enclosure: Enclosure, rows: np.ndarray) -> np.ndarray:
-    """Bounds of |value - exact state|, shape (rows, states); arguments as those of `is_nearest`."""
+    """Bounds of |value - exact value|, shape (rows, names); arguments as those of `is_nearest`."""
     # the factor covers the roundings of these operations, far fewer than 30 of 2^-53 each
     beside = np.abs((values - enclosure.high[rows]) - enclosure.low[rows])
     return (beside + enclosure.radius[rows]) * (1 + 2.0**-48)

@@ -1,6 +1,6 @@
 """The page of proven errors."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,9 +8,10 @@ import numpy as np
 
 from rparm.fmi.model import Model
 from rparm.proof import proven
+from rparm.proof.proven import ProvenReference
 from rparm.proof.prover import Enclosure
 from rparm.report import assets
-from rparm.report.overview import PASSED
+from rparm.report.overview import FAILED, PASSED
 from rparm.report.pages import INDEX, RunPage, Table, write_run
 from rparm.report.run_data import Curve, Plot, RunData, thinned
 from rparm.scenarios.scenario import Scenario
@@ -26,11 +27,13 @@ def write(
     model: Model,
     enclosure: Enclosure,
     errors: Mapping[str, np.ndarray],
+    good: ProvenReference | None,
     again: str,
 ) -> Path:
     """Write the page of a scenario; return its path. The command `again` proves it again.
 
-    `errors` are the proven ones of runs, (communication points, states), by method and tolerance.
+    `errors` are the proven ones of runs, (communication points, states), by method and tolerance;
+    `good` says how good the reference is, if there is one.
     """
     plots = [
         Plot(
@@ -41,7 +44,7 @@ def write(
             log=True,
             note=f"The exact {name} is no farther than this from the run.",
         )
-        for i, name in enumerate(enclosure.states)
+        for i, name in enumerate(enclosure.names)
     ]
     rows = thinned([values for plot in plots for values in plot.columns])
     title = f"{scenario.title}: proven errors"
@@ -54,32 +57,46 @@ def write(
     ]
     if len(enclosure.starts) > 1:
         facts.append(("start", f"in {counted(enclosure.starts, 'piece')}"))
+    if good is not None:
+        facts.append(("reference", f"{good.nearest} of {good.values} values are nearest doubles"))
     page = RunPage(
         title=title,
         description=scenario.description,
-        status=PASSED,
+        status=_status([good] if good else []),
         facts=facts,
         data=RunData(scenario.name, title, enclosure.times[rows], shown),
         tables=[_largest(model, enclosure, errors)],
         notes=[ASSUMES],
+        failures=[str(wrong) for wrong in good.wrong] if good else [],
         again=again,
     )
     return _write(report, scenario.name, page)
 
 
-def write_references(report: Path, head: Sequence[str], rows: Sequence, again: str) -> Path:
+def write_references(
+    report: Path,
+    head: Sequence[str],
+    rows: Sequence,
+    found: Mapping[str, ProvenReference],
+    again: str,
+) -> Path:
     """Write the page of the references; return its path. `head` and `rows` are of its table."""
     page = RunPage(
         title="References: proven accuracy",
         description="How many values of each reference are the doubles nearest to the exact ones.",
-        status=PASSED,
+        status=_status(found.values()),
         facts=[("references", str(len(rows)))],
         data=None,
         tables=[Table("References", head, rows)],
         notes=[ASSUMES],
+        failures=[str(wrong) for good in found.values() for wrong in good.wrong],
         again=again,
     )
     return _write(report, "references", page)
+
+
+def _status(references: Iterable[ProvenReference]) -> str:
+    return PASSED if all(good.passed for good in references) else FAILED
 
 
 def _write(report: Path, name: str, page: RunPage) -> Path:
@@ -91,7 +108,7 @@ def _write(report: Path, name: str, page: RunPage) -> Path:
 
 def _largest(model: Model, enclosure: Enclosure, errors: Mapping[str, np.ndarray]) -> Table:
     """Largest error of each state in each run, and when."""
-    heads = [f"{n} in {unit(model.variables[n].unit)}" for n in enclosure.states]
+    heads = [f"{n} in {unit(model.variables[n].unit)}" for n in enclosure.names]
     found = {run: proven.largest(course, enclosure).values() for run, course in errors.items()}
     rows = [
         (run, *(f"{rounded_up(e.error, 2)} at {e.at:.4g} s" for e in largest))

@@ -142,10 +142,9 @@ def failures(
     """What the runs of a seed do wrong."""
     model, found = hybrid(seed), []
     chosen = [label for label in labels(model, is_full) if label.startswith(only)]
-    versions = ["fmi2"] + ["fmi3"] * any(label.startswith("early") for label in chosen)
     with tempfile.TemporaryDirectory() as folder:
         try:
-            unit = Unit(Path(folder), model.text(form or None), versions)
+            unit = Unit(Path(folder), model.text(form or None))
         except ModelFileError as error:
             return [Failure(seed, model.kind, only or "-", "build", str(error))]
         for label in chosen:

@@ -8,6 +8,7 @@ import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 
@@ -324,6 +325,7 @@ KINDS: list[Callable[[Maker], Parts]] = [
 ]  # fmt: skip
 
 
+@cache
 def hybrid(seed: int) -> Hybrid:
     """The model of a seed, with its motion."""
     chance = random.Random(seed)

@@ -4,7 +4,7 @@ The FMU is linked to the runtime that is compiled once; it has no archive.
 """
 
 import ctypes
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from building import contents  # isort: skip
 
 METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3, "taylor": 4}
 MASTER_STEP = 2e-3  # s, of Model Exchange
-MOST_EVENTS = 2000
+MOST_EVENTS = 300
 
 
 @dataclass
@@ -38,30 +38,31 @@ class Run:
 
 
 class Unit:
-    """The shared objects of a text, one for each version of FMI."""
+    """The shared objects of a text, each linked when an instance needs it."""
 
-    def __init__(self, folder: Path, text: str, versions: Iterable[str] = ("fmi2",)) -> None:
+    def __init__(self, folder: Path, text: str) -> None:
         file = read_text(folder, text)
         keys = lock.references(Path("no-such-file"), declaration.keys(file))
         declared = contents.write_c(file, keys, folder)
-        made = runtime.Runtime.load(BUILD / "runtime" / "runtime.json", True)
-        objects = made.compile([folder / name for name in contents.C_FILES], folder)
+        self.made = runtime.Runtime.load(BUILD / "runtime" / "runtime.json", True)
+        self.objects = self.made.compile([folder / name for name in contents.C_FILES], folder)
         self.folder = folder
-        for version in versions:
-            library = folder / f"model{made.content['suffix']}"
-            made.link(version, objects, library)
-            place = folder / version / made.content["versions"][version]["folder"]
-            place.mkdir(parents=True)
-            library.rename(place / library.name)
-        self.guid, self.token = declared.guid, declared.token("fmi3")
+        self.guids = {"fmi2": declared.guid, "fmi3": declared.token("fmi3")}
         self.references = {name: v.reference for name, v in declared.variables.items()}
         self.states = [v.name for v in file.of("states")]
         self.indicators = len(file.graph.located)
 
-    def instance(self, kind: type, version: str = "fmi2") -> Any:
+    def instance(self, kind: type) -> Any:
         """An instance of a class of fmpy, not yet instantiated."""
+        version = "fmi3" if kind is FMU3Slave else "fmi2"
+        place = self.folder / version / self.made.content["versions"][version]["folder"]
+        if not place.exists():
+            place.mkdir(parents=True)
+            library = self.folder / f"model{self.made.content['suffix']}"
+            self.made.link(version, self.objects, library)
+            library.rename(place / library.name)
         return kind(
-            guid=self.guid if version == "fmi2" else self.token,
+            guid=self.guids[version],
             modelIdentifier="model",
             unzipDirectory=str(self.folder / version),
         )
@@ -146,7 +147,7 @@ def early_return(
     unit: Unit, method: str, tolerance: float, step: float, count: int, snapshots: bool = False
 ) -> Run:
     """A run of FMI 3.0 whose steps end at events, with snapshots there."""
-    fmu = unit.instance(FMU3Slave, "fmi3")
+    fmu = unit.instance(FMU3Slave)
     fmu.instantiate(eventModeUsed=True, earlyReturnAllowed=True)
     fmu.setInt64(unit.of("solver_method"), [METHODS[method]])
     states, run, saved = unit.of(*unit.states), Run(), []

@@ -14,7 +14,7 @@ from rparm.command_line import COMMANDS
 from tests.support.installed import RELEASE, Installed, wheel_of_release
 from tests.support.paths import NAMES, ROOT, SYSTEMS
 
-LARGEST, UNPACKED = 25_000_000, 22_000_000  # bytes; what it needs, with pip, has 230 MB more
+UNPACKED = 22_000_000  # bytes; what it needs, with pip, has 230 MB more
 OF_CHECKOUT = ("./run.sh", "./setup.sh", "build/venv", "build/report")
 
 
@@ -37,7 +37,6 @@ def checkout(*arguments: object) -> subprocess.CompletedProcess[str]:
 
 
 def test_it_is_small_and_for_every_platform(wheel: Path) -> None:
-    assert wheel.stat().st_size < LARGEST
     with zipfile.ZipFile(wheel) as archive:
         assert sum(member.file_size for member in archive.infolist()) < UNPACKED
         names = archive.namelist()

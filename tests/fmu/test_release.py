@@ -17,7 +17,9 @@ from tests.support.missing import missing
 from tests.support.paths import NAMES, ROOT, SYSTEMS
 
 BELOW = {"fmi2": "", "fmi3": "fmi3/"}  # folder of the archives of a version of FMI
-LARGEST = {"fmi2": 2_500_000, "fmi3": 3_500_000}  # bytes of an FMU
+# bytes of an FMU, by version, and of the wheel: what the page says
+SIZES = re.findall(r"less than ([\d.]+) MB", (ROOT / "fmu" / "release.md").read_text())
+LARGEST = dict(zip(("fmi2", "fmi3", "wheel"), (1e6 * float(x) for x in SIZES), strict=True))
 
 # what the loader of each platform has
 KERNEL = re.compile(r"KERNEL32\.dll|api-ms-win-crt-[a-z]+-l1-1-0\.dll")
@@ -73,6 +75,7 @@ def test_a_release_has_checksums_of_all_its_files(release: Path) -> None:
     assert {name for _, name in lines} == found
     names = {*(f"{name}.ssp" for name in SYSTEMS), *(f"{name}.fmu" for name in NAMES)}
     (wheel,) = release.glob("*.whl")
+    assert wheel.stat().st_size < LARGEST["wheel"]
     assert found == {
         wheel.name,
         "built.tar.xz",

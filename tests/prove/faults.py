@@ -31,7 +31,7 @@ import sites  # noqa: E402
 
 COMPILE = ("cc", "-std=c17", "-O1", "-ffp-contract=off", "-w")
 UNCOMPILABLE = "does not compile"
-FILES = ("ball.h", "arm_series.h", "step.h")
+FILES = ("ball.h", "arm_series.h", "step.h", "arm_outputs.h")
 SAMPLE = Path(__file__).with_name("random_faults.json")
 WIDEST = 1e-26  # radius of free motion
 
@@ -117,6 +117,16 @@ PLANTED = (
         "begin(&series, problem, step->box, false, 0)",
         "begin(&series, problem, step->box, true, 0)",
     ),
+    Fault(
+        "outputs without radii", "arm_outputs.h",
+        "ball_widened(outputs[i], outputs[i].radius * LOOSENED)", "ball_midpoint(outputs[i])",
+    ),
+    Fault(
+        "outputs with efforts of the step's begin", "prove.c", "ball_of_sum(time, -from), efforts",
+        "ball_exact(0.0), efforts",
+    ),
+    Fault("outputs with another Coriolis term", "arm_outputs.h", "v)), 2.0)", "v)), 1.0)"),
+    Fault("another velocity of the end effector", "arm_outputs.h", "ball_product(w, y)", "v"),
 )  # fmt: skip
 
 
@@ -152,6 +162,10 @@ MASKED = {
         "a certificate with numbers that are not finite is refused",
     "for (int i = 0; i <= n; i += 16)": "OUTWARD is for 32 roundings, these are 17 and a few",
     "for (int j = 3; j >= k; j--)": "a fourth derivative would be below 2^-1000",
+    "const struct step_times when = {.length = ball_exact(1.0), .within = ball_exact(0.0), "
+    ".elapsed = ball_of_sum(point, -problem->start),}": "order 0 does not depend on the length",
+    "for (int e = 0; e < EFFORTS; e++)": "one more, which nothing reads",
+    "for (int i = 0; i < OUTPUTS; i++)": "one more, which nothing reads",
 }  # fmt: skip
 
 

@@ -78,11 +78,11 @@ def run(
 
 
 def enclosures(problem: str, program: Path = PROGRAM) -> np.ndarray:
-    """hi, lo and radius of the states at all communication points, (points, 4, 3)."""
+    """hi, lo and radius of states and outputs at all communication points, (points, 14, 3)."""
     answer = run(problem, program=program)
     assert answer.returncode == 0, answer.stdout[-80:] + answer.stderr
     rows = [line.split()[2:] for line in answer.stdout.splitlines()]
-    return np.array([[float.fromhex(word) for word in row] for row in rows]).reshape(-1, 4, 3)
+    return np.array([[float.fromhex(word) for word in row] for row in rows]).reshape(-1, 14, 3)
 
 
 ZERO = (0.0,)

@@ -1,6 +1,10 @@
 """`prove` from the command line and from Python."""
 
 import json
+import math
+import random
+import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -17,6 +21,7 @@ from rparm.commands import prove
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.proof import proven, prover
+from rparm.runs import reference
 from rparm.scenarios import scenario as scenarios
 from rparm.texts import rounded_up
 
@@ -64,7 +69,7 @@ def test_errors_of_each_method(own: Path, capsys: pytest.CaptureFixture[str]) ->
 def test_proven_error_is_what_a_run_and_the_interval_say(own: Path) -> None:
     with Fmu(rparm.fmu("rp_manipulator")) as fmu:
         scenario = scenarios.load(own, fmu.model)
-        enclosure = PROVER.enclose(scenario)
+        enclosure = PROVER.enclose(scenario).of(PROVER.states)
         bounds = proven.bounds(fmu, scenario, enclosure, "erk", 1e-8)
         error = proven.largest(bounds, enclosure)["q1"]
     own.write_text(OWN + '[parameters]\nsolver_method = "erk"\n')
@@ -105,16 +110,150 @@ def test_no_start_is_lost_in_rounding(typed: str, exact: arb) -> None:
 def test_taylor_is_proven_to_1e_13_in_all_scenarios(path: Path) -> None:
     with Fmu(rparm.fmu("rp_manipulator")) as fmu:
         scenario = scenarios.load(path, fmu.model)
-        errors = proven.bounds(fmu, scenario, PROVER.enclose(scenario), "taylor", 1e-13)
+        states = PROVER.enclose(scenario).of(PROVER.states)
+        errors = proven.bounds(fmu, scenario, states, "taylor", 1e-13)
     assert errors.max() <= 1e-13
+
+
+# ---- References ----------------------------------------------------------------------------------
 
 
 def test_references(capsys: pytest.CaptureFixture[str]) -> None:
     found = document(capsys)
-    assert len(found["references"]) == 11
-    for reference in found["references"].values():
-        assert reference["nearest"] > 0.93 * reference["values"]
-        assert reference["error"] < 2e-16 and reference["radius"] < 1e-21
+    assert found["exit_code"] == 0 and len(found["references"]) == 11
+    for good in found["references"].values():
+        assert good["nearest"] == good["values"] and not good["wrong"]
+        assert good["radius"] < 1e-21
+
+
+@pytest.fixture
+def copies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Copies of the references, which `prove` reads."""
+    folder = tmp_path / "references"
+    shutil.copytree(project.references(PROVER.folder), folder)
+    monkeypatch.setattr(project, "references", lambda _: folder)
+    return folder
+
+
+def table_of(path: Path) -> list[list[str]]:
+    return [line.split(",") for line in path.read_text().splitlines()]
+
+
+def write_table(path: Path, table: list[list[str]]) -> None:
+    path.write_text("".join(",".join(row) + "\n" for row in table))
+
+
+COLUMNS = [
+    "q1", "q2", "dq1", "dq2", "ddq1", "ddq2", "ee_x", "ee_y", "ee_vx", "ee_vy",
+    "kinetic_energy", "potential_energy", "total_energy", "actuator_power",
+]  # fmt: skip
+FAULTS: dict[str, Callable[[float], float]] = {
+    "the next double": lambda x: math.nextafter(x, math.inf),
+    "the one before": lambda x: math.nextafter(x, -math.inf),
+    "3 units": lambda x: x + 3 * math.ulp(x),
+    "1e-9": lambda x: x + 1e-9,
+    "1e-3": lambda x: x + 1e-3,
+    "sign": lambda x: -x or 1.0,
+    "none": lambda x: 0.0 if x else 5e-324,
+    "huge": lambda _: 1e300,
+}
+
+
+@pytest.mark.parametrize("name", ["early_start", "coasting"])  # coasting has columns of zeros
+def test_every_wrong_value_of_a_reference_is_found(name: str, copies: Path) -> None:
+    """One fault at a time, of each kind, in every column: at the start, the end and between."""
+    draw = random.Random(40)
+    with Fmu(rparm.fmu("rp_manipulator")) as fmu:
+        scenario = scenarios.load(project.scenario_file(name), fmu.model)
+        enclosure = PROVER.enclose(scenario)
+        right = reference.load(scenario, fmu.model)
+        assert list(right.names) == COLUMNS
+        for i, column in enumerate(COLUMNS):
+            for row in (0, draw.randrange(1, len(right.values) - 1), len(right.values) - 1):
+                for kind, fault in FAULTS.items():
+                    values = right.values.copy()
+                    values[row, i] = fault(float(values[row, i]))
+                    planted = replace(right, values=values)
+                    with pytest.MonkeyPatch.context() as patch:
+                        patch.setattr(reference, "load", lambda *_, x=planted: x)
+                        good = proven.of_reference(fmu, scenario, enclosure)
+                    (wrong,) = good.wrong
+                    assert not good.passed and good.values - good.nearest == 1, kind
+                    assert (wrong.line, wrong.column) == (row + 2, column), kind
+                    text = f"{copies / name / 'RPManipulator_ref.csv'}, line {row + 2}, "
+                    assert str(wrong).startswith(f"{text}column {column}: found "), kind
+
+
+@pytest.mark.parametrize("column", COLUMNS)
+def test_a_scenario_fails_with_a_wrong_value_in_its_reference(
+    column: str, copies: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = copies / "constant_effort_single_step" / "RPManipulator_ref.csv"
+    table = table_of(path)
+    place = table[0].index(f'"{column}"')
+    table[2][place] = repr(math.nextafter(float(table[2][place]), math.inf))
+    write_table(path, table)
+    arguments = ["prove", path.parent.name, "--method", "taylor", "--output", str(tmp_path)]
+    where = f"{path}, line 3, column {column}: found {table[2][place]}, the exact value is within"
+    assert main([*arguments, "--quiet"]) == 1
+    (line,) = capsys.readouterr().out.splitlines()
+    assert line.startswith(f"failed: {where}")
+    assert where in (tmp_path / "proofs" / f"{path.parent.name}.html").read_text()
+    found = document(capsys, path.parent.name, "--within", "1e-12", "--method", "erk")
+    assert found["exit_code"] == 1
+    (wrong,) = found["reference"]["wrong"]
+    assert (Path(wrong["file"]), wrong["line"], wrong["column"]) == (path, 3, column)
+
+
+def test_all_references_fail_with_one(copies: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Rows whose values are swapped, while times stay."""
+    path = copies / "sixtieth" / "RPManipulator_ref.csv"
+    table = table_of(path)
+    table[8][1:], table[9][1:] = table[9][1:], table[8][1:]
+    write_table(path, table)
+    with TemporaryDirectory() as folder:
+        assert main(["prove", "--output", folder]) == 1
+        page = (Path(folder) / "proofs" / "references.html").read_text()
+    out = capsys.readouterr().out.splitlines()
+    changing = sum(a != b for a, b in zip(table[8][1:], table[9][1:], strict=True))
+    assert out[-1].startswith(f"failed: {path}, line 9, column q1: found {float(table[8][1])}, ")
+    assert out[-1].endswith(f"; {2 * changing} values are wrong")
+    assert sum(line.endswith("passed") for line in out) == 10
+    assert [line.split()[0] for line in out if line.endswith("FAILED")] == ["sixtieth"]
+    assert "FAILED" in page and "line 9, column q1" in page
+
+
+MALFORMED: dict[str, tuple[Callable[[list[list[str]]], object], str]] = {
+    "rows swapped": (lambda t: t.insert(5, t.pop(6)), "line 6: does not match"),
+    "row twice": (lambda t: t.insert(5, t[5]), "line 7: does not match"),
+    "row dropped": (lambda t: t.pop(5), "line 6: does not match"),
+    "last row dropped": (lambda t: t.pop(), "line 361: does not match"),
+    "column dropped": (lambda t: [row.pop(6) for row in t], "line 1: has no column 'ddq2'"),
+    "value dropped": (lambda t: t[7].pop(6), "line 8: expected 15 values, found 14"),
+    "no number": (lambda t: t[7].__setitem__(6, "nan"), "line 8: expected finite numbers"),
+    "time": (lambda t: t[7].__setitem__(0, "0.11"), "line 8: does not match"),
+}
+
+
+@pytest.mark.parametrize("fault", MALFORMED)
+def test_a_malformed_reference_is_refused(
+    fault: str, copies: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    change, text = MALFORMED[fault]
+    path = copies / "sixtieth" / "RPManipulator_ref.csv"
+    table = table_of(path)
+    change(table)
+    write_table(path, table)
+    assert main(["prove", "sixtieth", "--method", "erk"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"{path}, {text}" in line
+
+
+def test_a_truncated_reference_is_refused(copies: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = copies / "sixtieth" / "RPManipulator_ref.csv"
+    path.write_bytes(path.read_bytes()[:-30])
+    assert main(["prove", "sixtieth"]) == 2
+    assert f"{path}, line 362: is cut off in the middle" in capsys.readouterr().err
 
 
 def around_one(low: float) -> prover.Enclosure:
@@ -129,6 +268,8 @@ def test_a_value_that_is_not_the_nearest_is_not_called_so() -> None:
     rows = np.arange(1)
     above, below = np.nextafter(one, 2), np.nextafter(one, 0)
     assert prover.is_nearest(one, enclosure, rows)
+    assert prover.is_nearest(one, around_one(2.0**-53 * 0.99), rows)
+    assert not prover.is_nearest(one, around_one(-(2.0**-53) * 0.51), rows)  # doubles are denser
     assert not prover.is_nearest(above, enclosure, rows)
     assert not prover.is_nearest(below, enclosure, rows)
 

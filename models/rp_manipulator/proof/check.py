@@ -19,17 +19,16 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from certificate import (
     NOTHING,
     STATES,
-    Ball,
     Problem,
     Set,
     Step,
     WrongClaim,
+    balls_of,
     exactly,
-    of_states,
     read_certificate,
     read_problem,
 )
-from motion_series import coefficients
+from motion_series import coefficients, outputs
 
 BITS = 192
 
@@ -99,9 +98,15 @@ class Checker:
     def efforts(self, index: int, step: Step, over: arb, last: int) -> list[list[arb]]:
         """Series of both efforts, `over` (s) after the begin of the step."""
         length, within, elapsed = (ball.arb for ball in step.times)
+        return self.series(index, within + over, elapsed + over, length, last)
+
+    def series(
+        self, index: int, within: arb, elapsed: arb, length: arb, last: int
+    ) -> list[list[arb]]:
+        """Series of both efforts in a communication step: arguments are those of effort_series."""
         of_sines = [[s[1:] for s in self.problem.sines if s[0] == i] for i in range(2)]
         return [
-            effort_series(u, sines, within + over, elapsed + over, length, last)
+            effort_series(u, sines, within, elapsed, length, last)
             for u, sines in zip(self.problem.steps[index][1], of_sines, strict=True)
         ]
 
@@ -204,11 +209,26 @@ class Checker:
             rest += (abs(middle - after[k]) + error) * radius
         return rest
 
-    def point(self, balls: Sequence[Ball]) -> None:
-        """The balls that were printed contain the set."""
-        for i, ball in enumerate(balls):
+    def point(self, words: Sequence[str], index: int, after: fmpq) -> None:
+        """The balls that were printed contain the set, and the outputs of all states in them.
+
+        The efforts are those `after` the begin of a communication step (s).
+        """
+        balls = balls_of(words)
+        states, printed = balls[:STATES], balls[STATES:]
+        if len(states) != STATES:
+            raise WrongClaim(f"{len(states)} balls for {STATES} states")
+        for i, ball in enumerate(states):
             if not ball.holds(self.set.centre[i], hull_radius(self.set, i)):
                 raise WrongClaim(f"printed ball of state {i}")
+        begin = self.problem.steps[index - 1][0] if index else self.problem.start
+        efforts = self.series(index, arb(after), arb(begin - self.problem.start + after), arb(1), 0)
+        found = outputs([ball.arb for ball in states], self.uncertain, [u[0] for u in efforts])
+        if len(printed) != len(found):
+            raise WrongClaim(f"{len(printed)} balls for {len(found)} outputs")
+        for i, (ball, output) in enumerate(zip(printed, found, strict=True)):
+            if not ball.contains(output):
+                raise WrongClaim(f"printed ball of output {i}")
 
 
 def _product(x: Sequence[Sequence[fmpq]], y: Sequence[Sequence[fmpq]]) -> list[list[fmpq]]:
@@ -273,7 +293,7 @@ def _check(
         raise WrongClaim(f"{len(points)} points for {len(ends)} communication steps")
     if exactly(points[0][1]) != problem.start:
         raise WrongClaim("time of the start")
-    checker.point(of_states(points[0][2:]))
+    checker.point(points[0][2:], 0, NOTHING)
     count, begin, steps = 0, problem.start, []
     index = 0
     for claim in read_certificate(certificate, checker.start.radii):
@@ -291,7 +311,7 @@ def _check(
                 raise WrongClaim(
                     f"step to {float(Fraction(int(claim.p), int(claim.q)))!r} s: {error}"
                 ) from error
-        checker.point(of_states(points[index + 1][2:]))
+        checker.point(points[index + 1][2:], index, claim - begin)
         count, begin, steps = count + len(steps), claim, []
         index += 1
         if progress is not None:

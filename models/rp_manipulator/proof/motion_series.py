@@ -1,4 +1,4 @@
-"""Taylor coefficients of the arm's motion in arb's intervals, for check.py.
+"""Taylor coefficients of the arm's motion and its outputs in arb's intervals, for check.py.
 
 With w = dq1, v = dq2, L = l1 + q2, P = L w and F = m1 lc1^2 + I1z + I2z, the momentum about the
 joint over m2 and the velocity v - a w along the slide have simple rates:
@@ -47,6 +47,29 @@ def coefficients(
         effort = [arithmetic.constant(of[order - 1]) for of in efforts]
         _extend(arithmetic, rows, given, effort, step / order)
     return [rows[name] for name in STATES]
+
+
+def outputs(states: Sequence[arb], parameters: Sequence[arb], efforts: Sequence[arb]) -> list[arb]:
+    """Outputs besides the states, in the order of proof.toml.
+
+    The operations are those of arm_outputs.h: intervals are no wider than there.
+    """
+    q1, q2, w, v = states
+    m1, m2, I1z, I2z, l1, lc1, a, g = parameters
+    tau1, f2 = efforts
+    s, c, length = q1.sin(), q1.cos(), l1 + q2
+    moment1, moment2 = m1 * lc1, m2 * length
+    fixed = moment1 * lc1 + (I1z + I2z)
+    push = f2 + m2 * (length * w * w)
+    weight = g * ((moment1 + moment2) * c)
+    ddq1 = (tau1 + a * push - 2 * (m2 * (length * w * v)) - weight) / (fixed + moment2 * length)
+    ddq2 = push / m2 - g * s + a * ddq1
+    x, y = length * c - a * s, length * s + a * c
+    vx, vy = v * c - w * y, v * s + w * x
+    kinetic = (fixed * (w * w) + m2 * (vx * vx + vy * vy)) / 2
+    potential = g * (moment1 * s + m2 * y)
+    power = tau1 * w + f2 * v
+    return [ddq1, ddq2, x, y, vx, vy, kinetic, potential, kinetic + potential, power]
 
 
 class _Jets:

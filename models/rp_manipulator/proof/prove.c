@@ -1,6 +1,6 @@
-/* Encloses the arm's motion: reads a problem from standard input, writes balls that contain the
- * states at all communication points, and what each step claims to a file, if one is named. */
-#include "step.h"
+/* Encloses the arm's motion: reads a problem from standard input, writes balls that contain states
+ * and outputs at all communication points, and what each step claims to a file, if one is named. */
+#include "arm_outputs.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -84,11 +84,14 @@ static void write_balls(FILE *file, const char *name, const struct ball balls[],
     fprintf(file, "\n");
 }
 
-static void write_point(const struct states_set *set, double time) {
-    struct ball hull[STATES];
-    states_hull(set, hull);
+/* The states and outputs at `time`, which is `from` or the end of the step that begins there. */
+static void write_point(const struct run *run, double from, double time) {
+    struct ball values[STATES + OUTPUTS], efforts[EFFORTS];
+    states_hull(&run->set, values);
+    arm_efforts_at(&run->problem, from, ball_of_sum(time, -from), efforts);
+    arm_outputs(&run->problem, values, efforts, values + STATES);
     printf("point %a", time);
-    write_balls(stdout, "", hull, STATES);
+    write_balls(stdout, "", values, STATES + OUTPUTS);
 }
 
 /* All that a step claims. */
@@ -175,10 +178,10 @@ static int enclose(struct run *run, FILE *certificate) {
         return wrong("expected start, states, parameters and sines in numbers up to 1.2e30");
     }
     arm_start(&run->problem, &run->set);
-    write_point(&run->set, run->problem.start);
     run->longest = INFINITY;
-    double from = run->problem.start, to = from;
-    for (; word[0] != '\0'; read_word(word)) {
+    const double start = run->problem.start;
+    double from = start, to = from;
+    do {
         bool read = strcmp(word, "to") == 0 && read_numbers(&to, 1) && to > from;
         for (int i = 0; i < EFFORTS; i++) {
             read = read && read_numbers(run->problem.cubic[i], 4);
@@ -186,17 +189,20 @@ static int enclose(struct run *run, FILE *certificate) {
         if (!read) {
             return wrong("expected 'to', a later time and efforts up to 1.2e30");
         }
+        if (from == start) {
+            write_point(run, start, start);
+        }
         const double reached = communication_step(run, from, to, certificate);
         if (reached < to) {
             printf("stopped %a\n", reached);
             return STOPPED;
         }
-        write_point(&run->set, to);
+        write_point(run, from, to);
         if (certificate != NULL) {
             fprintf(certificate, "point %a\n", to);
         }
         from = to;
-    }
+    } while (read_word(word));
     return DONE;
 }
 

@@ -1,9 +1,10 @@
 """Makes the reference trajectories of the RP manipulator, without the code that they check.
 
 The Lagrangian is written from the positions of both centers of mass, sympy turns it into equations
-of motion, and heyoka's Taylor method integrates them in long double at its precision. No closed
-form of "Example of dynamics computation (Euler-Lagrange and Newton-Euler formulations):
-Revolute-Prismatic (RP) manipulator (Problem 7.8)" goes in.
+of motion, and heyoka's Taylor method integrates them in numbers of 113 bits at their precision:
+what is written are the nearest doubles. No closed form of "Example of dynamics computation
+(Euler-Lagrange and Newton-Euler formulations): Revolute-Prismatic (RP) manipulator (Problem 7.8)"
+goes in.
 """
 
 import sys
@@ -91,13 +92,12 @@ def derive() -> Equations:
 
 
 class Reference:
-    """Compiled equations; evaluates scenarios in the floating-point type `real`."""
+    """Compiled equations; evaluates scenarios in the floating-point type `real`, or in 113 bits."""
 
-    def __init__(self, real: type = np.longdouble) -> None:
-        if real is np.longdouble and np.finfo(real).eps > 2e-19:
-            raise UserError(
-                "long double is no wider than double here: make the references elsewhere"
-            )
+    def __init__(self, real: type | None = None) -> None:
+        real = real or getattr(hy, "real128", None)
+        if real is None:
+            raise UserError("heyoka has no numbers of 113 bits here: make the references elsewhere")
         self.real = real
         equations = derive()
         self.outputs = list(equations.outputs)
@@ -147,10 +147,16 @@ class Reference:
         runtime[:, len(PARAMETERS) :] = held
         return self.evaluate(np.ascontiguousarray(states.T), pars=np.ascontiguousarray(runtime.T)).T
 
-    def write(self, scenario: Scenario, folder: Path) -> None:
-        values = self.simulate(scenario)
+    def write(self, scenario: Scenario, folder: Path, values: np.ndarray) -> None:
+        """Write what `simulate` gives."""
         reference_files.write(scenario, folder, MODEL, self.outputs, values, INPUTS)
 
 
+def writer() -> reference_files.Writer:
+    """Simulates and writes one scenario after the other."""
+    reference = Reference()
+    return lambda scenario, folder: reference.write(scenario, folder, reference.simulate(scenario))
+
+
 if __name__ == "__main__":
-    reference_files.main(MODEL_FOLDER, lambda: Reference().write)
+    reference_files.main(MODEL_FOLDER, writer)
