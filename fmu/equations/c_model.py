@@ -159,17 +159,19 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, list[str]]:
 
 
 def _checks(file: ModelFile) -> list[str]:
-    """Refuses parameters that are not finite or break a condition."""
-    code = Code(leaves(file))
-    conditions = {
-        f"isfinite(values->{FIELD.format(v.name)})": f"{v.name} is not finite"
+    """Refuses parameters that are not finite or break a condition, or leave it undefined."""
+    graph, code = file.graph, Code(leaves(file))
+    conditions = [
+        (f"isfinite(values->{FIELD.format(v.name)})", f"{v.name} is not finite")
         for v in file.of("parameters")
-    }
+    ]
+    for message, check in file.checks.items():
+        holds, unknown = check.value, graph.unknown(check.value)
+        if unknown is not None:
+            holds = graph.value("and", graph.value("not", unknown), holds)
+        conditions.append((code.of(holds), message))
     lines = []
-    for condition, message in [
-        *conditions.items(),
-        *((code.of(check.value), message) for message, check in file.checks.items()),
-    ]:
+    for condition, message in conditions:
         lines += [
             f"if (!{condition}) {{",
             f'    (void)snprintf(text, size, "%s", {text(message)});',

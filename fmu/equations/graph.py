@@ -152,19 +152,19 @@ class Graph:
 
     def _choice(self, condition: Value, first: Value, second: Value) -> Value:
         """The "if" of a text: not a number where a relation that decides is not defined."""
-        chosen, unknown = self.value("if", condition, first, second), self._unknown(condition)
+        chosen, unknown = self.value("if", condition, first, second), self.unknown(condition)
         return (
             chosen if unknown is None else self.value("if", unknown, self.number(math.nan), chosen)
         )
 
-    def _unknown(self, condition: Value) -> Value | None:
+    def unknown(self, condition: Value) -> Value | None:
         """Whether a relation that decides on a condition has no value; None: all have one."""
         if condition.name in self.relations:
             sides = self.relations[condition.name].distance.arguments
         elif condition.op in RELATIONS:
             sides = condition.arguments
         else:
-            unknown = [self._unknown(argument) for argument in condition.arguments]
+            unknown = [self.unknown(argument) for argument in condition.arguments]
             if condition.op in ("and", "or") and unknown[1] is not None:  # if it is looked at
                 first = condition.arguments[0]
                 passes = first if condition.op == "and" else self.value("not", first)

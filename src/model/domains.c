@@ -39,7 +39,7 @@ static bool follow(const struct domains *model, struct domains_room room, const 
             const struct relation *relation = &model->relation[k];
             const double distance = room.distance[k];
             const int now = relation->includes_zero ? distance >= 0.0 : distance > 0.0;
-            if (!relation->is_timed && !isnan(distance) && holds[k] != now) {
+            if (!isnan(distance) && holds[k] != now) {
                 holds[k] = now;
                 changes = true;
             }

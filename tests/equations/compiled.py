@@ -70,8 +70,10 @@ class Model:
         self.names = [name.removeprefix("v_") for name in names]
 
     def values(self, **given: float) -> np.ndarray:
-        """A value structure as an array."""
-        return np.array([given.get(name, 0.0) for name in self.names])
+        """A value structure as an array; behind the doubles there are ints, the modes."""
+        values = np.zeros(-(-self.words.size // 8))
+        values[: len(self.names)] = [given.get(name, 0.0) for name in self.names]
+        return values
 
     def _call(self, name: str, *arguments: object) -> None:
         function = ctypes.CFUNCTYPE(ctypes.c_int)(getattr(self.words, name))
