@@ -31,6 +31,7 @@ struct instance_state {
     struct instance_experiment experiment;
     struct instance_values own;
     struct clock_time time;
+    double drift; /* s: sum of clock_step_drift over all steps */
 
     /* The integrator's history, from which it continues while nothing changes. A replay needs only
      * the restart and the first and the last advance since then (integrator_advance). */
@@ -123,6 +124,12 @@ static inline size_t count_of(struct range range) {
 /* The instance integrates the states of its model itself. */
 static inline bool instance_has_integrator(const struct instance *instance) {
     return instance->integrator != NULL && !instance->is_integrated_outside;
+}
+
+/* The largest magnitude (s) among the start time and t: times are rounded as numbers of this size.
+ */
+static inline double instance_size_of_times(const struct instance *instance, double t) {
+    return fmax(fabs(t), fabs(instance->state.experiment.start_time));
 }
 
 /* The doubles at a range of a value structure. */
