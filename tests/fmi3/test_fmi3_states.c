@@ -71,7 +71,8 @@ static const struct {
     [FMU3_GetContinuousStateDerivatives] = {"MVNT", ""},
     [FMU3_GetEventIndicators] = {"MVNT", ""},
     [FMU3_GetContinuousStates] = {"MVNT", ""},
-    // constants: in more states than the standard asks for, as fmusim reads them while it integrates
+    // constants: in more states than the standard asks for, as fmusim reads them while it
+    // integrates
     [FMU3_GetNominalsOfContinuousStates] = {"IMVNT", ""},
     [FMU3_GetNumberOfEventIndicators] = {"IMVNT", ""},
     [FMU3_GetNumberOfContinuousStates] = {"IMVNT", ""},

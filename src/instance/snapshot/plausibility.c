@@ -294,6 +294,7 @@ static bool has_true_variables(const struct instance *instance,
 static bool has_true_start(const struct instance *instance, const struct instance_state *state) {
     const struct instance_values *own = &state->own;
     const bool has_started = state->phase >= PHASE_STEPPING;
+    const bool knows_start = state->phase >= PHASE_INITIALIZATION;
     // of the other kind: the adapter says so
     const bool is_foreign =
         state->phase == PHASE_CONTINUOUS_TIME && !instance->is_integrated_outside;
@@ -301,12 +302,13 @@ static bool has_true_start(const struct instance *instance, const struct instanc
     const struct twin of_start[] = {
         {"time", state->time.s, start},
         {"the rest of time", state->time.rest, 0.0},
+        {"drift", state->drift, 0.0},
         {"has_history", state->has_history, false},
         {"solver_steps", (double)state->statistics.steps, 0.0},
         {"event_count", own->event_count, 0.0},
     };
     const struct twin of_events[] = {
-        {"last_event_time", own->last_event_time, has_started ? start : 0.0},
+        {"last_event_time", own->last_event_time, knows_start ? start : 0.0},
     };
     const struct twin of_experiment[] = {
         {"experiment_defined", state->experiment_defined, true},

@@ -73,6 +73,7 @@ struct instance_memory {
 struct instance_real {
     const double *value; /* NULL: it is no float64 */
     bool is_calculated;  /* by the outputs of the model: it has to be brought up to date */
+    bool is_kept;        /* by events: in initialization mode it is calculated, too */
 };
 
 /* What each step reads or writes stands first: of many instances stepped in turn, few lines of a
@@ -113,6 +114,7 @@ struct instance {
     double *nodes;           /* POLYNOMIAL_NODES values per input, of the step that asks for them */
     char *first_derivatives; /* value structures, along a curve (struct model) */
     char *second_derivatives;
+    char *initial_values; /* value structure, see outputs.h; NULL: the model has no events */
     struct instance_snapshot *newest; /* snapshots that belong to the instance, a list */
     struct instance_snapshot *oldest;
 };
