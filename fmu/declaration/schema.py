@@ -35,6 +35,9 @@ include       further files, relative to this one, whose [variables] and [units]
                   depend on
     parameters    of calculated outputs, derivatives and event indicators: the parameters they
                   depend on
+    initially     of calculated outputs and derivatives: what they depend on in initialization mode,
+                  where that is something else: inputs, states, time and parameters, and outputs
+                  that stand for what they depend on
 [terminals.NAME]
     rule          "plug": terminals fit whose members have the same names; "bus": members of the
                   same name are connected; "none": no rule
@@ -179,6 +182,18 @@ class Variable(Table):
     reinit: bool = False
     dependencies: list[str] | None = None
     parameters: list[str] = []
+    initially: list[str] | None = None
+
+    def initial_knowns(self, variables: dict[str, Variable]) -> list[str]:
+        """What the variable depends on in initialization mode; `variables`: all of them."""
+        if self.initially is None:
+            return [*(self.dependencies or []), *self.parameters]
+        found: dict[str, None] = {}
+        for name in self.initially:
+            other = variables[name]
+            stands_for_more = other is not self and other.initial == "calculated"
+            found |= dict.fromkeys(other.initial_knowns(variables) if stands_for_more else [name])
+        return list(found)
 
     @property
     def is_unknown(self) -> bool:
@@ -363,6 +378,7 @@ class Change(Table):
 
     description: str = ""
     reinit: bool = False
+    initially: list[str] | None = None
     more_dependencies: list[str] = []
     more_parameters: list[str] = []
 

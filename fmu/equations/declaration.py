@@ -167,10 +167,34 @@ def _dependencies(value: Value, file: ModelFile) -> dict[str, list[str]]:
         leaves.add(leaf)
     moving = {name for op, name in leaves if op in MOVING}
     parameters = {name for op, name in leaves if op == "parameter"}
-    return {
+    known = {
         "dependencies": [name or "time" for name in ("", *file.variables) if name in moving],
         "parameters": [name for name in file.variables if name in parameters],
     }
+    return known | _initially(leaves, known, file)
+
+
+def _initially(
+    leaves: set[tuple[str, str]], known: dict[str, list[str]], file: ModelFile
+) -> dict[str, list[str]]:
+    """What it follows from at the end of the initialization, when events may happen."""
+    found, todo = set(), list(leaves)
+    while todo:
+        leaf = todo.pop()
+        if leaf in found:
+            continue
+        found.add(leaf)
+        if leaf[1] in file.graph.relations:
+            todo += file.graph.relations[leaf[1]].distance.leaves
+        for event in file.events:
+            if leaf[0] in ("state", "mode") and leaf[1] in (event.reinit | event.set):
+                during = [] if event.during is None else [event.during]
+                for expression in (event.when, *during, (event.reinit | event.set)[leaf[1]]):
+                    todo += expression.value.leaves
+    names = {name or "time" for op, name in found if op in (*MOVING, "parameter")}
+    if names == {*known["dependencies"], *known["parameters"]}:
+        return {}
+    return {"initially": [name for name in ("time", *file.variables) if name in names]}
 
 
 def _toml(value: object) -> str:

@@ -1,7 +1,8 @@
 /* Every function of fmi2Functions.h without its prefix, and in which kind and state of an instance
  * it may be called: the tables of section 3.2.3 (Model Exchange) and section 4.2.4 (Co-Simulation)
  * of the specification, as data. Functions that need no instance, and FreeInstance, are always
- * allowed. */
+ * allowed. Derivatives and nominal values can also be read in initialization mode: they are known
+ * there, and FMI 3.0 allows it. */
 #ifndef FMI2_FUNCTIONS_H
 #define FMI2_FUNCTIONS_H
 
@@ -39,10 +40,10 @@
     X(CompletedIntegratorStep, MODEL_EXCHANGE, CONTINUOUS_TIME)                                    \
     X(SetTime, MODEL_EXCHANGE, EVENT | CONTINUOUS_TIME)                                            \
     X(SetContinuousStates, MODEL_EXCHANGE, CONTINUOUS_TIME)                                        \
-    X(GetDerivatives, MODEL_EXCHANGE, TERMINATED | ERROR_STATE | EVENT | CONTINUOUS_TIME)          \
+    X(GetDerivatives, MODEL_EXCHANGE, ANY_STATE & ~INSTANTIATED)                                   \
     X(GetEventIndicators, MODEL_EXCHANGE, ANY_STATE & ~INSTANTIATED)                               \
     X(GetContinuousStates, MODEL_EXCHANGE, ANY_STATE & ~INSTANTIATED)                              \
-    X(GetNominalsOfContinuousStates, MODEL_EXCHANGE, ANY_STATE & ~INITIALIZATION)                  \
+    X(GetNominalsOfContinuousStates, MODEL_EXCHANGE, ANY_STATE)                                    \
     /* Co-Simulation */                                                                            \
     X(SetRealInputDerivatives, CO_SIMULATION, INSTANTIATED | INITIALIZATION | STEP_COMPLETE)       \
     X(GetRealOutputDerivatives, CO_SIMULATION,                                                     \

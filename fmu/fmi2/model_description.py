@@ -155,7 +155,7 @@ def add_structure(root: ET.Element, variables: dict[str, Variable], index: dict[
     """Write ModelStructure with exact dependencies (section 2.2.8 of the specification)."""
     structure = ET.SubElement(root, "ModelStructure")
     calculated = {n: v for n, v in variables.items() if v.is_unknown and v.initial == "calculated"}
-    for section, unknowns, with_parameters in (
+    for section, unknowns, is_initial in (
         ("Outputs", {n: v for n, v in variables.items() if v.causality == "output"}, False),
         ("Derivatives", {n: v for n, v in calculated.items() if v.derivative_of}, False),
         ("InitialUnknowns", calculated, True),
@@ -164,7 +164,8 @@ def add_structure(root: ET.Element, variables: dict[str, Variable], index: dict[
             continue
         element = ET.SubElement(structure, section)
         for name, unknown in unknowns.items():
-            knowns = (unknown.dependencies or []) + (unknown.parameters if with_parameters else [])
+            later = unknown.dependencies or []
+            knowns = unknown.initial_knowns(variables) if is_initial else later
             indices = sorted(int(index[known]) for known in knowns)
             dependencies = " ".join(map(str, indices))
             ET.SubElement(element, "Unknown", index=index[name], dependencies=dependencies)

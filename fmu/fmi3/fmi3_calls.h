@@ -1,7 +1,9 @@
 /* Which function of FMI 3.0 may be called in which state: sections 2.3, 3.2 (Model Exchange)
  * and 4.2 (Co-Simulation) of the specification, as data. Functions that need no instance, and
  * fmi3FreeInstance, are not in it. There are no structural parameters, so that no instance is ever
- * in configuration mode. */
+ * in configuration mode. Some functions answer in more states, because importers call them there:
+ * those that return constants in every state, fmi3SetTime and fmi3GetOutputDerivatives in event
+ * mode. */
 #ifndef FMI3_CALLS_H
 #define FMI3_CALLS_H
 
@@ -66,16 +68,16 @@
     X(fmi3UpdateDiscreteStates, ANY_KIND, EVENT)                                                   \
     X(fmi3EnterContinuousTimeMode, MODEL_EXCHANGE, EVENT)                                          \
     X(fmi3CompletedIntegratorStep, MODEL_EXCHANGE, CONTINUOUS_TIME)                                \
-    X(fmi3SetTime, MODEL_EXCHANGE, CONTINUOUS_TIME)                                                \
+    X(fmi3SetTime, MODEL_EXCHANGE, EVENT | CONTINUOUS_TIME)                                        \
     X(fmi3SetContinuousStates, MODEL_EXCHANGE, CONTINUOUS_TIME)                                    \
     X(fmi3GetContinuousStateDerivatives, MODEL_EXCHANGE, OUTSIDE_STEP & ~INSTANTIATED)             \
     X(fmi3GetEventIndicators, MODEL_EXCHANGE, OUTSIDE_STEP & ~INSTANTIATED)                        \
     X(fmi3GetContinuousStates, MODEL_EXCHANGE, OUTSIDE_STEP & ~INSTANTIATED)                       \
-    X(fmi3GetNominalsOfContinuousStates, MODEL_EXCHANGE, OUTSIDE_STEP & ~INSTANTIATED)             \
-    X(fmi3GetNumberOfEventIndicators, MODEL_EXCHANGE, INSTANTIATED | EVENT)                        \
-    X(fmi3GetNumberOfContinuousStates, MODEL_EXCHANGE, INSTANTIATED | EVENT)                       \
+    X(fmi3GetNominalsOfContinuousStates, MODEL_EXCHANGE, ANY_STATE)                                \
+    X(fmi3GetNumberOfEventIndicators, MODEL_EXCHANGE, ANY_STATE)                                   \
+    X(fmi3GetNumberOfContinuousStates, MODEL_EXCHANGE, ANY_STATE)                                  \
     X(fmi3EnterStepMode, CO_SIMULATION_WITH_EVENTS, EVENT)                                         \
-    X(fmi3GetOutputDerivatives, CO_SIMULATION, STEP | INTERMEDIATE_UPDATE | TERMINATED)            \
+    X(fmi3GetOutputDerivatives, CO_SIMULATION, STEP | EVENT | INTERMEDIATE_UPDATE | TERMINATED)    \
     X(fmi3DoStep, CO_SIMULATION, STEP)                                                             \
     X(fmi3ActivateModelPartition, ANY_KIND, 0) /* only in Scheduled Execution */
 

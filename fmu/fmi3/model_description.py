@@ -155,7 +155,9 @@ def add_structure(root: ET.Element, declaration: Declaration) -> None:
     ):
         for name in names:
             unknown = variables[name]
-            knowns = (unknown.dependencies or []) + unknown.parameters
+            later = (unknown.dependencies or []) + unknown.parameters
+            is_initial = section == "InitialUnknown"
+            knowns = unknown.initial_knowns(variables) if is_initial else later
             ET.SubElement(
                 structure,
                 section,

@@ -29,7 +29,9 @@ EQUATION void calculate(const struct rp_controller_values *const from[SOURCES],
     for (int i = 0; i < 2; i++) {
         WRITE(to, unlimited[i], unlimited[i]);
         WRITE(to, effort[i], law_limited(p, unlimited[i], i));
-        WRITE(to, dintegral[i], law_integral_rate(p, inputs, unlimited[i], i));
+        WRITE(to, dintegral[i],
+              p[0]->sample_time > 0.0 ? constant(0.0) // the first sample is still to come
+                                      : law_integral_rate(p, inputs, unlimited[i], i));
     }
 }
 

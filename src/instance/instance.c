@@ -99,9 +99,9 @@ static void locate_reals(struct instance *instance) {
     for (size_t i = 0; i < instance->description->variable_count; i++) {
         const struct variable *variable = &instance->description->variables[i];
         struct instance_real *real = &instance->reals[variable->reference];
+        real->is_kept = is_kept_by_events(instance->model, variable);
         real->is_calculated = variable->initial == INITIAL_CALCULATED &&
-                              variable->owner == VARIABLE_OF_MODEL &&
-                              !is_kept_by_events(instance->model, variable);
+                              variable->owner == VARIABLE_OF_MODEL && !real->is_kept;
         if (variable->type != VARIABLE_FLOAT64) {
             continue;
         }
@@ -120,8 +120,9 @@ static bool setup_events(struct instance *instance) {
         calloc(2 * state_count + count_of(model->inputs) + 3 * count + 1, sizeof(double));
     instance->indicators = calloc(count + 1, sizeof *instance->indicators);
     instance->triggered = calloc(count + 1, sizeof *instance->triggered);
+    instance->initial_values = calloc(1, aligned(model->values_size));
     if (instance->absolute_tolerances == NULL || instance->indicators == NULL ||
-        instance->triggered == NULL) {
+        instance->triggered == NULL || instance->initial_values == NULL) {
         return false;
     }
     instance->tolerances = instance->absolute_tolerances + state_count;
@@ -213,6 +214,7 @@ void instance_destroy(struct instance *instance) {
         instance_forget(instance, &snapshot);
     }
     integrator_destroy(instance->integrator);
+    free(instance->initial_values);
     free(instance->triggered);
     free(instance->indicators);
     free(instance->absolute_tolerances);
@@ -259,6 +261,8 @@ enum status instance_enter_initialization(struct instance *instance) {
         return STATUS_INVALID_ARGUMENT;
     }
     instance->state.phase = PHASE_INITIALIZATION;
+    instance->state.own.last_event_time = instance->state.time.s;
+    instance->outputs_are_valid = false;
     return STATUS_OK;
 }
 
@@ -285,7 +289,6 @@ enum status instance_exit_initialization(struct instance *instance) {
     }
     if (status == STATUS_OK) {
         instance->state.phase = PHASE_STEPPING;
-        instance->state.own.last_event_time = instance->state.time.s;
     }
     return status;
 }

@@ -54,10 +54,10 @@ static const struct {
     [FMU_CompletedIntegratorStep] = {"------", "---N--"},
     [FMU_SetTime] = {"------", "--VN--"},
     [FMU_SetContinuousStates] = {"------", "---N--"},
-    [FMU_GetDerivatives] = {"------", "--VNTE"},
+    [FMU_GetDerivatives] = {"------", "-MVNTE"}, // M: as FMI 3.0
     [FMU_GetEventIndicators] = {"------", "-MVNTE"},
     [FMU_GetContinuousStates] = {"------", "-MVNTE"},
-    [FMU_GetNominalsOfContinuousStates] = {"------", "I-VNTE"},
+    [FMU_GetNominalsOfContinuousStates] = {"------", "IMVNTE"}, // M: as FMI 3.0
 };
 
 static const char *allowed_states(fmi2Type type, enum fmu_function function) {

@@ -66,17 +66,19 @@ static const struct {
     // only Model Exchange
     [FMU3_EnterContinuousTimeMode] = {"V", ""},
     [FMU3_CompletedIntegratorStep] = {"N", ""},
-    [FMU3_SetTime] = {"N", ""},
+    [FMU3_SetTime] = {"VN", ""}, // V: as FMI 2.0
     [FMU3_SetContinuousStates] = {"N", ""},
     [FMU3_GetContinuousStateDerivatives] = {"MVNT", ""},
     [FMU3_GetEventIndicators] = {"MVNT", ""},
     [FMU3_GetContinuousStates] = {"MVNT", ""},
-    [FMU3_GetNominalsOfContinuousStates] = {"MVNT", ""},
-    [FMU3_GetNumberOfEventIndicators] = {"IV", ""},
-    [FMU3_GetNumberOfContinuousStates] = {"IV", ""},
+    // constants: in more states than the standard asks for, as fmusim reads them while it
+    // integrates
+    [FMU3_GetNominalsOfContinuousStates] = {"IMVNT", ""},
+    [FMU3_GetNumberOfEventIndicators] = {"IMVNT", ""},
+    [FMU3_GetNumberOfContinuousStates] = {"IMVNT", ""},
     // only Co-Simulation
     [FMU3_EnterStepMode] = {"", "V"},
-    [FMU3_GetOutputDerivatives] = {"", "SUT"},
+    [FMU3_GetOutputDerivatives] = {"", "VSUT"},
     [FMU3_DoStep] = {"", "S"},
     [FMU3_ActivateModelPartition] = {"", ""}, // only Scheduled Execution
 };

@@ -54,6 +54,7 @@ IMPORTERS = {
     "cofmupy": Importer(),
     "pathsim-fmi": Importer(inputs="end"),
     "gemseo-fmu": Importer(sets_states=False),
+    "syssimx": Importer(versions=["fmi2"], sets_states=False),
 }
 CHECKER = "fmu-manipulation-toolbox"
 OPTIMIZER = "casadi"  # test_casadi.py
@@ -229,6 +230,31 @@ def test_fmutool_finds_nothing(version: str, name: str, fmu: Path, tmp_path: Pat
     number = version[-1]
     assert f"seems to be compliant with FMI-{number}.0" in process.stdout
     assert f"No semantic error against the FMI-{number} standard" in process.stdout
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_container_gives_what_is_in_it(
+    version: str, built: dict[str, Built], tmp_path: Path
+) -> None:
+    fmu, loaded = built[version]
+    plan = make_plan(loaded, initial=False) | {"parameters": {}}  # their names differ outside
+    folder = tmp_path / "made"
+    folder.mkdir()
+    (folder / fmu.name).symlink_to(fmu)
+    table = folder / "container.csv"
+    table.write_text(
+        f"rule;from_fmu;from_port;to_fmu;to_port\nFMU;{fmu.name};;;\n", encoding="utf-8"
+    )
+    command = [folder_of(CHECKER) / "bin" / "fmucontainer", "-fmi", version[-1]]
+    command += ["-fmu-directory", folder, "-container"]
+    process = start([*command, f"{table.name}:{plan['step']}"], folder)
+    assert process.returncode == 0, process.stdout
+    assert complaints(process.stdout) == []
+    container = LoadedFmu(folder / "container.fmu", tmp_path / "container")
+    values = co_simulation(container, plan, "beginning")
+    differences = difference(values, co_simulation(loaded, plan, "beginning"))
+    report(f"fmucontainer {version}", plan, differences)
+    assert differences.max() <= BOUND
 
 
 @pytest.mark.parametrize(

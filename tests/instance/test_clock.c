@@ -42,7 +42,6 @@ static void test_difference_has_the_sign_of_later_minus_earlier(void) {
 
 static void test_slack_is_small_against_time_and_step(void) {
     TEST_ASSERT_EQUAL_DOUBLE(1e-9 * 2.0, clock_slack(2.0, 0.1));
-    TEST_ASSERT_EQUAL_DOUBLE(1e-9 * 2.0, clock_slack(-2.0, 0.1));
     TEST_ASSERT_EQUAL_DOUBLE(1e-9 * 0.1, clock_slack(0.0, 0.1));
     TEST_ASSERT_EQUAL_DOUBLE(1e-3 / 100.0, clock_slack(1e6, 1e-3));
 }
@@ -50,6 +49,21 @@ static void test_slack_is_small_against_time_and_step(void) {
 static void test_slack_covers_the_rounding_of_a_communication_point(void) {
     const double spacing = nextafter(1e6, INFINITY) - 1e6;
     TEST_ASSERT_TRUE(clock_slack(1e6, 2.0 * spacing) >= spacing);
+}
+
+static void test_the_slack_of_a_tick_is_the_drift_within_the_slack_of_the_step(void) {
+    static const double h = 1e-3;
+    TEST_ASSERT_TRUE(clock_tick_slack(1e3, h, 0.0) == clock_rounding(1e3));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-20, 1e-9 + clock_rounding(1.0), clock_tick_slack(1.0, h, 1e-9));
+    TEST_ASSERT_EQUAL_DOUBLE(h / 100.0, clock_tick_slack(1.0, h, 1.0));
+    TEST_ASSERT_TRUE(clock_tick_slack(1e9, h, 1.0) == h / 100.0);
+    TEST_ASSERT_TRUE(clock_tick_slack(1e9, 1e-6, 1.0) == clock_rounding(1e9));
+}
+
+/* What a step accepts at its beginning is accepted at its end, too. */
+static void test_the_drift_of_a_step_is_at_least_its_mismatch(void) {
+    TEST_ASSERT_TRUE(clock_step_drift(1e3, -1e-6) == 1e-6);
+    TEST_ASSERT_TRUE(clock_step_drift(1024.0, 0.0) == 0x1p-43);
 }
 
 /* Of two times that are the same double, the difference is that of what rounding left over. */

@@ -61,5 +61,6 @@ bool instance_is_unchanged(const struct instance *instance) {
 struct clock_time instance_resumed_end(const struct instance *instance, struct clock_time end) {
     const struct instance_state *state = &instance->state;
     const double difference = clock_difference(end, state->cut_end);
-    return fabs(difference) <= clock_spacing(end.s) ? state->cut_end : end;
+    const double rounding = clock_rounding(instance_size_of_times(instance, end.s));
+    return fabs(difference) <= rounding ? state->cut_end : end;
 }

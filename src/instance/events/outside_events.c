@@ -170,7 +170,8 @@ enum status instance_update_at_point(struct instance *instance, bool *states_cha
     bool *triggered = instance->triggered;
     memcpy(triggered, instance->memory.unhandled, instance_event_size(instance->model));
     const double now = instance->state.time.s;
-    triggered[events->indicator_count] = instance_next_time(instance) - now <= clock_spacing(now);
+    triggered[events->indicator_count] =
+        instance_next_time(instance) - now <= clock_rounding(instance_size_of_times(instance, now));
     const bool is_any =
         instance->state.event_point == EVENT_UNHANDLED || triggered[events->indicator_count];
     instance_forget_unhandled(instance);

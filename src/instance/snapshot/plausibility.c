@@ -56,6 +56,7 @@ static bool has_possible_settings(const struct instance *instance,
         {"time", state->time.s,
          isfinite(state->time.s) && (!only_advances || state->time.s >= start)},
         {"the rest of time", state->time.rest, is_rest_of(state->time)},
+        {"drift", state->drift, is_step(state->drift)},
         {"relative_tolerance", own->relative_tolerance, is_step(own->relative_tolerance)},
         {"max_step", own->max_step, is_step(own->max_step)},
         {"max_internal_steps", own->max_internal_steps, own->max_internal_steps >= 1},
@@ -202,8 +203,8 @@ static bool has_possible_modes(const struct instance *instance, const struct ins
     return true;
 }
 
-/* Steps handle time events as they come: none is earlier than the present time. An importer that
- * integrates outside may skip one. */
+/* Steps handle time events as they come: none is earlier than the present time by more than
+ * rounding. An importer that integrates outside may skip one. */
 static bool has_possible_next_time(const struct instance *instance,
                                    const struct instance_state *state, const char *values) {
     const struct model_events *events = instance->model->events;
@@ -212,7 +213,10 @@ static bool has_possible_next_time(const struct instance *instance,
         return true;
     }
     const double time = events->next_time(values);
-    const struct named_value value = {"the time of the next event", time, time >= state->time.s};
+    const double size = fmax(fabs(state->time.s), fabs(state->experiment.start_time));
+    const struct named_value value = {"the time of the next event", time,
+                                      time >=
+                                          state->time.s - (state->drift + clock_rounding(size))};
     return are_possible(instance, &value, 1);
 }
 
@@ -290,6 +294,7 @@ static bool has_true_variables(const struct instance *instance,
 static bool has_true_start(const struct instance *instance, const struct instance_state *state) {
     const struct instance_values *own = &state->own;
     const bool has_started = state->phase >= PHASE_STEPPING;
+    const bool knows_start = state->phase >= PHASE_INITIALIZATION;
     // of the other kind: the adapter says so
     const bool is_foreign =
         state->phase == PHASE_CONTINUOUS_TIME && !instance->is_integrated_outside;
@@ -297,12 +302,13 @@ static bool has_true_start(const struct instance *instance, const struct instanc
     const struct twin of_start[] = {
         {"time", state->time.s, start},
         {"the rest of time", state->time.rest, 0.0},
+        {"drift", state->drift, 0.0},
         {"has_history", state->has_history, false},
         {"solver_steps", (double)state->statistics.steps, 0.0},
         {"event_count", own->event_count, 0.0},
     };
     const struct twin of_events[] = {
-        {"last_event_time", own->last_event_time, has_started ? start : 0.0},
+        {"last_event_time", own->last_event_time, knows_start ? start : 0.0},
     };
     const struct twin of_experiment[] = {
         {"experiment_defined", state->experiment_defined, true},

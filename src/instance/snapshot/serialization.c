@@ -111,6 +111,7 @@ static void transfer_state(struct codec *codec, const struct instance *instance,
     transfer_own(codec, &state->own);
     codec_real(codec, &state->time.s);
     codec_real(codec, &state->time.rest);
+    codec_real(codec, &state->drift);
     codec_bool(codec, "has_history", &state->has_history);
     codec_real(codec, &state->restart_time.s);
     codec_real(codec, &state->restart_time.rest);

@@ -2,7 +2,14 @@
 
 #include <math.h>
 
-double clock_slack(double t, double h) {
-    const double relative = fmin(1e-9 * fmax(fabs(t), h), h / 100.0);
-    return fmax(relative, clock_spacing(t));
+/* Of a step: what a master may call rounding at most. */
+static const double largest_part = 0.01;
+
+double clock_slack(double size, double h) {
+    return fmax(fmin(1e-9 * fmax(size, h), largest_part * h), clock_rounding(size));
+}
+
+double clock_tick_slack(double size, double h, double drift) {
+    const double rounding = clock_rounding(size);
+    return fmax(fmin(drift + rounding, largest_part * h), rounding);
 }

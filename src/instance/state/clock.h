@@ -32,14 +32,34 @@ static inline double clock_difference(struct clock_time later, struct clock_time
     return difference.s + (difference.rest + (later.rest - earlier.rest));
 }
 
-/* Of doubles at t, at most. */
-static inline double clock_spacing(double t) {
-    return DBL_EPSILON * fabs(t);
+/* ---- Rounding -------------------------------------------------------------------------------
+ * In s. Times up to a given size (s, the largest magnitude among the start time and the times at
+ * hand) are computed by different ways: products, sums, decimal numbers. */
+
+/* Of doubles, at most. */
+static inline double clock_spacing(double size) {
+    return DBL_EPSILON * fabs(size);
+}
+
+/* How far two doubles may be apart that stand for one time, each after a few operations. */
+static inline double clock_rounding(double size) {
+    return 4.0 * clock_spacing(size);
 }
 
 /* How far the communication point of a master may be from the time of the instance for a step of
- * length h > 0 to be followed: min(1e-9 max(|t|, h), h / 100), and never less than clock_spacing.
- * s. */
-double clock_slack(double t, double h);
+ * length h > 0 to be followed: min(1e-9 max(size, h), h / 100), and never less than clock_rounding.
+ */
+double clock_slack(double size, double h);
+
+/* By how much a step adds to the drift of a master: the mismatch that was accepted at its beginning
+ * or, where the master hides it, what a sum of times is rounded by. */
+static inline double clock_step_drift(double size, double mismatch) {
+    return fmax(fabs(mismatch), 0.5 * clock_spacing(size));
+}
+
+/* How far a time event may be from the end of a step of length h > 0 to be there: the drift, summed
+ * over all steps, up to h / 100, and never less than clock_rounding. So a master that adds up its
+ * steps meets each event where it means to, and for one with exact times no event comes early. */
+double clock_tick_slack(double size, double h, double drift);
 
 #endif

@@ -31,6 +31,7 @@ struct instance_state {
     struct instance_experiment experiment;
     struct instance_values own;
     struct clock_time time;
+    double drift; /* s: sum of clock_step_drift over all steps */
 
     /* The integrator's history, from which it continues while nothing changes. A replay needs only
      * the restart and the first and the last advance since then (integrator_advance). */
@@ -72,6 +73,7 @@ struct instance_memory {
 struct instance_real {
     const double *value; /* NULL: it is no float64 */
     bool is_calculated;  /* by the outputs of the model: it has to be brought up to date */
+    bool is_kept;        /* by events: in initialization mode it is calculated, too */
 };
 
 /* What each step reads or writes stands first: of many instances stepped in turn, few lines of a
@@ -112,6 +114,7 @@ struct instance {
     double *nodes;           /* POLYNOMIAL_NODES values per input, of the step that asks for them */
     char *first_derivatives; /* value structures, along a curve (struct model) */
     char *second_derivatives;
+    char *initial_values; /* value structure, see outputs.h; NULL: the model has no events */
     struct instance_snapshot *newest; /* snapshots that belong to the instance, a list */
     struct instance_snapshot *oldest;
 };
@@ -123,6 +126,12 @@ static inline size_t count_of(struct range range) {
 /* The instance integrates the states of its model itself. */
 static inline bool instance_has_integrator(const struct instance *instance) {
     return instance->integrator != NULL && !instance->is_integrated_outside;
+}
+
+/* The largest magnitude (s) among the start time and t: times are rounded as numbers of this size.
+ */
+static inline double instance_size_of_times(const struct instance *instance, double t) {
+    return fmax(fabs(t), fabs(instance->state.experiment.start_time));
 }
 
 /* The doubles at a range of a value structure. */

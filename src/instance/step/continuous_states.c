@@ -118,11 +118,11 @@ enum status instance_get_derivatives(struct instance *instance, double dx[], siz
     if (status == STATUS_OK) {
         status = instance_update_outputs(instance);
     }
-    return status != STATUS_OK
-               ? status
-               : copy_finite(instance, "the derivative of a state",
-                             doubles_of(instance->memory.values, instance->model->derivatives), dx,
-                             count);
+    return status != STATUS_OK ? status
+                               : copy_finite(instance, "the derivative of a state",
+                                             doubles_of(instance_shown_values(instance),
+                                                        instance->model->derivatives),
+                                             dx, count);
 }
 
 enum status instance_get_nominals(struct instance *instance, double nominals[], size_t count) {

@@ -16,6 +16,7 @@ struct step {
     struct clock_time end;          /* where it will end; may become earlier */
     struct clock_time until;        /* end of its present part: the same, or a time event before */
     bool meets_time_event;          /* at the end of its present part */
+    double drift;                   /* s: of the communication points, up to its beginning */
     bool is_early;                  /* end has become earlier */
     bool is_over;                   /* the step ends where it is */
     struct instance_snapshot *kept; /* the instance before the step; NULL: not needed so far */
@@ -60,9 +61,8 @@ NONNULL void instance_keep_last_nodes(const struct step *step);
 
 /* ---- Events (step_events.c) ----------------------------------------------------------------- */
 
-/* Sets the end of the next part of the step. A time event that comes later than the end of the step
- * by at most a millionth of the step, or by some roundings of the time, belongs to this step:
- * importers that add up their steps mean the same time. */
+/* Sets the end of the next part of the step. A time event that differs from the end of the step by
+ * no more than rounding is at the end, be it earlier or later. */
 static inline void instance_set_part(struct step *step) {
     const double time = instance_next_time(step->instance);
     step->until = step->end;
@@ -70,13 +70,13 @@ static inline void instance_set_part(struct step *step) {
     if (time == INFINITY) {
         return;
     }
-    const double h = clock_difference(step->end, step->begin);
-    step->meets_time_event = time - step->end.s <= fmax(1e-6 * h, 4.0 * clock_spacing(step->end.s));
-    const struct clock_time now = step->instance->state.time;
-    if (time <= now.s) {
-        step->until = now;
-    } else if (time < step->end.s) {
-        step->until = (struct clock_time){.s = time};
+    const double slack = clock_tick_slack(instance_size_of_times(step->instance, step->end.s),
+                                          clock_difference(step->end, step->begin), step->drift);
+    const double left = clock_difference(step->end, (struct clock_time){.s = time});
+    step->meets_time_event = left >= -slack;
+    if (left > slack) {
+        const struct clock_time now = step->instance->state.time;
+        step->until = time <= now.s ? now : (struct clock_time){.s = time};
     }
 }
 

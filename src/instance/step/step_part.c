@@ -9,12 +9,12 @@ bool instance_report(struct step *step) {
     double end = step->end.s;
     step->answer = step->options->accept(step->options->context, now, &end);
     if (step->answer != STATUS_OK || end < step->end.s) {
-        step->is_over = step->answer != STATUS_OK || !(end - now > clock_slack(now, end - now));
+        step->is_over = step->answer != STATUS_OK ||
+                        !(end - now > clock_rounding(instance_size_of_times(step->instance, now)));
         step->end = step->is_over ? step->instance->state.time : (struct clock_time){.s = end};
         step->is_early = true;
         if (clock_difference(step->until, step->end) > 0.0) {
-            step->until = step->end;
-            step->meets_time_event = false;
+            instance_set_part(step);
         }
         return true;
     }

@@ -13,9 +13,11 @@
  * overflow cvode_bdf would try the same step without end. */
 static const double latest_time = 1e300;
 
-static enum status refuse_times(const struct instance *instance, double t, double h) {
+/* mismatch (s): of t from the time of the instance. */
+static enum status refuse_times(const struct instance *instance, double t, double h,
+                                double mismatch) {
     const struct instance_experiment *experiment = &instance->state.experiment;
-    const struct clock_time now = instance->state.time;
+    const double slack = clock_slack(instance_size_of_times(instance, t), h);
     if (!(h > 0.0 && h <= latest_time && fabs(t) <= latest_time)) {
         message_write(
             &instance->sink, STATUS_INVALID_TIME,
@@ -30,14 +32,13 @@ static enum status refuse_times(const struct instance *instance, double t, doubl
                       t);
         return STATUS_INVALID_TIME;
     }
-    const double mismatch = clock_difference((struct clock_time){.s = t}, now);
-    const bool is_there = fabs(mismatch) <= clock_spacing(t) || fabs(mismatch) <= clock_slack(t, h);
-    if (!is_there || !(mismatch + h > 0.0)) {
+    if (!(fabs(mismatch) <= slack && mismatch + h > 0.0)) {
         message_write(&instance->sink, STATUS_INVALID_TIME,
-                      "a step from t = %.17g is refused: the instance is at t = %.17g", t, now.s);
+                      "a step from t = %.17g is refused: the instance is at t = %.17g", t,
+                      instance->state.time.s);
         return STATUS_INVALID_TIME;
     }
-    if (experiment->stop_time_defined && t + h - experiment->stop_time > clock_slack(t + h, h)) {
+    if (experiment->stop_time_defined && t + h - experiment->stop_time > slack) {
         message_write(&instance->sink, STATUS_INVALID_TIME,
                       "a step from t = %.17g to t = %.17g is refused: the stop time is %.17g", t,
                       t + h, experiment->stop_time);
@@ -164,7 +165,9 @@ static enum status do_step(struct step *step, double communication_point, double
 
 enum status instance_do_step_with(struct instance *instance, double communication_point,
                                   double step_size, const struct step_options *options) {
-    enum status status = refuse_times(instance, communication_point, step_size);
+    const double mismatch =
+        clock_difference((struct clock_time){.s = communication_point}, instance->state.time);
+    enum status status = refuse_times(instance, communication_point, step_size, mismatch);
     if (status == STATUS_OK) {
         status = instance_check_parameters(instance);
     }
@@ -176,6 +179,8 @@ enum status instance_do_step_with(struct instance *instance, double communicatio
         .options = options,
         .begin = instance->state.time,
         .end = clock_add((struct clock_time){.s = communication_point}, step_size),
+        .drift = instance->state.drift +
+                 clock_step_drift(instance_size_of_times(instance, communication_point), mismatch),
         .answer = STATUS_OK,
         .steps_before = instance->state.statistics.steps,
     };
@@ -188,6 +193,7 @@ enum status instance_do_step_with(struct instance *instance, double communicatio
         const enum status restored = instance_undo(instance, step.kept);
         return restored == STATUS_OK ? status : restored;
     }
+    instance->state.drift = step.drift;
     return status;
 }
 

@@ -110,28 +110,61 @@ ALWAYS_INLINE enum status set(struct instance *instance, enum array array,
     }
 VALUE_TYPE_LIST(INSTANCE_SET)
 
+/* Where calculated values are read. */
+struct shown {
+    const char *values; /* of the instance */
+    const char *from;   /* instance_shown_values */
+};
+
+static inline struct shown shown_in(const struct instance *instance) {
+    return (struct shown){instance->memory.values, instance_shown_values(instance)};
+}
+
+static inline bool is_shown(const struct shown *shown, const struct instance_real *real) {
+    return real->is_calculated || (real->is_kept && shown->from != shown->values);
+}
+
+static inline const void *shown_at(const struct shown *shown, const struct instance_real *real,
+                                   const void *field) {
+    return is_shown(shown, real) ? shown->from + ((const char *)field - shown->values) : field;
+}
+
+static inline double shown_real(const struct shown *shown, const struct instance_real *real) {
+    return *(const double *)shown_at(shown, real, real->value);
+}
+
+/* Brings the value up to date. What events keep needs no calculation. */
+static enum status prepare(struct instance *instance, const struct instance_real *real) {
+    if (real->is_kept) {
+        instance_look_ahead(instance);
+        return STATUS_OK;
+    }
+    return instance_update_outputs(instance);
+}
+
 enum status instance_get_real(struct instance *instance, const unsigned references[], size_t count,
                               double values[]) {
     const struct model_description *description = instance->description;
     const struct instance_real *reals = instance->reals;
+    const struct shown shown = shown_in(instance);
     for (size_t i = 0; i < count; i++) {
         const unsigned reference = references[i];
         if (reference >= description->reference_count || reals[reference].value == NULL) {
             (void)instance_refuse_reference(instance, reference, VARIABLE_FLOAT64);
             return STATUS_INVALID_ARGUMENT;
         }
-        if (reals[reference].is_calculated && !instance->outputs_are_valid) {
-            const enum status status = instance_update_outputs(instance);
+        if (is_shown(&shown, &reals[reference]) && !instance->outputs_are_valid) {
+            const enum status status = prepare(instance, &reals[reference]);
             if (status != STATUS_OK) {
                 return status;
             }
         }
-        if (!isfinite(*reals[reference].value)) {
+        if (!isfinite(shown_real(&shown, &reals[reference]))) {
             return instance_not_finite(instance, variable_of(description, reference)->name);
         }
     }
     for (size_t i = 0; i < count; i++) {
-        values[i] = *reals[references[i]].value;
+        values[i] = shown_real(&shown, &reals[references[i]]);
     }
     return STATUS_OK;
 }
@@ -139,13 +172,14 @@ enum status instance_get_real(struct instance *instance, const unsigned referenc
 /* Checks that all of them can be read, and brings them up to date. */
 static enum status prepare_ints(struct instance *instance, enum array array,
                                 const unsigned references[], size_t count) {
+    const struct shown shown = shown_in(instance);
     for (size_t i = 0; i < count; i++) {
         const unsigned reference = references[i];
         if (instance_find(instance, reference, type_for(instance, array, reference)) == NULL) {
             return STATUS_INVALID_ARGUMENT;
         }
-        if (instance->reals[reference].is_calculated) {
-            const enum status status = instance_update_outputs(instance);
+        if (is_shown(&shown, &instance->reals[reference])) {
+            const enum status status = prepare(instance, &instance->reals[reference]);
             if (status != STATUS_OK) {
                 return status;
             }
@@ -155,8 +189,9 @@ static enum status prepare_ints(struct instance *instance, enum array array,
 }
 
 static int read_int(struct instance *instance, unsigned reference) {
-    const struct variable *variable = variable_of(instance->description, reference);
-    return *(const int *)instance_field(instance, variable);
+    const struct shown shown = shown_in(instance);
+    const void *field = instance_field(instance, variable_of(instance->description, reference));
+    return *(const int *)shown_at(&shown, &instance->reals[reference], field);
 }
 
 /* To a bool, the conversion of an int that is not 0 gives true. */

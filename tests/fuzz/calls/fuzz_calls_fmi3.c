@@ -222,7 +222,7 @@ void fuzz3_call_EnterStepMode(struct fuzz_session *session, struct fuzz_instance
 #define NUMBER_CALL(name, expected)                                                                \
     void fuzz3_call_##name(struct fuzz_session *session, struct fuzz_instance *instance) {         \
         size_t count = 99;                                                                         \
-        if (FUZZ_FMI3_CHECKED(instance, name, &count) == fmi2OK && count != (expected)) {          \
+        if (FUZZ_FMI3_CALL(instance, true, name, &count) == fmi2OK && count != (expected)) {       \
             fuzz_fail("fmi3" #name " returns %zu", count);                                         \
         }                                                                                          \
     }
