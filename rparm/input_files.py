@@ -5,6 +5,7 @@ import re
 import stat
 import tomllib
 from contextlib import suppress
+from decimal import Decimal
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -104,3 +105,11 @@ def number_in(text: str) -> float:
     if "_" in text:
         raise ValueError(f"could not convert string to float: {text!r}")
     return float(text)
+
+
+def difference(later: float, earlier: float) -> float:
+    """Difference of two numbers as they are written, rounded once.
+
+    Doubles of times that count from 1970 are 0.2 microseconds apart, and so would be theirs.
+    """
+    return float(Decimal(repr(float(later))) - Decimal(repr(float(earlier))))

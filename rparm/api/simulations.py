@@ -139,8 +139,8 @@ def simulate(
         run = scenarios.Scenario(
             name=path.stem, model=model.name, path=path, title=path.stem, description="",
             parameters=values, initial={}, start=times[0], stop=times[-1], steps=(step,),
-            tolerance=tolerance, times=times, signals={}, inputs=signals, reference_every=1,
-            defaults=model.start_values,
+            tolerance=tolerance, times=times, elapsed=times - times[0], signals={}, inputs=signals,
+            reference_every=1, defaults=model.start_values,
         )  # fmt: skip
         result = simulation.simulate(opened, run, compiled=True)
         columns = [result.names.index(name) for name in names]
@@ -229,7 +229,9 @@ class System:
     Attributes
     ----------
     variants : tuple of str
-        Names of its parameter sets.
+        Names of its parameter sets; "default" if it has none.
+    notes : tuple of str
+        What was chosen where the SSP says nothing: times, values of inputs that nothing feeds.
     """
 
     def __init__(self, name: str | Path, *, fmi: int = 2) -> None:
@@ -241,12 +243,15 @@ class System:
             self.path = project.built(known[str(name)], ".ssp", version=version(fmi))
         with ssp.unpacked(self.path) as opened:
             self.variants = tuple(opened.system.parameters)
+            self.notes = tuple(opened.notes)
 
-    def run(self, variant: str, *, engine: str = "master") -> Table:
+    def run(self, variant: str | None = None, *, engine: str = "master") -> Table:
         """Step a variant from its start to its stop time, in Jacobi order.
 
         Parameters
         ----------
+        variant : str, optional
+            Default: the first one.
         engine : str
             "master", that of rparm; "ecos", where ecospy is installed; "helics", each FMU in its
             own process, where helics is installed.
@@ -258,6 +263,7 @@ class System:
             the next step have been set. With "helics": all Real outputs, read after
             the step.
         """
+        variant = self.variants[0] if variant is None else variant
         if variant not in self.variants:
             raise UserError(
                 f"{self.path}: has no variant {variant!r}{hint(variant, self.variants)}"

@@ -36,7 +36,7 @@ class Base(ABC):
     KIND: ClassVar[str]  # for messages
     archives: dict[str, bytes]  # FMUs by their hash
     tolerance: float | None = None
-    questions: tuple[str, ...] = ()  # to ask the user about the scenario
+    questions: tuple[str, ...] = ()  # to ask the user about the scenario or system
 
     def __init__(
         self,
@@ -191,9 +191,18 @@ class SystemBase(Base):
         models = {f"{name}.": opened.models[name] for name in self._names}
         given = {f"{name}.": values for name, values in self._parameters.items()}
         super().__init__(opened.path, folder, times, models, given)
+        self.questions = tuple(f"{opened.path.name}: {text}" for text in opened.notes)
         contents = {name: opened.fmu(name).read_bytes() for name in self._names}
         self._hashes = {name: _sha256(content) for name, content in contents.items()}
         self.archives = {self._hashes[name]: content for name, content in contents.items()}
+        self._fed = {f"{c.end_component}.{c.end_connector}" for c in self._system.connections}
+
+    def settable(self, name: str) -> tuple[int, Variable]:
+        """Also an input that nothing feeds, which then is constant."""
+        component, variable = self.variable(name)
+        if variable.is_a(INPUTS) and variable.type == "Real" and name not in self._fed:
+            return component, variable
+        return super().settable(name)
 
     def components(
         self, read: Sequence[tuple[int, str]], fixed: Mapping[tuple[int, str], Value]
@@ -271,19 +280,28 @@ def opened(
             loaded = scenario.load(file, model, times)
         yield ScenarioBase(path, loaded, model)
         return
-    folders = project.systems()
-    if campaign.system not in folders:
-        known = hint(campaign.system, folders)
-        raise UserError(f"{where}: system: no system {campaign.system!r}{known}")
-    path = given or project.built(folders[campaign.system], ".ssp", "--fmu")
-    with ssp.unpacked(path) as system:
-        variants = system.system.parameter_sets
-        if campaign.variant not in variants:
-            known = hint(campaign.variant, variants)
-            raise UserError(f"{where}: variant: no variant {campaign.variant!r}{known}")
+    assert campaign.system is not None
+    with ssp.unpacked(given or _system_file(campaign.system, where)) as system:
+        variants = system.system.parameters
+        variant = campaign.variant
+        if variant is None and not system.system.has_sets:
+            variant = next(iter(variants))
+        if variant not in variants:
+            wrong = f"missing key {'variant'!r}" if variant is None else f"no variant {variant!r}"
+            raise UserError(f"{where}: variant: {wrong}{hint(variant or '', variants)}")
         with _said_of(where):
             given_times = _system_times(system, times)
-        yield SystemBase(campaign.system, system, campaign.variant, given_times)
+        yield SystemBase(campaign.system, system, variant, given_times)
+
+
+def _system_file(name: str, where: Path) -> Path:
+    """The SSP of a system of the project, or a file beside the campaign's."""
+    if Path(name).suffix.lower() == ".ssp":
+        return where.parent / name
+    folders = project.systems()
+    if name not in folders:
+        raise UserError(f"{where}: system: no system {name!r}{hint(name, folders)}")
+    return project.built(folders[name], ".ssp", "--fmu")
 
 
 @contextmanager

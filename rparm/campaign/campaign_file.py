@@ -160,8 +160,8 @@ class Campaign(_Table):
     title: Title
     description: Text
     scenario: Name | None = None  # or a file FILE.toml, beside this one
-    system: Name | None = None
-    variant: Name | None = None
+    system: Name | None = None  # or a file FILE.ssp, beside this one
+    variant: Name | None = None  # of a system with parameter sets
     sampling: Literal["random", "sobol", "latin", "grid", "indices"]
     seed: NonNegativeInt = 0
     runs: PositiveInt | None = None
@@ -201,8 +201,8 @@ class Campaign(_Table):
     def _fits(self) -> Self:
         if (self.scenario is None) == (self.system is None):
             raise ValueError("expected exactly one of scenario, system")
-        if (self.variant is None) != (self.system is None):
-            raise ValueError("variant: goes with system, which needs one")
+        if self.variant is not None and self.system is None:
+            raise ValueError("variant: goes with system")
         self._check_sampling()
         for name, text in self.derived.items():
             if name in self.parameters:

@@ -70,6 +70,7 @@ def run(options: argparse.Namespace) -> Ended:
     key()  # what is wrong with it is said before anything runs
     with ssp.unpacked(path) as system:
         _check_names(system, options)
+        console.messages(str(path), system.notes)
         names = options.names or list(system.system.parameters)
         for component in options.elsewhere:
             print(f"waiting for: {_command(path, names[0], component, address)}", flush=True)

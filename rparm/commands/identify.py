@@ -77,13 +77,13 @@ def run(options: argparse.Namespace) -> Ended:
         options.report.mkdir(parents=True, exist_ok=True)
         files = result_files.write(found, options.report, model)
         files.append(page.write(found, options.report, model, true, _again(options)))
-    verdict = (
-        f"identified: {len(found.estimates)} parameters, page {from_here(files[-1])}"
-        if found.has_converged
-        else f"failed: the fit has not converged in {found.steps} steps"
-    )
+    verdict = f"identified: {len(found.estimates)} parameters, page {from_here(files[-1])}"
+    if not found.has_converged:
+        verdict = f"failed: the fit has not converged in {found.steps} steps"
+    elif found.misfit:
+        verdict = f"{'identified' if found.passed else 'failed'}: {found.misfit}"
     document = results.document(found) | {"files": [file.absolute() for file in files]}
-    return Ended(0 if found.has_converged else 1, verdict, document, page=files[-1])
+    return Ended(0 if found.passed else 1, verdict, document, page=files[-1])
 
 
 def _asked(options: argparse.Namespace) -> tuple[Path, "Request", dict[str, float]]:

@@ -86,6 +86,7 @@ def _opened(path: Path, stack: ExitStack) -> Section:
     name, folders = unpacked.system.name, project.systems()
     if name not in folders:
         raise UserError(f"{path}: no system {name!r} has references{hint(name, folders)}")
+    console.messages(str(path), unpacked.notes)
     return Section(folders[name], unpacked)
 
 

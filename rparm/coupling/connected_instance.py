@@ -47,6 +47,9 @@ class ConnectedInstance:
         return self.instance.name
 
     def begin(self, start: float, stop: float | None, parameters: Mapping[str, Value]) -> None:
+        for name in self.inputs.names:
+            if name in parameters:
+                raise UserError(f"{self.name}.{name}: is fed by a connection, which says its value")
         begin(self.instance, start, stop, parameters)
 
     def set_inputs(self, values: np.ndarray) -> None:
@@ -86,8 +89,7 @@ def check_finite(component: str, outputs: Reals, when: str) -> None:
 def start_value(fmu: UnpackedFmu, component: str, name: str, value: Value) -> Value:
     """Value to set before initialization, an item as its number; UserError if it cannot be set."""
     variable = fmu.model.variables.get(name)
-    is_switch = variable is not None and variable.is_a(INPUTS) and variable.type == "Boolean"
-    if variable is None or not (variable.can_start or is_switch):
+    if variable is None or not (variable.can_start or variable.is_a(INPUTS)):
         raise UserError(f"{component}: {fmu.path} has no parameter {name!r}")
     is_item = variable.type == "Enumeration" and isinstance(value, str)
     if not is_item and variable.type != "Boolean":

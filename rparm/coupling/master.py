@@ -77,8 +77,7 @@ class Master(AbstractContextManager["Master"]):
 
     In Gauss-Seidel order the components step in the order of `fmus`. After each step all Real
     outputs are read, and the Real variables `also`, pairs of component and variable. UserError if
-    names are unknown, a Real input has no or several connections, or an FMU cannot do what is
-    asked.
+    names are unknown, an input has several connections, or an FMU cannot do what is asked.
 
     Attributes
     ----------
@@ -310,7 +309,7 @@ def _find(fmus: Mapping[str, Fmu], component: str, name: str, causality: str | N
 def _split(
     fmus: Mapping[str, Fmu], connections: Iterable[Connection], sloped: bool
 ) -> tuple[list[Connection], list[Connection]]:
-    """Connections of Booleans, and of Reals; every Real input has one, no input has two."""
+    """Connections of Booleans, and of Reals; no input has two."""
     switches: list[Connection] = []
     reals: list[Connection] = []
     seen = set()
@@ -333,11 +332,6 @@ def _split(
             raise UserError(f"{c.start_component}: {source.path} has no output derivatives")
         if not target.model.interpolates_inputs:
             raise UserError(f"{c.end_component}: {target.path} does not interpolate inputs")
-    for component, fmu in fmus.items():
-        for variable in fmu.model.variables.values():
-            connects = variable.causality == "input" and variable.type == "Real"
-            if connects and (component, variable.name) not in seen:
-                raise UserError(f"{component}.{variable.name}: the input is not connected")
     return switches, reals
 
 

@@ -22,6 +22,8 @@ from rparm.identification.whiteness import Whiteness, whiteness
 LEAD = 0.1  # of a segment: the longest delay
 WIDEST = np.log(1e6)  # of a distance from a limit: beyond, one end of an interval is not known
 FEWEST_SEGMENTS = 5  # for intervals by scatter
+SUSPICIOUS, BAD = 2.0, 10.0  # values of chi2
+CAUSES = "usual causes are units, outliers, or a model that lacks something"
 
 
 @dataclass(frozen=True)
@@ -71,9 +73,28 @@ class Identification:
         return self.covariances.variance
 
     @property
+    def misfit(self) -> str:
+        """What to say if chi2 of the logs, or of the second one, is far from 1; or nothing."""
+        second = None if self.validation is None else self.validation.chi2
+        for name, chi2 in (("chi2", self.chi2), ("chi2 of the second log", second)):
+            if chi2 is not None and not chi2 < SUSPICIOUS:
+                return f"{name} is {chi2:.3g} where noise has 1: {CAUSES}"
+        return ""
+
+    @property
+    def passed(self) -> bool:
+        """Whether the fit has converged, and what is left is not far above noise."""
+        second = 0.0 if self.validation is None else self.validation.chi2
+        return self.has_converged and max(self.chi2, second) <= BAD
+
+    @property
     def warnings(self) -> list[str]:
         """What a reader of the results must know."""
-        texts = []
+        texts = [text for recording in self.recordings for text in recording.warnings]
+        if self.validation is not None:
+            texts += self.validation.recording.warnings
+        if self.misfit:
+            texts.append(f"{self.misfit[0].upper()}{self.misfit[1:]}.")
         if not self.has_converged:
             texts.append(f"The fit has not converged in {self.steps} steps.")
         if len(self.segments) < FEWEST_SEGMENTS:

@@ -1,7 +1,7 @@
 """Segments of logs: rows between gaps, cut into pieces of equal length."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,11 +29,13 @@ class Recording:
     """What of a log is used, with rows put in where few are missing."""
 
     path: Path
-    times: np.ndarray  # (rows,) s, increasing
+    times: np.ndarray  # (rows,) s since the first row, increasing
     inputs: np.ndarray  # (rows, Real inputs), each held over the step from its row
     switches: np.ndarray  # (rows, Boolean inputs) int32, the same
     measured: np.ndarray  # (rows, outputs); NaN in rows that were put in
     step: float  # s, the usual one
+    first: float = 0.0  # s, time of the first row by the clock of the log
+    warnings: Sequence[str] = ()  # of what looks damaged
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,19 +67,14 @@ def read(
 
     UserError if one is not there, holds what is no number, or does not change where it should.
     """
-    log = logs.read(path)
-
-    def table(columns: Mapping[str, Column]) -> np.ndarray:
-        read = [column.scale * log.columns(time, column.name)[1] for column in columns.values()]
-        return np.column_stack(read) if read else np.empty((len(times), 0))
-
-    first = next(iter(outputs.values()))
-    times = log.columns(time, first.name)[0]
+    every = (*outputs.values(), *switches.values(), *reals.values())
+    log = logs.read(path).columns(time, [column.name for column in every])
+    times, values = log.times, log.values * [column.scale for column in every]
+    measured, on, efforts = np.split(values, np.cumsum([len(outputs), len(switches)]), axis=1)
     if len(times) < FEWEST_ROWS:
         raise UserError(f"{path}: has {len(times)} rows, a segment needs {FEWEST_ROWS}")
     if len(times) > MOST_ROWS:
         raise UserError(f"{path}: has {len(times)} rows, expected at most {MOST_ROWS}")
-    measured, on = table(outputs), table(switches)
     for name, values in zip(outputs, measured.T, strict=True):
         if np.ptp(values) == 0:
             column = outputs[name].name
@@ -87,37 +84,36 @@ def read(
     for name, values in zip(switches, on.T, strict=True):
         if not np.isin(values, (0, 1)).all():
             raise UserError(f"{path}: column {switches[name].name!r}: expected 0 or 1")
-    return _filled(Path(path), times, table(reals), on, measured)
+    said = [f"{path}: {text}" for text in log.warnings()]
+    step, on = float(np.median(np.diff(times))), on.astype(np.int32)
+    return _filled(Recording(Path(path), times, efforts, on, measured, step, log.first, said))
 
 
-def _filled(
-    path: Path, times: np.ndarray, inputs: np.ndarray, switches: np.ndarray, measured: np.ndarray
-) -> Recording:
+def _filled(recording: Recording) -> Recording:
     """Put rows in where few are missing; inputs are linear there."""
+    times, usual = recording.times, recording.step
     steps = np.diff(times)
-    usual = float(np.median(steps))
     counts = np.maximum(np.rint(steps / usual), 1).astype(int)
     is_filled = steps <= max(GAP * LENGTH, (2 + MISSING) * usual)
     is_filled &= np.abs(steps / usual - counts) <= MISSING
     counts[~is_filled] = 1
     if (counts == 1).all():
-        return Recording(path, times, inputs, switches.astype(np.int32), measured, usual)
+        return recording
     # place of each new row, in old rows
     places = np.append(
         np.concatenate([i + np.arange(n) / n for i, n in enumerate(counts)]), len(steps)
     )
     old = np.arange(len(times))
     there = places == np.floor(places)
-    filled = np.full((len(places), measured.shape[1]), np.nan)
-    filled[there] = measured
-    columns = [np.interp(places, old, values) for values in inputs.T]
-    return Recording(
-        path,
-        np.interp(places, old, times),
-        np.column_stack(columns) if columns else np.empty((len(places), 0)),
-        switches[np.floor(places).astype(int)].astype(np.int32),
-        filled,
-        usual,
+    filled = np.full((len(places), recording.measured.shape[1]), np.nan)
+    filled[there] = recording.measured
+    columns = [np.interp(places, old, values) for values in recording.inputs.T]
+    return replace(
+        recording,
+        times=np.interp(places, old, times),
+        inputs=np.column_stack(columns) if columns else np.empty((len(places), 0)),
+        switches=recording.switches[np.floor(places).astype(int)],
+        measured=filled,
     )
 
 

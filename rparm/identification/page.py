@@ -30,7 +30,7 @@ def write(
     page = RunPage(
         title=f"{found.model}: identified parameters",
         description=f"Fitted to {logs}: multiple shooting, with a start state for each segment.",
-        status=RAN if found.has_converged else FAILED,
+        status=RAN if found.passed else FAILED,
         facts=[
             ("model", found.model),
             ("rows", str(sum(int(segment.counts.sum()) for segment in found.segments))),

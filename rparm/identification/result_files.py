@@ -10,6 +10,7 @@ from rparm.errors import UserError
 from rparm.fmi.model import Model, Value
 from rparm.identification.identify import Identification
 from rparm.identification.parameters import DELAY
+from rparm.input_files import difference
 from rparm.output_files import from_folder, whole
 
 SCENARIO, PARAMETERS, PARAMETER_SET = "scenario.toml", "parameters.toml", "parameters.ssv"
@@ -85,6 +86,8 @@ def _scenario(
         for name, column in columns.items():
             yield f"\n[{section}.{name}]\nfile = {_toml(file)}\ncolumn = {_toml(column.name)}"
             yield f"time = {_toml(time)}"
+            if log.first:
+                yield f"begin = {difference(log.first, -start)!r}"
             if section == "inputs":
                 yield "hold = true"
             if column.scale != 1.0:

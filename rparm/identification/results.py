@@ -41,6 +41,7 @@ def document(found: Identification) -> dict[str, object]:
         "segments": len(found.segments),
         "steps": found.steps,
         "converged": found.has_converged,
+        "passed": found.passed,
         "warnings": found.warnings,
     }
 

@@ -137,7 +137,8 @@ class SystemSubject(ExitStack):
         merged = {name: dict(self._parameters.get(name, {})) for name in self.names}
         for name, value in values.items():
             component, _, variable = name.partition(".")
-            if self.variable(name).is_a("inputs") and self.variable(name).type == "Real":
+            fed = {f"{c.end_component}.{c.end_connector}" for c in self.connections}
+            if name in fed and self.variable(name).type == "Real":
                 raise UserError(f"{name}: is fed by a connection, which says its value")
             merged[component][variable] = value
         return merged

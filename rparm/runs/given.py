@@ -8,6 +8,7 @@ import numpy as np
 
 from rparm.errors import UserError, placed
 from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, Model, Value
+from rparm.input_files import difference
 from rparm.scenarios.scenario import MAX_STEPS
 
 Input = float | bool | np.ndarray | Sequence[float] | tuple[Any, Any] | Callable[[float], float]
@@ -29,7 +30,7 @@ def times(start: float, stop: float, step: float) -> np.ndarray:
             "expected 0 <= start_time < stop_time and step > 0, "
             f"got {start!r}, {stop!r} and {step!r}"
         )
-    exact = (stop - start) / step
+    exact = difference(stop, start) / step
     count = round(exact)
     if not 1 <= count <= MAX_STEPS:
         raise UserError(f"expected 1 to {MAX_STEPS} steps, got {exact:.6g}")

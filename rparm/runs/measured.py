@@ -38,7 +38,7 @@ class Comparison:
 
 def comparisons(scenario: Scenario, result: Result) -> Iterator[Comparison]:
     """What a scenario has measured, compared with a run of it."""
-    elapsed = result.times - scenario.start
+    elapsed = scenario.elapsed[scenario.reference_rows][: len(result.times)]
     for name, log in scenario.measured.items():
         measured = np.where(log.covers(elapsed), log.values(elapsed), np.nan)
         simulated = result.values[:, result.names.index(name)]

@@ -10,28 +10,40 @@ from rparm.errors import UserError, hint
 from rparm.fmi.model import INPUTS, Model, Variable
 from rparm.input_files import show
 from rparm.scenarios import logs
-from rparm.scenarios.logs import Log
+from rparm.scenarios.logs import Columns, Log
 from rparm.scenarios.reader import Reader
 from rparm.scenarios.signals import EARLY, Constant, Logged, Signal, Sines, Switches, Table
 from rparm.units import HERTZ, RADIANS, SECONDS
 
 MEASURED = "measured"  # section of a scenario
 CONSTANT, SINES, TABLE, FILE = "constant", "sines", "table", "file"  # shapes of an input
-BESIDE = {"offset": SINES, "column": FILE, "time": FILE, "scale": FILE, "hold": FILE}  # which take
+# keys beside a shape, and which one takes them
+BESIDE = {"offset": SINES} | dict.fromkeys(("column", "time", "begin", "scale", "hold"), FILE)
 
 
 class InputReader:
-    """Reads the sections [inputs] and [measured]; `times` are communication points in s."""
+    """Reads the sections [inputs] and [measured].
 
-    def __init__(self, reader: Reader, model: Model, times: np.ndarray) -> None:
+    Communication points are `times` (n + 1,) in s, rounded, and `elapsed` since the start.
+    """
+
+    def __init__(
+        self, reader: Reader, model: Model, times: np.ndarray, elapsed: np.ndarray
+    ) -> None:
         self._reader, self._model = reader, model
-        self._times, self._elapsed = times, times - times[0]
+        self._times, self._elapsed = times, elapsed
         self._logs: dict[str, Log] = {}  # by the file as the scenario gives it
+        self._warnings: dict[str, None] = {}  # in order
 
     @property
     def hashes(self) -> dict[str, str]:
         """SHA-256 of the logs that were read, by file as the scenario gives it."""
         return {file: log.sha256 for file, log in self._logs.items()}
+
+    @property
+    def warnings(self) -> list[str]:
+        """What looks damaged in the logs that were read."""
+        return list(self._warnings)
 
     def inputs(self, content: Mapping[str, Any]) -> dict[str, Signal]:
         """Section [inputs] as functions of time."""
@@ -67,8 +79,10 @@ class InputReader:
         result = {}
         for name, signal in signals.items():
             where = f"[{INPUTS}.{name}]"
+            # rounding must not decide which row counts; other signals are those of the rounded time
+            has_rows = isinstance(signal, Switches | Logged)
             with np.errstate(all="ignore"):
-                values = signal.values(self._elapsed)
+                values = signal.values(self._elapsed if has_rows else self._times - self._times[0])
             if not np.all(np.isfinite(values)):
                 self._reader.fail(f"{where}: expected finite values, got an overflow")
             with self._reader.placed(where):
@@ -147,19 +161,24 @@ class InputReader:
     # ---- Logs ------------------------------------------------------------------------------------
 
     def _logged(self, table: dict[str, Any], where: str, variable: Variable) -> Logged:
-        """A column of a log, whose times are those of the run."""
+        """A column of a log, whose times are those of the run unless `begin` says otherwise."""
         reader = self._reader
         file = reader.text(table[FILE], f"{where} {FILE}")
         column = reader.text(table.get("column", variable.name), f"{where} column")
         time = reader.text(table.get("time", "time"), f"{where} time")
+        start = float(self._times[0])
+        begin = reader.quantity(table.get("begin", start), f"{where} begin", SECONDS)
         is_held = table.get("hold", variable.type == "Boolean")
         if not isinstance(is_held, bool):
             reader.fail(f"{where} hold: expected true or false, got {show(is_held)}")
         try:
-            times, numbers = self._log(file).columns(time, column)
+            found = self._log(file).columns(time, [column], begin)
         except UserError as error:
             reader.fail(f"{where}: {error}")
-        self._check_covers(times, f"{where}: {self._logs[file].path}")
+        path = self._logs[file].path
+        self._check_covers(found, begin, f"{where}: {path}")
+        self._warnings |= {f"{path}: {x}": None for x in found.warnings(0.0, self._elapsed[-1])}
+        numbers = found.values[:, 0]
         if variable.type == "Boolean":
             numbers = self._on_or_off(table, numbers, where)
         elif "scale" in table:
@@ -168,7 +187,7 @@ class InputReader:
                 reader.fail(f"{where} scale: expected another number than 0, it loses the log")
             with np.errstate(over="ignore"):  # is looked for later
                 numbers = numbers * scale
-        return Logged(times - self._times[0], numbers, is_held, f"{file}, column {column}")
+        return Logged(found.times, numbers, is_held, f"{file}, column {column}")
 
     def _log(self, file: str) -> Log:
         """A log, read once."""
@@ -176,16 +195,18 @@ class InputReader:
             self._logs[file] = logs.read(Path(self._reader.path).parent / file)
         return self._logs[file]
 
-    def _check_covers(self, times: np.ndarray, where: str) -> None:
+    def _check_covers(self, log: Columns, begin: float, where: str) -> None:
         """Check that a log covers each point where a step begins: it may end one step early."""
-        begin, end = float(self._times[0]), float(self._times[-2])
-        if times[0] > begin + EARLY:
-            found = f"begins at {float(times[0])!r} s"
-        elif times[-1] < end - EARLY:
-            found = f"ends at {float(times[-1])!r} s"
+        last = float(self._elapsed[-2])
+        if log.times[0] > EARLY:
+            found = f"begins at {log.first!r} s"
+        elif log.times[-1] < last - EARLY:
+            found = f"ends at {begin + float(log.times[-1])!r} s"
         else:
             return
-        self._reader.fail(f"{where}: {found}, the run needs it from {begin!r} to {end!r} s")
+        self._reader.fail(
+            f"{where}: {found}, the run needs it from {begin!r} to {begin + last!r} s"
+        )
 
     def _on_or_off(self, table: dict[str, Any], numbers: np.ndarray, where: str) -> np.ndarray:
         """Values of a Boolean input."""

@@ -15,7 +15,7 @@ import numpy as np
 from rparm import project
 from rparm.errors import UserError, did_you_mean
 from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, TOLERANCE, Model, Value
-from rparm.input_files import is_file, missing, read_toml, show
+from rparm.input_files import difference, is_file, missing, read_toml, show
 from rparm.scenarios.inputs import MEASURED, InputReader
 from rparm.scenarios.reader import Reader
 from rparm.scenarios.signals import Logged, Signal
@@ -47,6 +47,7 @@ class Scenario:
     steps: tuple[float, ...]  # s, pattern of step lengths; one element: a constant step
     tolerance: float  # relative
     times: np.ndarray  # (n + 1,) communication points in s, from start to stop
+    elapsed: np.ndarray  # (n + 1,) s since the start; exact where times are rounded
     signals: dict[str, Signal]  # inputs as functions of time
     inputs: dict[str, np.ndarray]  # (n + 1,) each, zero-order hold: over the step from times[i]
     reference_every: int  # every k-th communication point is in the reference
@@ -56,7 +57,8 @@ class Scenario:
     logs: dict[str, str] = field(
         default_factory=dict
     )  # SHA-256 of logs of inputs, by file as given
-    questions: tuple[str, ...] = ()  # to ask the user: values that are hardly meant so
+    # to ask the user: values that are hardly meant so, logs that look damaged
+    questions: tuple[str, ...] = ()
     smallest_tolerance: float = 0.0  # relative; a smaller one makes no difference
 
     @property
@@ -154,13 +156,14 @@ def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> 
         reader.fail(f"reference_every: expected a whole number from 1 on, got {show(every)}")
 
     start, stop, steps = reader.time(reader.table(content["time"], "[time]") | dict(times or {}))
-    times = reader.communication_points(start, stop, steps)
+    times, elapsed = reader.communication_points(start, stop, steps)
     parameters = reader.values(content, PARAMETERS, model)
     reader.tolerances(tolerance, parameters, model)
     initial = reader.values(content, INITIAL, model)
-    inputs = InputReader(reader, model, times)
+    inputs = InputReader(reader, model, times, elapsed)
     signals = inputs.inputs(content)
     logs = inputs.hashes  # without those of measurements, which no run follows from
+    measured = inputs.measured(content)
     return Scenario(
         name=path.stem,
         model=name_of(subject),
@@ -174,14 +177,15 @@ def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> 
         steps=steps,
         tolerance=tolerance,
         times=times,
+        elapsed=elapsed,
         signals=signals,
         inputs=inputs.sampled(signals),
         reference_every=min(every, MAX_STEPS),
         defaults=model.start_values,
         panels=reader.panels(content, model),
-        measured=inputs.measured(content),
+        measured=measured,
         logs=logs,
-        questions=tuple(reader.questions),
+        questions=(*reader.questions, *inputs.warnings),
         smallest_tolerance=model.smallest_tolerance(parameters),
     )
 
@@ -274,17 +278,23 @@ class _Reader(Reader):
 
     def communication_points(
         self, start: float, stop: float, steps: tuple[float, ...]
-    ) -> np.ndarray:
-        """Times from start to stop in s, each computed from its index: nothing accumulates."""
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Times from start to stop in s, and since the start.
+
+        Each is computed from its index: nothing accumulates.
+        """
         period = math.fsum(steps)
         cycles = math.ceil((stop - start) / period) + 1
         within = np.array([math.fsum(steps[:i]) for i in range(len(steps))])
         with np.errstate(over="ignore"):  # beyond stop
-            times = start + (np.arange(cycles)[:, None] * period + within).ravel()
+            elapsed = (np.arange(cycles)[:, None] * period + within).ravel()
+            times = start + elapsed
         remainder = np.maximum(SLIVER * np.array(steps), 4 * np.spacing(max(abs(start), abs(stop))))
-        times = times[stop - times >= np.tile(remainder, cycles)]
-        times = np.concatenate(([start], times[times > start], [stop]))
+        kept = (stop - times >= np.tile(remainder, cycles)) & (times > start)
+        times = np.concatenate(([start], times[kept], [stop]))
         if not np.all(np.diff(times) > 0):
             self.fail("[time] step: too short, communication points coincide")
+        elapsed = np.concatenate(([0.0], elapsed[kept], [difference(stop, start)]))
         times.setflags(write=False)
-        return times
+        elapsed.setflags(write=False)
+        return times, elapsed

@@ -33,7 +33,7 @@ INPUT_HELP = """\
 #   table = [[0.0, 0.0], [1.0, 1.5]]  # [time in s from start, value], linear in between
 #   sines = [{ amplitude = 1.5, frequency = 0.5, phase = 0.0 }]  # Hz, rad; `offset = 1.0` beside it
 #   file = "log.csv"  # of measurements, beside this file; `column = "tau"`, `time = "t"`,
-#                     # `scale = "1 kN"`, `hold = true` beside it
+#                     # `scale = "1 kN"`, `begin = 1.5`, `hold = true` beside it
 # What was measured of an output is compared with it: [measured.NAME], with the keys of a file.
 # A Boolean one is `constant = true`, or a table that holds from each time on. An input that is not
 # here has its start value.

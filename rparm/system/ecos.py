@@ -88,7 +88,7 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     with temporary_folder() as folder:
         plan = {
             "ssp": str(ssp.path.resolve()),
-            "variant": variant,
+            "variant": variant if system.has_sets else None,
             "variables": _to_read(ssp, names),
             "statistics": _to_read(ssp, statistics),
             "start": system.start,

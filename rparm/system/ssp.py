@@ -8,7 +8,7 @@ from pathlib import Path
 from rparm.archives import unpack
 from rparm.errors import placed
 from rparm.fmi.fmu_file import Fmu
-from rparm.fmi.model import Model, Variable
+from rparm.fmi.model import INPUTS, Model, Variable
 from rparm.interruption import temporary_folder
 from rparm.system import ssp_checks
 from rparm.system.ssp_reader import SspReader
@@ -37,6 +37,19 @@ class Ssp:
         with ExitStack() as stack:
             wanted = self.models if names is None else names
             yield {name: stack.enter_context(self.unpacked_fmu(name)) for name in wanted}
+
+    @property
+    def notes(self) -> list[str]:
+        """What holds in all runs and is not in the SSP."""
+        fed = {f"{c.end_component}.{c.end_connector}" for c in self.system.connections}
+        alone = [
+            f"{component}.{variable.name}"
+            for component, model in self.models.items()
+            for variable in model.variables.values()
+            if variable.is_a(INPUTS) and f"{component}.{variable.name}" not in fed
+        ]
+        held = [f"not connected, constant: {', '.join(alone)}"] if alone else []
+        return [*self.system.notes, *held]
 
     def variable(self, name: str) -> Variable:
         """What the FMU declares of ``component.variable``."""

@@ -25,10 +25,10 @@ PARAMETERS = ("parameter", "input", "output")  # causalities of what has a start
 def checked_models(path: Path, folder: Path, system: System) -> dict[str, Model]:
     """Read what the FMU of each component declares, and check the system against it.
 
-    Every component has its FMU, every connector is a variable of it with that causality, type and
-    unit, connections go from an output to an input of the same type and unit, every input of every
-    FMU is connected exactly once, and parameters are variables that can be set. UserError if not;
-    the text names component and variable. The SSP is unpacked in `folder`.
+    Every component has its FMU, every connector is a variable of it with that causality, and with
+    that type and unit where it has them, connections go from an output to an input of the same type
+    and unit, no input has two, and parameters are variables that can be set. UserError if not; the
+    text names component and variable. The SSP is unpacked in `folder`.
     """
     checker = _Checker(path, system)
     for component in system.components:
@@ -52,7 +52,6 @@ class _Checker:
             for connector in component.connectors.values():
                 self.connector(component, connector)
         self.connections()
-        self.inputs()
         for variant, components in self.system.parameters.items():
             for component, values in components.items():
                 for name, parameter in values.items():
@@ -77,9 +76,9 @@ class _Checker:
         variable = self.variable(component.name, connector.name, where, "such variable")
         if variable.causality != connector.kind:
             self.fail(f"{where} is an {connector.kind}, in its FMU {_causality(variable)}")
-        if variable.type != connector.type:
+        if connector.type is not None and variable.type != connector.type:
             self.fail(f"{where} is of type {connector.type}, in its FMU {variable.type}")
-        if variable.unit != connector.unit:
+        if connector.unit is not None and variable.unit != connector.unit:
             self.fail(f"{where} is in {_unit(connector.unit)}, in its FMU {_unit(variable.unit)}")
 
     def variable(self, component: str, name: str, where: str, what: str) -> Variable:
@@ -94,9 +93,9 @@ class _Checker:
             where = f"connection {connection}"
             start = self.end(where, connection.start_component, connection.start_connector)
             end = self.end(where, connection.end_component, connection.end_connector)
-            if start.kind != "output":
+            if start.causality != "output":
                 self.fail(f"{where}: {connection.start_connector!r} is no output")
-            if end.kind != "input":
+            if end.causality != "input":
                 self.fail(f"{where}: {connection.end_connector!r} is no input")
             if start.type != end.type:
                 self.fail(f"{where}: types differ, {start.type} and {end.type}")
@@ -107,7 +106,8 @@ class _Checker:
                 self.fail(f"{where}: the input has a connection already, {fed[target]}")
             fed[target] = str(connection)
 
-    def end(self, where: str, component: str, connector: str) -> Connector:
+    def end(self, where: str, component: str, connector: str) -> Variable:
+        """The variable at one end of a connection."""
         names = [known.name for known in self.system.components]
         if component not in names:
             hint = did_you_mean(component, names)
@@ -116,14 +116,7 @@ class _Checker:
         if connector not in connectors:
             hint = did_you_mean(connector, connectors)
             self.fail(f"{where}: component {component!r} has no connector {connector!r}{hint}")
-        return connectors[connector]
-
-    def inputs(self) -> None:
-        fed = {(c.end_component, c.end_connector) for c in self.system.connections}
-        for component, model in self.models.items():
-            for variable in model.variables.values():
-                if variable.causality == "input" and (component, variable.name) not in fed:
-                    self.fail(f"component {component!r}: input {variable.name!r} is not connected")
+        return self.models[component].variables[connector]
 
     def parameter(self, variant: str, component: str, name: str, parameter: Parameter) -> None:
         where = f"parameter set {variant!r}: component {component!r}"

@@ -2,11 +2,13 @@
 
 It accepts what the engines run: one flat system of FMUs, with outputs connected to inputs and
 parameter sets bound at the components. The same set name at several components is one variant of
-the system.
+the system. Times that it does not say are chosen by the default experiments of the FMUs.
 """
 
 import math
 import re
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from functools import cache
 from pathlib import Path, PurePosixPath
 from typing import NoReturn
@@ -16,11 +18,13 @@ from lxml import etree
 
 from rparm.archives import read_xml, wrong_name
 from rparm.errors import UserError, placed
+from rparm.fmi.fmu_file import describe
 from rparm.fmi.model import Value
-from rparm.input_files import is_file
+from rparm.input_files import UnreadableError, difference, is_file
 from rparm.project import STRUCTURE
 from rparm.scenarios.scenario import MAX_STEPS
-from rparm.system.structure import Component, Connection, Connector, Parameter, System
+from rparm.system.structure import ALONE, Component, Connection, Connector, Parameter, System
+from rparm.texts import number
 
 NAMESPACES = {
     "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
@@ -36,6 +40,8 @@ STEP_SIZE = (
     "ssd:Annotations/ssc:Annotation[@type='com.opensimulationplatform']"
     "/osp:Algorithm/osp:FixedStepAlgorithm/@baseStepSize"
 )
+
+STEPS = 1000  # of a run whose step nothing says
 
 # of a variant, whose results are files of that name
 PLAIN_NAME = re.compile(r"\w[\w .+-]{0,99}")
@@ -53,6 +59,7 @@ class SspReader:
         self.path = path
         self.folder = folder
         self.descriptions: dict[str, str] = {}  # of parameter sets, by name
+        self.notes: list[str] = []  # what is chosen where the SSP says nothing
 
     def fail(self, file: str, message: str, node: etree._Element | None = None) -> NoReturn:
         line = f", line {node.sourceline}" if node is not None else ""
@@ -96,7 +103,7 @@ class SspReader:
         if not components:
             self.fail(STRUCTURE, "the system has no components", system)
         connections = system.iterfind("ssd:Connections/ssd:Connection", NAMESPACES)
-        start, stop, step = self.experiment(root)
+        start, stop, step = self.experiment(root, components.values())
         return System(
             name=system.get("name"),
             components=tuple(components.values()),
@@ -106,6 +113,7 @@ class SspReader:
             step=step,
             parameters=self.variants(bound),
             descriptions=self.descriptions,
+            notes=tuple(self.notes),
         )
 
     def component(self, node: etree._Element) -> Component:
@@ -121,10 +129,9 @@ class SspReader:
             if variable in connectors:
                 self.fail(STRUCTURE, f"{where} is there twice", child)
             types = [x for x in child if etree.QName(x).namespace == NAMESPACES["ssc"]]
-            if not types:
-                self.fail(STRUCTURE, f"{where} has no type, which engines want", child)
-            kind, type_name = child.get("kind"), etree.QName(types[0]).localname
-            connectors[variable] = Connector(variable, kind, type_name, types[0].get("unit"))
+            type_name = etree.QName(types[0]).localname if types else None
+            unit = types[0].get("unit") if types else None
+            connectors[variable] = Connector(variable, child.get("kind"), type_name, unit)
         return Component(name, str(PurePosixPath(source)), connectors)
 
     def check_source(self, source: str, component: str, node: etree._Element) -> None:
@@ -144,28 +151,63 @@ class SspReader:
             )
         return connection
 
-    def experiment(self, root: etree._Element) -> tuple[float, float, float]:
-        """Start, stop and communication step in s."""
+    def experiment(
+        self, root: etree._Element, components: Iterable[Component]
+    ) -> tuple[float, float, float]:
+        """Start, stop and communication step in s.
+
+        Where the SSP does not say them, those of the FMUs: the largest stop and the smallest step.
+        """
         node = root.find("ssd:DefaultExperiment", NAMESPACES)
-        if node is None or node.get("stopTime") is None:
-            self.fail(STRUCTURE, "has no DefaultExperiment with a stopTime")
-        sizes = node.xpath(STEP_SIZE, namespaces=NAMESPACES)
-        if not sizes:
-            self.fail(STRUCTURE, "no osp:FixedStepAlgorithm with a baseStepSize", node)
+        given = {} if node is None else node.attrib
+        sizes = [] if node is None else node.xpath(STEP_SIZE, namespaces=NAMESPACES)
         try:
-            times = (
-                float(node.get("startTime", 0.0)),
-                float(node.get("stopTime")),
-                float(sizes[0]),
-            )
+            start = float(given.get("startTime", 0.0))
+            stop = float(given["stopTime"]) if "stopTime" in given else None
+            step = float(sizes[0]) if sizes else None
         except ValueError as error:
             self.fail(STRUCTURE, str(error), node)
-        start, stop, step = times
-        if not (all(map(math.isfinite, times)) and start < stop and 0 < step <= stop - start):
+        defaults = {} if stop and step else self.defaults(components)
+        if stop is None:
+            later = {name: x for name, (x, _) in defaults.items() if x is not None and x > start}
+            if not later:
+                self.fail(STRUCTURE, "has no DefaultExperiment with a stopTime, nor have its FMUs")
+            longest = max(later, key=lambda name: later[name])
+            stop = later[longest]
+            self.notes.append(f"stop time {number(stop)} s: the largest of its FMUs ({longest})")
+        if step is None:
+            step = self.chosen_step(difference(stop, start), defaults)
+        if not (all(map(math.isfinite, (start, stop, step))) and 0 < step <= stop - start):
             self.fail(STRUCTURE, f"start {start!r} s, stop {stop!r} s, step {step!r} s", node)
         if (stop - start) / step > MAX_STEPS:
             self.fail(STRUCTURE, f"step {step!r} s makes more than {MAX_STEPS} steps", node)
         return start, stop, step
+
+    def defaults(
+        self, components: Iterable[Component]
+    ) -> dict[str, tuple[float | None, float | None]]:
+        """Stop time and step in s that the FMU of each component declares."""
+        found = {}
+        for component in components:
+            with suppress(UnreadableError, UserError):  # is said when the FMUs are checked
+                experiment = describe(self.folder / component.source).description.defaultExperiment
+                times = getattr(experiment, "stopTime", None), getattr(experiment, "stepSize", None)
+                found[component.name] = tuple(_positive(text) for text in times)
+        return found
+
+    def chosen_step(
+        self, span: float, defaults: Mapping[str, tuple[float | None, float | None]]
+    ) -> float:
+        """A step of which a whole number lead to the stop time."""
+        steps = {name: x for name, (_, x) in defaults.items() if x is not None}
+        shortest = min(steps, key=lambda name: steps[name], default=None)
+        step = span / STEPS if shortest is None else min(steps[shortest], span)
+        whole = max(round(span / step), 1)
+        if abs(whole - span / step) > 1e-6:
+            step = span / math.ceil(span / step)
+        reason = f"the smallest of its FMUs ({shortest})" if shortest else f"1/{STEPS} of the run"
+        self.notes.append(f"communication step {number(step)} s: {reason}")
+        return step
 
     # parameter sets
 
@@ -231,6 +273,8 @@ class SspReader:
         self, bound: dict[str, dict[str, dict[str, Parameter]]]
     ) -> dict[str, dict[str, dict[str, Parameter]]]:
         """Sets by variant; every component that has a binding has all of them."""
+        if not any(bound.values()):
+            return {ALONE: {}}
         names = list(dict.fromkeys(name for sets in bound.values() for name in sets))
         for component, sets in bound.items():
             missing = [name for name in names if name not in sets]
@@ -240,3 +284,12 @@ class SspReader:
             name: {component: sets.get(name, {}) for component, sets in bound.items()}
             for name in names
         }
+
+
+def _positive(text: object) -> float | None:
+    """A time above 0 that an FMU declares."""
+    with suppress(TypeError, ValueError):
+        time = float(text)  # type: ignore[arg-type]
+        if 0 < time < math.inf:
+            return time
+    return None

@@ -7,6 +7,8 @@ import numpy as np
 
 from rparm.fmi.model import Value
 
+ALONE = "default"  # the variant of a system that has no parameter sets
+
 
 @dataclass(frozen=True)
 class Connector:
@@ -14,8 +16,8 @@ class Connector:
 
     name: str
     kind: str  # input, output, parameter or calculatedParameter
-    type: str  # Real, Integer, Boolean, String or Enumeration
-    unit: str | None
+    type: str | None  # Real, Integer, Boolean, String or Enumeration; None: that of the variable
+    unit: str | None  # None: that of the variable
 
 
 @dataclass(frozen=True)
@@ -62,9 +64,11 @@ class System:
     start: float  # s
     stop: float  # s
     step: float  # s, communication step
-    # variant -> component -> variable; a component without a binding has no values
+    # variant -> component -> variable; a component without a binding has no values, and without
+    # parameter sets ALONE is the only variant
     parameters: dict[str, dict[str, dict[str, Parameter]]]
     descriptions: Mapping[str, str] = field(default_factory=dict)  # of variants that have one
+    notes: tuple[str, ...] = ()  # what was chosen where the SSP says nothing
 
     @property
     def parameter_sets(self) -> dict[str, dict[str, dict[str, Value]]]:
@@ -85,6 +89,11 @@ class System:
     def times(self) -> np.ndarray:
         """Communication points, (steps + 1,) s."""
         return self.start + self.step * np.arange(self.steps + 1)
+
+    @property
+    def has_sets(self) -> bool:
+        """Whether its variants are parameter sets."""
+        return any(self.parameters.values())
 
     def component(self, name: str) -> Component:
         return next(component for component in self.components if component.name == name)

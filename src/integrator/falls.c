@@ -27,8 +27,8 @@ static double fall_behind(const struct roots_polynomial *p, double s) {
     return INFINITY;
 }
 
-/* Between two roots, p is no farther from 0 than the rounding of its coefficients. */
-static bool is_touch(const struct roots_polynomial *p, double begin, double end) {
+/* Between two roots, p is no farther from 0 than this or the rounding of its coefficients. */
+static bool is_touch(const struct roots_polynomial *p, double begin, double end, double touch) {
     const double s = 0.5 * (begin + end);
     double value = 0.0;
     double size = 0.0;
@@ -36,18 +36,18 @@ static bool is_touch(const struct roots_polynomial *p, double begin, double end)
         value = value * s + p->c[k];
         size = size * s + fabs(p->c[k]);
     }
-    return fabs(value) <= 16.0 * DBL_EPSILON * size;
+    return fabs(value) <= fmax(touch, 16.0 * DBL_EPSILON * size);
 }
 
 /* The first s at which p falls to 0, or 1 if it ends there: a touch is no fall. INFINITY: neither.
  */
-static double fall_or_end(const struct roots_polynomial *p) {
+static double fall_or_end(const struct roots_polynomial *p, double touch) {
     struct root roots[ROOTS_LENGTH];
     const int count = roots_find(p, roots);
     for (int i = 0; i < count; i++) {
         const bool rises_again = i + 1 < count && roots[i + 1].kind == ROOT_RISES;
         const bool falls = roots[i].kind == ROOT_FALLS &&
-                           !(rises_again && is_touch(p, roots[i].s, roots[i + 1].s));
+                           !(rises_again && is_touch(p, roots[i].s, roots[i + 1].s, touch));
         if (falls || roots[i].s == 1.0) {
             return roots[i].s;
         }
@@ -119,18 +119,19 @@ static bool is_above_until(const struct roots_polynomial *p, double s, double no
 
 /* An indicator that is below 0 at a restart has not fallen: the modes have just been found valid,
  * and one event would come again and again. */
-double fall_first(const struct roots_polynomial *p, double error, double latest, bool is_restart,
-                  bool *is_armed, double *noise) {
-    if (latest <= 1.0 && is_above_until(p, latest, *is_armed ? -1.0 : *noise)) {
+double fall_first(const struct roots_polynomial *p, const struct fall *fall) {
+    double *noise = fall->noise;
+    const bool is_armed = *fall->is_armed;
+    if (fall->latest <= 1.0 && is_above_until(p, fall->latest, is_armed ? -1.0 : *noise)) {
         return INFINITY;
     }
-    if (!*is_armed) {
-        double within = fmax(error, *noise);
-        if (is_restart && p->c[0] <= -within) {
+    if (!is_armed) {
+        double within = fmax(fall->error, *noise);
+        if (fall->is_restart && p->c[0] <= -within) {
             within -= (1.0 + 0x1p-10) * p->c[0]; // doubled, fall after fall would lead far below
             *noise = within;
         }
-        return first_fall_from_zero(p, within, is_armed);
+        return first_fall_from_zero(p, within, fall->is_armed);
     }
     // from below 0 it can only rise by the error of the polynomial
     const bool rises = p->degree > 0 && p->c[0] <= 0.0 && p->c[1] > 0.0;
@@ -138,5 +139,5 @@ double fall_first(const struct roots_polynomial *p, double error, double latest,
         return fall_behind(p, 0.0);
     }
     const double s = roots_first(p);
-    return s > 0.0 && s < 1.0 ? fall_or_end(p) : s;
+    return s > 0.0 && s < 1.0 ? fall_or_end(p, fall->touch) : s;
 }

@@ -24,7 +24,7 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
     location->z = calloc(count, sizeof *location->z);
     location->has_row = calloc(count, sizeof *location->has_row);
     location->is_armed = calloc(count, sizeof *location->is_armed);
-    location->noise = calloc(count, sizeof *location->noise);
+    location->noise = calloc(2 * count, sizeof *location->noise);
     location->triggered = calloc(count, sizeof *location->triggered);
     if (location->rows == NULL || location->step.indicator_row == NULL || location->used == NULL ||
         location->first == NULL || location->samples == NULL || location->x == NULL ||
@@ -33,8 +33,9 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
         location_destroy(location);
         return false;
     }
+    location->touch = location->noise + count;
     location->dx = location->x + states;
-    location->ahead_x = location->dx + states;
+    location->restart_x = location->dx + states;
     return true;
 }
 
@@ -93,6 +94,7 @@ static enum status restart_model(struct location *location, const double x[]) {
         location->is_armed[i] = location->z[i] > 0.0;
         if (ode->rounding != NULL) {
             location->noise[i] = larger(location->first[i], DBL_MIN);
+            location->touch[i] = 4.0 * location->first[i];
             location->is_armed[i] = location->z[i] > location->noise[i];
         }
     }
@@ -108,6 +110,7 @@ enum status location_restart(struct location *location, const struct indicator *
     }
     bool needs_model = false;
     location->used_count = 0;
+    memcpy(location->restart_x, x, location->ode->state_count * sizeof *x);
     for (size_t i = 0; i < location->ode->indicator_count; i++) {
         const struct indicator *indicator = &indicators[i];
         location->has_row[i] = false;
@@ -121,15 +124,28 @@ enum status location_restart(struct location *location, const struct indicator *
         if (indicator->kind == INDICATOR_OF_MODEL) {
             needs_model = true;
             location->noise[i] = larger(2.0 * rounding, DBL_MIN);
+            location->touch[i] = 2.0 * rounding;
         } else {
             const double z = at_state(indicator, x);
             const bool is_sure = indicator->rises || z > 0.0;
             location->is_armed[i] = is_sure && (z > rounding || rounding == 0.0);
             const double miss = fabs(indicator->factor) * location->tolerances[indicator->state];
             location->noise[i] = is_sure ? rounding : larger(rounding, miss);
+            const double size = fabs(indicator->offset) + fabs(z - indicator->offset);
+            location->touch[i] = 8.0 * DBL_EPSILON * size;
         }
     }
     return needs_model ? restart_model(location, x) : STATUS_OK;
+}
+
+/* fall_first of indicator i; given: what does not follow from location. */
+static double first_fall(const struct location *location, size_t i,
+                         const struct roots_polynomial *p, const struct fall *given) {
+    struct fall fall = *given;
+    fall.touch = location->touch[i];
+    fall.is_armed = &location->is_armed[i];
+    fall.noise = &location->noise[i];
+    return fall_first(p, &fall);
 }
 
 /* ---- Indicators of states ------------------------------------------------------------------- */
@@ -187,8 +203,33 @@ static double first_of_state(struct location *location, size_t i, double latest)
         shift(c, step->degree);
     }
     const struct roots_polynomial p = {c, step->degree, -1.0};
-    return fall_first(&p, 0.0, latest, step->begin == 0.0, &location->is_armed[i],
-                      &location->noise[i]);
+    return first_fall(location, i, &p,
+                      &(struct fall){.latest = latest, .is_restart = step->begin == 0.0});
+}
+
+/* ---- Steps of states ------------------------------------------------------------------------ */
+
+void location_write_states(const struct location *location, double s, double x[]) {
+    const struct step_polynomial *step = &location->step;
+    const double at = step->is_from_end ? s - 1.0 : s;
+    for (size_t i = 0; i < location->ode->state_count; i++) {
+        double sum = step->row[i][step->degree];
+        for (int k = step->degree - 1; k >= 0; k--) {
+            sum = sum * at + step->row[i][k];
+        }
+        x[i] = sum;
+    }
+}
+
+void location_lead_from_restart(struct location *location) {
+    const struct step_polynomial *step = &location->step;
+    for (size_t i = 0; i < location->ode->state_count; i++) {
+        double value = 0.0; // at -1
+        for (int k = step->degree; k >= 0; k--) {
+            value = step->row[i][k] - value;
+        }
+        step->row[i][1] -= location->restart_x[i] - value;
+    }
 }
 
 /* ---- Indicators of the model ---------------------------------------------------------------- */
@@ -204,27 +245,17 @@ static double first_of_model(struct location *location, size_t i, double latest)
     for (int k = 0; k <= step->degree; k++) {
         size += fabs(p.c[k]);
     }
-    return fall_first(&p, representation * size, latest, step->begin == 0.0, &location->is_armed[i],
-                      &location->noise[i]);
-}
-
-/* Writes the states at s, of the whole step, to location->x; returns the time. */
-static double evaluate_states(struct location *location, double s) {
-    const struct step_polynomial *step = &location->step;
-    const double at = step->is_from_end ? s - 1.0 : s;
-    for (size_t i = 0; i < location->ode->state_count; i++) {
-        double x = step->row[i][step->degree];
-        for (int j = step->degree - 1; j >= 0; j--) {
-            x = x * at + step->row[i][j];
-        }
-        location->x[i] = x;
-    }
-    return step->begin + s * (step->end - step->begin);
+    return first_fall(location, i, &p,
+                      &(struct fall){.error = representation * size,
+                                     .latest = latest,
+                                     .is_restart = step->begin == 0.0});
 }
 
 /* Writes all indicators at s, of the whole step, to column k of samples. */
 static enum status sample(struct location *location, double s, int k) {
-    const double t = evaluate_states(location, s);
+    const struct step_polynomial *step = &location->step;
+    location_write_states(location, s, location->x);
+    const double t = step->begin + s * (step->end - step->begin);
     const enum status status = evaluate(location, t, location->x);
     for (size_t i = 0; status == STATUS_OK && i < location->ode->indicator_count; i++) {
         location->samples[i][k] = location->z[i];
@@ -295,7 +326,8 @@ static bool search_piece(struct location *location, const struct piece *piece, s
     const struct roots_polynomial p = {c, degree, -1.0};
     const bool is_restart = location->step.begin == 0.0 && piece->begin == 0.0;
     const double s =
-        fall_first(&p, noise, INFINITY, is_restart, &location->is_armed[i], &location->noise[i]);
+        first_fall(location, i, &p,
+                   &(struct fall){.error = noise, .latest = INFINITY, .is_restart = is_restart});
     location->first[i] = fmin(location->first[i], piece->begin + piece->length * s);
     return true;
 }
@@ -391,63 +423,13 @@ static enum status search(struct location *location, double *place) {
     return STATUS_OK;
 }
 
-/* z of indicator i at the time t and the state x with the derivative dx, and z a little later,
- * after `ahead` (s). False: not both are known. Over so small a part of the step the derivative of
- * an indicator hardly changes; the part is longer where the difference is lost in rounding. */
-static bool look_ahead(struct location *location, size_t i, double t, const double x[],
-                       const double dx[], double z[2], double *ahead) {
-    if (evaluate_one(location, i, t, x, &z[0]) != STATUS_OK) {
-        return false;
-    }
-    z[1] = z[0];
-    for (double part = 0x1p-20; z[1] == z[0] && part <= 0x1p-8; part *= 0x1p4) {
-        *ahead = part * (location->step.end - location->step.begin);
-        for (size_t j = 0; j < location->ode->state_count; j++) {
-            location->ahead_x[j] = x[j] + *ahead * dx[j];
-        }
-        if (evaluate_one(location, i, t + *ahead, location->ahead_x, &z[1]) != STATUS_OK) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/* Indicator i seems to fall to 0 at s but rises there: the polynomials of the states do not fit
- * each other as well as that. Then it counts as not having been above 0, and may be as far below.
- */
-static bool has_risen(struct location *location, size_t i, double s) {
-    const struct ode *ode = location->ode;
-    const double t = evaluate_states(location, s);
-    double z[2];
-    double ahead;
-    if (ode->rhs(t, location->x, location->dx, ode->context) != STATUS_OK ||
-        !look_ahead(location, i, t, location->x, location->dx, z, &ahead) || !(z[1] > z[0])) {
-        return false;
-    }
-    location->is_armed[i] = false;
-    location->noise[i] = larger(2.0 * location->noise[i], -2.0 * z[0]);
-    return true;
-}
-
-/* Whether this happened to an indicator that seems to fall at s. */
-static bool is_misled(struct location *location, double s) {
-    bool found = false;
-    for (size_t k = 0; k < location->used_count; k++) {
-        const size_t i = location->used[k];
-        found |= location->first[i] <= s + same_time && has_risen(location, i, location->first[i]);
-    }
-    return found;
-}
-
 enum status location_search(struct location *location) {
     const struct step_polynomial *step = &location->step;
     double s;
-    do {
-        const enum status status = search(location, &s);
-        if (status != STATUS_OK || !(s <= 1.0)) {
-            return status;
-        }
-    } while (is_misled(location, s));
+    const enum status status = search(location, &s);
+    if (status != STATUS_OK || !(s <= 1.0)) {
+        return status;
+    }
     memset(location->triggered, 0, location->ode->indicator_count * sizeof *location->triggered);
     for (size_t k = 0; k < location->used_count; k++) {
         const size_t i = location->used[k];
@@ -492,18 +474,26 @@ void location_write_cubic(struct location *location, double begin, const double 
 }
 
 bool location_correction(struct location *location, double t, const double x[], const double dx[],
-                         struct correction *found) {
+                         double *z, double *correction) {
     size_t i = 0;
     while (!location->triggered[i]) {
         i++;
     }
-    double z[2];
-    double ahead;
-    if (!look_ahead(location, i, t, x, dx, z, &ahead)) {
+    if (evaluate_one(location, i, t, x, z) != STATUS_OK) {
         return false;
     }
-    found->is_before = z[0] > 0.0 || z[1] > z[0];
-    found->rises = z[1] > z[0];
-    found->time = -z[0] * ahead / (z[1] - z[0]);
-    return isfinite(found->time);
+    // over so small a part of the step the derivative of an indicator hardly changes; the part is
+    // longer where the difference is lost in rounding
+    double z_ahead = *z;
+    for (double part = 0x1p-20; z_ahead == *z && part <= 0x1p-8; part *= 0x1p4) {
+        const double ahead = part * (location->step.end - location->step.begin);
+        for (size_t j = 0; j < location->ode->state_count; j++) {
+            location->x[j] = x[j] + ahead * dx[j];
+        }
+        if (evaluate_one(location, i, t + ahead, location->x, &z_ahead) != STATUS_OK) {
+            return false;
+        }
+        *correction = -*z * ahead / (z_ahead - *z);
+    }
+    return isfinite(*correction);
 }

@@ -36,12 +36,13 @@ struct location {
     bool *is_armed;           /* by indicator: it has been above 0 since the restart */
     double *noise;            /* by indicator of a state: one that is 0 at the restart
                                  may have either sign as long as it is within this */
+    double *touch;            /* by indicator, as in struct fall */
     bool *triggered;          /* by indicator: it is at 0 at `time` */
     struct step_polynomial step;         /* the last one; methods write it */
     double (*rows)[SERIES_LENGTH];       /* by state: room for its rows */
     double *x;                           /* at one point */
     double *dx;                          /* room for another one */
-    double *ahead_x;                     /* a little later */
+    double *restart_x;                   /* at the restart */
     double *z;                           /* by indicator, at one point */
     double *first;                       /* by indicator: s of its first root in the step */
     double (*samples)[CHEBYSHEV_LENGTH]; /* by indicator */
@@ -81,15 +82,18 @@ NONNULL void location_write_cubic(struct location *location, double begin, const
                                   const double begin_dx[], double end, const double x[],
                                   const double dx[]);
 
-/* Newton's correction of the time of an event. */
-struct correction {
-    double time;    /* s: -z / z' of the first indicator that has triggered */
-    bool is_before; /* it has not fallen yet */
-    bool rises;
-};
-
-/* From the state x with its derivative dx at the time t. False where there is none. */
+/* Writes z, the value of the first indicator that has triggered, and Newton's correction (s) of the
+ * event's time, -z / z', from the state x and its derivative dx at the time t. False where it has
+ * none. */
 MUST_CHECK NONNULL bool location_correction(struct location *location, double t, const double x[],
-                                            const double dx[], struct correction *found);
+                                            const double dx[], double *z, double *correction);
+
+/* Where location->step begins at the restart and goes back from its end: leads it through the state
+ * there. CVODE's polynomial misses that by about its tolerance, and flights that are lower would
+ * begin below their limits. */
+NONNULL void location_lead_from_restart(struct location *location);
+
+/* Writes the states at s of location->step, 0 to 1 from its begin on. */
+NONNULL void location_write_states(const struct location *location, double s, double x[]);
 
 #endif

@@ -35,7 +35,8 @@ struct cvode {
     SUNLinearSolver linear_solver;     /* of BDF */
     struct small_vector_terms columns; /* of the last internal step; count 0: not known */
     enum status search_status;         /* of the last search for an event */
-    struct method_work counted;        /* since the restart, up to the last advance */
+    bool is_led;                /* the last internal step is location->step, led from the restart */
+    struct method_work counted; /* since the restart, up to the last advance */
 };
 
 /* ---- Life ----------------------------------------------------------------------------------- */
@@ -164,6 +165,7 @@ static enum status restart(void *memory, const double x[]) {
     sundials_set_state(&cvode->base, x);
     cvode->counted = (struct method_work){0};
     cvode->search_status = STATUS_OK;
+    cvode->is_led = false;
     int flag = CV_SUCCESS;
     if (problem->ode.indicator_count > 0) {
         flag = CVodeSetEtaMaxFirstStep(
@@ -180,6 +182,12 @@ static enum status restart(void *memory, const double x[]) {
  * factor: most of the cost of a short communication step. So the columns are noted once per
  * internal step, and all points within the step come from Horner's scheme. */
 static void evaluate_history(struct cvode *cvode, double t, double x[]) {
+    if (cvode->is_led) {
+        const struct location *location = &cvode->base.problem->location;
+        const struct step_polynomial *step = &location->step;
+        location_write_states(location, (t - step->begin) / (step->end - step->begin), x);
+        return;
+    }
     double internal = 0.0;
     double last_step = 0.0;
     (void)CVodeGetCurrentTime(cvode->solver, &internal);
@@ -217,6 +225,10 @@ static enum status search(struct cvode *cvode, double begin, double end) {
         for (int k = 0; k < columns->count; k++) {
             step->row[i][k] = columns->data[columns->count - 1 - k][i];
         }
+    }
+    cvode->is_led = begin == 0.0 && problem->ode.rounding != NULL && step->degree > 0;
+    if (cvode->is_led) {
+        location_lead_from_restart(&problem->location);
     }
     return location_search(&problem->location);
 }

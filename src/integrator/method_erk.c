@@ -296,22 +296,22 @@ static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
     int flag = ERKStepSetPostprocessStepFn(erk->solver, NULL);
     for (int i = 0; flag >= 0 && i < MOST_CORRECTIONS; i++) {
         flag = step_to(erk, t, x);
-        struct correction correction;
-        if (flag < 0 || !location_correction(location, t, x, erk->dx, &correction)) {
+        double z = 0.0;
+        double correction = 0.0;
+        if (flag < 0 || !location_correction(location, t, x, erk->dx, &z, &correction)) {
             break;
         }
-        if (correction.is_before) {
+        if (z > 0.0) {
             low = t;
         } else {
             high = t;
             is_below = true;
         }
-        double next = t + correction.time;
+        double next = t + correction;
         if (next > high && !is_below) {
             next = high;
         }
-        if (fabs(next - t) <= 2.0 * DBL_EPSILON * erk->watched &&
-            (!correction.rises || t == high)) {
+        if (fabs(next - t) <= 2.0 * DBL_EPSILON * erk->watched) {
             break;
         }
         t = next > low && next <= high ? next : 0.5 * (low + high);

@@ -40,6 +40,7 @@ struct event {
                             inputs or parameters have changed, or the initialization ends */
     bool is_timed;           /* the time that next_time gave has come */
     const double *du;        /* derivative of each input by the time after the event */
+    bool du_is_known;        /* else 0: of inputs that move outside */
     const double *tolerance; /* of each state, in its unit: relative part and absolute one */
     int max_events;          /* events may follow each other so many times at one instant */
     char *reason;            /* one line, reason_size bytes: why update fails. NULL: nobody asks */

@@ -190,8 +190,11 @@ static void pass(const struct call *call, const struct event *event) {
             const bool is_past = call->t >= room.times[k] || room.times[k] <= passed;
             call->holds[k] = is_past == relation->rises;
         } else if (event->triggered != NULL) {
-            const bool is_on_it = joins(&room.compared[k], call->holds[k]);
-            call->holds[k] ^= event->triggered[relation->indicator] || is_on_it;
+            // where states are as close as their errors, an indicator may only seem to fall
+            const double slope = signed_slope(&room.compared[k], call->holds[k]);
+            const bool falls =
+                event->triggered[relation->indicator] && !(event->du_is_known && slope > 0.0);
+            call->holds[k] ^= falls || joins(&room.compared[k], call->holds[k]);
         }
     }
     settle_all(call, false);

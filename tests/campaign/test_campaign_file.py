@@ -1,5 +1,6 @@
 """Campaign files: what they mean, and what is refused with its place and reason."""
 
+import re
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -125,7 +126,9 @@ final = ["arm.q1"]
     [
         ("closed_loop", "close_loop", "did you mean 'closed_loop'?"),
         ("nominal", "nominell", "did you mean 'nominal'?"),
-        ('variant = "nominal"\n', "", "variant: goes with system"),
+        ('variant = "nominal"\n', "", "variant: missing key 'variant' (known: nominal, heavy"),
+        ('system = "closed_loop"', 'scenario = "hanging_swing"', "variant: goes with system"),
+        ("closed_loop", "none.ssp", "none.ssp: no such file"),
         ("arm.m2", "arm.m3", "the system has no variable 'arm.m3'"),
         ("arm.m2", "arm.tau1", "'arm.tau1' is not a parameter"),
         ("arm.q1", "q1", "the system has no variable 'q1'"),
@@ -136,7 +139,7 @@ def test_a_mistake_of_a_system_is_refused(
     old: str, new: str, expected: str, tmp_path: Path
 ) -> None:
     with (
-        pytest.raises(UserError, match=expected.replace("?", r"\?")),
+        pytest.raises(UserError, match=re.escape(expected)),
         bases.opened(given := campaign(tmp_path, SYSTEM, [(old, new)]), None) as base,
     ):
         planning.plan(given, base, "test")

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rparm.campaign import bases
 from rparm.campaign.measures import LYAPUNOV
 from rparm.coupling.master import Master
 from rparm.fmi.fmu_file import Fmu
@@ -16,6 +17,7 @@ from tests.campaign.files import ARM, HEAD, campaign
 from tests.campaign.runners import rows, runner
 from tests.support.paths import ROOT
 from tests.support.rparm_project import BUILD, FMUS, fmi3_fmu, load
+from tests.support.ssp_files import EXPERIMENT, FROM_TRAJECTORY, SETS, TYPES, without
 
 OUTPUTS = ("q1", "q2", "dq1", "dq2", "total_energy", "ee_x")
 
@@ -294,3 +296,19 @@ def test_the_exponent_passes_springs_and_has_no_value_where_a_deviation_jumps(
         with runner(campaign(tmp_path, text, [change]), tmp_path) as (runs, job, points):
             (other,) = rows(runs, job, points, [0]).measures
         assert np.isnan(other[columns.index(LYAPUNOV)]) and np.isfinite(other[states]).all()
+
+
+def test_a_system_without_parameter_sets_varies_inputs_that_nothing_feeds(tmp_path: Path) -> None:
+    """Computed torque brings the joint to its reference: poles at -20."""
+    bare = without(tmp_path / "bare.ssp", SETS, EXPERIMENT, TYPES, FROM_TRAJECTORY)
+    text = (
+        f'{HEAD}system = "{bare.name}"\nsampling = "grid"\ntime = {{ stop = 1.0 }}\n'
+        '[parameters."controller.q1_ref"]\nvalues = [0.1, 0.2]\n[keep]\nfinal = ["arm.q1"]\n'
+    )
+    given = campaign(tmp_path, text)
+    with bases.opened(given, None, tmp_path / "test.toml") as base:
+        *times, alone = base.questions
+    assert "bare.ssp: communication step 0.001 s" in times[-1] and "controller.q1_ref" in alone
+    with runner(given, tmp_path, fmu=bare) as (runs, job, points):
+        found = rows(runs, job, points, [0, 1]).measures[:, 0]
+    assert found == pytest.approx([0.1, 0.2], rel=1e-6)

@@ -4,13 +4,14 @@ import json
 import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
 import pytest
 from lxml import etree
 
-from tests.identification.synthetic import ARM, write
+from tests.identification.synthetic import ARM, save, write
 from tests.support.rparm_project import FMUS, assert_one_line, call
 
 GIVEN = ("--inputs", "tau1", "f2", "--measured", "q1", "q2")
@@ -104,6 +105,65 @@ def test_columns_may_have_other_names_and_units(identify, log: Path, tmp_path: P
     ]
     values = [each["parameters"]["m2"]["value"] for each in found]
     assert values[0] == pytest.approx(values[1], rel=1e-9)
+
+
+def test_the_clock_of_the_log_makes_no_difference(
+    identify, log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Doubles near 1.7e9 are 2.4e-7 s apart, more than the fit moves a delay."""
+    head, *rows = log.read_text().splitlines()
+    cells = [row.split(",", 1) for row in rows]
+    later = [
+        f"{Decimal('1700000000.25') + Decimal(repr(float(t)))},{others}" for t, others in cells
+    ]
+    path = tmp_path / "later.csv"
+    path.write_text("\n".join([head, *later]))
+    found = []
+    for file in (log, path):
+        code, out, _ = identify("--parameters", "m2", *KNOWN, "--delay", "--json", path=file)
+        assert code == 0
+        found.append(json.loads(out)["parameters"])
+    for name in ("m2", "delay"):
+        for end in ("value", "low", "high"):
+            ends = [parameters[name][end] for parameters in found]
+            assert ends[0] == pytest.approx(ends[1], rel=1e-9, abs=1e-12)
+    file = tmp_path / "output/scenario.toml"
+    code, out, _ = call(capsys, file, "--json", "--output", tmp_path / "report")
+    (scenario,) = json.loads(out)["scenarios"]
+    assert code == 0 and scenario["runs"][0]["measured"]["q1"]["rms"] < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("row", "size", "code", "begin"),
+    [(slice(200, 1200, 200), 5e-3, 0, "identified"), (slice(700, 701), 0.1, 1, "failed")],
+)
+def test_what_is_far_above_noise_is_said_in_the_last_line(
+    row: slice, size: float, code: int, begin: str, identify, log: Path, tmp_path: Path
+) -> None:
+    """Outliers add their squares: 5 of 50 deviations of the noise, and 1 of 1000, to 4004 rows."""
+    table = np.loadtxt(log, delimiter=",", skiprows=1)
+    table[row, 3] += size
+    path = tmp_path / "outliers.csv"
+    save(path, table[:, 0], table[:, 1:3], table[:, 3:])
+    ended, out, error = identify("--parameters", "m2", *KNOWN, "--json", path=path)
+    last, found = error.splitlines()[-1], json.loads(out)
+    assert ended == code and last.startswith(f"{begin}: chi2 is ") and "units, outliers" in last
+    outliers = len(table[row]) * (size / 1e-4) ** 2
+    assert found["chi2"] == pytest.approx(1 + outliers / (2 * len(table)), rel=0.3)
+    assert (found["exit_code"], found["passed"]) == (code, code == 0)
+    assert any(text.startswith("Chi2 is") for text in found["warnings"])
+
+
+def test_swallowed_rows_are_said(identify, log: Path, tmp_path: Path) -> None:
+    lines = log.read_text().splitlines()
+    noted = [lines[0] + ",note", *(f"{line},ok" for line in lines[1:])]
+    noted[301], noted[361] = f'{lines[301]},"', f'{lines[361]},"'
+    path = tmp_path / "noted.csv"
+    path.write_text("\n".join(noted))
+    code, out, _ = identify("--parameters", "m2", *KNOWN, "--json", path=path)
+    joined, gap, *_ = json.loads(out)["warnings"]
+    assert code == 0 and "lines 302 to 362 are one row" in joined
+    assert "a gap of 0.061 s" in gap
 
 
 # ---- mistakes ------------------------------------------------------------------------------------

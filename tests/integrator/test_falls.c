@@ -35,10 +35,16 @@ static void test_a_fall_up_to_the_latest_is_located_to_the_same_bit(void) {
         bool is_armed_too = is_armed;
         double noise = i % 8 < 4 ? 1e-15 : 1e-10;
         double same_noise = noise;
-        const double s = fall_first(&p, 0.0, INFINITY, true, &is_armed, &noise);
+        const double s = fall_first(&p, &(struct fall){.latest = INFINITY,
+                                                       .is_restart = true,
+                                                       .is_armed = &is_armed,
+                                                       .noise = &noise});
         const bool is_close = s <= 1.0 && i % 5 == 0;
         const double latest = is_close ? s * (1.0 + 1e-15 * chance()) : fabs(chance());
-        const double found = fall_first(&p, 0.0, latest, true, &is_armed_too, &same_noise);
+        const double found = fall_first(&p, &(struct fall){.latest = latest,
+                                                           .is_restart = true,
+                                                           .is_armed = &is_armed_too,
+                                                           .noise = &same_noise});
         if (s <= latest) {
             TEST_ASSERT_TRUE(found == s);
             located++;

@@ -4,6 +4,7 @@ import math
 import os
 import re
 from collections.abc import Callable
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -83,6 +84,78 @@ def test_a_log_may_lie_elsewhere_and_end_where_the_last_step_begins(write: Write
     run = scenario.load(path, TOY)
     assert run.inputs["force"].tolist() == [1.0, 2.0, 3.0, 4.0, 4.0]
     assert list(run.logs) == ["../a log/ü.csv"]
+
+
+@pytest.mark.parametrize(
+    ("log", "names"),
+    [
+        ("time;force (N, filtered)\n1;2\n2;4\n", ["force (N, filtered)"]),
+        ("time\tforce; x, y\n1\t2\n2\t4\n", ["force; x, y"]),
+        ("time,force;N\n1,2\n2,4\n", ["force;N"]),
+        ("time;a, b;c, d, e\n1;2;0,5\n2;4;0,7\n", ["a, b"]),  # decimal commas, not in what is used
+    ],
+)
+def test_the_delimiter_is_that_of_the_rows(write: Write, log: str, names: list[str]) -> None:
+    run = loaded(write, log, f"column = '{names[0]}'\n")
+    assert run.inputs["force"].tolist() == [2.0, 2.5, 3.0, 3.5, 4.0] and run.questions == ()
+
+
+def test_a_quotation_mark_that_swallows_rows_is_said(write: Write) -> None:
+    rows = [f"{1 + i / 100},1,ok" for i in range(201)]
+    rows[70] = f'{1 + 70 / 100},1,"5 mm'  # begins a field that ends 60 rows later
+    rows[130] = f'{1 + 130 / 100},1,ok"'
+    run = loaded(write, "\n".join(["time,force,note", *rows]))
+    joined, gap = run.questions
+    assert "log.csv: lines 72 to 132 are one row, by a quoted field with line ends" in joined
+    assert "log.csv: line 133: a gap of 0.61 s before it, where rows are 0.01 s apart" in gap
+    header = loaded(write, 'time,force,"note\n1,1,a\n1.5,1,b"\n1,2,c\n2,2,d\n')
+    assert ["lines 1 to 3 are one row" in text for text in header.questions] == [True]
+
+
+@pytest.mark.parametrize(
+    ("missing", "said"),
+    [
+        ([(130, 139)], ""),  # ten steps
+        ([(130, 140)], "line 132: a gap of 0.11 s before it, where rows are 0.01 s apart"),
+        ([(130, 140), (150, 165)], "line 142: 2 gaps, the longest of 0.16 s before it"),
+        ([(30, 90), (210, 290)], ""),  # before and after the run
+    ],
+)
+def test_gaps_above_ten_steps_are_said(
+    write: Write, missing: list[tuple[int, int]], said: str
+) -> None:
+    rows = [f"{t / 100},1" for t in range(301) if not any(a <= t < b for a, b in missing)]
+    questions = loaded(write, "\n".join(["time,force", *rows])).questions
+    assert [said in text for text in questions] == [True] * bool(said)
+
+
+@pytest.mark.parametrize("start", ["0", "1700000000", "1700000000.3"])
+def test_late_clocks_lose_no_row(write: Write, start: str) -> None:
+    """Doubles near 1.7e9 are 2.4e-7 apart: rows and switches at points of the run count there."""
+    begin = Decimal(start)
+    stop, switch = begin + 1, "[inputs.brake]\ntable = [[0.0, false], [0.3, true], [0.7, false]]\n"
+    held = "[inputs.force]\nfile = 'log.csv'\nhold = true\n"
+    path = write(f"{HEAD}[time]\nstart = {begin}\nstop = {stop}\nstep = 0.1\n{held}{switch}")
+    rows = [f"{begin + Decimal(i) / 10},{i / 2}" for i in range(11)]
+    (path.parent / "log.csv").write_text("\n".join(["time,force", *rows]))
+    run = scenario.load(path, SWITCHED)
+    assert run.inputs["force"].tolist() == [i / 2 for i in range(11)]
+    assert run.inputs["brake"].tolist() == [3 <= i < 7 for i in range(11)]
+    assert run.elapsed.tolist() == pytest.approx([i / 10 for i in range(11)], abs=1e-15)
+
+
+def test_a_log_may_begin_elsewhere_than_the_run(write: Write) -> None:
+    rows = "".join(f"1700000000.{i}23456,{i}\n" for i in range(10))
+    log = f"time,force\n{rows}"
+    run = loaded(write, log, "hold = true\nbegin = 1700000000.123456\n")
+    assert run.inputs["force"].tolist() == [1.0, 3.0, 6.0, 8.0, 9.0]  # every 0.25 s
+    for given, message in (
+        ("1699999999", "begins at 1700000000.023456 s, the run needs it from 1699999999.0 to"),
+        ("1700000000.5", "ends at 1700000000.923456 s, the run needs it from 1700000000.5 to"),
+        ("'soon'", "begin: expected a number"),
+    ):
+        with pytest.raises(UserError, match=message):
+            loaded(write, log, f"begin = {given}\n")
 
 
 # ---- mistakes ------------------------------------------------------------------------------------

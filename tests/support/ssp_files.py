@@ -1,6 +1,7 @@
 """Copies of SSPs and FMUs with something in them changed."""
 
 import io
+import re
 import subprocess
 import zipfile
 from collections.abc import Callable
@@ -14,6 +15,12 @@ from tests.support.paths import ROOT
 SSP = ROOT / "build" / "ClosedLoop.ssp"
 MACHINE = ROOT / "build" / "Machine.ssp"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
+# what an SSP may leave out
+SETS = r"<ssd:ParameterBindings>.*?</ssd:ParameterBindings>"
+EXPERIMENT = r"<ssd:DefaultExperiment.*</ssd:DefaultExperiment>"
+ALGORITHM = r"<ssd:DefaultExperiment([^>]*)>.*</ssd:DefaultExperiment>"
+FROM_TRAJECTORY = r'<ssd:Connection startElement="trajectory".*?/>'
+TYPES = r"<ssc:(Real|Boolean|Integer)[^>]*/>"
 Edit = Callable[[bytes], bytes | None]  # None: the file is left out
 
 
@@ -38,6 +45,20 @@ def replace(old: str, new: str, count: int = 1) -> Edit:
         return content.replace(old.encode(), new.encode(), count)
 
     return edit
+
+
+def without(path: Path, *patterns: str, more: dict[str, Edit] | None = None) -> Path:
+    """Copy the closed loop without what matches `patterns`, and with `more` edits."""
+
+    def edit(content: bytes) -> bytes:
+        text = content.decode()
+        for pattern in patterns:
+            kept = r"<ssd:DefaultExperiment\1/>" if pattern == ALGORITHM else ""
+            text, count = re.subn(pattern, kept, text, flags=re.DOTALL)
+            assert count
+        return text.encode()
+
+    return edited(SSP, path, {"SystemStructure.ssd": edit} | (more or {}))
 
 
 def edited_fmu(edits: dict[str, Edit]) -> Edit:

@@ -130,7 +130,7 @@ def opened(path: Path) -> Iterator[ClosedLoop]:
         real = [
             c
             for c in system.connections
-            if system.component(c.start_component).connectors[c.start_connector].type == "Real"
+            if unpacked.variable(f"{c.start_component}.{c.start_connector}").type == "Real"
         ]
         loop = ClosedLoop(fmus, real, system.parameter_sets, system.stop)
         _check(path, loop)

@@ -262,7 +262,7 @@ const Plots = (() => {
       if (row === this.row) return;
       this.row = row;
       const { title, unit } = this.data.axis;
-      const text = `${title} ${shown(this.x[row], 12)}${unit ? ` ${unit}` : ''}`;
+      const text = `${title} ${shown(this.x[row], 15)}${unit ? ` ${unit}` : ''}`;
       this.bar.value = row;
       this.bar.setAttribute('aria-valuetext', text);
       this.output.textContent = text;

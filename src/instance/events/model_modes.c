@@ -85,6 +85,7 @@ static enum status update(struct instance *instance, const bool *triggered) {
         .triggered = triggered,
         .is_timed = is_timed(instance, triggered),
         .du = instance->du,
+        .du_is_known = !instance->is_integrated_outside,
         .tolerance = instance->tolerances,
         .max_events = instance->state.own.max_events,
         .reason = reason,
