@@ -14,10 +14,8 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 
-from tests.equations.compiled import BUILD, declaration, lock, read_text, runtime
+from tests.equations.compiled import BUILD, contents, declaration, lock, read_text, runtime
 from tests.equations.hybrid_models import Polynomial
-
-from building import contents  # isort: skip
 
 METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3, "taylor": 4}
 MASTER_STEP = 2e-3  # s, of Model Exchange
