@@ -9,15 +9,18 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 from building.contents import PLACES, build
 from building.runtime import Runtime
 from equations import declaration, lock
-from equations.model_file import ModelFileError, read
+from equations.model_file import ModelFile, ModelFileError, read
 from package import pack
 from program import WrongInputError
 
+# absolute tolerance of a state over its nominal value, at the default relative tolerance
+TOLERANCE = 1e-10
 MISTAKES = (ModelFileError, WrongInputError, OSError)
 
 
@@ -50,8 +53,21 @@ def main() -> int:
     except MISTAKES as error:
         print(f"{error!s:.2000}", file=sys.stderr)
         return 2
+    for warning in _warnings(file):
+        print(f"warning: {arguments.file}: {warning}", file=sys.stderr)
     print("\n".join(names))
     return 0
+
+
+def _warnings(file: ModelFile) -> Iterator[str]:
+    """Yield what is allowed, but will hardly be meant."""
+    for state in file.of("states"):
+        start, nominal = abs(state.start or 0.0), state.nominal or 1.0
+        if 0.0 < start < TOLERANCE * nominal:
+            yield (
+                f"[states]: {state.name}: starts at {state.start:g}, but its tolerance is "
+                f"{TOLERANCE * nominal:g}: a nominal value of its usual size makes it smaller"
+            )
 
 
 if __name__ == "__main__":

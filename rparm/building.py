@@ -69,6 +69,7 @@ def _made(file: Path, runtimes: list[Path], of_this_machine: bool, work: Path) -
     if ended.returncode:
         lines = ended.stderr.strip().splitlines() or [f"{tool} ended with {ended.returncode}"]
         raise UserError(one_line(lines[-1]))
+    sys.stderr.write(ended.stderr)  # warnings
     return ended.stdout.splitlines()
 
 

@@ -132,3 +132,14 @@ def test_the_message_of_a_check_arrives_as_it_is(folder: Path) -> None:
             with pytest.raises(UserError) as refused:
                 rparm.simulate(fmu, stop_time=1.0, step=0.1, start_values={"k": -60.0})
             assert str(refused.value).endswith(f"failed (error): {expected}")
+
+
+@pytest.mark.parametrize("nominal", ["", ", nominal = 1e-12"])
+def test_a_state_far_below_its_tolerance_is_a_warning(folder: Path, nominal: str) -> None:
+    text = f'name = "Tiny"\n[states]\nh = {{ start = 1e-12, derivative = "-h"{nominal} }}\n'
+    (folder / "tiny.toml").write_text(text, encoding="utf-8")
+    with started(folder, "build", "tiny.toml") as process:
+        _, error = process.communicate()
+    assert process.returncode == 0
+    warned = "warning: tiny.toml: [states]: h: starts at 1e-12, but its tolerance is 1e-10"
+    assert error.startswith(warned) if not nominal else not error
