@@ -136,10 +136,9 @@ class Events:
         motion = {x.leaf: x.value for x in states} | {graph.value("time"): graph.number(1.0)}
         motion |= {u.leaf: graph.value("first", name=u.name) for u in inputs}
         given = {("state", x.name): f"given->state_errors[{i}]" for i, x in enumerate(states)}
-        given |= {
-            leaf: f"given->relative * fabs({code.leaves[leaf]})"
-            for leaf in [("time", ""), *(("input", u.name) for u in inputs)]
-        }
+        given["time", ""] = "given->time * fabs(t)"
+        for u in inputs:
+            given["input", u.name] = f"given->inputs * fabs({code.leaves['input', u.name]})"
         errors = Errors(code, given)
         for k, relation in enumerate(self.relations):
             distance, used = relation.distance, self.used[relation.name]

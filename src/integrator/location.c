@@ -24,7 +24,7 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
     location->z = calloc(count, sizeof *location->z);
     location->has_row = calloc(count, sizeof *location->has_row);
     location->is_armed = calloc(count, sizeof *location->is_armed);
-    location->noise = calloc(2 * count, sizeof *location->noise);
+    location->noise = calloc(3 * count, sizeof *location->noise);
     location->triggered = calloc(count, sizeof *location->triggered);
     if (location->rows == NULL || location->step.indicator_row == NULL || location->used == NULL ||
         location->first == NULL || location->samples == NULL || location->x == NULL ||
@@ -34,6 +34,7 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
         return false;
     }
     location->touch = location->noise + count;
+    location->rounding = location->touch + count;
     location->dx = location->x + states;
     location->restart_x = location->dx + states;
     return true;
@@ -95,6 +96,7 @@ static enum status restart_model(struct location *location, const double x[]) {
         if (ode->rounding != NULL) {
             location->noise[i] = larger(location->first[i], DBL_MIN);
             location->touch[i] = 4.0 * location->first[i];
+            location->rounding[i] = location->noise[i];
             location->is_armed[i] = location->z[i] > location->noise[i];
         }
     }
@@ -312,8 +314,8 @@ static bool search_piece(struct location *location, const struct piece *piece, s
                          bool is_last_try) {
     double c[ROOTS_LENGTH] = {0};
     const double error = chebyshev_interpolate(piece->count, location->samples[i], c);
-    const double noise =
-        larger(representation * largest(location->samples[i], piece->count), location->noise[i]);
+    const double size = largest(location->samples[i], piece->count);
+    const double noise = larger(representation * size, location->rounding[i]);
     const bool is_exact = error <= noise;
     const int degree = piece->count - 1;
     if (!is_exact && !is_last_try) {

@@ -37,6 +37,7 @@ struct location {
     double *noise;            /* by indicator of a state: one that is 0 at the restart
                                  may have either sign as long as it is within this */
     double *touch;            /* by indicator, as in struct fall */
+    double *rounding;         /* by indicator, at the restart; 0: not known */
     bool *triggered;          /* by indicator: it is at 0 at `time` */
     struct step_polynomial step;         /* the last one; methods write it */
     double (*rows)[SERIES_LENGTH];       /* by state: room for its rows */

@@ -15,7 +15,7 @@ static const ARKODE_ERKTableID table = ARKODE_DORMAND_PRINCE_7_4_5;
 static const int order = 5;
 
 /* Of the time of an event. */
-enum { MOST_CORRECTIONS = 60 };
+enum { MOST_CORRECTIONS = 20, MOST_DIVISIONS = 40 };
 
 /* s: ARKODE multiplies lengths of steps with each other, and with one that it keeps over a restart.
  * Where that underflows, what it does would depend on the step before. */
@@ -291,10 +291,13 @@ static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
     struct location *location = &erk->base.problem->location;
     double low = erk->step_begin;
     double high = erk->watched;
-    bool is_below = false; // at `high`
+    const double slack = 0x1p-30 * (high - low); // far more than rounding
+    bool is_below = false;                       // at `high`
     double t = location->time;
     int flag = ERKStepSetPostprocessStepFn(erk->solver, NULL);
-    for (int i = 0; flag >= 0 && i < MOST_CORRECTIONS; i++) {
+    int corrections = 0;
+    int divisions = 0;
+    while (flag >= 0 && corrections < MOST_CORRECTIONS && divisions < MOST_DIVISIONS) {
         flag = step_to(erk, t, x);
         double z = 0.0;
         double correction = 0.0;
@@ -314,7 +317,13 @@ static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
         if (fabs(next - t) <= 2.0 * DBL_EPSILON * erk->watched) {
             break;
         }
-        t = next > low && next <= high ? next : 0.5 * (low + high);
+        if (next > low - slack && next <= high + slack) {
+            t = next;
+            corrections++;
+        } else {
+            t = 0.5 * (low + high);
+            divisions++;
+        }
     }
     location->time = t;
     *stopped_at = t;

@@ -17,6 +17,7 @@ struct call {
     int *is_begun, *holds, *active; /* its modes */
     double t;                       /* s */
     const double *du;               /* derivative of each input by the time */
+    bool inputs_move;
 };
 
 static const int *modes_in(const struct relations *model, const void *values) {
@@ -27,13 +28,19 @@ static struct call call_of(const struct relations *model, struct relations_room 
                            double t, const double du[]) {
     int *modes = (int *)(void *)((char *)values + model->modes.offset);
     int *holds = modes + 1;
-    return (struct call){model, room, values, modes, holds, holds + model->relation_count, t, du};
+    bool inputs_move = false;
+    for (int i = 0; i < model->input_count; i++) {
+        inputs_move |= du[i] != 0.0;
+    }
+    return (struct call){model, room, values,     modes, holds, holds + model->relation_count,
+                         t,     du,   inputs_move};
 }
 
 /* state_errors: of each state where it may have been located, in its unit. */
 static void compare(const struct call *call, const double state_errors[],
                     struct compared compared[]) {
-    const struct given given = {state_errors, time_error, call->du};
+    const double inputs = call->inputs_move ? time_error : 0.0; // those that are set are exact
+    const struct given given = {state_errors, time_error, inputs, call->du};
     call->model->compare(call->values, call->t, &given, compared);
 }
 
@@ -232,7 +239,7 @@ enum status relations_update(const struct relations *model, struct relations_roo
 
 void relations_errors(const struct relations *model, struct relations_room room, const void *values,
                       double t, const double state_errors[], double relative, double errors[]) {
-    const struct given given = {state_errors, relative, room.zeros};
+    const struct given given = {state_errors, relative, relative, room.zeros};
     model->compare(values, t, &given, room.compared);
     for (int k = 0; k < model->relation_count; k++) {
         if (!model->relation[k].is_timed) {

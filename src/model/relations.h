@@ -29,7 +29,8 @@ struct compared {
 /* Errors of the values that distances follow from, and how inputs move. */
 struct given {
     const double *state_errors; /* of each state, in its unit */
-    double relative;            /* error of the time and of inputs */
+    double time;                /* relative error of the time */
+    double inputs;              /* and of all inputs */
     const double *du;           /* derivative of each input by the time */
 };
 
@@ -39,7 +40,7 @@ struct relations {
      * due; further modes of the model */
     struct range modes;
     size_t states; /* offset of the states */
-    int relation_count, event_count, state_count;
+    int relation_count, event_count, state_count, input_count;
     bool has_inputs; /* some relation follows from inputs and parameters only */
     const struct relation *relation;
     const double *nominal; /* of each state */
