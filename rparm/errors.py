@@ -47,11 +47,11 @@ def closest(name: str, known: Iterable[str]) -> str:
     """The one of `known` that `name` may be meant for, or nothing."""
     known = list(known)
     close = difflib.get_close_matches(name, known, n=1)
+    if not close and len(name) >= SHORTEST_PART:
+        close = [other for other in known if name.lower() in other.lower()]
     if not close:
         plain = {_plain(other): other for other in reversed(known)}
         close = [plain[found] for found in difflib.get_close_matches(_plain(name), plain, n=1)]
-    if not close and len(name) >= SHORTEST_PART:
-        close = [other for other in known if name.lower() in other.lower()]
     return close[0] if close else ""
 
 

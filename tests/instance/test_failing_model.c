@@ -110,7 +110,7 @@ static void test_derivatives_fail_with_any_propagation(void) {
 static void test_a_derivative_that_is_not_finite_is_not_given(void) {
     is_infinite = true;
     assert_fails(derive_energy, "energy at t = 0.1");
-    assert_fails(derive_energy_by_x, "energy at t = 0.1");
+    assert_fails(derive_energy_by_x, "energy by x at t = 0.1");
     is_infinite = false;
     assert_works(derive_energy);
     assert_works(derive_energy_by_x);
