@@ -202,7 +202,7 @@ def _grid(model: Linear, found: Margins | None = None) -> np.ndarray:
 
 
 def _below(grid: np.ndarray, model: Linear, step: float) -> np.ndarray:
-    """Frequencies below half of that of the samples, dense where sampled poles are."""
+    """Frequencies below half the sampling rate, dense where sampled poles are."""
     z = eigenvalues(hold(model.A, model.B, step)[0])
     own = frequencies(np.log(z[z != 0]) / step, (), 0.0)
     every = np.union1d(grid, own)

@@ -16,7 +16,7 @@ NAMED = 5  # failed things in the last line
 
 
 def width() -> int:
-    """Columns to fill: those of the terminal, within limits."""
+    """Columns to fill: as many as the terminal has, within limits."""
     return max(min(WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns), LEAST)
 
 

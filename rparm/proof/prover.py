@@ -305,7 +305,7 @@ def is_nearest(values: np.ndarray, enclosure: Enclosure, rows: np.ndarray) -> np
 
 
 def distances(values: np.ndarray, enclosure: Enclosure, rows: np.ndarray) -> np.ndarray:
-    """Bounds of |value - exact value|, shape (rows, names); arguments as those of `is_nearest`."""
+    """Bounds of |value - exact value|, shape (rows, names); arguments as in `is_nearest`."""
     # the factor covers the roundings of these operations, far fewer than 30 of 2^-53 each
     beside = np.abs((values - enclosure.high[rows]) - enclosure.low[rows])
     return (beside + enclosure.radius[rows]) * (1 + 2.0**-48)

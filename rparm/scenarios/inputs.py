@@ -161,7 +161,7 @@ class InputReader:
     # ---- Logs ------------------------------------------------------------------------------------
 
     def _logged(self, table: dict[str, Any], where: str, variable: Variable) -> Logged:
-        """A column of a log, whose times are those of the run unless `begin` says otherwise."""
+        """A column of a log, whose times are the run's unless `begin` says otherwise."""
         reader = self._reader
         file = reader.text(table[FILE], f"{where} {FILE}")
         column = reader.text(table.get("column", variable.name), f"{where} column")

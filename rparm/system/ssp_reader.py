@@ -156,7 +156,7 @@ class SspReader:
     ) -> tuple[float, float, float]:
         """Start, stop and communication step in s.
 
-        Where the SSP does not say them, those of the FMUs: the largest stop and the smallest step.
+        Where the SSP does not say them, the FMUs do: the largest stop and the smallest step.
         """
         node = root.find("ssd:DefaultExperiment", NAMESPACES)
         given = {} if node is None else node.attrib

@@ -16,8 +16,8 @@ class Connector:
 
     name: str
     kind: str  # input, output, parameter or calculatedParameter
-    type: str | None  # Real, Integer, Boolean, String or Enumeration; None: that of the variable
-    unit: str | None  # None: that of the variable
+    type: str | None  # Real, Integer, Boolean, String or Enumeration; None: the variable's
+    unit: str | None  # None: the variable's
 
 
 @dataclass(frozen=True)

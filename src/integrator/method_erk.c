@@ -285,7 +285,7 @@ static int step_to(struct erk *erk, double t, double x[]) {
 }
 
 /* The polynomial of the search is less accurate than the step: Newton's method leads from its root
- * to that of the steps which end there. The indicator may be 0 where the step begins, too: a
+ * to the root of the steps which end there. The indicator may be 0 where the step begins, too: a
  * correction that leads out of where the fall must be divides this part in two. */
 static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
     struct location *location = &erk->base.problem->location;

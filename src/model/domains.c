@@ -26,8 +26,8 @@ static void complete(double value[], const double other[], size_t count) {
     }
 }
 
-/* Lets the modes of room.values follow from its states and inputs; false: they are those of
- * `values`. A relation that is not defined keeps its mode. */
+/* Lets the modes of room.values follow from its states and inputs; false: `values` has the same. A
+ * relation that is not defined keeps its mode. */
 static bool follow(const struct domains *model, struct domains_room room, const void *values,
                    double t) {
     int *holds = modes_in(model, room.values);
@@ -76,8 +76,8 @@ enum status domains_jacobian(const struct domains *model, struct domains_room ro
                                                    : STATUS_OK;
 }
 
-/* Replaces indicators that are not finite by `other`, which are those of room.values: their signs
- * are those of the modes in values. */
+/* Replaces indicators that are not finite by the ones of room.values, `other`, with signs for the
+ * modes in values. */
 static void complete_indicators(const struct domains *model, struct domains_room room,
                                 const void *values, double z[], const double other[]) {
     for (int k = 0; k < model->relation_count; k++) {
@@ -139,7 +139,7 @@ enum status domains_propagate(const struct domains *model, struct domains_room r
     return status;
 }
 
-/* Indicators that change their signs with the modes keep those of `values`. */
+/* Indicators that change their signs with the modes keep the signs of `values`. */
 static void keep_signs(const struct domains *model, struct domains_room room, const void *values,
                        int first, int last, double row[][SERIES_LENGTH]) {
     for (int k = 0; k < model->relation_count; k++) {

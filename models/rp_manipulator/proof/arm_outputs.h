@@ -1,4 +1,4 @@
-/* The arm's outputs, in balls that follow from those of its states. */
+/* The arm's outputs, in balls, from the balls of its states. */
 #ifndef ARM_OUTPUTS_H
 #define ARM_OUTPUTS_H
 

@@ -103,7 +103,7 @@ class Checker:
     def series(
         self, index: int, within: arb, elapsed: arb, length: arb, last: int
     ) -> list[list[arb]]:
-        """Series of both efforts in a communication step: arguments are those of effort_series."""
+        """Series of both efforts in a communication step; arguments as in effort_series."""
         of_sines = [[s[1:] for s in self.problem.sines if s[0] == i] for i in range(2)]
         return [
             effort_series(u, sines, within, elapsed, length, last)

@@ -52,7 +52,7 @@ def coefficients(
 def outputs(states: Sequence[arb], parameters: Sequence[arb], efforts: Sequence[arb]) -> list[arb]:
     """Outputs besides the states, in the order of proof.toml.
 
-    The operations are those of arm_outputs.h: intervals are no wider than there.
+    The operations are the same as in arm_outputs.h: intervals are no wider than there.
     """
     q1, q2, w, v = states
     m1, m2, I1z, I2z, l1, lc1, a, g = parameters
