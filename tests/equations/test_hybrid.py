@@ -23,7 +23,7 @@ from tests.equations.hybrid_runs import (
     model_exchange,
 )
 
-COUNT = int(os.environ.get("HYBRID_MODELS", "30"))
+COUNT = int(os.environ.get("HYBRID_MODELS", "15"))
 G = 9.81
 EACH_METHOD = pytest.mark.parametrize("method", METHODS)
 
