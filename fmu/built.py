@@ -40,8 +40,12 @@ def collect(build: Path) -> dict[str, bytes]:
     versions = content["versions"].values()
     entries = [*(version["sources"] for version in versions), *content["sources"]]
     sources = SourceFolder({name: Path(folder) for name, folder in roots.items()})
-    for library in manifest(entries, roots, build).libraries:
+    libraries = manifest(entries, roots, build).libraries
+    for library in libraries:
         sources.add_library(library)
+    # some are for generated models only
+    for header in sorted(Path(roots["project"], "src", "model").glob("*.h")):
+        sources.add_header(header, libraries[-1])
     objects = [path for version in versions for path in version["objects"]]
     files = [*sources.origins.values(), *objects, *content["libraries"]]
     files += [*content["licenses"].values(), *build.glob("proof/*/prove*")]
