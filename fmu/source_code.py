@@ -34,8 +34,9 @@ RENAMES = "generated/elementary_functions.h"
 
 # nothing that they define is used; the first two are not on every system
 NOT_NEEDED = {"endian.h", "features.h", "sunmatrix/sunmatrix_sparse.h"}
-# every importer has them, and an FMU must not (FMI 3.0, section 2.5)
+# every importer has them, and an FMU does without (FMI 2.0, section 2.3; FMI 3.0, section 2.5)
 OF_IMPORTERS = {"fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"}
+OF_IMPORTERS |= {"fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"}
 # behind conditions that never hold: options of SUNDIALS, and C++
 NOT_REACHED = {"caliper/cali.h", "mpi.h", "sundials/sundials_context.hpp"}
 

@@ -145,7 +145,7 @@ def test_new_writes_one(scenario: Path, capsys: pytest.CaptureFixture[str]) -> N
     path = scenario.parent / "new.toml"
     assert call(capsys, "new", path, "--model", fmu_of(scenario))[0] == 0
     assert 'fmu = "../dahlquist/Dahlquist.fmu"' in path.read_text(encoding="utf-8")
-    assert rparm.Scenario(path).run()["x"][-1] == pytest.approx(np.exp(-2.0), rel=1e-6)
+    assert rparm.Scenario(path).run()["x"][-1] == pytest.approx(np.exp(-10.0), rel=1e-6)
 
 
 def test_it_is_linearized_and_identified(

@@ -151,7 +151,7 @@ def test_fmpy_compiles_an_fmu_of_fmi_3(fmu: Path, tmp_path: Path) -> None:
 
 @dataclass(frozen=True)
 class Build:
-    """All C files of an FMU, each compiled by itself, and linked; nothing else is given."""
+    """All C files of an FMU, each compiled by itself with the headers of FMI, and linked."""
 
     fmu: str
     compiler: str
@@ -179,7 +179,7 @@ def compiled(compiler: str, options: tuple[str, ...], files: list[Path], folder:
     """Compile files to objects in the folder, in two processes."""
     if not shutil.which(compiler):
         missing(f"{compiler} is not installed: ./setup.sh --platforms installs it")
-    command = [compiler, *options, "-c"]
+    command = [compiler, *options, f"-I{Path(fmpy.__file__).parent / 'c-code'}", "-c"]
     with ThreadPoolExecutor(2) as executor:
         halves = [executor.submit(run, *command, *files[i::2], folder=folder) for i in (0, 1)]
         for half in halves:

@@ -153,7 +153,7 @@ def test_the_plant_slides_strikes_and_is_held(native: Runner, name: str) -> None
     """Events with every method, in modes of all kinds."""
     model = native.model
     names = [v.name for v in model.variables if v.kind in {"Integer", "Enumeration"}]
-    ends = []
+    ends, held = [], set()
     for variant in (1, 2, 3):
         answers = answers_of(native, scripts.co_simulation(model, variant))
         numbers = [
@@ -162,7 +162,9 @@ def test_the_plant_slides_strikes_and_is_held(native: Runner, name: str) -> None
             if a.call.startswith("GetInteger 0")
         ]
         points = rows(model, answers, 0)
-        assert {0, 1, -1} == {n["mode1"] for n in numbers} == {n["mode2"] for n in numbers}
+        modes = [{n[f"mode{joint}"] for n in numbers} for joint in (1, 2)]
+        assert all({1, -1} <= found <= {0, 1, -1} for found in modes)
+        held |= {0} & (modes[0] | modes[1])
         assert numbers[-1]["event_count"] > 20 and points[-1]["impact_loss"] > 0.0
         assert (points[-1]["grasp_loss"] > 0.0) == (variant > 1)  # at rest
         attached = [a.words for a in answers if a.call.startswith("GetBoolean 0")]
@@ -171,7 +173,7 @@ def test_the_plant_slides_strikes_and_is_held(native: Runner, name: str) -> None
             is_compliant = scripts.CHANGED[name][f"stops{joint}"][variant - 1] == 3
             assert not is_compliant or any(point[f"stop_force{joint}"] for point in points)
         ends.append(points[-1]["last_event_time"])
-    assert len(set(ends)) == 3 and min(ends) > 1.0
+    assert held and len(set(ends)) == 3 and min(ends) > 1.0
 
 
 # ---- Rollback ------------------------------------------------------------------------------------
