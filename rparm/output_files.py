@@ -73,12 +73,9 @@ def copied(file: Path, path: Path) -> Path:
 
 
 def check_for_windows(name: str) -> None:
-    """Refuse the name of a file that Windows cannot have, so that the file can go there."""
+    """Refuse the name of a device of Windows, which no file there can have."""
     if name.partition(".")[0].rstrip().upper() in DEVICES:
         raise UserError(f"{name!r}: Windows keeps this name for a device, choose another one")
-    wrong = next((character for character in name if character in '<>:"|?*'), "")
-    if wrong:
-        raise UserError(f"{name!r}: no file of Windows has {wrong} in its name, choose another one")
 
 
 def check_writable(folder: Path) -> None:

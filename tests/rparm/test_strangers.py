@@ -41,7 +41,6 @@ REFUSED = {
     "device": (["new", "Con.toml"], "'Con.toml': Windows keeps this name for a device"),
     "device of a model": (["new-model", "lpt1"], "'lpt1': Windows keeps this name for a device"),
     "superscript": (["new", "com\xb2"], "Windows keeps this name for a device"),
-    "character": (["new", "what?"], "no file of Windows has ? in its name"),
 }
 
 
