@@ -487,8 +487,8 @@ bool location_correction(struct location *location, double t, const double x[], 
     // over so small a part of the step the derivative of an indicator hardly changes; the part is
     // longer where the difference is lost in rounding
     double z_ahead = *z;
-    for (double part = 0x1p-20; z_ahead == *z && part <= 0x1p-8; part *= 0x1p4) {
-        const double ahead = part * (location->step.end - location->step.begin);
+    double ahead = 0x1p-20 * (location->step.end - location->step.begin);
+    for (int tries = 0; z_ahead == *z && tries < 4; tries++) {
         for (size_t j = 0; j < location->ode->state_count; j++) {
             location->x[j] = x[j] + ahead * dx[j];
         }
@@ -496,6 +496,7 @@ bool location_correction(struct location *location, double t, const double x[], 
             return false;
         }
         *correction = -*z * ahead / (z_ahead - *z);
+        ahead *= 0x1p4;
     }
     return isfinite(*correction);
 }

@@ -131,6 +131,10 @@ def compiler_of(row: Platform) -> list[str]:
     raise Missing(f"zig or {row.compiler}, for the host of {row.name}: ./setup.sh --platforms")
 
 
+def headers_of_fmi() -> str:
+    return str(Path(importlib.util.find_spec("fmpy").origin).parent / "c-code")
+
+
 @functools.cache
 def host_of(row: Platform) -> Path:
     """The host for a platform, compiled if it is older than its sources."""
@@ -141,10 +145,8 @@ def host_of(row: Platform) -> Path:
     if host.is_file() and host.stat().st_mtime > changed:
         return host
     host.parent.mkdir(parents=True, exist_ok=True)
-    fmpy = importlib.util.find_spec("fmpy")
-    headers = Path(fmpy.origin).parent / "c-code"
     # -O3 and -s as for the release: zig has the C library for these options
-    command += ["-std=c17", "-O3", "-s", "-isystem", str(headers), "-o", str(host)]
+    command += ["-std=c17", "-O3", "-s", "-isystem", headers_of_fmi(), "-o", str(host)]
     command += ["-I", str(ROOT / "fmu" / "fmi2")]  # fmi2_functions.h
     command += [str(sources / name) for name in HOST_SOURCES]
     if row.system == "Linux":
@@ -211,7 +213,8 @@ class Runner:
     def recompile(self) -> None:
         """Replace the library by one that the row's gcc makes of the sources in the release.
 
-        As a foreign build does it: every file by itself, with no options but -fPIC on Linux.
+        As a foreign build does it: every file by itself, with no options but the folder of FMI's
+        headers, and -fPIC on Linux.
         """
         row = self.row
         assert row is not None
@@ -223,7 +226,7 @@ class Runner:
         sources = self.folder / "sources"
         files = sorted(path.name for path in sources.glob("*.c"))
         position = [] if row.system == "Windows" else ["-fPIC"]
-        finish([row.compiler, *position, "-c", *files], sources)
+        finish([row.compiler, *position, f"-I{headers_of_fmi()}", "-c", *files], sources)
         objects = [path.name for path in sorted(sources.glob("*.o"))]
         (self.folder / self.library).unlink()
         finish([row.compiler, "-shared", "-o", f"../{self.library}", *objects], sources)

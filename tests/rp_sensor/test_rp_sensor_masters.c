@@ -129,8 +129,10 @@ static int run(const struct grid *grid, int count) {
             (void)snprintf(text + strlen(text), sizeof text - strlen(text), ": step %d", i);
             TEST_FAIL_MESSAGE(text);
         }
-        sampled = counted > ticks ? i : sampled;
-        ticks = counted;
+        if (counted > ticks) {
+            sampled = i;
+            ticks = counted;
+        }
         TEST_ASSERT_EQUAL_INT_MESSAGE(sampled, (int)get(RP_SENSOR_q1_measured), text);
         t = next;
     }
