@@ -8,8 +8,8 @@
 
 /* Times in s since the last restart. */
 struct problem {
-    struct ode ode;
     struct message_sink sink;
+    struct ode ode;
     struct integrator_settings settings;
     double origin;            /* time of the simulation at the restart, s: for messages only */
     double horizon;           /* the right-hand side is not evaluated beyond */

@@ -32,12 +32,15 @@ def test_a_step_touches_few_lines_of_an_instance(tmp_path: Path) -> None:
         [*command, PROGRAM, LIBRARY, str(TAYLOR)], capture_output=True, text=True, check=True
     )
     mark, begin, end = (int(address, 16) for address in done.stdout.split())
-    lines = {
-        byte // LINE
+    touched = [
+        byte
         for address, size in accesses(trace, mark)
         if begin <= address < end
         for byte in range(address, address + size)
-    }
-    print(f"{len(lines)} lines")
+    ]
+    # where lines begin depends on what was allocated before, such as paths
+    shifts = range(0, LINE, 16)
+    lines = max(len({(byte + shift) // LINE for byte in touched}) for shift in shifts)
+    print(f"{lines} lines")
     # its four states, their inputs and its time alone are in three
-    assert 3 < len(lines) <= MOST // LINE
+    assert 3 < lines <= MOST // LINE

@@ -53,12 +53,6 @@ struct instance_state {
 
 /* Parts of one block of memory, of which a snapshot is a copy, in this order. */
 struct instance_memory {
-    char *block;
-    size_t size; /* bytes */
-    /* Of the block: what a step writes, but the first two and what is calculated from the rest. */
-    struct range written_at_restart; /* active_inputs to restart_values */
-    struct range written;            /* of values */
-
     struct polynomial *next_inputs; /* inputs of the next step: last value set, and derivatives */
     struct polynomial *current_inputs; /* inputs at the current time */
     struct polynomial *active_inputs;  /* inputs since the last restart */
@@ -67,6 +61,12 @@ struct instance_memory {
                              with */
     char *values;         /* the model's value structure, as set and read from outside; its
                              inputs are those at the current time */
+
+    char *block;
+    size_t size; /* bytes */
+    /* Of the block: what a step writes, but the first two and what is calculated from the rest. */
+    struct range written_at_restart; /* active_inputs to restart_values */
+    struct range written;            /* of values */
 };
 
 /* Of each value reference. */
@@ -82,7 +82,6 @@ struct instance {
     const struct model_description *description;
     const struct model *model;
     struct instance_state state;
-    struct instance_memory memory;
 
     struct instance_real *reals; /* by value reference */
 
@@ -101,6 +100,7 @@ struct instance {
     struct integrator *integrator;               /* NULL: the model has no states */
     struct integrator_settings configured; /* what the integrator was configured with, without the
                                               tolerances of the states */
+    struct instance_memory memory;
 
     struct message_sink sink;
     struct ode ode;
