@@ -60,3 +60,14 @@ enum component_status continuous_get_indicators(struct component *component, uns
         component,
         instance_get_real(component->instance, model_description.indicators, count, indicators));
 }
+
+enum component_status continuous_complete_step(struct component *component, unsigned call,
+                                               const void *enters, const void *terminates,
+                                               bool *is_event) {
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, 1, enters, terminates)) {
+        return COMPONENT_ERROR;
+    }
+    *is_event = instance_complete_step(component->instance);
+    return COMPONENT_OK;
+}

@@ -20,4 +20,10 @@ enum component_status continuous_get_nominals(struct component *component, unsig
 enum component_status continuous_get_indicators(struct component *component, unsigned call,
                                                 double indicators[], size_t count);
 
+/* Ends a step of the integrator; enters, terminates: where the caller's answers go. Writes whether
+ * event mode is needed. */
+enum component_status continuous_complete_step(struct component *component, unsigned call,
+                                               const void *enters, const void *terminates,
+                                               bool *is_event);
+
 #endif

@@ -40,15 +40,15 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
                                        fmi2Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi2Boolean *enterEventMode,
                                        fmi2Boolean *terminateSimulation) {
-    const enum fmi2_call call = CALL_fmi2CompletedIntegratorStep;
-    struct component *component = c;
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, 1, enterEventMode, terminateSimulation)) {
-        return fmi2Error;
+    bool is_event = false;
+    const enum component_status status =
+        continuous_complete_step(c, CALL_fmi2CompletedIntegratorStep, enterEventMode,
+                                 terminateSimulation, &is_event);
+    if (status == COMPONENT_OK) {
+        *enterEventMode = is_event;
+        *terminateSimulation = fmi2False;
     }
-    *enterEventMode = fmi2False;
-    *terminateSimulation = fmi2False;
-    return fmi2OK;
+    return fmi2_status(status);
 }
 
 /* ---- Time and states ------------------------------------------------------------------------ */

@@ -15,15 +15,15 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance,
                                        fmi3Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi3Boolean *enterEventMode,
                                        fmi3Boolean *terminateSimulation) {
-    const enum fmi3_call call = CALL_fmi3CompletedIntegratorStep;
-    struct component *component = instance;
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, 1, enterEventMode, terminateSimulation)) {
-        return fmi3Error;
+    bool is_event = false;
+    const enum component_status status =
+        continuous_complete_step(instance, CALL_fmi3CompletedIntegratorStep, enterEventMode,
+                                 terminateSimulation, &is_event);
+    if (status == COMPONENT_OK) {
+        *enterEventMode = is_event;
+        *terminateSimulation = fmi3False;
     }
-    *enterEventMode = fmi3False;
-    *terminateSimulation = fmi3False;
-    return fmi3OK;
+    return fmi3_status(status);
 }
 
 /* ---- Time and states ------------------------------------------------------------------------ */

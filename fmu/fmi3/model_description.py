@@ -57,7 +57,7 @@ def add_interfaces(root: ET.Element, identifier: str, *, has_events: bool) -> No
         "providesDirectionalDerivatives": "true",
         "providesAdjointDerivatives": "true",
     }
-    ET.SubElement(root, "ModelExchange", shared)
+    model_exchange = ET.SubElement(root, "ModelExchange", shared)
     co_simulation = ET.SubElement(
         root,
         "CoSimulation",
@@ -69,6 +69,7 @@ def add_interfaces(root: ET.Element, identifier: str, *, has_events: bool) -> No
         hasEventMode="true",
     )
     if has_events:
+        model_exchange.set("needsCompletedIntegratorStep", "true")
         co_simulation.set("mightReturnEarlyFromDoStep", "true")
 
 

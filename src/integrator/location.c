@@ -397,8 +397,8 @@ void location_check_rows(struct location *location, const double x[], double rel
 /* Roots of several indicators within this part of a step are one event. */
 static const double same_time = 4.0 * 0x1p-52;
 
-/* Writes where each indicator falls first, at least of those that do so first, and that place. */
-static enum status search(struct location *location, double *place) {
+enum status location_search(struct location *location) {
+    const struct step_polynomial *step = &location->step;
     bool needs_model = false;
     double s = INFINITY; // of the first event so far: none behind it is located
     for (size_t k = 0; k < location->used_count; k++) {
@@ -413,24 +413,18 @@ static enum status search(struct location *location, double *place) {
         s = location->first[i] < s ? location->first[i] : s;
         needs_model |= indicator->kind == INDICATOR_OF_MODEL && !location->has_row[i];
     }
-    const enum status status = needs_model ? search_model_in(location, 0.0, 1.0, 0) : STATUS_OK;
-    if (status != STATUS_OK) {
-        return status;
+    if (needs_model) {
+        const enum status status = search_model_in(location, 0.0, 1.0, 0);
+        if (status != STATUS_OK) {
+            return status;
+        }
+        for (size_t k = 0; k < location->used_count; k++) {
+            const double first = location->first[location->used[k]];
+            s = first < s ? first : s;
+        }
     }
-    for (size_t k = 0; needs_model && k < location->used_count; k++) {
-        const double first = location->first[location->used[k]];
-        s = first < s ? first : s;
-    }
-    *place = s;
-    return STATUS_OK;
-}
-
-enum status location_search(struct location *location) {
-    const struct step_polynomial *step = &location->step;
-    double s;
-    const enum status status = search(location, &s);
-    if (status != STATUS_OK || !(s <= 1.0)) {
-        return status;
+    if (!(s <= 1.0)) {
+        return STATUS_OK;
     }
     memset(location->triggered, 0, location->ode->indicator_count * sizeof *location->triggered);
     for (size_t k = 0; k < location->used_count; k++) {

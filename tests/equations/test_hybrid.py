@@ -160,10 +160,19 @@ def test_impacts_without_end_do_not_let_it_fall_through(
     stays_above(run)
 
 
-def test_impacts_without_end_in_model_exchange(unit: Callable) -> None:
-    """The ball is put back: flights too low for the outside integrator begin on the limit."""
-    losing = unit(ball(1.0, reinit='h = "0", v = "-0.5 * v"'))
-    stays_above(model_exchange(losing, 1e-8, 0.01, 200, {}))
+@pytest.mark.parametrize(
+    ("reinit", "restitution"), [("", 0.2), ("", 0.5), *(('h = "0", ', e) for e in (0.2, 0.5, 0.8))]
+)
+def test_impacts_without_end_in_model_exchange(
+    unit: Callable, reinit: str, restitution: float
+) -> None:
+    """They end in an error where flights become too low for the importer, or stay on the floor."""
+    losing = unit(ball(1.0, reinit=f'{reinit}v = "-{restitution} * v"'))
+    run = model_exchange(losing, 1e-8, 0.01, 420, {})
+    total = np.sqrt(2 / G) * (1 + restitution) / (1 - restitution)
+    assert min(x[0] for x in run.x) > -1e-4
+    assert run.times[-1] > total - 0.04
+    assert run.failure
 
 
 def stays_above(run: Run) -> None:

@@ -8,6 +8,7 @@ import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
+import fmpy
 import pytest
 
 from tests.support.missing import missing
@@ -50,6 +51,7 @@ def counting(tmp_path_factory: pytest.TempPathFactory) -> Path:
         opened.extractall(folder, names)
     library = folder / "RPPlant.so"
     options = ["-O3", "-ffp-contract=off", "-fPIC", "-shared", "-w", "-fsanitize-coverage=trace-pc"]
+    options.append(f"-I{Path(fmpy.__file__).parent / 'c-code'}")
     output("gcc", *options, "-o", library, *sorted((folder / "sources").glob("*.c")), "-lm")
     return library
 

@@ -144,6 +144,13 @@ void instance_forget_unhandled(struct instance *instance) {
     instance->state.event_point = NO_EVENT;
 }
 
+bool instance_has_missed_event(struct instance *instance) {
+    bool is_any = false;
+    return instance->model->events != NULL && instance->model->events->errors != NULL &&
+           can_fire(instance) &&
+           find_triggered(instance, instance->triggered, &is_any) == STATUS_OK && is_any;
+}
+
 /* Takes forces out of triggered that are not below 0 with the values set now. */
 static enum status forget_past_forces(struct instance *instance, bool triggered[]) {
     if (!can_fire(instance)) {
@@ -156,6 +163,59 @@ static enum status forget_past_forces(struct instance *instance, bool triggered[
     for (size_t i = 0; i < instance->model->events->indicator_count; i++) {
         triggered[i] = triggered[i] &&
                        (instance->indicators[i].kind != INDICATOR_OF_MODEL || instance->z[i] < 0.0);
+    }
+    return STATUS_OK;
+}
+
+/* z: an indicator at three times in equal distances. It moves to 0 and turns before it comes there.
+ */
+static bool turns_before_zero(double z, double ahead, double far_ahead) {
+    const double side = z < 0.0 ? -1.0 : 1.0;
+    const double slope = side * (ahead - z);
+    const double bend = side * (far_ahead - 2.0 * ahead + z);
+    return slope < 0.0 && bend > 0.0 && side * z - slope * slope / (2.0 * bend) >= 0.0;
+}
+
+/* Writes all indicators along the motion that begins now, after no, one and two slope_time. */
+static enum status look_ahead(struct instance *instance) {
+    const struct model *model = instance->model;
+    const size_t count = model->events->indicator_count;
+    const double *u = doubles_of(instance->memory.values, model->inputs);
+    double *x = doubles_of(instance->first_derivatives, model->states);
+    double *dx = doubles_of(instance->second_derivatives, model->derivatives);
+    memcpy(x, instance->memory.values + model->states.offset, model->states.size);
+    enum status status = STATUS_OK;
+    for (size_t k = 0; k < 3 && status == STATUS_OK; k++) {
+        const double t = instance->state.time.s + (double)k * slope_time;
+        status = evaluate(instance, t, x, instance->z + k * count);
+        if (status == STATUS_OK) {
+            status = model->right_hand_side(instance->memory.values, t, x, u, dx);
+        }
+        for (size_t i = 0; i < count_of(model->states); i++) {
+            x[i] += slope_time * dx[i];
+        }
+    }
+    return status;
+}
+
+/* Where impacts follow each other ever faster, an event that leaves the state beyond its limit is
+ * followed by a flight that ends before it. No further event would come. */
+static enum status refuse_unseen_events(struct instance *instance, const bool triggered[]) {
+    const size_t count = instance->model->events->indicator_count;
+    if (instance->model->events->errors == NULL || look_ahead(instance) != STATUS_OK) {
+        return STATUS_OK;
+    }
+    const double *z = instance->z;
+    for (size_t i = 0; i < count; i++) {
+        if (triggered[i] && instance->indicators[i].kind != INDICATOR_UNUSED &&
+            turns_before_zero(z[i], z[count + i], z[2 * count + i])) {
+            message_write(&instance->sink, STATUS_INTERNAL,
+                          "at t = %.17g: events at which %s falls to 0 follow each other faster "
+                          "than they can be seen from outside: let a mode rest, or set the states "
+                          "onto the limit",
+                          instance->state.time.s, instance->model->events->indicator_names[i]);
+            return STATUS_INTERNAL;
+        }
     }
     return STATUS_OK;
 }
@@ -189,5 +249,5 @@ enum status instance_update_at_point(struct instance *instance, bool *states_cha
         status = instance_update_modes(instance, is_any ? triggered : NULL);
     }
     *states_changed = memcmp(before, instance->memory.values + states.offset, states.size) != 0;
-    return status;
+    return status == STATUS_OK && is_any ? refuse_unseen_events(instance, triggered) : status;
 }

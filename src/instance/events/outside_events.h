@@ -13,6 +13,10 @@ NONNULL void instance_add_bands(struct instance *instance);
  * before the update, cause no event. */
 NONNULL void instance_note_unhandled(struct instance *instance);
 
+/* At the end of a step outside: an event of a generated model has come, which the integrator cannot
+ * see where the step began and ends below 0. */
+MUST_CHECK NONNULL bool instance_has_missed_event(struct instance *instance);
+
 NONNULL void instance_forget_unhandled(struct instance *instance);
 
 /* As instance_update_modes, for the noted event or a time event at the present time.

@@ -26,6 +26,10 @@ void instance_enter_event_mode(struct instance *instance) {
     }
 }
 
+bool instance_complete_step(struct instance *instance) {
+    return instance_has_missed_event(instance);
+}
+
 static enum status update_discrete_states(struct instance *instance, bool *states_changed) {
     if (instance->is_integrated_outside) {
         return instance_update_at_point(instance, states_changed);

@@ -8,6 +8,9 @@
 MUST_CHECK NONNULL enum status instance_enter_continuous_time(struct instance *instance);
 NONNULL void instance_enter_event_mode(struct instance *instance);
 
+/* The integrator outside has ended a step; true: event mode is needed. */
+MUST_CHECK NONNULL bool instance_complete_step(struct instance *instance);
+
 struct discrete_update {
     bool states_changed; /* states integrated outside have jumped */
     bool is_incomplete;  /* integrated outside: the next time event is not later than now */
