@@ -41,9 +41,8 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
                                        fmi2Boolean *enterEventMode,
                                        fmi2Boolean *terminateSimulation) {
     bool is_event = false;
-    const enum component_status status =
-        continuous_complete_step(c, CALL_fmi2CompletedIntegratorStep, enterEventMode,
-                                 terminateSimulation, &is_event);
+    const enum component_status status = continuous_complete_step(
+        c, CALL_fmi2CompletedIntegratorStep, enterEventMode, terminateSimulation, &is_event);
     if (status == COMPONENT_OK) {
         *enterEventMode = is_event;
         *terminateSimulation = fmi2False;

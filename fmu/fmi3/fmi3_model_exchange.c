@@ -16,9 +16,8 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance,
                                        fmi3Boolean *enterEventMode,
                                        fmi3Boolean *terminateSimulation) {
     bool is_event = false;
-    const enum component_status status =
-        continuous_complete_step(instance, CALL_fmi3CompletedIntegratorStep, enterEventMode,
-                                 terminateSimulation, &is_event);
+    const enum component_status status = continuous_complete_step(
+        instance, CALL_fmi3CompletedIntegratorStep, enterEventMode, terminateSimulation, &is_event);
     if (status == COMPONENT_OK) {
         *enterEventMode = is_event;
         *terminateSimulation = fmi3False;

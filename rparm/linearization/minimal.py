@@ -91,9 +91,9 @@ def _rule(A: np.ndarray, B: np.ndarray) -> _Rule | None:
 
 
 def _equilibrated(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A matrix with entries as near to 1 as factors of rows and columns make them; those of rows.
+    """Scale rows and columns so that entries are near 1; return the matrix and the rows' factors.
 
-    The squares of their logarithms are least.
+    The sum of the squares of the entries' logarithms is least.
     """
     i, j = np.nonzero(matrix)
     count, n = len(i), len(matrix)

@@ -79,7 +79,7 @@ class InputReader:
         result = {}
         for name, signal in signals.items():
             where = f"[{INPUTS}.{name}]"
-            # rounding must not decide which row counts; other signals are those of the rounded time
+            # rounding must not decide which row counts; other signals use the rounded time
             has_rows = isinstance(signal, Switches | Logged)
             with np.errstate(all="ignore"):
                 values = signal.values(self._elapsed if has_rows else self._times - self._times[0])

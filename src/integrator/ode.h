@@ -36,9 +36,9 @@ struct ode {
     ode_rhs *rhs;
     ode_jacobian *jacobian; /* for INTEGRATOR_CVODE_BDF only */
     ode_indicators *indicators;
-    ode_rounding *rounding; /* NULL: it follows from the limits of the indicators */
-    ode_reach *reach;       /* NULL: any way; asked where events are looked for */
-    size_t indicator_count; /* 0: no events */
+    ode_rounding *rounding;         /* NULL: it follows from the limits of the indicators */
+    ode_reach *reach;               /* NULL: any way; asked where events are looked for */
+    size_t indicator_count;         /* 0: no events */
     const size_t *row_of_indicator; /* as in struct series */
     ode_series *series;             /* for INTEGRATOR_TAYLOR only; NULL: there is none */
     size_t series_row_count;        /* >= state_count, where there is one */

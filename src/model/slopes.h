@@ -45,8 +45,8 @@ static inline double slopes_logged(double p, double x, double exponent) {
     return (x == 0.0 && exponent > 0.0) || (x != 0.0 && isinf(p)) ? 0.0 : p * log(x);
 }
 
-/* Coefficient k > 0 of y = x to the power exponent, where x is 0 at first. x: coefficients of x
- * from those of lower orders, times 1 / factor. Where y has no such series, it is constant: too
+/* Coefficient k > 0 of y = x to the power exponent, where x is 0 at first. x: coefficients of x.
+ * It follows from lower orders, times 1 / factor. Where y has no such series, it is constant: too
  * short a step will do. */
 static inline double slopes_power(const double x[], double factor, double exponent, int k,
                                   const double y[]) {

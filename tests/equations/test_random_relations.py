@@ -191,13 +191,13 @@ def test_derivatives_are_limits_of_differences(case: tuple) -> None:
             first, second = model.values(**{by: 1.0}), model.values()
             model.propagate(values, point["time"], float(by == "time"), first, second)
             for name, text in texts.items():
-                slopes, told = [], []
+                slopes, decisions = [], []
                 for h in (1e-5, 5e-6):
                     ends = [value(text, {**point, by: point[by] + s}) for s in (-h, h)]
                     slopes.append((ends[1][0] - ends[0][0]) / (2 * h))
-                    told += [decided for _, decided in ends]
+                    decisions += [decided for _, decided in ends]
                 error = abs(slopes[1] - slopes[0])
-                if any(decided != told[0] for decided in told) or not error < 1e-6:
+                if any(decided != decisions[0] for decided in decisions) or not error < 1e-6:
                     continue
                 found = first[model.names.index(name)]
                 assert abs(found - slopes[1]) <= 1e-9 + 4 * error, (text, point, by)
@@ -216,9 +216,9 @@ def x_at(t: float) -> float:
 def changes(text: str, point: Callable[[float], dict[str, float]]) -> list[float]:
     """The times at which relations of a text change."""
     times = [float(t) for t in np.linspace(0, STOP, 1501)]
-    told = [value(text, point(t))[1] for t in times]
+    decisions = [value(text, point(t))[1] for t in times]
     found = []
-    for begin, end, last in zip(times, times[1:], told[1:], strict=False):
+    for begin, end, last in zip(times, times[1:], decisions[1:], strict=False):
         while (first := value(text, point(begin))[1]) != last:
             low, high = begin, end
             while high - low > 1e-13:
