@@ -8,13 +8,37 @@ a file cannot declare, come from another file.
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
+from typing import Any
 
 from equations import declaration, lock
 from equations.model_file import ModelFileError, read
 from generate import write_if_changed
 from program import program
+
+
+def toml(declared: dict[str, Any]) -> str:
+    """Text of a variables.toml."""
+    lines = []
+    for title, content in declared.items():
+        tables = {title: content} if title in ("model", "experiment") else {}
+        if title in ("units", "variables"):
+            tables = {f"{title}.{value_of_toml(name)}": table for name, table in content.items()}
+        elif not tables:
+            lines.append(f"{title} = {value_of_toml(content)}")
+        for header, table in tables.items():
+            lines += ["", f"[{header}]"]
+            lines += [f"{key} = {value_of_toml(value)}" for key, value in table.items()]
+    return "\n".join(lines) + "\n"
+
+
+def value_of_toml(value: object) -> str:
+    """A value of TOML: JSON's texts, lists and numbers are the same, but for one character."""
+    if isinstance(value, float):
+        return repr(value)
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 @program(ModelFileError)
@@ -32,8 +56,8 @@ def main() -> None:
         if (name, kind) not in references and name not in hidden:
             raise ModelFileError(f"{lock_file}: has no {name}: build the model by rparm build")
     terminals = arguments.terminals.read_text(encoding="utf-8") if arguments.terminals else ""
-    texts = declaration.generated(file, references)
-    texts["variables.toml"] += terminals
+    texts = declaration.generated(file)
+    texts["variables.toml"] = toml(declaration.declared(file, references)) + terminals
     arguments.output.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
         write_if_changed(arguments.output / name, text)

@@ -8,8 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from declaration.c_tables import value_references, variable_table
-from declaration.load import Declaration
-from declaration.load import load as load_declaration
+from declaration.files import check
+from declaration.load import Declaration, assemble
 from document import document
 from equations import declaration, lock
 from equations.model_file import ModelFile
@@ -27,8 +27,8 @@ PLACES = {"fmi2": "", "fmi3": "fmi3"}  # below the folder of the output
 
 def write_c(file: ModelFile, references: dict[lock.Key, int], folder: Path) -> Declaration:
     """Write all files that the FMUs are made of; its declaration."""
-    _write(folder, declaration.generated(file, references))
-    declared = load_declaration(folder / "variables.toml")
+    _write(folder, declaration.generated(file))
+    declared = assemble(file.path, check(file.path, declaration.declared(file, references)))
     tables = {"variables.c": variable_table, "value_references.h": value_references}
     _write(folder, {name: table(declared) for name, table in tables.items()})
     return declared

@@ -31,14 +31,16 @@ class DeclarationError(WrongInputError):
     """A variables.toml that cannot be used: file, place and reason in one line."""
 
 
-def files_of(path: Path, including: tuple[Path, ...] = ()) -> Iterator[tuple[Path, File]]:
+def files_of(
+    path: Path, file: File, including: tuple[Path, ...] = ()
+) -> Iterator[tuple[Path, File]]:
     """What a file, included by others, includes and changes, and the file itself at the end."""
-    file = read(path)
     if path.resolve() in including:
         raise DeclarationError(f"{path}: includes itself")
     left = dict(file.changes)
     for include in file.include:
-        for source, other in files_of(path.parent / include.file, (*including, path.resolve())):
+        included = path.parent / include.file
+        for source, other in files_of(included, read(included), (*including, path.resolve())):
             taken = {
                 name: changed(variable, include, left.pop(name, Change()), f"{path}: change {name}")
                 for name, variable in other.variables.items()
@@ -74,13 +76,20 @@ def changed(variable: Variable, include: Include, change: Change, place: str) ->
 def read(path: Path) -> File:
     """Read one file and check each of its tables."""
     try:
-        return File.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except ValidationError as error:
-        raise DeclarationError(f"{path}: {first_mistake(error)}") from None
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise DeclarationError(f"{path}: cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError) as error:  # of the parser, and of reading as UTF-8
         raise DeclarationError(f"{path}: is not valid TOML: {error}") from None
+    return check(path, document)
+
+
+def check(path: Path, document: dict[str, Any]) -> File:
+    """Check each table of a file, which is or could be at this path."""
+    try:
+        return File.model_validate(document)
+    except ValidationError as error:
+        raise DeclarationError(f"{path}: {first_mistake(error)}") from None
 
 
 def first_mistake(error: ValidationError) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from declaration.files import DeclarationError, files_of, read
-from declaration.schema import Experiment, Float64, Model, Terminal, Unit, Variable
+from declaration.schema import Experiment, File, Float64, Model, Terminal, Unit, Variable
 
 UNITS = Path(__file__).with_name("units.toml")  # of all models
 
@@ -48,20 +48,25 @@ class Declaration:
 
 def load(path: Path) -> Declaration:
     """Read variables.toml and what it includes; DeclarationError if something in them is wrong."""
+    return assemble(path, read(path))
+
+
+def assemble(path: Path, file: File) -> Declaration:
+    """All that a file, which is or could be at this path, declares with what it includes."""
     units = dict(read(UNITS).units)
     variables: dict[str, Variable] = {}
     places: dict[str, str] = {}
-    for source, file in files_of(path):
-        for name, unit in file.units.items():
+    for source, part in files_of(path, file):
+        for name, unit in part.units.items():
             if units.setdefault(name, unit) != unit:
                 raise DeclarationError(f"{source}: unit {name}: is declared otherwise elsewhere")
-        for name, variable in file.variables.items():
+        for name, variable in part.variables.items():
             place = f"{source}: variable {name}"
             if name in variables:
                 raise DeclarationError(f"{place}: is declared twice")
             variables[name], places[name] = variable, place
     for section in ("model", "experiment", "variables"):
-        if not getattr(file, section):  # of the last file, which is that of the model
+        if not getattr(file, section):
             raise DeclarationError(f"{path}: the section [{section}] is missing")
     check_references(variables, places)
     check_names(variables, units, places)

@@ -1,8 +1,8 @@
-"""variables.toml of a model (declaration/schema.py), and its page."""
+"""What a model declares (declaration/schema.py), and its page."""
 
-import json
 import re
 import string
+from typing import Any
 
 from declaration.files import read as read_declaration
 from declaration.load import UNITS
@@ -54,18 +54,17 @@ def _indicators(file: ModelFile) -> dict[str, Relation]:
     return found
 
 
-def generated(file: ModelFile, references: dict[Key, int]) -> dict[str, str]:
-    """Texts of all files that are written of a model, by their names."""
+def generated(file: ModelFile) -> dict[str, str]:
+    """Texts of the files that are written of a model, by their names."""
     return {
         "equations.h": c_model.header(file),
         "equations.c": c_model.source(file),
-        "variables.toml": variables_toml(file, references),
         "README.md": page(file),
     }
 
 
-def variables_toml(file: ModelFile, references: dict[Key, int]) -> str:
-    """Text of variables.toml."""
+def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
+    """Write a variables.toml (declaration/schema.py) as nested dictionaries."""
     relations, indicators, states = file.graph.relations, _indicators(file), file.of("states")
     standard = {name: unit.exponents for name, unit in read_declaration(UNITS).units.items()}
     units = dict(standard)  # those that are declared here come to it
@@ -99,18 +98,18 @@ def variables_toml(file: ModelFile, references: dict[Key, int]) -> str:
         "time_events": len(indicators) < len(relations),
     }
     includes = [TIME, *([SOLVER] if states else []), *([EVENTS] if relations else [])]
-    sections = {"model": model, "experiment": {"start": 0.0} | file.experiment}
-    sections |= {f"units.{_toml(n)}": units[n] for n in units if n not in standard}
     helpers = {variable.name for variable in file.of("where")}  # last, if shown at all
-    sections |= {
-        f"variables.{name}": {"reference": references[name, kind], **tables[name]}
-        for name, kind in sorted(keys(file), key=lambda key: key[0] in helpers)
-        if name in tables and (name, kind) in references
+    return {
+        "include": [str(path) for path in includes],
+        "model": model,
+        "experiment": {"start": 0.0} | file.experiment,
+        "units": {name: units[name] for name in units if name not in standard},
+        "variables": {
+            name: {"reference": references[name, kind], **tables[name]}
+            for name, kind in sorted(keys(file), key=lambda key: key[0] in helpers)
+            if name in tables and (name, kind) in references
+        },
     }
-    lines = [f"include = {_toml([str(path) for path in includes])}"]
-    for title, entries in sections.items():
-        lines += ["", f"[{title}]", *(f"{key} = {_toml(given)}" for key, given in entries.items())]
-    return "\n".join(lines) + "\n"
 
 
 def page(file: ModelFile) -> str:
@@ -195,10 +194,3 @@ def _initially(
     if names == {*known["dependencies"], *known["parameters"]}:
         return {}
     return {"initially": [name for name in ("time", *file.variables) if name in names]}
-
-
-def _toml(value: object) -> str:
-    """A value of TOML: JSON's texts, lists and numbers are the same, but for one character."""
-    if isinstance(value, float):
-        return repr(value)
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,10 +15,11 @@ sys.path.insert(0, str(ROOT / "fmu"))
 from building import contents, runtime  # noqa: E402
 from equations import c_model, declaration, lock  # noqa: E402
 from equations.model_file import ModelFile, ModelFileError, read  # noqa: E402
+from equations_to_c import toml  # noqa: E402
 
 __all__ = [
     "Model", "ModelFileError", "c_model", "contents", "declaration", "declared", "lock", "read",
-    "read_text", "runtime",
+    "read_text", "runtime", "toml",
 ]  # fmt: skip
 
 BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).parent
@@ -122,7 +124,7 @@ class Model:
         return rows[: len(states), : last + 1]
 
 
-def declared(file: ModelFile) -> str:
-    """variables.toml of a file without a lock file."""
+def declared(file: ModelFile) -> dict[str, Any]:
+    """The declaration of a file without a lock file."""
     references = lock.references(Path("no-such-file"), declaration.keys(file))
-    return declaration.variables_toml(file, references)
+    return declaration.declared(file, references)

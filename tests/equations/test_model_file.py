@@ -17,6 +17,7 @@ from tests.equations.compiled import (
     lock,
     read,
     read_text,
+    toml,
 )
 from tests.support.paths import ROOT
 
@@ -197,7 +198,8 @@ def test_texts_with_any_characters_stay_texts(tmp_path: Path) -> None:
         f'description = "{odd}" }}\n[check]\n"{odd}" = "p > 0"\n'
     )
     model = Model(tmp_path, text)
-    content = tomllib.loads(declared(model.file))
+    content = declared(model.file)
+    assert tomllib.loads(toml(content)) == {key: table for key, table in content.items() if table}
     given = tomllib.loads(text)["description"]
     assert content["variables"]["p"]["description"] == " ".join(given.split())
     assert odd[:8] in declaration.page(model.file)
