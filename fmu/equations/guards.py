@@ -30,10 +30,18 @@ def guards(graph: Graph, roots: Iterable[tuple[Value, Value | None]]) -> Guards:
             condition = value.arguments[0]
             for i, chosen in enumerate((condition, graph.value("not", condition)), 1):
                 own = found[value]
-                conditions[i] = chosen if own is None else graph.value("and", own, chosen)
+                conditions[i] = _both(graph, own, chosen)
+        if value.op in ("and", "or"):  # the second one decides where the first one does not
+            first = value.arguments[0]
+            open_ = first if value.op == "and" else graph.value("not", first)
+            conditions[1] = _both(graph, found[value], open_)
         for argument, guard in zip(value.arguments, conditions, strict=True):
             _widen(graph, found, argument, guard)
     return {value: guard for value, guard in found.items() if value.op == "mode"}
+
+
+def _both(graph: Graph, guard: Value | None, condition: Value) -> Value:
+    return condition if guard is None else graph.value("and", guard, condition)
 
 
 def _widen(graph: Graph, found: Guards, value: Value, guard: Value | None) -> None:

@@ -94,8 +94,10 @@ static enum status restart_model(struct location *location, const double x[]) {
         }
         location->is_armed[i] = location->z[i] > 0.0;
         if (ode->rounding != NULL) {
-            location->noise[i] = larger(location->first[i], DBL_MIN);
-            location->touch[i] = 4.0 * location->first[i];
+            // nothing is known of an indicator that begins at infinity
+            const double rounding = isfinite(location->first[i]) ? location->first[i] : 0.0;
+            location->noise[i] = larger(rounding, DBL_MIN);
+            location->touch[i] = 4.0 * rounding;
             location->rounding[i] = location->noise[i];
             location->is_armed[i] = location->z[i] > location->noise[i];
         }
@@ -374,7 +376,7 @@ static bool is_converged(const double c[], int degree, double z, double relative
         size += fabs(c[k]);
     }
     const double last = degree > 0 ? fabs(c[degree - 1]) + fabs(c[degree]) : 0.0;
-    return last + fabs(sum - z) <= relative_tolerance * size;
+    return isfinite(size) && last + fabs(sum - z) <= relative_tolerance * size;
 }
 
 void location_check_rows(struct location *location, const double x[], double relative_tolerance) {

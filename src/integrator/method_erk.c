@@ -148,6 +148,8 @@ static bool create_solver(struct erk *erk) {
            // each
            ERKStepSetInterpolantType(erk->solver, ARK_INTERP_LAGRANGE) == ARK_SUCCESS &&
            ERKStepSetInterpolantDegree(erk->solver, 0) == ARK_SUCCESS &&
+           // the first stage after an event may still be on the other side of it
+           ERKStepSetMaxErrTestFails(erk->solver, 30) == ARK_SUCCESS &&
            ERKStepSetMaxHnilWarns(erk->solver, -1) == ARK_SUCCESS;
 }
 

@@ -53,9 +53,10 @@ static bool is_near(const struct compared *compared) {
     return fabs(compared->distance) <= compared->noise;
 }
 
-/* The distance says which mode is right. */
+/* The distance says which mode is right. One that no value needs may be nothing. */
 static bool is_sure(const struct compared *compared) {
-    return !compared->used || fabs(compared->distance) >= compared->noise;
+    const double size = fabs(compared->distance);
+    return compared->used ? size >= compared->noise : !(size < compared->noise);
 }
 
 /* Lets relations follow from their distances; at its limit a relation keeps its mode, as does one
@@ -141,14 +142,14 @@ static void turn(const struct call *call) {
     for (int k = 0; k < model->relation_count; k++) {
         const double slope = signed_slope(&after[k], call->holds[k]);
         const bool falls = slope < 0.0 && slope < signed_slope(&before[k], call->holds[k]);
-        const bool may_turn = after[k].used && !model->relation[k].is_timed && is_near(&after[k]);
+        const bool may_turn = !model->relation[k].is_timed && is_near(&after[k]);
         call->room.turned[k] = may_turn && falls;
         call->holds[k] ^= may_turn && falls;
     }
     compare(call, call->room.zeros, after);
     for (int k = 0; k < model->relation_count; k++) {
         const bool rests = after[k].slope == 0.0 && signed_slope(&before[k], call->holds[k]) > 0.0;
-        if (after[k].used && !model->relation[k].is_timed && is_near(&after[k]) && rests) {
+        if (!model->relation[k].is_timed && is_near(&after[k]) && rests) {
             call->room.turned[k] = 1;
             call->holds[k] = model->relation[k].includes_zero;
         }
@@ -180,9 +181,10 @@ static bool fire(const struct call *call) {
     return fires;
 }
 
-/* Relations with the same limit switch at one event: those on it that are about to pass it. */
+/* Relations with the same limit switch at one event: those on it that are about to pass it, also
+ * ones that no value needs yet. */
 static bool joins(const struct compared *compared, int holds) {
-    return compared->used && is_near(compared) && signed_slope(compared, holds) < 0.0;
+    return is_near(compared) && signed_slope(compared, holds) < 0.0;
 }
 
 static void pass(const struct call *call, const struct event *event) {

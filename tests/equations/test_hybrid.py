@@ -238,6 +238,78 @@ def test_an_input_that_moves_makes_an_event_a_period(
     assert run.x[-1][1] == 5.0
 
 
+TURNS = """name = "Turns"
+modes = ["positive"]
+[states]
+x = {{ start = 1.0, derivative = "v" }}
+v = {{ derivative = "{rate}" }}
+n = {{ derivative = "0" }}
+[events.up]
+when = "x > {limit}"
+while = "not positive"
+reinit = {{ n = "n + 1"{reinit} }}
+set = {{ positive = "not positive" }}
+[events.down]
+when = "x < {limit}"
+while = "positive"
+reinit = {{ n = "n + 1"{reinit} }}
+set = {{ positive = "not positive" }}
+"""
+EACH_KIND = pytest.mark.parametrize("kind", [*METHODS, "model_exchange"])
+
+
+def run_of(unit: Unit, kind: str, step: float, count: int) -> Run:
+    if kind == "model_exchange":
+        return model_exchange(unit, 1e-8, step, count, {})
+    return co_simulation(unit, kind, 1e-8, step, count, {})
+
+
+@pytest.mark.parametrize("step", [0.01, 0.003])
+@pytest.mark.parametrize("limit", ["0", "0.1 * v"])
+@EACH_KIND
+def test_two_events_at_one_limit_fire_in_turn(
+    unit: Callable, kind: str, limit: str, step: float
+) -> None:
+    """Of the two, only one's mode is on: x = cos t passes the limit once in pi."""
+    turns = unit(TURNS.format(rate="-x", limit=limit, reinit=""))
+    run = run_of(turns, kind, step, round(20 / step))
+    first = np.pi / 2 if limit == "0" else np.pi / 2 + np.arctan(0.1)  # cos t = -0.1 sin t
+    assert not run.failure
+    assert run.x[-1][2] == 1 + np.floor((20 - first) / np.pi + 1)
+
+
+@EACH_KIND
+def test_a_rocking_block_loses_speed_once_an_impact(unit: Callable, kind: str) -> None:
+    """It turns back at 1 m/s2 on either side and keeps half its speed at each impact."""
+    rate, reinit = "-1 if positive else 1", ', v = "0.5 * v"'
+    run = run_of(unit(TURNS.format(rate=rate, limit="0", reinit=reinit)), kind, 0.01, 400)
+    speed = np.sqrt(2)
+    impacts = [speed + 2 * speed * (1 - 0.5**k) for k in range(4)]  # then 2 v until the next
+    assert not run.failure
+    assert run.x[-1][2] == 1 + sum(impact < 4 for impact in impacts)
+    flown, v = 4 - impacts[3], speed / 16
+    assert run.x[-1][0] == pytest.approx(v * flown - flown**2 / 2, abs=1e-6)
+
+
+GUARDS = """name = "Guards"
+[states]
+s = { start = -1.0, derivative = "1" }
+z = { derivative = "(1 if sqrt(s) > 0.5 else 0) if s > 0 else 0" }
+w = { derivative = "max(sqrt(s), 0.7) if s > 0 else 0" }
+y = { derivative = "1 if s > 0 and log(s) > -1 else 0" }
+"""
+
+
+@pytest.mark.parametrize("step", [0.25, 0.1, 0.05])
+@EACH_KIND
+def test_conditions_behind_a_guard_switch(unit: Callable, kind: str, step: float) -> None:
+    """At the end of the guard, s = 0, log(s) is infinite and the slope of the root, too."""
+    run = run_of(unit(GUARDS), kind, step, round(3 / step))
+    assert not run.failure
+    w = 0.7 * 0.49 + (2**1.5 - 0.7**3) / 1.5
+    assert run.x[-1] == pytest.approx([2.0, 1.75, w, 2 - np.exp(-1)], abs=1e-5)
+
+
 def test_what_a_motion_is(tmp_path: Path) -> None:
     """The event loop itself, against the closed form of the rising floor."""
     from tests.equations.event_loop import EventLoop

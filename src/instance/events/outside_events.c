@@ -38,6 +38,8 @@ static void write_bands(struct instance *instance, double bands[]) {
             bands[i] = 1e-12 * fabs(indicator->factor) * nominal + 1e-14 * fabs(indicator->offset);
         } else if (events->errors == NULL) {
             bands[i] = 2.0 * near_root + 1e-9 * fabs(indicator->offset);
+        } else if (!isfinite(bands[i])) {
+            bands[i] = 0.0; // of a value that is not finite, or close to where it is not
         }
     }
 }
@@ -145,10 +147,18 @@ void instance_forget_unhandled(struct instance *instance) {
 }
 
 bool instance_has_missed_event(struct instance *instance) {
+    const struct model_events *events = instance->model->events;
     bool is_any = false;
-    return instance->model->events != NULL && instance->model->events->errors != NULL &&
-           can_fire(instance) &&
-           find_triggered(instance, instance->triggered, &is_any) == STATUS_OK && is_any;
+    if (events == NULL || events->errors == NULL || !can_fire(instance) ||
+        find_triggered(instance, instance->triggered, &is_any) != STATUS_OK) {
+        return false;
+    }
+    // one that only comes to 0 will be seen
+    bool is_missed = false;
+    for (size_t i = 0; is_any && i < events->indicator_count; i++) {
+        is_missed |= instance->triggered[i] && instance->z[i] < 0.0;
+    }
+    return is_missed;
 }
 
 /* Takes forces out of triggered that are not below 0 with the values set now. */
