@@ -1,5 +1,5 @@
 #include "arithmetic_gradient.h"
-#include "rp_equations.h"
+#include "rp_equations_lifted.h"
 
 void rp_dynamics_jacobians(const struct rp_parameters *p, const double q[2], const double dq[2],
                            const double tau[2], struct rp_dynamics_jacobians *jacobians) {

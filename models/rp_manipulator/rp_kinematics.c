@@ -1,4 +1,3 @@
-#include "arithmetic_double.h"
 #include "rp_equations.h"
 
 #include <string.h>
@@ -45,13 +44,13 @@ void rp_forward_kinematics(const struct rp_parameters *p, const double q[2], dou
 
 void rp_end_effector_position(const struct rp_parameters *p, const double q[2],
                               double position[2]) {
-    const struct arm arm = arm_in_state(&p, q, at_rest);
+    const struct arm arm = arm_in_state(p, q, at_rest);
     arm_end_effector_position(&arm, position);
 }
 
 void rp_end_effector_velocity(const struct rp_parameters *p, const double q[2], const double dq[2],
                               double velocity[2]) {
-    const struct arm arm = arm_in_state(&p, q, dq);
+    const struct arm arm = arm_in_state(p, q, dq);
     arm_end_effector_velocity(&arm, velocity);
 }
 
@@ -103,7 +102,7 @@ void rp_jacobian_linear_link1(const struct rp_parameters *p, const double q[2], 
 }
 
 void rp_jacobian_linear_link2(const struct rp_parameters *p, const double q[2], double J[3][2]) {
-    const struct arm arm = arm_in_state(&p, q, at_rest);
+    const struct arm arm = arm_in_state(p, q, at_rest);
     arm_end_effector_jacobian(&arm, J);
     J[2][0] = J[2][1] = 0.0;
 }

@@ -1,4 +1,3 @@
-#include "arithmetic_double.h"
 #include "rp_equations.h"
 
 #include <stddef.h>
@@ -6,7 +5,7 @@
 static const double at_rest[2] = {0.0, 0.0};
 
 double rp_fixed_inertia(const struct rp_parameters *p) {
-    return arm_fixed_inertia(&p);
+    return arm_fixed_inertia(p);
 }
 
 bool rp_parameters_check(const struct rp_parameters *p) {
@@ -21,50 +20,50 @@ bool rp_parameters_check(const struct rp_parameters *p) {
 }
 
 void rp_mass_matrix(const struct rp_parameters *p, const double q[2], double D[2][2]) {
-    const struct arm arm = arm_in_state(&p, q, at_rest);
+    const struct arm arm = arm_in_state(p, q, at_rest);
     arm_mass_matrix(&arm, D);
 }
 
 void rp_christoffel(const struct rp_parameters *p, const double q[2], double c[2][2][2]) {
-    const struct arm arm = arm_in_state(&p, q, at_rest);
+    const struct arm arm = arm_in_state(p, q, at_rest);
     arm_christoffel(&arm, c);
 }
 
 void rp_coriolis_matrix(const struct rp_parameters *p, const double q[2], const double dq[2],
                         double C[2][2]) {
-    const struct arm arm = arm_in_state(&p, q, dq);
+    const struct arm arm = arm_in_state(p, q, dq);
     arm_coriolis_matrix(&arm, C);
 }
 
 void rp_coriolis_forces(const struct rp_parameters *p, const double q[2], const double dq[2],
                         double forces[2]) {
-    const struct arm arm = arm_in_state(&p, q, dq);
+    const struct arm arm = arm_in_state(p, q, dq);
     arm_coriolis_forces(&arm, forces);
 }
 
 double rp_potential_energy(const struct rp_parameters *p, const double q[2]) {
-    const struct arm arm = arm_in_state(&p, q, at_rest);
+    const struct arm arm = arm_in_state(p, q, at_rest);
     return arm_potential_energy(&arm);
 }
 
 void rp_gravity_forces(const struct rp_parameters *p, const double q[2], double forces[2]) {
-    const struct arm arm = arm_in_state(&p, q, at_rest);
+    const struct arm arm = arm_in_state(p, q, at_rest);
     arm_gravity_forces(&arm, forces);
 }
 
 double rp_kinetic_energy(const struct rp_parameters *p, const double q[2], const double dq[2]) {
-    const struct arm arm = arm_in_state(&p, q, dq);
+    const struct arm arm = arm_in_state(p, q, dq);
     return arm_kinetic_energy(&arm);
 }
 
 void rp_inverse_dynamics(const struct rp_parameters *p, const double q[2], const double dq[2],
                          const double ddq[2], double tau[2]) {
-    const struct arm arm = arm_in_state(&p, q, dq);
+    const struct arm arm = arm_in_state(p, q, dq);
     arm_inverse_dynamics(&arm, ddq, tau);
 }
 
 void rp_forward_dynamics(const struct rp_parameters *p, const double q[2], const double dq[2],
                          const double tau[2], double ddq[2]) {
-    const struct arm arm = arm_in_state(&p, q, dq);
+    const struct arm arm = arm_in_state(p, q, dq);
     arm_forward_dynamics(&arm, tau, ddq);
 }

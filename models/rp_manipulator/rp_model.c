@@ -1,7 +1,5 @@
 #include "rp_model.h"
 
-#include "arithmetic_double.h"
-#include "calculated.h"
 #include "rp_calculated.h"
 #include "rp_series.h"
 
@@ -10,7 +8,7 @@
 static enum status right_hand_side(const void *values_pointer, double t, const double x[],
                                    const double u[], double dx[]) {
     const struct rp_parameters *p = &((const struct rp_values *)values_pointer)->parameters;
-    const struct arm arm = arm_in_state(&p, x, x + 2);
+    const struct arm arm = arm_in_state(p, x, x + 2);
     dx[0] = x[2];
     dx[1] = x[3];
     arm_forward_dynamics(&arm, u, dx + 2);
@@ -35,7 +33,10 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     return STATUS_OK;
 }
 
-DEFINE_OUTPUTS(rp_values)
+static enum status outputs(void *values, double t) {
+    rp_calculate(values);
+    return STATUS_OK;
+}
 
 static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
     const struct rp_parameters *p = &((const struct rp_values *)values_pointer)->parameters;

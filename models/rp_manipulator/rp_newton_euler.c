@@ -1,19 +1,12 @@
-#include "arithmetic_double.h"
 #include "rp_recursion.h"
 
 static struct vector vector_of(const double v[3]) {
     return (struct vector){v[0], v[1], v[2]};
 }
 
-static void write_vector(struct vector v, double out[3]) {
-    out[0] = v.x;
-    out[1] = v.y;
-    out[2] = v.z;
-}
-
 void rp_newton_euler_forward(const struct rp_parameters *p, const double q[2], const double dq[2],
                              const double ddq[2], struct rp_link_motion *motion) {
-    const struct arm arm = arm_in_state(&p, q, dq);
+    const struct arm arm = arm_in_state(p, q, dq);
     const struct link_motion links = link_motion(&arm, ddq);
     write_vector(links.omega, motion->omega);
     write_vector(links.domega, motion->domega);
@@ -25,7 +18,7 @@ void rp_newton_euler_forward(const struct rp_parameters *p, const double q[2], c
 void rp_newton_euler_backward(const struct rp_parameters *p, const double q[2],
                               const struct rp_link_motion *motion, struct rp_joint_loads *loads) {
     const double dq[2] = {0.0, 0.0}; // in the motion already
-    const struct arm arm = arm_in_state(&p, q, dq);
+    const struct arm arm = arm_in_state(p, q, dq);
     const struct link_motion links = {
         .omega = vector_of(motion->omega),
         .domega = vector_of(motion->domega),
@@ -36,10 +29,7 @@ void rp_newton_euler_backward(const struct rp_parameters *p, const double q[2],
     struct joint_loads joints;
     link2_loads(&arm, &links, &joints);
     link1_loads(&arm, &links, &joints);
-    write_vector(joints.f1, loads->f1);
-    write_vector(joints.tau1, loads->tau1);
-    write_vector(joints.f2, loads->f2);
-    write_vector(joints.tau2, loads->tau2);
+    write_loads(&joints, loads);
 }
 
 void rp_newton_euler(const struct rp_parameters *p, const double q[2], const double dq[2],
