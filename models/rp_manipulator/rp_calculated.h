@@ -1,11 +1,20 @@
-/* The calculated fields of struct rp_values. */
+/* The right-hand side and the calculated fields of struct rp_values. */
 #ifndef RP_CALCULATED_H
 #define RP_CALCULATED_H
 
 #include "rp_model.h"
 #include "rp_recursion.h"
 
-/* Writes them from the parameters, inputs and states. */
+/* Writes the derivatives of the states x = (q, dq) with the inputs u = tau. */
+static inline void rp_right_hand_side(const struct rp_parameters *p, const real x[4],
+                                      const real u[2], real dx[4]) {
+    const struct arm arm = arm_in_state(p, x, x + 2);
+    dx[0] = x[2];
+    dx[1] = x[3];
+    arm_forward_dynamics(&arm, u, dx + 2);
+}
+
+/* Writes the calculated fields from the parameters, inputs and states. */
 static inline void rp_calculate(struct rp_values *values) {
     const real *tau = values->tau;
     const real *dq = values->dq;

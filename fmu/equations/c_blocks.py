@@ -1,0 +1,306 @@
+"""Values of a graph as statements in C that people read, with `if` blocks.
+
+What only one branch of a choice needs is calculated in this branch. A value that is used once
+stands where it is used; others are constants with the names that the source gave them.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+
+from equations.c_code import indented, number
+from equations.graph import CONDITIONS, DERIVATIVES, LEAVES, Value
+from rparm.expressions.tree import in_order
+
+WIDTH = 100
+MOST_INLINE = 72  # characters of an expression within another
+# how tightly an operation binds
+PRIMARY, UNARY, TERNARY = 10, 9, 2
+BINDING = {"*": 8, "/": 8, "+": 7, "-": 7, "<": 6, "<=": 6, ">": 6, ">=": 6, "==": 5}
+BINDING |= {"and": 4, "or": 3}
+SYMBOLS = {"and": "&&", "or": "||"}
+TRANSPARENT = ("value_of", "moving_as")  # the value is that of the first argument
+KEYWORDS = {"auto", "break", "case", "char", "const", "continue", "default", "do", "double"}
+KEYWORDS |= {"else", "enum", "extern", "float", "for", "goto", "if", "inline", "int", "long"}
+KEYWORDS |= {"register", "restrict", "return", "short", "signed", "sizeof", "static", "struct"}
+KEYWORDS |= {"switch", "typedef", "union", "unsigned", "void", "volatile", "while", "bool"}
+KEYWORDS |= {"true", "false", "NULL", "y0", "y1", "yn", "j0", "j1", "jn", "gamma", "real"}
+RESERVED = {*KEYWORDS, *DERIVATIVES}
+
+Path = tuple[tuple[Value, bool], ...]  # conditions that hold, or do not
+Text = tuple[str, int]  # of an expression, and how tightly it binds
+
+
+class Scope:
+    """Texts of the values that are known in a block and those around it."""
+
+    def __init__(self, path: Path, outer: Scope | None = None) -> None:
+        self.path, self.outer = path, outer
+        self.known: dict[Value, Text] = {}
+        self.lines: list[str] = []
+
+    def find(self, value: Value) -> Text | None:
+        scope: Scope | None = self
+        while scope is not None:
+            if value in scope.known:
+                return scope.known[value]
+            scope = scope.outer
+        return None
+
+
+class Blocks:
+    """Statements that give targets, lvalues of C, their values.
+
+    names: what values are called. enumerators: names of whole numbers, by an integer leaf. taken:
+    names that are not free.
+    """
+
+    def __init__(
+        self,
+        targets: Mapping[str, Value],
+        names: Mapping[Value, str],
+        enumerators: Mapping[str, Mapping[int, str]],
+        taken: Iterable[str] = (),
+    ) -> None:
+        self.names, self.enumerators = names, enumerators
+        self.taken = {*taken, *RESERVED}
+        self.targets = targets
+        self.order = in_order(targets.values())
+        self.uses = Counter(plain(a) for v in self.order for a in v.arguments if v is plain(v))
+        self.uses.update(plain(v) for v in targets.values())
+        self.paths = self._paths()
+        self.blocks = self._block_values()
+        bits = {value: 1 << i for i, value in enumerate(self.blocks)}
+        self.depends: dict[Value, int] = {}  # on values of blocks, as bits
+        for value in self.order:
+            mask = 0
+            for argument in value.arguments:
+                mask |= self.depends[argument] | bits.get(argument, 0)
+            self.depends[value] = mask
+        self.bits, self.in_progress = bits, 0
+
+    def lines(self) -> list[str]:
+        """The statements."""
+        scope = Scope(())
+        for target, value in self.targets.items():
+            scope.lines.append(f"{target} = {self.text(value, scope)[0]};")
+        return scope.lines
+
+    def _is_constant(self, value: Value) -> bool:
+        """Whether it may get a name: an operation, or what is read more than once."""
+        is_read = value.op in LEAVES and value.op != "integer" and self.uses[value] > 1
+        return is_read or bool(value.arguments)
+
+    # ---- Where values are calculated -------------------------------------------------------------
+
+    def _paths(self) -> dict[Value, Path]:
+        """The innermost block that contains all uses of a value."""
+        paths: dict[Value, Path] = {value: () for value in self.targets.values()}
+
+        def use(value: Value, path: Path) -> None:
+            paths[value] = common(paths[value], path) if value in paths else path
+
+        for value in self.order[::-1]:
+            path = paths[value]
+            if value.op == "if":
+                condition, first, second = value.arguments
+                use(condition, path)
+                use(first, (*path, (condition, True)))
+                use(second, (*path, (condition, False)))
+            elif value.op == "moving_as":
+                use(value.arguments[0], path)
+                paths.setdefault(value.arguments[1], path)
+            else:
+                for argument in value.arguments:
+                    use(argument, path)
+        return paths
+
+    def _block_values(self) -> dict[Value, None]:
+        """Choices with calculations in a branch; the others are `?:`."""
+        inside: set[tuple[Path, Value]] = set()
+        for value in self.order:
+            if value.arguments and value.op not in (*CONDITIONS, *TRANSPARENT, "negative"):
+                path = self.paths[value]
+                inside.update((path[:i], path[i][0]) for i in range(len(path)))
+        return {
+            value: None for value in self.order
+            if value.op == "if" and (self.paths[value], value.arguments[0]) in inside
+        }  # fmt: skip
+
+    # ---- Statements ------------------------------------------------------------------------------
+
+    def text(self, value: Value, scope: Scope) -> Text:
+        """Expression of a value in a block, after statements that it needs."""
+        value = plain(value)
+        found = scope.find(value)
+        if found is not None:
+            return found
+        if not self._is_constant(value):
+            return self._leaf(value)
+        while len(scope.path) > len(self.paths[value]) and scope.outer is not None:
+            scope = scope.outer  # it was forgotten before the block began
+        if value in self.blocks:
+            self._block(value, scope)
+            return scope.known[value]
+        text = self._expression(value, scope)
+        if value.op in CONDITIONS or self._is_inline(value, text):
+            return text
+        name = self._new_name(value)
+        scope.lines.append(f"const double {name} = {text[0]};")
+        scope.known[value] = (name, PRIMARY)
+        return scope.known[value]
+
+    def _is_inline(self, value: Value, text: Text) -> bool:
+        if value.op == "negative" and text[0][1:].isidentifier():
+            return True
+        return self.uses[value] == 1 and value not in self.names and len(text[0]) <= MOST_INLINE
+
+    def _leaf(self, value: Value) -> Text:
+        if value.op == "number":
+            return number(value.number), PRIMARY
+        return value.name, PRIMARY
+
+    def _expression(self, value: Value, scope: Scope) -> Text:
+        if not value.arguments:
+            return self._leaf(value)
+        given = [self.text(argument, scope) for argument in value.arguments]
+        if value.arguments and value.arguments[0].op == "integer" and value.op in BINDING:
+            if value.op in CONDITIONS:
+                return self._of_integer(value)
+        given = [
+            (f"(double){text}", UNARY) if argument.op == "integer" else (text, binding)
+            for argument, (text, binding) in zip(value.arguments, given, strict=True)
+        ]
+        match value.op:
+            case "negative":
+                text, binding = given[0]
+                return "-" + (text if binding >= UNARY and text[0] != "-" else f"({text})"), UNARY
+            case "not":
+                return self._not(value.arguments[0], given[0])
+            case "if":
+                parts = [self._within(text, TERNARY + 1) for text in given]
+                return f"{parts[0]} ? {parts[1]} : {parts[2]}", TERNARY
+            case op if op in BINDING:
+                binding = BINDING[op]
+                left, right = given
+                is_mixed = op == "or"  # && within || needs none, but compilers ask for them
+                low = UNARY if is_mixed and left[1] == BINDING["and"] else binding
+                texts = self._within(left, low), self._within(right, binding + 1)
+                if is_mixed and right[1] == BINDING["and"]:
+                    texts = texts[0], self._within(right, UNARY)
+                return f"{texts[0]} {SYMBOLS.get(op, op)} {texts[1]}", binding
+        return f"{value.op}({', '.join(text for text, _ in given)})", PRIMARY
+
+    def _of_integer(self, value: Value) -> Text:
+        """A comparison of an integer leaf with a whole number."""
+        leaf, other = value.arguments
+        named = self.enumerators.get(leaf.name, {})
+        constant = int(other.number)
+        return f"{leaf.name} {value.op} {named.get(constant, constant)}", BINDING[value.op]
+
+    def _not(self, condition: Value, text: Text) -> Text:
+        if condition.op == "==":
+            return text[0].replace(" == ", " != "), BINDING["=="]
+        return f"!{self._within(text, UNARY)}", UNARY
+
+    def _within(self, text: Text, least: int) -> str:
+        return text[0] if text[1] >= least else f"({text[0]})"
+
+    def _block(self, value: Value, scope: Scope) -> None:
+        """The `if` that calculates a choice and all others that go with it."""
+        condition, path = value.arguments[0], self.paths[value]
+        group = [value]
+        busy = self.in_progress | self.bits[value]
+        for other in self.blocks:
+            if (
+                other is not value
+                and other.arguments[0] is condition
+                and self.paths[other] == path
+                and scope.find(other) is None
+                and not self.depends[other] & busy
+                and not self.in_progress & self.bits[other]
+            ):
+                group.append(other)
+                busy |= self.bits[other]
+        before, self.in_progress = self.in_progress, busy
+        for needed in self._needed(group, path):
+            self.text(needed, scope)
+        head = self.text(condition, scope)[0]
+        self.in_progress = before
+
+        names = [self._new_name(member) for member in group]
+        for name in names:
+            scope.lines.append(f"double {name};")
+        bodies = []
+        for holds in (True, False):
+            inner = Scope((*path, (condition, holds)), scope)
+            for name, member in zip(names, group, strict=True):
+                result = self.text(member.arguments[1 if holds else 2], inner)[0]
+                inner.lines.append(f"{name} = {result};")
+            bodies.append(inner.lines)
+        scope.lines += [f"if ({head}) {{", *indented(bodies[0])]
+        scope.lines += ["} else {", *indented(bodies[1]), "}"]
+        for name, member in zip(names, group, strict=True):
+            scope.known[member] = (name, PRIMARY)
+
+    def _needed(self, group: list[Value], path: Path) -> list[Value]:
+        """What branches need that is calculated before them, in this block."""
+        members, seen, found = set(group), set(group), []
+        todo = [plain(a) for value in group[::-1] for a in value.arguments[::-1]]
+        while todo:
+            value = todo.pop()
+            if value in seen:
+                continue
+            seen.add(value)
+            if len(self.paths[value]) > len(path):
+                todo += [plain(a) for a in value.arguments[::-1]]
+            elif self.paths[value] == path and value not in members and self._is_constant(value):
+                if value.op in CONDITIONS:
+                    todo += [plain(a) for a in value.arguments[::-1]]
+                else:
+                    found.append(value)
+        return found
+
+    def _new_name(self, value: Value) -> str:
+        """A name that is free."""
+        base = self.names.get(value, "")
+        if not base:
+            base = "t"
+        name, count = base, 1
+        while name in self.taken or (base == "t" and count == 1):
+            count += 1
+            name = f"{base}{count - 1}" if base == "t" else f"{base}_{count}"
+        self.taken.add(name)
+        return name
+
+
+def plain(value: Value) -> Value:
+    """The value without what differs in derivatives only."""
+    while value.op in TRANSPARENT:
+        value = value.arguments[0]
+    return value
+
+
+def common(first: Path, second: Path) -> Path:
+    """What two paths begin with."""
+    length = 0
+    for a, b in zip(first, second, strict=False):
+        if a[0] is not b[0] or a[1] is not b[1]:
+            break
+        length += 1
+    return first[:length]
+
+
+def wrapped(line: str, indent: int | None = None) -> list[str]:
+    """A statement in lines that are not too long; indent: of all but the first."""
+    lines: list[str] = []
+    own = len(line) - len(line.lstrip()) + 4 if indent is None else indent
+    while len(line) > WIDTH:
+        at = line.rfind(" ", own + 8, WIDTH)
+        if at < 0:
+            break
+        lines.append(line[:at])
+        line = " " * own + line[at + 1 :]
+    return [*lines, line]
+
