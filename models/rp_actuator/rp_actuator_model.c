@@ -1,7 +1,5 @@
 #include "rp_actuator_model.h"
 
-#include "arithmetic_double.h"
-#include "calculated.h"
 #include "rp_actuator_calculated.h"
 
 #include <math.h>
@@ -19,7 +17,7 @@ static enum status right_hand_side(const void *values_pointer, double t, const d
         &((const struct rp_actuator_values *)values_pointer)->parameters;
     struct rp_actuator_inputs inputs;
     memcpy(&inputs, u, sizeof inputs);
-    rp_actuator_current_rates(p, &inputs, x, dx);
+    drive_current_rates(p, &inputs, x, dx);
     return STATUS_OK;
 }
 
@@ -35,7 +33,10 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     return STATUS_OK;
 }
 
-DEFINE_OUTPUTS(rp_actuator_values)
+static enum status outputs(void *values, double t) {
+    rp_actuator_calculate(values);
+    return STATUS_OK;
+}
 
 static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
     const struct rp_actuator_parameters *p =

@@ -1,5 +1,5 @@
 #include "arithmetic_gradient.h"
-#include "rp_controller_law.h"
+#include "rp_controller_law_lifted.h"
 
 void rp_controller_integral_jacobian(const struct rp_controller_parameters *p, bool attached,
                                      const struct rp_controller_inputs *inputs, const double w[2],

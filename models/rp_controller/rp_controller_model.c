@@ -1,7 +1,5 @@
 #include "rp_controller_model.h"
 
-#include "arithmetic_double.h"
-#include "calculated.h"
 #include "rp_controller_calculated.h"
 #include "rp_controller_events.h"
 
@@ -16,17 +14,13 @@ _Static_assert(sizeof(struct rp_controller_samples) == sizeof(double[13]),
 static enum status right_hand_side(const void *values_pointer, double t, const double x[],
                                    const double u[], double dx[]) {
     const struct rp_controller_values *values = values_pointer;
-    const struct rp_controller_parameters *p = &values->parameters;
     if (values->form == RP_CONTROLLER_SAMPLED) {
         dx[0] = dx[1] = 0.0;
         return STATUS_OK;
     }
     struct rp_controller_inputs inputs;
     memcpy(&inputs, u, sizeof inputs);
-
-    double unlimited[2];
-    rp_controller_unlimited(p, values->payload_attached != 0, &inputs, x, unlimited);
-    rp_controller_integral_rates(p, &inputs, unlimited, dx);
+    law_integral_rates(&values->parameters, values->payload_attached != 0, &inputs, x, dx);
     return STATUS_OK;
 }
 
@@ -47,7 +41,10 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     return STATUS_OK;
 }
 
-DEFINE_OUTPUTS(rp_controller_values)
+static enum status outputs(void *values, double t) {
+    rp_controller_calculate(values);
+    return STATUS_OK;
+}
 
 static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
     const struct rp_controller_parameters *p =

@@ -1,6 +1,5 @@
 #include "rp_plant_events.h"
 
-#include "arithmetic_double.h"
 #include "rp_plant_contact.h"
 #include "rp_plant_equations.h"
 #include "rp_plant_impact.h"
@@ -38,7 +37,7 @@ static bool arrive(struct rp_plant_values *values, const struct triggered *trigg
     for (int i = 0; i < 2; i++) {
         const double hit = triggered->hit[i] > 0 ? p->lower[i] : p->upper[i];
         const bool is_near = triggered->hit[i] != 0 && fabs(values->q[i] - hit) <= near_limit(hit);
-        side[i] = rp_plant_closed_stop(p, i, values->q[i]);
+        side[i] = plant_closed_stop(p, i, values->q[i]);
         if (side[i] == 0 && is_near && p->stops[i] == RP_PLANT_STOPS_RIGID) {
             side[i] = triggered->hit[i];
         }
@@ -190,7 +189,7 @@ bool rp_plant_modes_exist(const struct rp_plant_modes *modes) {
  * friction or on a stop. Contacts follow from the state. */
 static bool fits(const struct rp_plant_values *values, int joint) {
     const struct rp_plant_parameters *p = &values->parameters;
-    const bool has_friction = rp_plant_breakaway(p, joint) > 0.0;
+    const bool has_friction = plant_breakaway(p, joint) > 0.0;
     const int mode = values->modes.joint[joint];
     if (!rp_plant_contact_fits(p, joint, values->q[joint], values->dq[joint],
                                values->modes.contact[joint])) {
@@ -198,7 +197,7 @@ static bool fits(const struct rp_plant_values *values, int joint) {
     }
     if (mode == RP_PLANT_STUCK) {
         return values->dq[joint] == 0.0 &&
-               (has_friction || rp_plant_closed_stop(p, joint, values->q[joint]) != 0);
+               (has_friction || plant_closed_stop(p, joint, values->q[joint]) != 0);
     }
     return rp_plant_slides(mode) == has_friction;
 }
@@ -298,8 +297,8 @@ static void describe_joint(const struct rp_plant_values *values, const struct rp
     }
     if (mode == RP_PLANT_STUCK) {
         const struct indicator of_force = {.kind = INDICATOR_OF_MODEL,
-                                           .offset = rp_plant_breakaway(p, joint)};
-        const int closed = rp_plant_closed_stop(p, joint, values->q[joint]);
+                                           .offset = plant_breakaway(p, joint)};
+        const int closed = plant_closed_stop(p, joint, values->q[joint]);
         if (closed >= 0) {
             *of_joint[SLIP_FORWARD] = of_force;
         }
@@ -344,7 +343,7 @@ static enum status indicators(const void *values_pointer, double t, const double
     }
     for (int i = 0; i < 2; i++) {
         double of_joint[PLANT_INDICATORS];
-        plant_indicators(&p, &modes, i, x[i], x[2 + i], motion.reaction[i], of_joint);
+        plant_indicators(p, &modes, i, x[i], x[2 + i], motion.reaction[i], of_joint);
         for (int k = 0; k < PLANT_INDICATORS; k++) {
             z[plant_indicator_index(i, k)] = of_joint[k];
         }

@@ -1,7 +1,5 @@
 #include "rp_plant_model.h"
 
-#include "arithmetic_double.h"
-#include "calculated.h"
 #include "rp_plant_calculated.h"
 #include "rp_plant_events.h"
 #include "rp_plant_modes.h"
@@ -63,7 +61,13 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     return STATUS_OK;
 }
 
-DEFINE_OUTPUTS(rp_plant_values)
+static enum status outputs(void *values_pointer, double t) {
+    struct rp_plant_values *values = values_pointer;
+    struct rp_plant_modes modes;
+    rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs, &modes);
+    rp_plant_calculate(values, &modes);
+    return STATUS_OK;
+}
 
 const struct model rp_plant_model = {
     .values_size = sizeof(struct rp_plant_values),

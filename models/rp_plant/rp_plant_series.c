@@ -19,7 +19,6 @@
  * The reaction of a stuck joint is the rest of its row of the equations, as in plant_motion. */
 #include "rp_plant_series.h"
 
-#include "arithmetic_double.h"
 #include "jet.h"
 #include "platform.h"
 #include "rp_plant_equations.h"
@@ -98,7 +97,7 @@ static void set_bodies(struct series_motion *m, double q2) {
     plant.arm.L = arm->l1 + q2;
     plant.arm.J = rp_fixed_inertia(arm) + arm->m2 * plant.arm.L * plant.arm.L;
     if (has_payload(m)) {
-        plant_attach(&plant, &p);
+        plant_attach(&plant, p);
     }
     const double m2 = plant.arm.m2;
     const double a = plant.arm.a;
@@ -237,7 +236,7 @@ static void write_indicators(const struct series_motion *m, int k, const struct 
     };
     for (int i = 0; i < 2; i++) {
         if (is_stuck(m, i)) {
-            const double breakaway = k == 0 ? rp_plant_breakaway(m->p, i) : 0.0;
+            const double breakaway = k == 0 ? plant_breakaway(m->p, i) : 0.0;
             row[FORWARD + i][k] = breakaway - reaction[i];
             row[BACKWARD + i][k] = breakaway + reaction[i];
         }

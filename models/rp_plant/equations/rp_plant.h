@@ -93,18 +93,6 @@ struct rp_plant_motion {
     double reaction[2]; /* N.m, N: of a stuck joint friction - rigid stop, else 0 */
 };
 
-/* Breakaway friction: the largest of a joint at rest, N.m (joint 0) or N (joint 1). */
-double rp_plant_breakaway(const struct rp_plant_parameters *p, int joint);
-
-/* Friction of a joint that slides at a speed >= 0, by Stribeck's law. Its value at 0 is the
- * breakaway friction: there is no jump when a joint breaks away. Below 0 it is what integrators see
- * past the event that ends the mode. */
-double rp_plant_sliding_friction(const struct rp_plant_parameters *p, int joint, double speed);
-
-/* +1: the joint rests on its lower rigid stop and can only move forward; -1: on its upper one; 0.
- */
-int rp_plant_closed_stop(const struct rp_plant_parameters *p, int joint, double q);
-
 void rp_plant_inertia(const struct rp_plant_parameters *p, bool attached, double q2,
                       struct rp_plant_inertia *inertia);
 

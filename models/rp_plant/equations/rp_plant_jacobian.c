@@ -1,5 +1,5 @@
 #include "arithmetic_gradient.h"
-#include "rp_plant_equations.h"
+#include "rp_plant_equations_lifted.h"
 
 void rp_plant_jacobians(const struct rp_plant_parameters *p, const struct rp_plant_modes *modes,
                         const double q[2], const double dq[2], const struct rp_plant_inputs *inputs,

@@ -1,5 +1,5 @@
 #include "arithmetic_taylor.h"
-#include "rp_plant_equations.h"
+#include "rp_plant_equations_lifted.h"
 
 /* Along the motion, whose velocities and accelerations are the rates of q and q'. */
 void rp_plant_reaction_rates(const struct rp_plant_parameters *p,
