@@ -10,17 +10,19 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 
 from equations.c_code import indented, number
+from equations.c_placement import Guards, Path, cost, paths, stripped
+from equations.c_values import Conditions
 from equations.graph import CONDITIONS, DERIVATIVES, LEAVES, Value
 from rparm.expressions.tree import in_order
 
 WIDTH = 100
+MOST_CHOSEN = 2  # cost of both branches of ?:
 MOST_INLINE = 72  # characters of an expression within another
 # how tightly an operation binds
 PRIMARY, UNARY, TERNARY = 10, 9, 2
 BINDING = {"*": 8, "/": 8, "+": 7, "-": 7, "<": 6, "<=": 6, ">": 6, ">=": 6, "==": 5}
 BINDING |= {"and": 4, "or": 3}
 SYMBOLS = {"and": "&&", "or": "||"}
-TRANSPARENT = ("value_of", "moving_as")  # the value is that of the first argument
 KEYWORDS = {"auto", "break", "case", "char", "const", "continue", "default", "do", "double"}
 KEYWORDS |= {"else", "enum", "extern", "float", "for", "goto", "if", "inline", "int", "long"}
 KEYWORDS |= {"register", "restrict", "return", "short", "signed", "sizeof", "static", "struct"}
@@ -28,15 +30,17 @@ KEYWORDS |= {"switch", "typedef", "union", "unsigned", "void", "volatile", "whil
 KEYWORDS |= {"true", "false", "NULL", "y0", "y1", "yn", "j0", "j1", "jn", "gamma", "real"}
 RESERVED = {*KEYWORDS, *DERIVATIVES}
 
-Path = tuple[tuple[Value, bool], ...]  # conditions that hold, or do not
 Text = tuple[str, int]  # of an expression, and how tightly it binds
 
 
 class Scope:
-    """Texts of the values that are known in a block and those around it."""
+    """Texts of the values that are known in a block and those around it.
 
-    def __init__(self, path: Path, outer: Scope | None = None) -> None:
-        self.path, self.outer = path, outer
+    wanted: the values that this block is for.
+    """
+
+    def __init__(self, path: Path, wanted: set[Value], outer: Scope | None = None) -> None:
+        self.path, self.wanted, self.outer = path, wanted, outer
         self.known: dict[Value, Text] = {}
         self.lines: list[str] = []
 
@@ -60,16 +64,23 @@ class Blocks:
         self,
         targets: Mapping[str, Value],
         names: Mapping[Value, str],
+        conditions: Conditions,
         enumerators: Mapping[str, Mapping[int, str]],
         taken: Iterable[str] = (),
     ) -> None:
-        self.names, self.enumerators = names, enumerators
+        self.enumerators = enumerators
+        targets, plain = stripped(targets, conditions)
+        targets, guarded = Guards(targets, conditions).rewritten()
+        self.names: dict[Value, str] = {}
+        for value, name in names.items():
+            if value in plain:
+                self.names.setdefault(guarded[plain[value]], name)
         self.taken = {*taken, *RESERVED}
         self.targets = targets
         self.order = in_order(targets.values())
-        self.uses = Counter(plain(a) for v in self.order for a in v.arguments if v is plain(v))
-        self.uses.update(plain(v) for v in targets.values())
-        self.paths = self._paths()
+        self.uses = Counter(a for v in self.order for a in v.arguments)
+        self.uses.update(targets.values())
+        self.paths = paths(targets)
         self.blocks = self._block_values()
         bits = {value: 1 << i for i, value in enumerate(self.blocks)}
         self.depends: dict[Value, int] = {}  # on values of blocks, as bits
@@ -82,10 +93,17 @@ class Blocks:
 
     def lines(self) -> list[str]:
         """The statements."""
-        scope = Scope(())
+        scope = Scope((), set(self.order))
         for target, value in self.targets.items():
-            scope.lines.append(f"{target} = {self.text(value, scope)[0]};")
+            scope.lines.append(f"{target} = {self._result(value, scope)};")
         return scope.lines
+
+    def _result(self, value: Value, scope: Scope) -> str:
+        """Text of a value that is stored: it needs no name if nothing else uses it."""
+        is_only_here = self.uses[value] == 1 and value.arguments and value not in self.blocks
+        if is_only_here and scope.find(value) is None and len(self.paths[value]) >= len(scope.path):
+            return self._expression(value, scope)[0]
+        return self.text(value, scope)[0]
 
     def _is_constant(self, value: Value) -> bool:
         """Whether it may get a name: an operation, or what is read more than once."""
@@ -94,45 +112,22 @@ class Blocks:
 
     # ---- Where values are calculated -------------------------------------------------------------
 
-    def _paths(self) -> dict[Value, Path]:
-        """The innermost block that contains all uses of a value."""
-        paths: dict[Value, Path] = {value: () for value in self.targets.values()}
-
-        def use(value: Value, path: Path) -> None:
-            paths[value] = common(paths[value], path) if value in paths else path
-
-        for value in self.order[::-1]:
-            path = paths[value]
-            if value.op == "if":
-                condition, first, second = value.arguments
-                use(condition, path)
-                use(first, (*path, (condition, True)))
-                use(second, (*path, (condition, False)))
-            elif value.op == "moving_as":
-                use(value.arguments[0], path)
-                paths.setdefault(value.arguments[1], path)
-            else:
-                for argument in value.arguments:
-                    use(argument, path)
-        return paths
-
     def _block_values(self) -> dict[Value, None]:
         """Choices with calculations in a branch; the others are `?:`."""
-        inside: set[tuple[Path, Value]] = set()
+        inside: Counter[tuple[Path, Value]] = Counter()
         for value in self.order:
-            if value.arguments and value.op not in (*CONDITIONS, *TRANSPARENT, "negative"):
-                path = self.paths[value]
-                inside.update((path[:i], path[i][0]) for i in range(len(path)))
+            path = self.paths[value]
+            for i in range(len(path)):
+                inside[path[:i], path[i][0]] += cost(value)
         return {
             value: None for value in self.order
-            if value.op == "if" and (self.paths[value], value.arguments[0]) in inside
+            if value.op == "if" and inside[self.paths[value], value.arguments[0]] > MOST_CHOSEN
         }  # fmt: skip
 
     # ---- Statements ------------------------------------------------------------------------------
 
     def text(self, value: Value, scope: Scope) -> Text:
         """Expression of a value in a block, after statements that it needs."""
-        value = plain(value)
         found = scope.find(value)
         if found is not None:
             return found
@@ -211,53 +206,67 @@ class Blocks:
         """The `if` that calculates a choice and all others that go with it."""
         condition, path = value.arguments[0], self.paths[value]
         group = [value]
-        busy = self.in_progress | self.bits[value]
+        busy, below = self.in_progress | self.bits[value], self.depends[value]
         for other in self.blocks:
             if (
-                other is not value
+                other in scope.wanted
+                and other is not value
                 and other.arguments[0] is condition
                 and self.paths[other] == path
                 and scope.find(other) is None
                 and not self.depends[other] & busy
-                and not self.in_progress & self.bits[other]
+                and not (self.in_progress | below) & self.bits[other]
             ):
                 group.append(other)
                 busy |= self.bits[other]
+                below |= self.depends[other]
         before, self.in_progress = self.in_progress, busy
         for needed in self._needed(group, path):
             self.text(needed, scope)
         head = self.text(condition, scope)[0]
-        self.in_progress = before
 
         names = [self._new_name(member) for member in group]
         for name in names:
             scope.lines.append(f"double {name};")
         bodies = []
         for holds in (True, False):
-            inner = Scope((*path, (condition, holds)), scope)
-            for name, member in zip(names, group, strict=True):
-                result = self.text(member.arguments[1 if holds else 2], inner)[0]
-                inner.lines.append(f"{name} = {result};")
+            results = [member.arguments[1 if holds else 2] for member in group]
+            inner = Scope((*path, (condition, holds)), set(), scope)
+            inner.wanted = self._inside(results, len(inner.path))
+            for name, result in zip(names, results, strict=True):
+                inner.lines.append(f"{name} = {self._result(result, inner)};")
             bodies.append(inner.lines)
         scope.lines += [f"if ({head}) {{", *indented(bodies[0])]
         scope.lines += ["} else {", *indented(bodies[1]), "}"]
+        self.in_progress = before
         for name, member in zip(names, group, strict=True):
             scope.known[member] = (name, PRIMARY)
+
+    def _inside(self, roots: list[Value], depth: int) -> set[Value]:
+        """What the roots follow from in a block."""
+        found: set[Value] = set()
+        todo = list(roots)
+        while todo:
+            value = todo.pop()
+            if value not in found and len(self.paths[value]) >= depth:
+                found.add(value)
+                todo += value.arguments
+        return found
 
     def _needed(self, group: list[Value], path: Path) -> list[Value]:
         """What branches need that is calculated before them, in this block."""
         members, seen, found = set(group), set(group), []
-        todo = [plain(a) for value in group[::-1] for a in value.arguments[::-1]]
+        todo = [a for value in group[::-1] for a in value.arguments[::-1]]
         while todo:
             value = todo.pop()
             if value in seen:
                 continue
             seen.add(value)
             if len(self.paths[value]) > len(path):
-                todo += [plain(a) for a in value.arguments[::-1]]
+                todo += [a for a in value.arguments[::-1]]
             elif self.paths[value] == path and value not in members and self._is_constant(value):
                 if value.op in CONDITIONS:
-                    todo += [plain(a) for a in value.arguments[::-1]]
+                    todo += [a for a in value.arguments[::-1]]
                 else:
                     found.append(value)
         return found
@@ -265,31 +274,15 @@ class Blocks:
     def _new_name(self, value: Value) -> str:
         """A name that is free."""
         base = self.names.get(value, "")
-        if not base:
-            base = "t"
+        if value.op == "if" and not base:
+            base = self.names.get(value.arguments[1]) or self.names.get(value.arguments[2], "")
+        base = base or "t"
         name, count = base, 1
         while name in self.taken or (base == "t" and count == 1):
             count += 1
             name = f"{base}{count - 1}" if base == "t" else f"{base}_{count}"
         self.taken.add(name)
         return name
-
-
-def plain(value: Value) -> Value:
-    """The value without what differs in derivatives only."""
-    while value.op in TRANSPARENT:
-        value = value.arguments[0]
-    return value
-
-
-def common(first: Path, second: Path) -> Path:
-    """What two paths begin with."""
-    length = 0
-    for a, b in zip(first, second, strict=False):
-        if a[0] is not b[0] or a[1] is not b[1]:
-            break
-        length += 1
-    return first[:length]
 
 
 def wrapped(line: str, indent: int | None = None) -> list[str]:

@@ -19,17 +19,32 @@ from equations.graph import Graph, Value
 Place = tuple[str | int, ...]  # a part of an argument, from its name
 
 
+KINDS = ("jacobian", "rates", "derivatives")
+FORM = "NAME = jacobian|rates|derivatives of FUNCTION [OUTPUT ...] by ARGUMENT ..."
+
+
 @dataclass(frozen=True)
 class Wanted:
     """What is to be derived from a function.
 
     kind: "jacobian", "rates" (first derivatives along a curve) or "derivatives" (first and second).
-    by: the arguments that move.
+    of: the arguments that it writes, if not of all. by: the arguments that move.
     """
 
+    name: str
     kind: str
     function: str
+    of: tuple[str, ...]
     by: tuple[str, ...]
+
+    @staticmethod
+    def read(text: str) -> Wanted:
+        """What a text of the form `FORM` says."""
+        match text.split():
+            case [name, "=", kind, "of", function, *rest] if kind in KINDS and "by" in rest:
+                at = rest.index("by")
+                return Wanted(name, kind, function, tuple(rest[:at]), tuple(rest[at + 1 :]))
+        raise CTextError(f"{text!r}: is not {FORM}")
 
 
 @dataclass
@@ -86,6 +101,7 @@ class Function:
         self.places: dict[Value, Place] = {}
         self.names: dict[Value, str] = {}
         _, self.written = self.interpreter.run(wanted.function, self._leaf)
+        self.outs = {str(place[0]) for place in self.written}
 
     def _modes(
         self, modes: Mapping[str, tuple[str, ...]]
@@ -105,9 +121,10 @@ class Function:
         text = shown(place, self.kinds[place[0]])
         if is_whole(kind):
             key = general(place)
-            leaf = self.interpreter.conditions.leaf(text, self.modes.get(key))
-            self.enumerators[text] = self.enumerators.get(key, {})
-            return leaf
+            known = [mode for mode in self.modes if f".{key}".endswith(f".{mode}")]
+            domain = self.modes[known[0]] if known else None
+            self.enumerators[text] = self.enumerators[known[0]] if known else {}
+            return self.interpreter.conditions.leaf(text, domain)
         moves = place[0] in self.wanted.by
         last = max(i for i, part in enumerate(place) if isinstance(part, str))
         leaf = self.graph.value("state" if moves else "parameter", name=text)
@@ -130,9 +147,11 @@ class Function:
     def _outputs(self) -> dict[Place, Value]:
         """What the function writes, in the order of its declaration."""
         written = {
-            place: value for place, value in self.written.items() if isinstance(value, Value)
+            place: value
+            for place, value in self.written.items()
+            if not self.wanted.of or place[0] in self.wanted.of
         }
-        for place, value in self.written.items():
+        for place, value in written.items():
             if not isinstance(value, Value):
                 name = shown(place, self.kinds[place[0]])
                 raise refused(self.function.decl, f"{name} is a whole number: nothing to derive")
@@ -155,7 +174,6 @@ class Function:
 
     def _jacobian(self, outputs: dict[Place, Value]) -> str:
         """J[i + n j]: derivative of output i by variable j."""
-        outs = {place[0] for place in outputs}
         variables = self._variables()
         one, zero, n = self.graph.number(1.0), self.graph.number(0.0), len(outputs)
         targets: dict[str, Value] = {}
@@ -171,9 +189,8 @@ class Function:
                 first = curve.firsts.get(value)
                 if first is not None and first.arguments:
                     names.setdefault(first, f"{name}_by_{label}")
-        head = self._head(
-            "jacobian", [d for d in self._declared() if d.name not in outs], ["double J[]"]
-        )
+        read = [d for d in self._declared() if d.name not in self.outs]
+        head = self._head(self.wanted.name, read, ["double J[]"])
         return self._definition(head, self._lines(targets, names))
 
     def _variables(self) -> list[Place]:
@@ -213,33 +230,37 @@ class Function:
             }
             for order in orders
         }
-        outs = [place[0] for place in outputs]
-        read = [d for d in self._declared() if d.name not in outs or d.name in self.wanted.by]
-        moving = []
-        for order in orders:
-            for declared in self._declared():
-                if declared.name in outs or declared.name in self.wanted.by:
-                    name = self._of_order(declared.name, order)
-                    moving.append(self._parameter(declared, name, declared.name not in outs))
+        outs = {str(place[0]) for place in outputs}
+        read = [d for d in self._declared() if d.name not in self.outs - {*self.wanted.by}]
+        moving = [
+            (self._parameter(d, self._of_order(d.name, order), d.name not in outs), order)
+            for order in orders
+            for d in self._declared()
+            if d.name in outs | {*self.wanted.by}
+        ]
+        name, declared = self.wanted.name, [text for text, _ in moving]
         firsts = self._lines(targets["first"], names)
         if len(orders) == 1:
-            return self._definition(self._head("rates", read, moving), firsts)
+            return self._definition(self._head(name, read, declared), firsts)
         both = self._lines(targets["first"] | targets["second"], names)
-        own = [self._of_order(out, "second") for out in dict.fromkeys(outs)][0]
-        texts, arguments = [], [d.name for d in read] + [parameter_name(m) for m in moving]
-        half = [m for m in moving if not parameter_name(m).endswith("second")]
-        texts.append(self._definition("static " + self._head("first", read, half), firsts))
-        texts.append(self._definition("static " + self._head("second", read, moving), both))
-        name = self.wanted.function
+        half = [text for text, order in moving if order == "first"]
+        own = [d.name for d in read]
+        given = [*own, *map(parameter_name, declared)]
         calls = [
-            f"if ({own} == NULL) {{",
-            f"    {name}_first({', '.join(a for a in arguments if not a.endswith('second'))});",
+            f"if ({parameter_name(declared[-1])} == NULL) {{",
+            f"    {name}_first({', '.join([*own, *map(parameter_name, half)])});",
             "} else {",
-            f"    {name}_second({', '.join(arguments)});",
+            f"    {name}_second({', '.join(given)});",
             "}",
         ]
-        texts.append(self._definition(self._head("derivatives", read, moving), calls))
-        return "\n\n".join(texts)
+        return "\n\n".join(
+            self._definition(head, lines)
+            for head, lines in (
+                ("static " + self._head(f"{name}_first", read, half), firsts),
+                ("static " + self._head(f"{name}_second", read, declared), both),
+                (self._head(name, read, declared), calls),
+            )
+        )
 
     def _rates(self, leaf: Value) -> tuple[Value, Value] | None:
         place = self.places.get(leaf)
@@ -275,14 +296,16 @@ class Function:
             return f"{const}{c_name(kind)} {name}{sizes}"
         return f"{const}{c_name(kind.to)} *{name}"
 
-    def _head(self, suffix: str, read: list[c_ast.Decl], more: list[str]) -> str:
+    def _head(self, name: str, read: list[c_ast.Decl], more: list[str]) -> str:
         given = [self._parameter(d, d.name, True) for d in read]
-        return f"void {self.wanted.function}_{suffix}({', '.join([*given, *more])})"
+        return f"void {name}({', '.join([*given, *more])})"
 
     def _lines(self, targets: Mapping[str, Value], names: Mapping[Value, str]) -> list[str]:
         taken = {*self.kinds, "first", "second", "J"}
         taken |= {f"{name}_{order}" for name in self.kinds for order in ("first", "second")}
-        return Blocks(targets, names, self.enumerators, taken).lines()
+        return Blocks(
+            targets, names, self.interpreter.conditions, self.enumerators, taken
+        ).lines()
 
     def _definition(self, head: str, lines: list[str]) -> str:
         body = [part for line in indented(lines) for part in wrapped(line)]

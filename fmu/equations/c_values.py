@@ -92,7 +92,7 @@ class Conditions:
             return first
         one, other = self._membership(first), self._membership(second)
         if one and other and one[0] is other[0]:
-            return self._member(one[0], one[1] & other[1])
+            return self.member(one[0], one[1] & other[1])
         return self.graph.value("and", first, second)
 
     def either(self, first: Value, second: Value) -> Value:
@@ -101,7 +101,7 @@ class Conditions:
             one, other = self._membership(first), self._membership(second)
             if not (one and other and one[0] is other[0]):
                 return self.graph.value("or", first, second)
-            return self._member(one[0], one[1] | other[1])
+            return self.member(one[0], one[1] | other[1])
         return self.no(self.both(self.no(first), self.no(second)))
 
     def _membership(self, condition: Value) -> tuple[Value, frozenset[int]] | None:
@@ -111,7 +111,7 @@ class Conditions:
             return inner and (inner[0], self.domains[inner[0]] - inner[1])
         return self.members.get(condition)
 
-    def _member(self, leaf: Value, values: frozenset[int], known: Known | None = None) -> Value:
+    def member(self, leaf: Value, values: frozenset[int], known: Known | None = None) -> Value:
         """Whether a leaf is one of these values, in the shortest form."""
         possible = known.sets.get(leaf) if known else None
         possible = self.domains[leaf] if possible is None else possible
@@ -270,7 +270,7 @@ class Conditions:
         left = list(groups.items())
         value = left[-1][0]
         for result, ats in left[-2::-1]:
-            value = self.choice(self._member(table.leaf, frozenset(ats), known), result, value)
+            value = self.choice(self.member(table.leaf, frozenset(ats), known), result, value)
         return value
 
     def truth(self, value: Any, known: Known) -> Value:
@@ -280,7 +280,7 @@ class Conditions:
             if value.results is None:
                 return self.resolve(self.no(self._compare("==", value.leaf, 0)), known)
             holds = frozenset(at for at, result in value.results if result)
-            return self.resolve(self._member(value.leaf, holds, known), known)
+            return self.resolve(self.member(value.leaf, holds, known), known)
         if isinstance(value, Choice):
             c = value.condition
             yes, no = self.assume(c, True, known), self.assume(c, False, known)

@@ -8,10 +8,9 @@
 /* Writes the derivatives of the states x = (q, dq) with the inputs u = tau. */
 static inline void rp_right_hand_side(const struct rp_parameters *p, const real x[4],
                                       const real u[2], real dx[4]) {
-    const struct arm arm = arm_in_state(p, x, x + 2);
     dx[0] = x[2];
     dx[1] = x[3];
-    arm_forward_dynamics(&arm, u, dx + 2);
+    arm_accelerations(p, x, x + 2, u, dx + 2);
 }
 
 /* Writes the calculated fields from the parameters, inputs and states. */
@@ -39,5 +38,13 @@ static inline void rp_calculate(struct rp_values *values) {
     const struct joint_loads loads = loads_of_motion(&arm, tau, values->ddq);
     write_loads(&loads, &values->loads);
 }
+
+/* Derived: J[i + 4 j] is the derivative of dx[i] by x[j]. */
+void rp_jacobian(const struct rp_parameters *p, const double x[4], const double u[2], double J[]);
+
+/* Derived: first and, unless NULL, second derivatives of the calculated fields along a curve, from
+ * those of the other fields. */
+void rp_derivatives(const struct rp_values *values, struct rp_values *first,
+                    struct rp_values *second);
 
 #endif

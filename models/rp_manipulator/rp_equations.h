@@ -181,4 +181,15 @@ static inline void arm_forward_dynamics(const struct arm *arm, const real tau[2]
     ddq[1] = push + centrifugal - fall + arm->a * ddq[0];
 }
 
+/* The same from parameters and states. */
+static inline void arm_accelerations(const struct rp_parameters *p, const real q[2],
+                                     const real dq[2], const real tau[2], real ddq[2]) {
+    const struct arm arm = arm_in_state(p, q, dq);
+    arm_forward_dynamics(&arm, tau, ddq);
+}
+
+/* Derived: J[i + 2 j] is the derivative of ddq[i] by number j of q, dq and tau. */
+void arm_accelerations_jacobian(const struct rp_parameters *p, const double q[2],
+                                const double dq[2], const double tau[2], double J[]);
+
 #endif

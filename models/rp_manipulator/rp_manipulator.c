@@ -67,3 +67,16 @@ void rp_forward_dynamics(const struct rp_parameters *p, const double q[2], const
     const struct arm arm = arm_in_state(p, q, dq);
     arm_forward_dynamics(&arm, tau, ddq);
 }
+
+void rp_dynamics_jacobians(const struct rp_parameters *p, const double q[2], const double dq[2],
+                           const double tau[2], struct rp_dynamics_jacobians *jacobians) {
+    double J[2 * 6];
+    arm_accelerations_jacobian(p, q, dq, tau, J);
+    for (int i = 0; i < 2; i++) {
+        for (int j = 0; j < 2; j++) {
+            jacobians->q[i][j] = J[i + 2 * j];
+            jacobians->dq[i][j] = J[i + 2 * (2 + j)];
+            jacobians->tau[i][j] = J[i + 2 * (4 + j)];
+        }
+    }
+}

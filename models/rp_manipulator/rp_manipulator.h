@@ -112,7 +112,7 @@ void rp_inverse_dynamics(const struct rp_parameters *p, const double q[2], const
 void rp_forward_dynamics(const struct rp_parameters *p, const double q[2], const double dq[2],
                          const double tau[2], double ddq[2]);
 
-/* Derivatives of rp_forward_dynamics (rp_jacobians.c): row i, column j is
+/* Derivatives of rp_forward_dynamics: row i, column j is
  * d ddq[i] / d (argument)[j]. */
 struct rp_dynamics_jacobians {
     double q[2][2];

@@ -7,34 +7,25 @@
 
 static enum status right_hand_side(const void *values_pointer, double t, const double x[],
                                    const double u[], double dx[]) {
-    const struct rp_parameters *p = &((const struct rp_values *)values_pointer)->parameters;
-    const struct arm arm = arm_in_state(p, x, x + 2);
-    dx[0] = x[2];
-    dx[1] = x[3];
-    arm_forward_dynamics(&arm, u, dx + 2);
+    const struct rp_values *values = values_pointer;
+    rp_right_hand_side(&values->parameters, x, u, dx);
     return STATUS_OK;
 }
 
 static enum status jacobian(const void *values_pointer, double t, const double x[],
                             const double u[], double J[]) {
     const struct rp_values *values = values_pointer;
-    struct rp_dynamics_jacobians ddq_by;
-    rp_dynamics_jacobians(&values->parameters, x, x + 2, u, &ddq_by);
-    for (size_t j = 0; j < 2; j++) {
-        double *by_q = J + 4 * j;
-        double *by_dq = J + 4 * (2 + j);
-        for (size_t i = 0; i < 2; i++) {
-            by_q[i] = 0.0;
-            by_q[2 + i] = ddq_by.q[i][j];
-            by_dq[i] = i == j ? 1.0 : 0.0;
-            by_dq[2 + i] = ddq_by.dq[i][j];
-        }
-    }
+    rp_jacobian(&values->parameters, x, u, J);
     return STATUS_OK;
 }
 
 static enum status outputs(void *values, double t) {
     rp_calculate(values);
+    return STATUS_OK;
+}
+
+static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
+    rp_derivatives(values, first, second);
     return STATUS_OK;
 }
 
@@ -60,7 +51,7 @@ const struct model rp_model = {
     .jacobian = jacobian,
     .series = &rp_series,
     .outputs = outputs,
-    .propagate = rp_propagate,
+    .propagate = propagate,
     .check_parameters = check_parameters,
 };
 
