@@ -24,6 +24,7 @@ static inline real arm_fixed_inertia(const struct rp_parameters *p) {
 
 static inline struct arm arm_in_state(const struct rp_parameters *p, const real q[2],
                                       const real dq[2]) {
+    const real s1 = sin(q[0]), c1 = cos(q[0]); // first: nothing is kept across these calls
     const real L = p->l1 + q[1];
     return (struct arm){
         .m1 = p->m1,
@@ -36,8 +37,8 @@ static inline struct arm arm_in_state(const struct rp_parameters *p, const real 
         .g = p->g,
         .q = {q[0], q[1]},
         .dq = {dq[0], dq[1]},
-        .s1 = sin(q[0]),
-        .c1 = cos(q[0]),
+        .s1 = s1,
+        .c1 = c1,
         .L = L,
         .J = arm_fixed_inertia(p) + p->m2 * L * L,
     };
