@@ -19,4 +19,15 @@ static inline void rp_actuator_calculate(struct rp_actuator_values *values) {
     }
 }
 
+/* Derived: J[i + 2 j] is the derivative of rates[i] by current[j]. */
+void rp_actuator_jacobian(const struct rp_actuator_parameters *p,
+                          const struct rp_actuator_inputs *inputs, const double current[2],
+                          double J[]);
+
+/* Derived: first and, unless NULL, second derivatives of the calculated fields along a curve, from
+ * those of the other fields. A current is taken as free strictly within its limits; at and beyond
+ * one it moves as this limit does. */
+void rp_actuator_derivatives(const struct rp_actuator_values *values,
+                             struct rp_actuator_values *first, struct rp_actuator_values *second);
+
 #endif

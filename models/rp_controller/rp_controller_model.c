@@ -27,22 +27,23 @@ static enum status right_hand_side(const void *values_pointer, double t, const d
 static enum status jacobian(const void *values_pointer, double t, const double x[],
                             const double u[], double J[]) {
     const struct rp_controller_values *values = values_pointer;
-    double by_w[2][2] = {{0.0}};
-    if (values->form != RP_CONTROLLER_SAMPLED) {
-        struct rp_controller_inputs inputs;
-        memcpy(&inputs, u, sizeof inputs);
-        rp_controller_integral_jacobian(&values->parameters, values->payload_attached != 0, &inputs,
-                                        x, by_w);
+    if (values->form == RP_CONTROLLER_SAMPLED) {
+        memset(J, 0, 4 * sizeof J[0]);
+        return STATUS_OK;
     }
-    for (size_t i = 0; i < 2; i++) {
-        J[i] = by_w[i][0];
-        J[i + 2] = by_w[i][1];
-    }
+    struct rp_controller_inputs inputs;
+    memcpy(&inputs, u, sizeof inputs);
+    rp_controller_jacobian(&values->parameters, values->payload_attached != 0, &inputs, x, J);
     return STATUS_OK;
 }
 
 static enum status outputs(void *values, double t) {
     rp_controller_calculate(values);
+    return STATUS_OK;
+}
+
+static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
+    rp_controller_derivatives(values, first, second);
     return STATUS_OK;
 }
 
@@ -83,7 +84,7 @@ const struct model rp_controller_model = {
     .right_hand_side = right_hand_side,
     .jacobian = jacobian,
     .outputs = outputs,
-    .propagate = rp_controller_propagate,
+    .propagate = propagate,
     .check_parameters = check_parameters,
     .events = &rp_controller_events,
 };

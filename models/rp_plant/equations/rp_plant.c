@@ -61,3 +61,13 @@ void rp_plant_motion(const struct rp_plant_parameters *p, const struct rp_plant_
     }
     plant_motion(&plant, modes->joint, efforts, motion->ddq, motion->reaction);
 }
+
+/* Along the motion, whose velocities and accelerations are the rates of q and q'. */
+void rp_plant_reaction_rates(const struct rp_plant_parameters *p,
+                             const struct rp_plant_modes *modes, const double q[2],
+                             const double dq[2], const struct rp_plant_inputs *inputs,
+                             const struct rp_plant_inputs *du, double rates[2]) {
+    struct rp_plant_motion now;
+    rp_plant_motion(p, modes, q, dq, inputs, &now);
+    plant_reaction_rates(p, modes, q, dq, inputs, dq, now.ddq, du, rates);
+}

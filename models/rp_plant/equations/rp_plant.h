@@ -112,19 +112,8 @@ void rp_plant_motion(const struct rp_plant_parameters *p, const struct rp_plant_
                      const double q[2], const double dq[2], const struct rp_plant_inputs *inputs,
                      struct rp_plant_motion *motion);
 
-/* Derivatives of the accelerations in these modes (rp_plant_jacobian.c): row i, column j is
- * d ddq[i] / d (argument)[j]. */
-struct rp_plant_jacobians {
-    double q[2][2];
-    double dq[2][2];
-};
-
-void rp_plant_jacobians(const struct rp_plant_parameters *p, const struct rp_plant_modes *modes,
-                        const double q[2], const double dq[2], const struct rp_plant_inputs *inputs,
-                        struct rp_plant_jacobians *jacobians);
-
 /* Time derivatives of the reactions along the motion in these modes, the inputs changing at the
- * rates du (rp_plant_rates.c). */
+ * rates du. */
 void rp_plant_reaction_rates(const struct rp_plant_parameters *p,
                              const struct rp_plant_modes *modes, const double q[2],
                              const double dq[2], const struct rp_plant_inputs *inputs,

@@ -360,4 +360,20 @@ static inline void plant_indicators(const struct rp_plant_parameters *p,
     }
 }
 
+/* ---- Derived -------------------------------------------------------------------------------- */
+
+/* J[i + 2 j] is the derivative of ddq[i] by number j of q and dq. */
+void plant_accelerations_jacobian(const struct rp_plant_parameters *p,
+                                  const struct rp_plant_modes *modes, const double q[2],
+                                  const double dq[2], const struct rp_plant_inputs *inputs,
+                                  double J[]);
+
+/* First derivatives of the reactions along a curve, from those of positions, velocities and inputs;
+ * the parameters rest. */
+void plant_reaction_rates(const struct rp_plant_parameters *p, const struct rp_plant_modes *modes,
+                          const double q[2], const double dq[2],
+                          const struct rp_plant_inputs *inputs, const double q_first[2],
+                          const double dq_first[2], const struct rp_plant_inputs *inputs_first,
+                          double reaction_first[2]);
+
 #endif
