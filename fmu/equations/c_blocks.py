@@ -6,11 +6,12 @@ stands where it is used; others are constants with the names that the source gav
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
 
 from equations.c_code import indented, number
-from equations.c_placement import Guards, Path, cost, paths, stripped
+from equations.c_placement import Path, cost, guarded, paths, stripped
 from equations.c_values import Conditions
 from equations.graph import CONDITIONS, DERIVATIVES, LEAVES, Value
 from rparm.expressions.tree import in_order
@@ -23,6 +24,7 @@ PRIMARY, UNARY, TERNARY = 10, 9, 2
 BINDING = {"*": 8, "/": 8, "+": 7, "-": 7, "<": 6, "<=": 6, ">": 6, ">=": 6, "==": 5}
 BINDING |= {"and": 4, "or": 3}
 SYMBOLS = {"and": "&&", "or": "||"}
+NUMBER = re.compile(r"\(?-?[\d.e+-]+\)?")
 KEYWORDS = {"auto", "break", "case", "char", "const", "continue", "default", "do", "double"}
 KEYWORDS |= {"else", "enum", "extern", "float", "for", "goto", "if", "inline", "int", "long"}
 KEYWORDS |= {"register", "restrict", "return", "short", "signed", "sizeof", "static", "struct"}
@@ -42,6 +44,7 @@ class Scope:
     def __init__(self, path: Path, wanted: set[Value], outer: Scope | None = None) -> None:
         self.path, self.wanted, self.outer = path, wanted, outer
         self.known: dict[Value, Text] = {}
+        self.shared: set[Value] = set()  # which a later block with this condition reads, too
         self.lines: list[str] = []
 
     def find(self, value: Value) -> Text | None:
@@ -70,11 +73,11 @@ class Blocks:
     ) -> None:
         self.enumerators = enumerators
         targets, plain = stripped(targets, conditions)
-        targets, guarded = Guards(targets, conditions).rewritten()
+        targets, became = guarded(targets, conditions)
         self.names: dict[Value, str] = {}
         for value, name in names.items():
-            if value in plain:
-                self.names.setdefault(guarded[plain[value]], name)
+            if plain.get(value) in became:
+                self.names.setdefault(became[plain[value]], name)
         self.taken = {*taken, *RESERVED}
         self.targets = targets
         self.order = in_order(targets.values())
@@ -139,14 +142,25 @@ class Blocks:
             self._block(value, scope)
             return scope.known[value]
         text = self._expression(value, scope)
-        if value.op in CONDITIONS or self._is_inline(value, text):
+        if value.op in CONDITIONS or self._is_inline(value, text, scope):
             return text
         name = self._new_name(value)
-        scope.lines.append(f"const double {name} = {text[0]};")
-        scope.known[value] = (name, PRIMARY)
-        return scope.known[value]
+        if value in scope.shared and scope.outer is not None:
+            self._share(value, name, scope.outer)
+            scope.lines.append(f"{name} = {text[0]};")
+        else:
+            scope.lines.append(f"const double {name} = {text[0]};")
+            scope.known[value] = (name, PRIMARY)
+        return (name, PRIMARY)
 
-    def _is_inline(self, value: Value, text: Text) -> bool:
+    def _share(self, value: Value, name: str, scope: Scope) -> None:
+        """Declare a value in front of the block that calculates it."""
+        scope.lines.append(f"double {name} = 0.0;")
+        scope.known[value] = (name, PRIMARY)
+
+    def _is_inline(self, value: Value, text: Text, scope: Scope) -> bool:
+        if value in scope.shared:
+            return False
         if value.op == "negative" and text[0][1:].isidentifier():
             return True
         return self.uses[value] == 1 and value not in self.names and len(text[0]) <= MOST_INLINE
@@ -195,7 +209,7 @@ class Blocks:
         return f"{leaf.name} {value.op} {named.get(constant, constant)}", BINDING[value.op]
 
     def _not(self, condition: Value, text: Text) -> Text:
-        if condition.op == "==":
+        if condition.op == "==" and " == " in text[0]:
             return text[0].replace(" == ", " != "), BINDING["=="]
         return f"!{self._within(text, UNARY)}", UNARY
 
@@ -207,13 +221,14 @@ class Blocks:
         condition, path = value.arguments[0], self.paths[value]
         group = [value]
         busy, below = self.in_progress | self.bits[value], self.depends[value]
-        for other in self.blocks:
+        same = [
+            other for other in self.blocks
+            if other.arguments[0] is condition and self.paths[other] == path
+            and other in scope.wanted and scope.find(other) is None
+        ]  # fmt: skip
+        for other in same:
             if (
-                other in scope.wanted
-                and other is not value
-                and other.arguments[0] is condition
-                and self.paths[other] == path
-                and scope.find(other) is None
+                other is not value
                 and not self.depends[other] & busy
                 and not (self.in_progress | below) & self.bits[other]
             ):
@@ -223,24 +238,56 @@ class Blocks:
         before, self.in_progress = self.in_progress, busy
         for needed in self._needed(group, path):
             self.text(needed, scope)
-        head = self.text(condition, scope)[0]
+        head = self.text(condition, scope)
 
         names = [self._new_name(member) for member in group]
-        for name in names:
-            scope.lines.append(f"double {name};")
         bodies = []
         for holds in (True, False):
             results = [member.arguments[1 if holds else 2] for member in group]
             inner = Scope((*path, (condition, holds)), set(), scope)
             inner.wanted = self._inside(results, len(inner.path))
-            for name, result in zip(names, results, strict=True):
-                inner.lines.append(f"{name} = {self._result(result, inner)};")
-            bodies.append(inner.lines)
-        scope.lines += [f"if ({head}) {{", *indented(bodies[0])]
-        scope.lines += ["} else {", *indented(bodies[1]), "}"]
+            later = [other for other in same if scope.find(other) is None and other not in group]
+            inner.shared = self._shared(later, inner, 1 if holds else 2)
+            given = [self._result(result, inner) for result in results]
+            bodies.append((inner.lines, given))
+        if not bodies[0][0] and all(NUMBER.fullmatch(value) for value in bodies[0][1]):
+            head, bodies = self._not(condition, head), bodies[::-1]
+        lines = self._if(head[0], names, *bodies)
+        if scope.outer is not None:
+            for name, member in zip(names, group, strict=True):
+                if member in scope.shared:
+                    declared = next(line for line in lines if line.startswith(f"double {name}"))
+                    lines.remove(declared)
+                    scope.outer.lines.append(f"double {name} = 0.0;")
+                    if declared != f"double {name};":
+                        lines.insert(0, declared.removeprefix("double "))
+        scope.lines += lines
         self.in_progress = before
         for name, member in zip(names, group, strict=True):
+            if member in scope.shared and scope.outer is not None:
+                scope.outer.known[member] = (name, PRIMARY)
             scope.known[member] = (name, PRIMARY)
+
+    def _if(
+        self,
+        head: str,
+        names: list[str],
+        first: tuple[list[str], list[str]],
+        second: tuple[list[str], list[str]],
+    ) -> list[str]:
+        """Lines of a block: statements and results of both branches.
+
+        A branch of constants only gives the first values.
+        """
+        ends = [
+            [*lines, *(f"{name} = {value};" for name, value in zip(names, given, strict=True))]
+            for lines, given in (first, second)
+        ]
+        if not second[0] and all(NUMBER.fullmatch(value) for value in second[1]):
+            begin = [f"double {n} = {v};" for n, v in zip(names, second[1], strict=True)]
+            return [*begin, f"if ({head}) {{", *indented(ends[0]), "}"]
+        begin = [f"double {name};" for name in names]
+        return [*begin, f"if ({head}) {{", *indented(ends[0]), "} else {", *indented(ends[1]), "}"]
 
     def _inside(self, roots: list[Value], depth: int) -> set[Value]:
         """What the roots follow from in a block."""
@@ -252,6 +299,16 @@ class Blocks:
                 found.add(value)
                 todo += value.arguments
         return found
+
+    def _shared(self, later: list[Value], scope: Scope, branch: int) -> set[Value]:
+        """Of what a block calculates, what other choices of the same condition start from."""
+        if not later:
+            return set()
+        depth = len(scope.path)
+        results = [other.arguments[branch] for other in later]
+        users = self._inside(results, depth) - scope.wanted
+        read = {*results, *(argument for user in users for argument in user.arguments)}
+        return {v for v in read & scope.wanted if self.paths[v] == scope.path and v.arguments}
 
     def _needed(self, group: list[Value], path: Path) -> list[Value]:
         """What branches need that is calculated before them, in this block."""

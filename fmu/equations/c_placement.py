@@ -7,6 +7,7 @@ own.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -17,6 +18,7 @@ from rparm.expressions.tree import in_order
 COSTS = {"+": 1, "-": 1, "*": 1, "negative": 0, "/": 5, "value_of": 0, "moving_as": 0, "if": 0}
 OF_FUNCTION = 20
 WORTH_A_BRANCH = 8  # cost of what is not calculated then
+MOST_LEVELS = 20  # of guards within each other
 
 Path = tuple[tuple[Value, bool], ...]  # conditions that hold, or do not, from outside to inside
 
@@ -99,8 +101,22 @@ def common(first: Path, second: Path) -> Path:
     return first[:length]
 
 
+def guarded(
+    targets: Mapping[str, Value], conditions: Conditions
+) -> tuple[dict[str, Value], dict[Value, Value]]:
+    """Values that are needed in some cases only behind choices, and what became of each value."""
+    became = {value: value for value in in_order(targets.values())}
+    for _ in range(MOST_LEVELS):
+        guards = Guards(targets, conditions)
+        if not guards.found:
+            break
+        targets, found = guards.rewritten()
+        became = {value: found[now] for value, now in became.items() if now in found}
+    return dict(targets), became
+
+
 class Guards:
-    """Puts values that are needed in some cases only behind a choice of their own."""
+    """The guards of values that are needed in some cases only: conditions that stand outermost."""
 
     def __init__(self, targets: Mapping[str, Value], conditions: Conditions) -> None:
         self.targets, self.conditions = targets, conditions
@@ -113,28 +129,49 @@ class Guards:
                 new = self._and(need, *literal) if literal else need
                 known = self.needs.get(argument)
                 self.needs[argument] = new if known is None else self._either(known, new)
+        self.found = self._guards()
 
     def rewritten(self) -> tuple[dict[str, Value], dict[Value, Value]]:
         """The targets' values with guards, and what became of each value."""
-        graph, zero = self.conditions.graph, self.conditions.graph.number(0.0)
-        guards = self._guards()
+        zero = self.conditions.graph.number(0.0)
+        guards = self.found
         found: dict[Value, Value] = {}
         for value in self.order:
             arguments = []
             for argument, literal in _uses(value):
-                new = found[argument]
-                guard = guards.get(argument)
-                is_inside = guards.get(value) is guard and self.paths[argument] == self.paths[value]
-                if guard is not None and not (is_inside and literal is None):
-                    new = graph.value("if", guard, new, zero)
+                new, guard = found[argument], guards.get(argument)
+                if guard is not None and not self._is_inside(value, argument, literal, guards):
+                    new = self.conditions.select(guard, new, zero)
                 arguments.append(new)
             found[value] = _with(value, arguments, self.conditions)
         return {target: found[value] for target, value in self.targets.items()}, found
 
+    def _is_inside(
+        self,
+        user: Value,
+        value: Value,
+        literal: tuple[Value, bool] | None,
+        guards: Mapping[Value, Value],
+    ) -> bool:
+        """Whether a use of a value is behind the same guard."""
+        guard, path = guards[value], self.paths[value]
+        if guards.get(user) is guard and self.paths[user] == path:
+            return literal is None
+        of_use = (*self.paths[user], literal) if literal else self.paths[user]
+        if len(of_use) <= len(path):
+            return False
+        condition, holds = of_use[len(path)]
+        return guard is (condition if holds else self.conditions.no(condition))
+
     def _guards(self) -> dict[Value, Value]:
         """Conditions that are stronger than where the uses are, and worth a branch."""
         found: dict[Value, Value] = {}
-        costs: dict[tuple[Path, Value], int] = {}
+        costs: Counter[tuple[Path, Value]] = Counter()
+        inside: Counter[tuple[Path, Value]] = Counter()
+        for value in self.order:
+            path = self.paths[value]
+            for i in range(len(path)):
+                inside[path[:i], path[i][0]] += cost(value)
         for value in self.order:
             if cost(value) == 0 and value.op != "if":
                 continue
@@ -142,14 +179,15 @@ class Guards:
             for condition, holds in self.paths[value]:
                 known = self.conditions.assume(condition, holds, known) or known
             guard = self._condition(self.needs[value], known)
-            if guard.op != "number":
+            has_it = value.op == "if" and value.arguments[0] in (guard, self.conditions.no(guard))
+            if guard.op != "number" and not has_it:
                 found[value] = guard
-                place = (self.paths[value], guard)
-                costs[place] = costs.get(place, 0) + cost(value)
-        return {
-            value: guard for value, guard in found.items()
-            if costs[self.paths[value], guard] >= WORTH_A_BRANCH
-        }  # fmt: skip
+                path = self.paths[value]
+                own = inside[path, value.arguments[0]] if value.op == "if" else cost(value)
+                costs[path, guard] += own
+        worth = [v for v, guard in found.items() if costs[self.paths[v], guard] >= WORTH_A_BRANCH]
+        depth = min((len(self.paths[value]) for value in worth), default=0)
+        return {value: found[value] for value in worth if len(self.paths[value]) == depth}
 
     def _condition(self, need: Need, known: Known) -> Value:
         """A need as a condition, where some is known already."""

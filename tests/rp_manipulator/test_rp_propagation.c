@@ -6,7 +6,7 @@
  * of the differences; h = R / 128 leaves that far below their rounding. */
 #include "last_text.h"
 #include "model_test.h"
-#include "rp_model.h"
+#include "rp_calculated.h"
 #include "rp_test_support.h"
 #include "unity.h"
 

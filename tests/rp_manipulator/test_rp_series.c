@@ -6,7 +6,7 @@
 #include "rp_series.h"
 
 #include "jet.h"
-#include "rp_model.h"
+#include "rp_calculated.h"
 #include "rp_test_support.h"
 #include "unity.h"
 
