@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 
 from equations.c_code import indented, number
 from equations.c_placement import Path, cost, guarded, paths, stripped
-from equations.c_values import Conditions
+from equations.c_values import RELATION, Conditions
 from equations.graph import CONDITIONS, DERIVATIVES, LEAVES, Value
 from rparm.expressions.tree import in_order
 
@@ -174,9 +174,8 @@ class Blocks:
         if not value.arguments:
             return self._leaf(value)
         given = [self.text(argument, scope) for argument in value.arguments]
-        if value.arguments and value.arguments[0].op == "integer" and value.op in BINDING:
-            if value.op in CONDITIONS:
-                return self._of_integer(value)
+        if value.arguments[0].op == "integer" and value.op in RELATION:
+            return self._of_integer(value)
         given = [
             (f"(double){text}", UNARY) if argument.op == "integer" else (text, binding)
             for argument, (text, binding) in zip(value.arguments, given, strict=True)
@@ -252,42 +251,24 @@ class Blocks:
             bodies.append((inner.lines, given))
         if not bodies[0][0] and all(NUMBER.fullmatch(value) for value in bodies[0][1]):
             head, bodies = self._not(condition, head), bodies[::-1]
-        lines = self._if(head[0], names, *bodies)
-        if scope.outer is not None:
-            for name, member in zip(names, group, strict=True):
-                if member in scope.shared:
-                    declared = next(line for line in lines if line.startswith(f"double {name}"))
-                    lines.remove(declared)
-                    scope.outer.lines.append(f"double {name} = 0.0;")
-                    if declared != f"double {name};":
-                        lines.insert(0, declared.removeprefix("double "))
-        scope.lines += lines
         self.in_progress = before
-        for name, member in zip(names, group, strict=True):
+        has_values = not bodies[1][0] and all(NUMBER.fullmatch(value) for value in bodies[1][1])
+        for name, member, value in zip(names, group, bodies[1][1], strict=True):
             if member in scope.shared and scope.outer is not None:
-                scope.outer.known[member] = (name, PRIMARY)
-            scope.known[member] = (name, PRIMARY)
+                self._share(member, name, scope.outer)
+                scope.lines += [f"{name} = {value};"] if has_values else []
+            else:
+                scope.lines.append(f"double {name} = {value};" if has_values else f"double {name};")
+                scope.known[member] = (name, PRIMARY)
+        scope.lines += self._if(head[0], names, *bodies[: 1 if has_values else 2])
 
-    def _if(
-        self,
-        head: str,
-        names: list[str],
-        first: tuple[list[str], list[str]],
-        second: tuple[list[str], list[str]],
-    ) -> list[str]:
-        """Lines of a block: statements and results of both branches.
-
-        A branch of constants only gives the first values.
-        """
-        ends = [
-            [*lines, *(f"{name} = {value};" for name, value in zip(names, given, strict=True))]
-            for lines, given in (first, second)
-        ]
-        if not second[0] and all(NUMBER.fullmatch(value) for value in second[1]):
-            begin = [f"double {n} = {v};" for n, v in zip(names, second[1], strict=True)]
-            return [*begin, f"if ({head}) {{", *indented(ends[0]), "}"]
-        begin = [f"double {name};" for name in names]
-        return [*begin, f"if ({head}) {{", *indented(ends[0]), "} else {", *indented(ends[1]), "}"]
+    def _if(self, head: str, names: list[str], *bodies: tuple[list[str], list[str]]) -> list[str]:
+        """Lines of a block: statements and results of one branch or of both."""
+        found = [f"if ({head}) {{"]
+        for i, (lines, given) in enumerate(bodies):
+            results = [f"{name} = {value};" for name, value in zip(names, given, strict=True)]
+            found += ["} else {"] * i + indented([*lines, *results])
+        return [*found, "}"]
 
     def _inside(self, roots: list[Value], depth: int) -> set[Value]:
         """What the roots follow from in a block."""
@@ -353,4 +334,3 @@ def wrapped(line: str, indent: int | None = None) -> list[str]:
         lines.append(line[:at])
         line = " " * own + line[at + 1 :]
     return [*lines, line]
-

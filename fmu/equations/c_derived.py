@@ -60,9 +60,9 @@ class Derived:
         parts = [self._one(w) for w in wanted]
         own = [path.name for path in self.program.files]
         lines = [
-            "/* Derived from equations in plain C, by the rules of differentiation: change those, not",
-            " * this file. In the order of their operations, and with their names for values: d_x is",
-            " * the first derivative of x and dd_x the second, x_by_y that of x by y.",
+            "/* Derived from equations in plain C by the build: change those, not this file.",
+            " * Operations keep their order, and values their names: d_x is the first derivative of x",
+            " * along a curve, dd_x the second, x_by_y the derivative of x by y.",
             " *",
             *wrapped_list(" * Read: ", own),
             " */",
@@ -303,9 +303,7 @@ class Function:
     def _lines(self, targets: Mapping[str, Value], names: Mapping[Value, str]) -> list[str]:
         taken = {*self.kinds, "first", "second", "J"}
         taken |= {f"{name}_{order}" for name in self.kinds for order in ("first", "second")}
-        return Blocks(
-            targets, names, self.interpreter.conditions, self.enumerators, taken
-        ).lines()
+        return Blocks(targets, names, self.interpreter.conditions, self.enumerators, taken).lines()
 
     def _definition(self, head: str, lines: list[str]) -> str:
         body = [part for line in indented(lines) for part in wrapped(line)]
@@ -358,5 +356,3 @@ def wrapped_list(head: str, words: list[str]) -> list[str]:
             line = " *   "
         line += f"{more} "
     return [*lines, line.rstrip()]
-
-

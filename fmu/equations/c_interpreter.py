@@ -16,9 +16,20 @@ from pycparser import c_ast
 
 from equations.c_text import CTextError, Program, check_function, refused, walk
 from equations.c_types import (
-    BOOL, DOUBLE, INT, REAL, UNSET, VOID, Address, Array, Pointer, Structure, Types, is_real,
+    BOOL,
+    DOUBLE,
+    INT,
+    REAL,
+    UNSET,
+    VOID,
+    Address,
+    Array,
+    Pointer,
+    Structure,
+    Types,
+    is_real,
     is_whole,
-)  # fmt: skip
+)
 from equations.c_values import RELATION, Choice, Conditions, Known, Table
 from equations.graph import DERIVATIVES, Graph, Value
 from rparm.expressions.tree import RELATIONS, in_order
@@ -160,7 +171,7 @@ class Interpreter:
         """The state after a call, and what it returns."""
         name = function.decl.name
         if name not in self.checked:
-            check_function(self.program, function)
+            check_function(function)
             self.checked.add(name)
         if name in self.calls:
             raise refused(place, f"{name} calls itself: write a loop with a fixed number of rounds")
@@ -257,10 +268,8 @@ class Interpreter:
             if returns:
                 branch = replace(branch, after=after) if branch else after
             ends.append(self.execute(branch, path))
-        if None in ends:
-            end = ends[0] or ends[1]
-        else:
-            end = self.merged(condition, ends[0], ends[1], node)
+        first, second = ends
+        end = self.merged(condition, first, second) if first and second else first or second
         if returns:
             end[0].known = state.known
             return end
@@ -268,10 +277,10 @@ class Interpreter:
         return after
 
     def merged(
-        self, condition: Value, first: tuple[State, Any], second: tuple[State, Any], place: Any
+        self, condition: Value, first: tuple[State, Any], second: tuple[State, Any]
     ) -> tuple[State, Any]:
         """The end of two paths."""
-        choose = partial(self.chosen, condition, place=place)
+        choose = partial(self.chosen, condition)
         a, b = first[0].memory, second[0].memory
         memory = {
             address: value if value is b[address] else choose(value, b[address])
@@ -297,13 +306,13 @@ class Interpreter:
             result = (choose(results[0][0], results[1][0]),)
         return State(memory, first[0].known), result
 
-    def chosen(self, condition: Value, first: Any, second: Any, place: Any) -> Any:
+    def chosen(self, condition: Value, first: Any, second: Any) -> Any:
         """The first value where the condition holds, else the second."""
         if isinstance(first, dict):
-            return {k: self.chosen(condition, first[k], second[k], place) for k in first}
+            return {k: self.chosen(condition, first[k], second[k]) for k in first}
         if isinstance(first, list):
             pairs = zip(first, second, strict=True)
-            return [self.chosen(condition, a, b, place) for a, b in pairs]
+            return [self.chosen(condition, a, b) for a, b in pairs]
         if first is second:
             return first
         if first is UNSET or second is UNSET:
@@ -471,7 +480,7 @@ class Interpreter:
             before = self.get(address, self.kind_at(address, node), state, node)
             if before is UNSET:
                 raise refused(node, "set all elements before one is chosen by a condition")
-            self.set_all(address, self.chosen(condition, value, before, node), state)
+            self.set_all(address, self.chosen(condition, value, before), state)
 
     def alternatives(
         self, places: Any, known: Known, condition: Value | None = None
@@ -499,7 +508,7 @@ class Interpreter:
         if isinstance(places, Choice):
             kind, first = self.load(places.first, state, node)
             _, second = self.load(places.second, state, node)
-            return kind, self.chosen(places.condition, first, second, node)
+            return kind, self.chosen(places.condition, first, second)
         kind = self.kind_at(places, node)
         if isinstance(kind, Array):  # as a value, it is a pointer to its first element
             return Pointer(kind.of), places + 0
@@ -781,7 +790,7 @@ class Interpreter:
             b = b if is_real(other) else self.conditions.real(b, known_b)
             kind = DOUBLE if is_whole(kind) else kind
         kind = REAL if REAL in (kind, other) else kind
-        return kind, self.chosen(condition, a, b, node)
+        return kind, self.chosen(condition, a, b)
 
     def assignment(self, node: c_ast.Assignment, scope: Scope, state: State) -> tuple[Any, Any]:
         right = self.value(node.rvalue, scope, state)
@@ -797,9 +806,7 @@ class Interpreter:
         self.store(places, value, state, node)
         return kind, value
 
-    def converted(
-        self, kind: Any, value: Any, to: Any, state: State, node: c_ast.Node
-    ) -> Any:
+    def converted(self, kind: Any, value: Any, to: Any, state: State, node: c_ast.Node) -> Any:
         """A value as one of another type."""
         if is_real(to) and is_real(kind):
             return value
@@ -817,9 +824,7 @@ class Interpreter:
             return value
         raise refused(node, "the types do not fit")
 
-    def scalar(
-        self, kind: Any, value: Any, to: Any, state: State, node: c_ast.Node
-    ) -> Any:
+    def scalar(self, kind: Any, value: Any, to: Any, state: State, node: c_ast.Node) -> Any:
         """As `converted`, for a variable, an argument or a result."""
         value = self.converted(kind, value, to, state, node)
         if to == DOUBLE and not self.doubles_move and self.carries(value):
@@ -844,9 +849,7 @@ class Interpreter:
         if not isinstance(node.name, c_ast.ID):
             raise refused(node, "pointers to functions are not read: call the function")
         name = node.name.name
-        given = [
-            self.value(a, scope, state) for a in (node.args.exprs if node.args else [])
-        ]
+        given = [self.value(a, scope, state) for a in (node.args.exprs if node.args else [])]
         if name in ARGUMENTS and (name in BUILT_IN or name not in self.program.functions):
             return self.built_in(name, given, state, node)
         function = self.program.functions.get(name)

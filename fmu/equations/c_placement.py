@@ -28,7 +28,7 @@ class Need:
     """A value is needed where integer leaves have one of these values and the literals hold."""
 
     sets: tuple[tuple[Value, frozenset[int]], ...] = ()
-    literals: frozenset[tuple[Value, bool]] = frozenset()
+    literals: Path = ()
 
 
 def cost(value: Value) -> int:
@@ -195,20 +195,10 @@ class Guards:
         for leaf, values in need.sets:
             member = self.conditions.member(leaf, values, known)
             result = self.conditions.both(result, self.conditions.resolve(member, known))
-        ordered = [literal for literal in self._literals() if literal in need.literals]
-        for condition, holds in ordered:
+        for condition, holds in need.literals:
             literal = condition if holds else self.conditions.no(condition)
             result = self.conditions.both(result, self.conditions.resolve(literal, known))
         return result
-
-    def _literals(self) -> list[tuple[Value, bool]]:
-        if not hasattr(self, "_ordered"):
-            found: dict[tuple[Value, bool], None] = {}
-            for value in self.order:
-                for literal in sorted(self.needs[value].literals, key=lambda at: at[1]):
-                    found.setdefault(literal)
-            self._ordered = list(found)
-        return self._ordered
 
     def _and(self, need: Need, condition: Value, holds: bool) -> Need:
         """A need that also has this condition."""
@@ -224,7 +214,8 @@ class Guards:
             for part in condition.arguments:
                 need = self._and(need, part, holds)
             return need
-        return Need(need.sets, need.literals | {(condition, holds)})
+        new = (condition, holds)
+        return need if new in need.literals else Need(need.sets, (*need.literals, new))
 
     def _either(self, first: Need, second: Need) -> Need:
         """What two needs have in common."""
@@ -234,4 +225,5 @@ class Guards:
             union = values | other.get(leaf, self.conditions.domains[leaf])
             if union != self.conditions.domains[leaf]:
                 sets.append((leaf, union))
-        return Need(tuple(sets), first.literals & second.literals)
+        literals = tuple(literal for literal in first.literals if literal in second.literals)
+        return Need(tuple(sets), literals)

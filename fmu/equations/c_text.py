@@ -100,9 +100,7 @@ class Preprocessor:
         if skipping:
             raise CTextError(f"{shown}:{number}: #ifndef without #endif")
 
-    def directive(
-        self, name: str, rest: str, skipping: list[bool], path: Path, place: str
-    ) -> None:
+    def directive(self, name: str, rest: str, skipping: list[bool], path: Path, place: str) -> None:
         """One line that begins with #."""
         if name == "ifndef":
             skipping.append(rest in self.defined)
@@ -121,9 +119,7 @@ class Preprocessor:
         elif name == "include":
             self.include(rest, path, place)
         else:
-            raise CTextError(
-                f"{place}: #{name} is not read: only include guards and #include are"
-            )
+            raise CTextError(f"{place}: #{name} is not read: only include guards and #include are")
 
     def include(self, rest: str, path: Path, place: str) -> None:
         name = rest[1:-1]
@@ -189,7 +185,7 @@ def _rephrased(message: str, text: str, name: str) -> str:
     place = f"{found['file']}:{found['line']}"
     if reason.startswith("before: "):
         token = reason.removeprefix("before: ")
-        return f"{place}: {token} does not fit here: look at what is before it, often a ; is missing"
+        return f"{place}: {token} does not fit here: often a ; is missing before it"
     if reason == "Invalid function definition":
         return f"{place}: this is no declaration: a type or a ; may be missing before it"
     return f"{place}: {reason[:1].lower()}{reason[1:]}"
@@ -254,22 +250,20 @@ def walk(node: c_ast.Node) -> Iterator[c_ast.Node]:
         todo += [child for _, child in found.children()][::-1]
 
 
-def check_function(program: Program, function: c_ast.FuncDef) -> None:
+def check_function(function: c_ast.FuncDef) -> None:
     """Refuse a function with something that is no part of the equations' C."""
     for node in walk(function):
-        if type(node) in INSTEAD:
-            raise refused(node, INSTEAD[type(node)])
-        if isinstance(node, c_ast.IdentifierType):
-            for name in node.names:
-                if name in NO_TYPES:
+        match node:
+            case c_ast.IdentifierType():
+                for name in NO_TYPES.keys() & set(node.names):
                     raise refused(node, NO_TYPES[name])
-        elif isinstance(node, c_ast.Decl) and "static" in node.storage and node is not function.decl:
-            if "const" not in node.quals:
-                raise refused(
-                    node, f"{node.name} keeps a value between calls: leave out static, or write const"
-                )
-        elif isinstance(node, c_ast.UnaryOp) and node.op in ("sizeof", "~", "_Alignof"):
-            raise refused(node, f"{node.op} is not read")
-        elif isinstance(node, c_ast.BinaryOp) and node.op in ("%", "&", "|", "^", "<<", ">>"):
-            if node.op != "%":
+            case c_ast.Decl() if node is not function.decl and "static" in node.storage:
+                if "const" not in node.quals:
+                    reason = f"{node.name} keeps a value between calls: leave out static"
+                    raise refused(node, reason)
+            case c_ast.UnaryOp(op="sizeof" | "~" | "_Alignof"):
+                raise refused(node, f"{node.op} is not read")
+            case c_ast.BinaryOp(op="&" | "|" | "^" | "<<" | ">>"):
                 raise refused(node, f"{node.op} is not read: use && || ! for conditions")
+            case _ if type(node) in INSTEAD:
+                raise refused(node, INSTEAD[type(node)])

@@ -341,4 +341,3 @@ class Conditions:
         if second.op == "if" and second.arguments[0] is condition:
             second = second.arguments[2]
         return first if first is second else self.graph.value("if", condition, first, second)
-

@@ -57,9 +57,7 @@ class Curve:
             case "*":
                 a, b = y.arguments
                 mixed = simple("*", simple("*", self.two, d[0]), d[1])
-                return simple(
-                    "+", simple("+", simple("*", dd[0], b), mixed), simple("*", a, dd[1])
-                )
+                return simple("+", simple("+", simple("*", dd[0], b), mixed), simple("*", a, dd[1]))
             case "/":
                 b = y.arguments[1]
                 mixed = simple("*", simple("*", self.two, self.firsts[y]), d[1])
