@@ -61,8 +61,8 @@ class Derived:
         own = [path.name for path in self.program.files]
         lines = [
             "/* Derived from equations in plain C by the build: change those, not this file.",
-            " * Operations keep their order, and values their names: d_x is the first derivative of x",
-            " * along a curve, dd_x the second, x_by_y the derivative of x by y.",
+            " * Operations keep their order, and values their names: d_x is the first derivative",
+            " * of x along a curve, dd_x the second, x_by_y the derivative of x by y.",
             " *",
             *wrapped_list(" * Read: ", own),
             " */",
