@@ -164,7 +164,7 @@ class Function:
         kind, found = pointed(self.kinds[place[0]]), []
         for part in place[1:]:
             if isinstance(kind, Structure):
-                fields = self.interpreter.types.fields(kind, self.function, self.interpreter.size)
+                fields = self.interpreter.types.fields(kind, self.function)
                 found.append(list(fields).index(str(part)))
                 kind = fields[str(part)]
             else:
@@ -206,7 +206,7 @@ class Function:
                 raise refused(self.function.decl, f"the array {place[0]} has no size")
             return [p for i in range(kind.length) for p in self._parts((*place, i), kind.of)]
         if isinstance(kind, Structure):
-            fields = self.interpreter.types.fields(kind, self.function, self.interpreter.size)
+            fields = self.interpreter.types.fields(kind, self.function)
             return [p for name, of in fields.items() for p in self._parts((*place, name), of)]
         return [place] if is_real(kind) else []
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -50,51 +51,51 @@ def is_whole(kind: Any) -> bool:
 
 
 class Types:
-    """The types of a program."""
+    """The types of a program; size: calculates the length of an array."""
 
-    def __init__(self, program: Program) -> None:
-        self.program = program
+    def __init__(self, program: Program, size: Callable[[c_ast.Node], int]) -> None:
+        self.program, self.size = program, size
         self.structures: dict[str, dict[str, Any]] = {}
 
-    def of(self, node: c_ast.Node, sizes: Any) -> Any:
-        """Type of a declaration; sizes: calculates the length of an array."""
+    def of(self, node: c_ast.Node) -> Any:
+        """Type of a declaration."""
         if isinstance(node, c_ast.Decl | c_ast.Typename | c_ast.Typedef | c_ast.TypeDecl):
-            return self.of(node.type, sizes)
+            return self.of(node.type)
         if isinstance(node, c_ast.PtrDecl):
             if isinstance(node.type, c_ast.FuncDecl):
                 raise refused(node, "pointers to functions are not read: call the function")
-            return Pointer(self.of(node.type, sizes))
+            return Pointer(self.of(node.type))
         if isinstance(node, c_ast.ArrayDecl):
-            length = None if node.dim is None else sizes(node.dim)
-            return Array(self.of(node.type, sizes), length)
+            length = None if node.dim is None else self.size(node.dim)
+            return Array(self.of(node.type), length)
         if isinstance(node, c_ast.Struct):
             return Structure(node.name or f"at {node.coord}")
         if isinstance(node, c_ast.Enum):
             return INT
         if isinstance(node, c_ast.IdentifierType):
-            return self._named(node, sizes)
+            return self._named(node)
         raise refused(node, f"{type(node).__name__} is no type of the equations' C")
 
-    def _named(self, node: c_ast.IdentifierType, sizes: Any) -> Any:
+    def _named(self, node: c_ast.IdentifierType) -> Any:
         name = " ".join(node.names)
         if name in ("real", "size_t") and name in self.program.typedefs:
             return REAL if name == "real" else INT
         if name in NAMES:
             return NAMES[name]
         if name in self.program.typedefs:
-            return self.of(self.program.typedefs[name], sizes)
+            return self.of(self.program.typedefs[name])
         for part in node.names:
             if part in NO_TYPES:
                 raise refused(node, NO_TYPES[part])
         raise refused(node, f"{name} is no type of the equations' C: use double, int or a struct")
 
-    def fields(self, structure: Structure, node: c_ast.Node, sizes: Any) -> dict[str, Any]:
+    def fields(self, structure: Structure, node: c_ast.Node) -> dict[str, Any]:
         """Types of the fields of a structure."""
         name = structure.name
         if name not in self.structures:
             if name not in self.program.structs:
                 raise refused(node, f"struct {name} is not defined")
             self.structures[name] = {
-                field.name: self.of(field, sizes) for field in self.program.structs[name].decls
+                field.name: self.of(field) for field in self.program.structs[name].decls
             }
         return self.structures[name]

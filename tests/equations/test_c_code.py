@@ -137,8 +137,9 @@ class Compiled:
         program = read(header, [ROOT / "models"])
         derived = Derived(program, {"m": ("0", "1", "2")})
         source = written(folder, derived.text(map(Wanted.read, wanted), "text.h"), "derived.c")
-        values = written(folder, '#include "text.h"\nvoid g(const double x[N], int m, double y[2]);'
-                         "\nvoid g(const double x[N], int m, double y[2]) { f(x, m, y); }\n", "g.c")  # fmt: skip
+        head = "void g(const double x[N], int m, double y[2])"
+        call = f'#include "text.h"\n{head};\n{head} {{ f(x, m, y); }}\n'
+        values = written(folder, call, "g.c")
         library = folder / "derived.so"
         subprocess.run(
             [compiler, "-std=c17", "-O1", "-ffp-contract=off", *WARNINGS, "-Wno-unused-parameter",
