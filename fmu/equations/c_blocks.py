@@ -323,10 +323,10 @@ class Blocks:
         return name
 
 
-def wrapped(line: str, indent: int | None = None) -> list[str]:
-    """A statement in lines that are not too long; indent: of all but the first."""
+def wrapped(line: str) -> list[str]:
+    """A statement in lines that are not too long."""
     lines: list[str] = []
-    own = len(line) - len(line.lstrip()) + 4 if indent is None else indent
+    own = len(line) - len(line.lstrip()) + 4
     while len(line) > WIDTH:
         at = line.rfind(" ", own + 8, WIDTH)
         if at < 0:

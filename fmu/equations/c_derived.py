@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from pycparser import c_ast
 
-from equations.c_blocks import Blocks, wrapped
+from equations.c_blocks import WIDTH, Blocks, wrapped
 from equations.c_code import indented
 from equations.c_interpreter import Interpreter
 from equations.c_text import CTextError, Program, refused
@@ -189,9 +190,8 @@ class Function:
                 first = curve.firsts.get(value)
                 if first is not None and first.arguments:
                     names.setdefault(first, f"{name}_by_{label}")
-        read = [d for d in self._declared() if d.name not in self.outs]
-        head = self._head(self.wanted.name, read, ["double J[]"])
-        return self._definition(head, self._lines(targets, names))
+        parameters = [*self._read(self.outs), "double J[]"]
+        return self._definition(self.wanted.name, parameters, self._lines(targets, names))
 
     def _variables(self) -> list[Place]:
         """Parts of the arguments that move, in their order."""
@@ -231,36 +231,29 @@ class Function:
             for order in orders
         }
         outs = {str(place[0]) for place in outputs}
-        read = [d for d in self._declared() if d.name not in self.outs - {*self.wanted.by}]
+        read = self._read(self.outs - {*self.wanted.by})
         moving = [
             (self._parameter(d, self._of_order(d.name, order), d.name not in outs), order)
             for order in orders
             for d in self._declared()
             if d.name in outs | {*self.wanted.by}
         ]
-        name, declared = self.wanted.name, [text for text, _ in moving]
+        name, given = self.wanted.name, [*read, *(text for text, _ in moving)]
         firsts = self._lines(targets["first"], names)
         if len(orders) == 1:
-            return self._definition(self._head(name, read, declared), firsts)
+            return self._definition(name, given, firsts)
         both = self._lines(targets["first"] | targets["second"], names)
-        half = [text for text, order in moving if order == "first"]
-        own = [d.name for d in read]
-        given = [*own, *map(parameter_name, declared)]
+        half = [*read, *(text for text, order in moving if order == "first")]
         calls = [
-            f"if ({parameter_name(declared[-1])} == NULL) {{",
-            f"    {name}_first({', '.join([*own, *map(parameter_name, half)])});",
+            f"if ({parameter_name(given[-1])} == NULL) {{",
+            f"    {name}_first({', '.join(map(parameter_name, half))});",
             "} else {",
-            f"    {name}_second({', '.join(given)});",
+            f"    {name}_second({', '.join(map(parameter_name, given))});",
             "}",
         ]
-        return "\n\n".join(
-            self._definition(head, lines)
-            for head, lines in (
-                ("static " + self._head(f"{name}_first", read, half), firsts),
-                ("static " + self._head(f"{name}_second", read, declared), both),
-                (self._head(name, read, declared), calls),
-            )
-        )
+        parts = ((f"{name}_first", half, firsts), (f"{name}_second", given, both))
+        texts = [self._definition(*part, storage="static ") for part in parts]
+        return "\n\n".join([*texts, self._definition(name, given, calls)])
 
     def _rates(self, leaf: Value) -> tuple[Value, Value] | None:
         place = self.places.get(leaf)
@@ -296,18 +289,31 @@ class Function:
             return f"{const}{c_name(kind)} {name}{sizes}"
         return f"{const}{c_name(kind.to)} *{name}"
 
-    def _head(self, name: str, read: list[c_ast.Decl], more: list[str]) -> str:
-        given = [self._parameter(d, d.name, True) for d in read]
-        return f"void {name}({', '.join([*given, *more])})"
+    def _read(self, names: Collection[str]) -> list[str]:
+        """Parameters that are passed on, but those with these names."""
+        return [self._parameter(d, d.name, True) for d in self._declared() if d.name not in names]
 
     def _lines(self, targets: Mapping[str, Value], names: Mapping[Value, str]) -> list[str]:
         taken = {*self.kinds, "first", "second", "J"}
         taken |= {f"{name}_{order}" for name in self.kinds for order in ("first", "second")}
         return Blocks(targets, names, self.interpreter.conditions, self.enumerators, taken).lines()
 
-    def _definition(self, head: str, lines: list[str]) -> str:
+    def _definition(
+        self, name: str, parameters: list[str], lines: list[str], storage: str = ""
+    ) -> str:
+        """Text of a function."""
+        head, own = f"{storage}void {name}(", []
+        indent = len(head)
+        for i, parameter in enumerate(parameters):
+            more = parameter + (") {" if i + 1 == len(parameters) else ", ")
+            if len(head) + len(more.rstrip()) > WIDTH:
+                own.append(head.rstrip())
+                head = " " * indent
+            head += more
         body = [part for line in indented(lines) for part in wrapped(line)]
-        return "\n".join([*wrapped(f"{head} {{", head.index("(") + 1), *body, "}"])
+        words = set(re.findall(r"\w+", "\n".join(body)))
+        unread = [n for n in map(parameter_name, parameters) if n not in words]
+        return "\n".join([*own, head, *(f"    (void){n};" for n in unread), *body, "}"])
 
 
 def pointed(kind: Any) -> Any:

@@ -48,7 +48,8 @@ class CTextError(ValueError):
 
 def refused(node: c_ast.Node | None, reason: str) -> CTextError:
     """The error of a place in a text."""
-    coord = getattr(node, "coord", None)
+    places = [found.coord for found in walk(node) if found.coord] if node else []
+    coord = places[0] if places else None
     return CTextError(f"{coord.file}:{coord.line}: {reason}" if coord else reason)
 
 

@@ -5,6 +5,8 @@ Derived C is compiled and compared with sympy, and values that the graph has wit
 
 import ctypes
 import math
+import random
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -118,6 +120,22 @@ def test_division_of_whole_numbers_is_warned_of(tmp_path: Path) -> None:
     graph, warnings = Graph(has_switches=False), []
     Interpreter(program, graph, warn=warnings.append).run("f", lambda *_: graph.value("state"))
     assert warnings == ["text.h:2: warning: 1 / 2 of whole numbers is 0: write 1.0 / 2.0"]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_mutants_are_read_or_refused_in_a_line(tmp_path: Path, seed: int) -> None:
+    """Words of the arm's equations put in each other's place: never a traceback."""
+    text = (ROOT / "models/rp_manipulator/rp_equations.h").read_text(encoding="utf-8")
+    words = list(re.finditer(r"\w+|[^\w\s]", text))
+    generator = random.Random(seed)
+    word, other = generator.choice(words), generator.choice(words)[0]
+    mutant = f"{text[: word.start()]} {other} {text[word.end() :]}"
+    folders = [ROOT / "models", ROOT / "models/rp_manipulator"]
+    wanted = Wanted.read("J = jacobian of arm_accelerations by q dq tau")
+    try:
+        Derived(read(written(tmp_path, mutant), folders)).text([wanted], "text.h")
+    except CTextError as error:
+        assert re.match(r"\w+\.h:\d+: [^\n]+$", str(error))
 
 
 # ---- Derivatives ---------------------------------------------------------------------------------
