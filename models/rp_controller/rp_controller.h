@@ -54,8 +54,9 @@ struct rp_controller_inputs {
  * The efforts are u brought into [-limit, limit]. Rates of the integral parts (rad/s3, m/s3):
  * Ki e + (effort - u) / (M tracking_time) where Ki > 0, else 0. */
 
-/* Derivatives of the rates of the integral parts, with the efforts that the law asks for, by the integral parts: row i,
- * column j is that of rate i by w[j] (1/s). One-sided where an effort just meets its limit. */
+/* Derivatives of the rates of the integral parts, with the efforts that the law asks for, by the
+ * integral parts: row i, column j is that of rate i by w[j] (1/s). One-sided where an effort just
+ * meets its limit. */
 void rp_controller_integral_jacobian(const struct rp_controller_parameters *p, bool attached,
                                      const struct rp_controller_inputs *inputs, const double w[2],
                                      double rates_by_w[2][2]);

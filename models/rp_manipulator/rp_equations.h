@@ -150,7 +150,7 @@ static inline real arm_kinetic_energy(const struct arm *arm) {
 
 /* ---- Equations of motion -------------------------------------------------------------------- */
 
-/* (13) with its rows (14) and (15): the efforts that a motion takes. */
+/* (13)-(15) Efforts that a motion takes. */
 static inline void arm_inverse_dynamics(const struct arm *arm, const real ddq[2], real tau[2]) {
     real D[2][2];
     real coriolis[2];
