@@ -182,4 +182,11 @@ static inline void arm_forward_dynamics(const struct arm *arm, const real tau[2]
     ddq[1] = push + centrifugal - fall + arm->a * ddq[0];
 }
 
+/* The same from parameters, states and inputs: the right side. */
+static inline void arm_accelerations(const struct rp_parameters *p, const real q[2],
+                                     const real dq[2], const real tau[2], real ddq[2]) {
+    const struct arm arm = arm_in_state(p, q, dq);
+    arm_forward_dynamics(&arm, tau, ddq);
+}
+
 #endif

@@ -6,10 +6,9 @@
 static enum status right_hand_side(const void *values_pointer, double t, const double x[],
                                    const double u[], double dx[]) {
     const struct rp_parameters *p = &((const struct rp_values *)values_pointer)->parameters;
-    const struct arm arm = arm_in_state(p, x, x + 2);
     dx[0] = x[2];
     dx[1] = x[3];
-    arm_forward_dynamics(&arm, u, dx + 2);
+    arm_accelerations(p, x, x + 2, u, dx + 2);
     return STATUS_OK;
 }
 

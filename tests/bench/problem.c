@@ -11,8 +11,7 @@ const struct rp_parameters problem_parameters = {
 void problem_rhs(const double x[4], const double u[2], double dx[4]) {
     dx[0] = x[2];
     dx[1] = x[3];
-    const struct arm arm = arm_in_state(&problem_parameters, x, x + 2);
-    arm_forward_dynamics(&arm, u, dx + 2);
+    arm_accelerations(&problem_parameters, x, x + 2, u, dx + 2);
 }
 
 static void sample_inputs(const struct problem *problem) {
