@@ -1,5 +1,5 @@
-/* Two functions of struct model (model.h), made from one equation: `calculate` (equation.h) writes
- * all calculated fields of a value structure from its parameters, inputs and states:
+/* propagate of struct model, made from one equation: `calculate` (equation.h) writes all calculated
+ * fields of a value structure from its parameters, inputs and states:
  *
  *   EQUATION void calculate(const struct my_values *const from[SOURCES],
  *                           struct my_values *const to[TARGETS]) */
@@ -9,15 +9,6 @@
 #include "status.h"
 
 #include <stddef.h>
-
-/* Defines `outputs`, in a file with arithmetic_double.h; tag: of the value structure. */
-#define DEFINE_OUTPUTS(tag)                                                                        \
-    static enum status outputs(void *values_pointer, double t) {                                   \
-        struct tag *values = values_pointer;                                                       \
-        const struct tag *from = values;                                                           \
-        calculate(&from, &values);                                                                 \
-        return STATUS_OK;                                                                          \
-    }
 
 /* Defines `propagate` by this name, in a file with arithmetic_taylor.h, for a model without fields
  * that depend on the time itself. Its results are exact but for rounding, and 0 for a field whose

@@ -1,13 +1,8 @@
-/* Equations that are written once and calculated in several arithmetics.
+/* For headers of equations in prefix form (*_lifted.h), which derivatives are calculated from until
+ * the build derives them from the plain ones. Include an arithmetic before:
  *
- * A header of equations uses the names real, plus, times, sine ... and READ, WRITE, which an
- * arithmetic such as arithmetic_double.h defines. Include one arithmetic before it:
- *
- *   arithmetic_double.h    values
  *   arithmetic_taylor.h    first and second derivatives along a curve
- *   arithmetic_gradient.h  derivatives by each of some variables
- *
- * All have the same order of operations, and so the same values bit for bit. */
+ *   arithmetic_gradient.h  derivatives by each of some variables */
 #ifndef EQUATION_H
 #define EQUATION_H
 
