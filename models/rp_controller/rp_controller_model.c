@@ -50,12 +50,7 @@ static enum status propagate(const void *values, double t, double dt, void *firs
 static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
     const struct rp_controller_parameters *p =
         &((const struct rp_controller_values *)values_pointer)->parameters;
-    const struct rp_parameters *arm = &p->arm;
-    if (!rp_parameters_check(arm)) {
-        (void)snprintf(text, size,
-                       "the inertia m1 lc1^2 + I1z + I2z = %g is refused: it must be above 0 "
-                       "(m1 = %g, lc1 = %g, I1z = %g, I2z = %g)",
-                       rp_fixed_inertia(arm), arm->m1, arm->lc1, arm->I1z, arm->I2z);
+    if (!rp_parameters_check(&p->arm, text, size)) {
         return STATUS_INVALID_PARAMETERS;
     }
     if (p->sample_time > 0.0 && p->sample_time < rp_controller_shortest_sample_time) {

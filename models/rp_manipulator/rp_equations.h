@@ -150,7 +150,7 @@ static inline real arm_kinetic_energy(const struct arm *arm) {
 
 /* ---- Equations of motion -------------------------------------------------------------------- */
 
-/* (13) with its rows (14) and (15): the efforts that a motion takes. */
+/* (13)-(15) Efforts that a motion takes. */
 static inline void arm_inverse_dynamics(const struct arm *arm, const real ddq[2], real tau[2]) {
     real D[2][2];
     real coriolis[2];
@@ -182,7 +182,7 @@ static inline void arm_forward_dynamics(const struct arm *arm, const real tau[2]
     ddq[1] = push + centrifugal - fall + arm->a * ddq[0];
 }
 
-/* The same from parameters and states. */
+/* The same from parameters, states and inputs: the right side. */
 static inline void arm_accelerations(const struct rp_parameters *p, const real q[2],
                                      const real dq[2], const real tau[2], real ddq[2]) {
     const struct arm arm = arm_in_state(p, q, dq);

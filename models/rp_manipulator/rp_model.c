@@ -3,8 +3,6 @@
 #include "rp_calculated.h"
 #include "rp_series.h"
 
-#include <stdio.h>
-
 static enum status right_hand_side(const void *values_pointer, double t, const double x[],
                                    const double u[], double dx[]) {
     const struct rp_values *values = values_pointer;
@@ -30,15 +28,9 @@ static enum status propagate(const void *values, double t, double dt, void *firs
 }
 
 static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
-    const struct rp_parameters *p = &((const struct rp_values *)values_pointer)->parameters;
-    if (rp_parameters_check(p)) {
-        return STATUS_OK;
-    }
-    (void)snprintf(text, size,
-                   "the inertia m1 lc1^2 + I1z + I2z = %g is refused: it must be above 0 "
-                   "(m1 = %g, lc1 = %g, I1z = %g, I2z = %g)",
-                   rp_fixed_inertia(p), p->m1, p->lc1, p->I1z, p->I2z);
-    return STATUS_INVALID_PARAMETERS;
+    const struct rp_values *values = values_pointer;
+    return rp_parameters_check(&values->parameters, text, size) ? STATUS_OK
+                                                                : STATUS_INVALID_PARAMETERS;
 }
 
 const struct model rp_model = {

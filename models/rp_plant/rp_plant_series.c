@@ -95,7 +95,7 @@ static void set_bodies(struct series_motion *m, double q2) {
                 .q = {0.0, q2}},
     };
     plant.arm.L = arm->l1 + q2;
-    plant.arm.J = rp_fixed_inertia(arm) + arm->m2 * plant.arm.L * plant.arm.L;
+    plant.arm.J = arm_fixed_inertia(arm) + arm->m2 * plant.arm.L * plant.arm.L;
     if (has_payload(m)) {
         plant_attach(&plant, p);
     }
@@ -130,7 +130,7 @@ static void begin_motion(const struct series_origin *origin, double row[][SERIES
     rp_plant_modes_in_effect(values, q, dq, &inputs, &m->modes);
     m->has_wrench = has_wrench(origin);
     for (int i = 0; i < 2; i++) {
-        m->direction[i] = rp_plant_slides(m->modes.joint[i]) ? m->modes.joint[i] : 0.0;
+        m->direction[i] = plant_slides(m->modes.joint[i]) ? m->modes.joint[i] : 0.0;
         m->depends_on_velocity[i] =
             has_breakaway(m->p, i) && fabs(dq[i]) < (fast + 1.0) * m->p->stribeck_velocity[i];
         m->per_vs[i] = m->depends_on_velocity[i] ? 1.0 / m->p->stribeck_velocity[i] : 0.0;
@@ -288,7 +288,7 @@ void rp_plant_reach(const void *values_pointer, const double x[], double reach[]
     const struct rp_plant_values *values = values_pointer;
     const struct rp_plant_parameters *p = &values->parameters;
     for (int i = 0; i < 2; i++) {
-        const bool is_sliding = rp_plant_slides(values->modes.joint[i]);
+        const bool is_sliding = plant_slides(values->modes.joint[i]);
         const double vs = p->stribeck_velocity[i];
         const double above_fast = fabs(x[2 + i]) - fast * vs;
         reach[i] = INFINITY;

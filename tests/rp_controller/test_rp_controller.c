@@ -62,7 +62,8 @@ static void test_computed_torque_makes_the_error_dynamics_linear(void) {
             state.ddq[i] = asked[i];
         }
         law_unlimited(&v.parameters, false, in, v.integral, efforts);
-        rp_forward_dynamics(&v.parameters.arm, in->q, in->dq, efforts, ddq);
+        const struct arm arm = arm_in_state(&v.parameters.arm, in->q, in->dq);
+        arm_forward_dynamics(&arm, efforts, ddq);
 
         double force[2];
         double scale[2];
@@ -89,7 +90,8 @@ static void test_gravity_compensation_holds_the_arm(void) {
         double gravity[2];
         double ddq[2];
         law_unlimited(&v.parameters, false, &v.inputs, v.integral, efforts);
-        rp_gravity_forces(&v.parameters.arm, v.inputs.q, gravity);
+        const struct arm arm = arm_in_state(&v.parameters.arm, v.inputs.q, v.inputs.dq);
+        arm_gravity_forces(&arm, gravity);
         TEST_ASSERT_TRUE(efforts[0] == gravity[0] && efforts[1] == gravity[1]);
 
         const struct rp_test_state state = {.q = {v.inputs.q[0], v.inputs.q[1]}};
@@ -97,7 +99,7 @@ static void test_gravity_compensation_holds_the_arm(void) {
         double scale[2];
         rp_test_force_scale(&v.parameters.arm, &state, force);
         rp_test_acceleration_scale(&v.parameters.arm, v.inputs.q, force, scale);
-        rp_forward_dynamics(&v.parameters.arm, v.inputs.q, v.inputs.dq, efforts, ddq);
+        arm_forward_dynamics(&arm, efforts, ddq);
         for (int i = 0; i < 2; i++) {
             ASSERT_CLOSE(0.0, ddq[i], 16 * DBL_EPSILON * scale[i]);
         }

@@ -108,7 +108,8 @@ static void test_jacobian_is_that_of_the_integral_rates(void) {
         const struct rp_controller_parameters *p = &at.v.parameters;
         double D[2][2] = {{p->inertia[0], 0.0}, {0.0, p->inertia[1]}};
         if (mode == RP_CONTROLLER_COMPUTED_TORQUE) {
-            rp_mass_matrix(&p->arm, at.v.inputs.q, D);
+            const struct arm arm = arm_in_state(&p->arm, at.v.inputs.q, at.v.inputs.dq);
+            arm_mass_matrix(&arm, D);
         }
         for (int i = 0; i < 2; i++) {
             const bool follows = p->Ki[i] > 0.0 && side[i] != BELOW;

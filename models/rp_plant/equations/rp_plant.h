@@ -8,8 +8,8 @@
  * or none; with all off the results are those of the manipulator bit for bit, up to the sign of
  * zero.
  *
- * The equations themselves are in rp_plant_equations.h, once for values and derivatives; the
- * functions here are their values. All functions are pure and allocate nothing. */
+ * The equations are in rp_plant_equations.h; the functions here call them and leave out what is 0.
+ * All functions are pure and allocate nothing. */
 #ifndef RP_PLANT_H
 #define RP_PLANT_H
 

@@ -6,8 +6,6 @@
 #include "rp_payload.h"
 #include "rp_plant.h"
 
-#include <stdlib.h>
-
 /* The plant in a state, with what many equations share. */
 struct plant {
     struct arm hand; /* without payload and armature: where the end effector is */
@@ -115,9 +113,13 @@ static inline real plant_sliding_friction(const struct rp_plant_parameters *p, i
     return breakaway * e + coulomb * (1.0 - e);
 }
 
+static inline bool plant_slides(int mode) {
+    return mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD;
+}
+
 /* Friction of a joint that slides, against its direction; 0 for one that does not. */
 static inline real plant_friction(const struct rp_plant_parameters *p, int mode, int i, real dq) {
-    if (mode != RP_PLANT_FORWARD && mode != RP_PLANT_BACKWARD) {
+    if (!plant_slides(mode)) {
         return 0.0;
     }
     return mode * plant_sliding_friction(p, i, mode * dq);
@@ -352,7 +354,7 @@ static inline void plant_indicators(const struct rp_plant_parameters *p,
         plant_stuck_indicators(p, i, q, reaction, z);
         return;
     }
-    if (mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD) {
+    if (plant_slides(mode)) {
         z[0] = mode * dq;
     }
     if (p->stops[i] == RP_PLANT_STOPS_RIGID || p->stops[i] == RP_PLANT_STOPS_COMPLIANT) {

@@ -1,4 +1,4 @@
-#include "rp_trajectory.h"
+#include "rp_trajectory_lifted.h"
 
 #include <stddef.h>
 
@@ -249,8 +249,4 @@ void rp_trajectory_evaluate(const struct rp_trajectory_curve *curve,
         circle(curve, point);
         break;
     }
-}
-
-bool rp_trajectory_is_attached(const struct rp_trajectory_parameters *p, double t) {
-    return p->grasp_time <= t && t < p->release_time;
 }
