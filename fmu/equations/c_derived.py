@@ -245,7 +245,7 @@ class Function:
         both = self._lines(targets["first"] | targets["second"], names)
         half = [*read, *(text for text, order in moving if order == "first")]
         calls = [
-            f"if ({parameter_name(given[-1])} == NULL) {{",
+            f"if ({self._of_order(next(iter(outs)), 'second')} == NULL) {{",
             f"    {name}_first({', '.join(map(parameter_name, half))});",
             "} else {",
             f"    {name}_second({', '.join(map(parameter_name, given))});",

@@ -28,8 +28,10 @@ from equations.graph import DERIVATIVES, Graph, Value
 from rparm.expressions.tree import RELATIONS, in_order
 
 BUILT_IN = ("fabs", "abs", "value_of", "moving_as")
+ROUNDING = ("ceil", "floor", "trunc", "round")  # of what has no derivatives
 ARGUMENTS = {name: len(rules) for name, rules in DERIVATIVES.items()}
 ARGUMENTS |= {"fabs": 1, "abs": 1, "value_of": 1, "moving_as": 2}
+ARGUMENTS |= dict.fromkeys(ROUNDING, 1)
 
 
 class Expressions(Memory):
@@ -497,6 +499,8 @@ class Expressions(Memory):
         if name == "value_of":
             value = self.graph.value("value_of", *reals) if self.carries(reals[0]) else reals[0]
             return DOUBLE, value
+        if name in ROUNDING and self.carries(reals[0]):
+            raise refused(node, f"{name} has no derivatives: write {name}(value_of(...))")
         if name == "moving_as" and reals[0] is reals[1]:
             return REAL, reals[0]
         return REAL, self.graph.value(name, *reals)

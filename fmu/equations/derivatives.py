@@ -34,7 +34,7 @@ class Curve:
             elif y.op in STILL or all(self.rests(a) for a in y.arguments):
                 self.firsts[y] = self.seconds[y] = self.zero
             else:
-                self.firsts[y] = self.graph.chain(y, [self.firsts[a] for a in y.arguments])
+                self.firsts[y] = self._first(y, [self.firsts[a] for a in y.arguments])
         return [self.firsts[root] for root in roots]
 
     def rests(self, y: Value) -> bool:
@@ -48,6 +48,21 @@ class Curve:
         for y in in_order(roots, self.seconds):
             self.seconds[y] = self._second(y)
         return [self.seconds[root] for root in roots]
+
+    def _first(self, y: Value, d: list[Value]) -> Value:
+        simple = self.graph.simple
+        match y.op:
+            case "sqrt":  # from x = y^2
+                return simple("/", d[0], self.graph.value("*", self.two, y))
+            case "atan2":  # from (x^2 + z^2) y' = z x' - x z'
+                x, z = y.arguments
+                area_rate = simple("-", simple("*", z, d[0]), simple("*", x, d[1]))
+                return simple("/", area_rate, self._square_sum(y))
+        return self.graph.chain(y, d)
+
+    def _square_sum(self, y: Value) -> Value:
+        x, z = (self.graph.value("*", a, a) for a in y.arguments)
+        return self.graph.value("+", z, x)
 
     def _second(self, y: Value) -> Value:
         simple = self.graph.simple
@@ -63,6 +78,15 @@ class Curve:
                 mixed = simple("*", simple("*", self.two, self.firsts[y]), d[1])
                 rest = simple("-", simple("-", dd[0], mixed), simple("*", y, dd[1]))
                 return simple("/", rest, b)
+            case "sqrt":
+                mixed = simple("*", simple("*", self.two, self.firsts[y]), self.firsts[y])
+                return simple("/", simple("-", dd[0], mixed), self.graph.value("*", self.two, y))
+            case "atan2":
+                x, z = y.arguments
+                half_rate = simple("+", simple("*", z, d[1]), simple("*", x, d[0]))
+                area = simple("-", simple("*", z, dd[0]), simple("*", x, dd[1]))
+                mixed = simple("*", simple("*", self.two, self.firsts[y]), half_rate)
+                return simple("/", simple("-", area, mixed), self._square_sum(y))
             case "exp":
                 return simple("*", y, simple("+", dd[0], simple("*", d[0], d[0])))
             case "+" | "-" | "negative" | "moving_as" | "if":

@@ -4,7 +4,7 @@ Operations on numbers: number, the leaves of `LEAVES`, + - * / negative, pow, "i
 one or two arguments; in derivatives also the functions of src/model/slopes.h. Conditions: the leaf
 mode, relations, and, or, not, isnan, isfinite. abs, min, max and squares have become others.
 From C come the leaf integer, the condition ==, and two operations that differ in derivatives only:
-value_of(x) rests, and moving_as(x, y) moves as y.
+value_of(x) rests, and moving_as(x, y) moves as y; and the functions ceil, floor, trunc, round.
 """
 
 from __future__ import annotations

@@ -19,6 +19,11 @@ static enum status outputs(void *values_pointer, double t) {
     return STATUS_OK;
 }
 
+static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
+    rp_trajectory_derivatives(values, t, first, dt, second, 0.0);
+    return STATUS_OK;
+}
+
 static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
     const struct rp_trajectory_parameters *p =
         &((const struct rp_trajectory_values *)values_pointer)->parameters;
@@ -108,7 +113,7 @@ const struct model rp_trajectory_model = {
                    sizeof(struct rp_trajectory_parameters)},
     .right_hand_side = right_hand_side,
     .outputs = outputs,
-    .propagate = rp_trajectory_propagate,
+    .propagate = propagate,
     .check_parameters = check_parameters,
     .events = &events,
 };

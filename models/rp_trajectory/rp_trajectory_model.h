@@ -27,10 +27,6 @@ struct rp_trajectory_values {
     int payload_attached;
 };
 
-/* propagate of struct model. */
-enum status rp_trajectory_propagate(const void *values, double t, double dt, void *first,
-                                    void *second);
-
 extern const struct model rp_trajectory_model;
 
 #endif

@@ -242,7 +242,7 @@ def project(tmp_path: Path) -> Path:
         "src/model/model.h", "src/integrator/ode.h", "src/integrator/method.h",
         "src/instance/instance.h", "src/instance/state/internals.h",
         "src/instance/step/stepping.h", "src/instance/step/step.h", "fmu/component/component.h",
-        "fmu/fmi2/fmi2_calls.h", "fmu/fmi3/fmi3_calls.h", "models/taylor.h",
+        "fmu/fmi2/fmi2_calls.h", "fmu/fmi3/fmi3_calls.h", "models/jet.h",
         "models/rp_manipulator/rp_manipulator.h", "models/rp_trajectory/motion.h",
         "models/rp_plant/rp_plant_model.h", "models/rp_plant/equations/rp_plant.h",
         "fmu/generate.py", "rparm/unit.py", "models/rp_plant/references/make.py",
