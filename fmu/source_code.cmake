@@ -84,4 +84,9 @@ ${entries}]}
     COMMENT "Collecting ${name}"
     VERBATIM)
   add_custom_target(${name} DEPENDS ${description})
+  foreach(library IN LISTS libraries)
+    if(TARGET ${library}_derived) # derive.cmake
+      add_dependencies(${name} ${library}_derived)
+    endif()
+  endforeach()
 endfunction()

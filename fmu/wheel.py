@@ -37,7 +37,14 @@ OF_FMU = (
     "fmu/*.html",
     "src/instance/*.toml",
 )
-OF_RELEASES = ("bill_of_materials", "built", "pieces", "references", "wheel")  # not for a model
+OF_RELEASES = (
+    "bill_of_materials",
+    "built",
+    "derive",
+    "pieces",
+    "references",
+    "wheel",
+)  # not for a model
 FOR_TESTS = ("_in", "sampled", "tightest")  # ends of names of tables that no command reads
 
 

@@ -3,6 +3,8 @@
 Operations on numbers: number, the leaves of `LEAVES`, + - * / negative, pow, "if" and functions of
 one or two arguments; in derivatives also the functions of src/model/slopes.h. Conditions: the leaf
 mode, relations, and, or, not, isnan, isfinite. abs, min, max and squares have become others.
+From C come the leaf integer, the condition ==, and two operations that differ in derivatives only:
+value_of(x) rests, and moving_as(x, y) moves as y; and the functions ceil, floor, trunc, round.
 """
 
 from __future__ import annotations
@@ -16,10 +18,11 @@ from rparm.expressions.parser import parse
 from rparm.expressions.tree import RELATIONS, Node, in_order
 
 # along a curve, "first" and "second" are the derivatives of the other leaves
-LEAVES = ("parameter", "input", "state", "time", "mode", "first", "second")
+LEAVES = ("parameter", "input", "state", "time", "mode", "integer", "first", "second")
 MOVING = ("input", "state", "time")
 RUNTIME = ("first", "second")  # derivatives that may be 0 in one call and not in another
-CONDITIONS = ("mode", "and", "or", "not", "isnan", "isfinite", *RELATIONS)
+CONDITIONS = ("mode", "and", "or", "not", "isnan", "isfinite", "==", *RELATIONS)
+STILL = (*CONDITIONS, "value_of")  # derivatives are 0
 PRODUCTS_UP_TO = 8  # whole exponents that are repeated multiplication
 WHOLE_UP_TO = 64  # whole exponents whose derivatives are defined at 0
 # derivatives of y = f(x) or f(x, z) by each argument
@@ -101,6 +104,7 @@ class Graph:
     known: dict[tuple, Value] = field(default_factory=dict)
     relations: dict[str, Relation] = field(default_factory=dict)
     has_switches: bool = True  # else relations are evaluated with the values
+    is_guarded: bool = True  # else derivatives are not finite where a slope is not, as those of C
 
     @property
     def located(self) -> list[Relation]:
@@ -260,31 +264,34 @@ class Graph:
         moving = {(leaf.op, leaf.name) for leaf in seeds}
         found: dict[Value, Value] = {}
         for y in in_order(roots):
-            if not y.leaves & moving or y.op in CONDITIONS:
+            if not y.leaves & moving or y.op in STILL:
                 found[y] = zero
             elif y in seeds:
                 found[y] = seeds[y]
             else:
-                found[y] = self._chain(y, [found[argument] for argument in y.arguments])
+                found[y] = self.chain(y, [found[argument] for argument in y.arguments])
         return [found[root] for root in roots]
 
     def derivative(self, y: Value, x: Value) -> Value:
         """The partial derivative of y by a leaf."""
         return self.derivatives([y], {x: self.number(1.0)})[0]
 
-    def _chain(self, y: Value, d: list[Value]) -> Value:
+    def chain(self, y: Value, d: list[Value]) -> Value:
+        """Derivative of an operation whose arguments have the derivatives d."""
         a, b = y.arguments[0], y.arguments[-1]
         match y.op:
             case "+" | "-":
                 return self.simple(y.op, *d)
             case "negative":
                 return self.negative(d[0])
+            case "moving_as":
+                return d[1]
             case "if":
                 of_first = y.arguments[1] if is_unknown(y) else d[1]
                 return of_first if of_first is d[2] else self.value("if", a, of_first, d[2])
             case "/" | "slopes_over":
                 rest = self.simple("-", d[0], self._scaled(y, d[1], is_runtime(d[1])))
-                is_plain = b.op == "number" or not is_runtime(rest)
+                is_plain = b.op == "number" or not self.is_guarded or not is_runtime(rest)
                 return self.simple("/", rest, b) if is_plain else self.value("slopes_over", rest, b)
             case "*" | "slopes_product":
                 b = y.arguments[1]
@@ -294,25 +301,27 @@ class Graph:
             case "slopes_scaled":
                 return self.simple("+", self._scaled(d[0], b), self._scaled(a, d[1]))
         total, is_steep = self.number(0.0), y.op in STEEP or y.op.startswith("slopes_")
-        for slope, of_argument in zip(self._slopes(y), d, strict=True):
+        for slope, of_argument in zip(self.slopes(y), d, strict=True):
             total = self.simple("+", total, self._scaled(slope, of_argument, is_steep))
         return total
 
     def _scaled(self, slope: Value, d: Value, is_steep: bool = True) -> Value:
         """slope d; is_steep: it may not be finite, and is 0 where d is 0."""
-        is_plain = not is_steep or "number" in (slope.op, d.op)
+        is_plain = not is_steep or not self.is_guarded or "number" in (slope.op, d.op)
         return self.simple("*", slope, d) if is_plain else self.value("slopes_scaled", slope, d)
 
     def _product(self, a: Value, of_b: Value, of_a: Value) -> Value:
         """a db, in the derivative of the product a b."""
         known = a.functions.intersection(FALLIBLE) | of_b.functions.intersection(STEEP)
         is_plain = known <= {"/"} if not is_runtime(of_b) else not known
-        if "number" in (a.op, of_b.op) or is_plain:
+        if "number" in (a.op, of_b.op) or is_plain or not self.is_guarded:
             return self.simple("*", a, of_b)
         return self.value("slopes_product", a, of_b, of_a)
 
-    def _slopes(self, y: Value) -> list[Value]:
+    def slopes(self, y: Value) -> list[Value]:
         """Derivatives as `partials`, which are finite where they exist."""
+        if not self.is_guarded:
+            return self.partials(y)
         if y.op in GROWING:
             return [self.value("slopes_bounded", *self.partials(y))]
         if y.op == "pow":

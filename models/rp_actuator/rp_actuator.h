@@ -2,8 +2,8 @@
  * limits of current and voltage.
  *
  * Arrays have one element per joint: torques and angles of joint 1 (N.m, rad), forces and
- * displacements of joint 2 (N, m). A gear ratio is motor angle over joint variable (1, rad/m). All
- * functions are pure and take their arguments as they are. */
+ * displacements of joint 2 (N, m). A gear ratio is motor angle over joint variable (1, rad/m). The
+ * functions of rp_actuator_equations.h are pure and take their arguments as they are. */
 #ifndef RP_ACTUATOR_H
 #define RP_ACTUATOR_H
 
@@ -20,17 +20,5 @@ struct rp_actuator_inputs {
     double effort_cmd[2]; /* N.m, N */
     double dq[2];         /* rad/s, m/s */
 };
-
-/* Currents i (A) that the loops follow. The command cmd / (n k) is clipped to the currents that the
- * voltage allows, |R i + n k dq| <= voltage_max, and then to |i| <= current_max. The second limit
- * holds at any speed. The first one cannot where |n k dq| > voltage_max + R current_max: there the
- * result is the allowed current nearest to its range. */
-void rp_actuator_limited_currents(const struct rp_actuator_parameters *p,
-                                  const struct rp_actuator_inputs *inputs, double limited[2]);
-
-/* Rates of the currents (A/s): (limited - i) / time_constant. */
-void rp_actuator_current_rates(const struct rp_actuator_parameters *p,
-                               const struct rp_actuator_inputs *inputs, const double current[2],
-                               double rates[2]);
 
 #endif

@@ -1,23 +1,33 @@
-/* The calculated fields of struct rp_actuator_values, in any arithmetic (equation.h). */
+/* The calculated fields of struct rp_actuator_values. */
 #ifndef RP_ACTUATOR_CALCULATED_H
 #define RP_ACTUATOR_CALCULATED_H
 
 #include "rp_actuator_equations.h"
 #include "rp_actuator_model.h"
 
-/* From the parameters, inputs and states. */
-EQUATION void calculate(const struct rp_actuator_values *const from[SOURCES],
-                        struct rp_actuator_values *const to[TARGETS]) {
-    const struct rp_actuator_parameters *const p[SOURCES] = PARTS(from, parameters);
-    const struct rp_actuator_inputs *const inputs[SOURCES] = PARTS(from, inputs);
+/* Writes them from the parameters, inputs and states. */
+static inline void rp_actuator_calculate(struct rp_actuator_values *values) {
+    const struct rp_actuator_parameters *p = &values->parameters;
+    const struct rp_actuator_inputs *inputs = &values->inputs;
     for (int i = 0; i < 2; i++) {
-        const real current = READ(from, current[i]);
+        const real current = values->current[i];
         const real limited = drive_limited_current(p, inputs, i);
-        WRITE(to, limited[i], limited);
-        WRITE(to, dcurrent[i], drive_current_rate(p, limited, current, i));
-        WRITE(to, effort[i], drive_effort(p, current, i));
-        WRITE(to, voltage[i], drive_voltage(p, inputs, current, i));
+        values->limited[i] = limited;
+        values->dcurrent[i] = drive_current_rate(p, limited, current, i);
+        values->effort[i] = drive_effort(p, current, i);
+        values->voltage[i] = drive_voltage(p, inputs, current, i);
     }
 }
+
+/* Derived: J[i + 2 j] is the derivative of rates[i] by current[j]. */
+void rp_actuator_jacobian(const struct rp_actuator_parameters *p,
+                          const struct rp_actuator_inputs *inputs, const double current[2],
+                          double J[]);
+
+/* Derived: first and, unless NULL, second derivatives of the calculated fields along a curve, from
+ * those of the other fields. A current is taken as free strictly within its limits; at and beyond
+ * one it moves as this limit does. */
+void rp_actuator_derivatives(const struct rp_actuator_values *values,
+                             struct rp_actuator_values *first, struct rp_actuator_values *second);
 
 #endif

@@ -1,60 +1,65 @@
-/* The equations of a drive in any arithmetic (equation.h). rp_actuator.h, with doubles, explains
- * symbols and limits. */
+/* The equations of a drive. rp_actuator.h explains symbols and limits. */
 #ifndef RP_ACTUATOR_EQUATIONS_H
 #define RP_ACTUATOR_EQUATIONS_H
 
-#include "equation.h"
+#include "real.h"
 #include "rp_actuator.h"
 
 /* n k: effort per current, and back-EMF per velocity of the joint. */
-EQUATION real drive_constant(const struct rp_actuator_parameters *const p[SOURCES], int i) {
-    return times(READ(p, gear_ratio[i]), READ(p, torque_constant[i]));
+static inline real drive_constant(const struct rp_actuator_parameters *p, int i) {
+    return p->gear_ratio[i] * p->torque_constant[i];
 }
 
-/* n k i */
-EQUATION real drive_effort(const struct rp_actuator_parameters *const p[SOURCES], real current,
-                           int i) {
-    return times(drive_constant(p, i), current);
+static inline real drive_effort(const struct rp_actuator_parameters *p, real current, int i) {
+    return drive_constant(p, i) * current;
 }
 
-EQUATION real drive_back_emf(const struct rp_actuator_parameters *const p[SOURCES],
-                             const struct rp_actuator_inputs *const inputs[SOURCES], int i) {
-    return times(drive_constant(p, i), READ(inputs, dq[i]));
+static inline real drive_back_emf(const struct rp_actuator_parameters *p,
+                                  const struct rp_actuator_inputs *inputs, int i) {
+    return drive_constant(p, i) * inputs->dq[i];
 }
 
-/* R i + n k dq */
-EQUATION real drive_voltage(const struct rp_actuator_parameters *const p[SOURCES],
-                            const struct rp_actuator_inputs *const inputs[SOURCES], real current,
-                            int i) {
-    return plus(times(READ(p, resistance[i]), current), drive_back_emf(p, inputs, i));
+static inline real drive_voltage(const struct rp_actuator_parameters *p,
+                                 const struct rp_actuator_inputs *inputs, real current, int i) {
+    return p->resistance[i] * current + drive_back_emf(p, inputs, i);
 }
 
 /* At a limit and beyond it the result moves with the limit. NaN stays NaN. */
-EQUATION real drive_clipped(real x, real lowest, real highest) {
-    if (value_of(x) >= value_of(highest)) {
+static inline real drive_clipped(real x, real lowest, real highest) {
+    if (x >= highest) {
         return highest;
     }
-    return value_of(x) <= value_of(lowest) ? lowest : x;
+    return x <= lowest ? lowest : x;
 }
 
-EQUATION real drive_limited_current(const struct rp_actuator_parameters *const p[SOURCES],
-                                    const struct rp_actuator_inputs *const inputs[SOURCES], int i) {
-    const real resistance = READ(p, resistance[i]);
-    const real voltage_max = READ(p, voltage_max[i]);
-    const real current_max = READ(p, current_max[i]);
+/* The current (A) that the loop follows. The command cmd / (n k) is clipped to the currents that
+ * the voltage allows, |R i + n k dq| <= voltage_max, and then to |i| <= current_max. The second
+ * limit holds at any speed. The first one cannot where |n k dq| > voltage_max + R current_max:
+ * there the result is the allowed current nearest to its range. */
+static inline real drive_limited_current(const struct rp_actuator_parameters *p,
+                                         const struct rp_actuator_inputs *inputs, int i) {
     const real back_emf = drive_back_emf(p, inputs, i);
-    const real lowest = quotient(minus(negative(voltage_max), back_emf), resistance);
-    const real highest = quotient(minus(voltage_max, back_emf), resistance);
+    const real lowest = (-p->voltage_max[i] - back_emf) / p->resistance[i];
+    const real highest = (p->voltage_max[i] - back_emf) / p->resistance[i];
 
-    const real commanded = quotient(READ(inputs, effort_cmd[i]), drive_constant(p, i));
+    const real commanded = inputs->effort_cmd[i] / drive_constant(p, i);
     const real possible = drive_clipped(commanded, lowest, highest);
-    // last, so that it holds where both limits cannot
-    return drive_clipped(possible, negative(current_max), current_max);
+    return drive_clipped(possible, -p->current_max[i], p->current_max[i]);
 }
 
-EQUATION real drive_current_rate(const struct rp_actuator_parameters *const p[SOURCES],
-                                 real limited, real current, int i) {
-    return quotient(minus(limited, current), READ(p, time_constant[i]));
+static inline real drive_current_rate(const struct rp_actuator_parameters *p, real limited,
+                                      real current, int i) {
+    return (limited - current) / p->time_constant[i];
+}
+
+/* Rates of the currents (A/s): the right side. */
+static inline void drive_current_rates(const struct rp_actuator_parameters *p,
+                                       const struct rp_actuator_inputs *inputs,
+                                       const real current[2], real rates[2]) {
+    for (int i = 0; i < 2; i++) {
+        const real limited = drive_limited_current(p, inputs, i);
+        rates[i] = drive_current_rate(p, limited, current[i], i);
+    }
 }
 
 #endif

@@ -1,7 +1,5 @@
 #include "rp_actuator_model.h"
 
-#include "arithmetic_double.h"
-#include "calculated.h"
 #include "rp_actuator_calculated.h"
 
 #include <math.h>
@@ -19,23 +17,28 @@ static enum status right_hand_side(const void *values_pointer, double t, const d
         &((const struct rp_actuator_values *)values_pointer)->parameters;
     struct rp_actuator_inputs inputs;
     memcpy(&inputs, u, sizeof inputs);
-    rp_actuator_current_rates(p, &inputs, x, dx);
+    drive_current_rates(p, &inputs, x, dx);
     return STATUS_OK;
 }
 
 static enum status jacobian(const void *values_pointer, double t, const double x[],
                             const double u[], double J[]) {
-    const struct rp_actuator_parameters *p =
-        &((const struct rp_actuator_values *)values_pointer)->parameters;
-    // the limits do not depend on the currents
-    J[0] = -1.0 / p->time_constant[0];
-    J[1] = 0.0;
-    J[2] = 0.0;
-    J[3] = -1.0 / p->time_constant[1];
+    const struct rp_actuator_values *values = values_pointer;
+    struct rp_actuator_inputs inputs;
+    memcpy(&inputs, u, sizeof inputs);
+    rp_actuator_jacobian(&values->parameters, &inputs, x, J);
     return STATUS_OK;
 }
 
-DEFINE_OUTPUTS(rp_actuator_values)
+static enum status outputs(void *values, double t) {
+    rp_actuator_calculate(values);
+    return STATUS_OK;
+}
+
+static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
+    rp_actuator_derivatives(values, first, second);
+    return STATUS_OK;
+}
 
 static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
     const struct rp_actuator_parameters *p =
@@ -61,6 +64,6 @@ const struct model rp_actuator_model = {
     .right_hand_side = right_hand_side,
     .jacobian = jacobian,
     .outputs = outputs,
-    .propagate = rp_actuator_propagate,
+    .propagate = propagate,
     .check_parameters = check_parameters,
 };

@@ -18,11 +18,6 @@ struct rp_actuator_values {
     double voltage[2];  /* V */
 };
 
-/* propagate of struct model. A current is taken as free strictly within its limits; at and beyond
- * one it moves as this limit does. */
-enum status rp_actuator_propagate(const void *values, double t, double dt, void *first,
-                                  void *second);
-
 extern const struct model rp_actuator_model;
 
 #endif

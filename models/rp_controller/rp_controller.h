@@ -42,31 +42,16 @@ struct rp_controller_inputs {
     double dq[2];      /* rad/s, m/s */
 };
 
-/* Efforts (N.m, N) that the law asks for, with the integral parts w of the commanded accelerations
- * (rad/s2, m/s2). attached: D, C and g are those of link 2 with the payload. With the errors
- * e = q_ref - q and de = dq_ref - dq and, for each joint, v = Kp e + Kd de + w:
+/* Efforts u (N.m, N) that the law asks for, with the integral parts w of the commanded
+ * accelerations (rad/s2, m/s2), in rp_controller_law.h. With a payload that the controller knows
+ * of, D, C and g are those of link 2 with the payload. With the errors e = q_ref - q and
+ * de = dq_ref - dq and, for each joint, v = Kp e + Kd de + w:
  *
  *   PD               M v                                       M: inertia
  *   PD with gravity  M v + g(q)
- *   computed torque  D(q) (ddq_ref + v) + C(q, dq) dq + g(q) */
-void rp_controller_unlimited(const struct rp_controller_parameters *p, bool attached,
-                             const struct rp_controller_inputs *inputs, const double w[2],
-                             double unlimited[2]);
-
-/* The efforts brought into [-limit, limit]; NaN stays NaN. */
-void rp_controller_limited(const struct rp_controller_parameters *p, const double unlimited[2],
-                           double effort[2]);
-
-/* Rates of the integral parts (rad/s3, m/s3): Ki e + (effort - unlimited) / (M tracking_time) where
- * Ki > 0, else 0. */
-void rp_controller_integral_rates(const struct rp_controller_parameters *p,
-                                  const struct rp_controller_inputs *inputs,
-                                  const double unlimited[2], double rates[2]);
-
-/* Derivatives of these rates, with the efforts that the law asks for, by the integral parts: row i,
- * column j is that of rate i by w[j] (1/s). One-sided where an effort just meets its limit. */
-void rp_controller_integral_jacobian(const struct rp_controller_parameters *p, bool attached,
-                                     const struct rp_controller_inputs *inputs, const double w[2],
-                                     double rates_by_w[2][2]);
+ *   computed torque  D(q) (ddq_ref + v) + C(q, dq) dq + g(q)
+ *
+ * The efforts are u brought into [-limit, limit]. Rates of the integral parts (rad/s3, m/s3):
+ * Ki e + (effort - u) / (M tracking_time) where Ki > 0, else 0. */
 
 #endif

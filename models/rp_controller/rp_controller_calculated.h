@@ -1,38 +1,51 @@
-/* The calculated fields of struct rp_controller_values, in any arithmetic (equation.h). */
+/* The calculated fields of struct rp_controller_values. */
 #ifndef RP_CONTROLLER_CALCULATED_H
 #define RP_CONTROLLER_CALCULATED_H
 
 #include "rp_controller_law.h"
 #include "rp_controller_model.h"
 
-/* From the parameters, inputs and states; in the sampled form efforts are those of a sample. */
-EQUATION void calculate(const struct rp_controller_values *const from[SOURCES],
-                        struct rp_controller_values *const to[TARGETS]) {
-    const struct rp_controller_parameters *const p[SOURCES] = PARTS(from, parameters);
-    const struct rp_controller_inputs *const inputs[SOURCES] = PARTS(from, inputs);
+/* Writes them from the parameters, inputs and states; in the sampled form efforts are those of a
+ * sample, which do not move. */
+static inline void rp_controller_calculate(struct rp_controller_values *values) {
+    const struct rp_controller_parameters *p = &values->parameters;
+    const struct rp_controller_inputs *inputs = &values->inputs;
     for (int i = 0; i < 2; i++) {
-        WRITE(to, error[i], law_error(inputs, i));
-        WRITE(to, derror[i], law_error_rate(inputs, i));
+        values->error[i] = law_error(inputs, i);
+        values->derror[i] = law_error_rate(inputs, i);
     }
-    if (from[0]->form == RP_CONTROLLER_SAMPLED) {
-        const struct rp_controller_command *command = &from[0]->samples.command;
+    if (values->form == RP_CONTROLLER_SAMPLED) {
+        const struct rp_controller_command *command = &values->samples.command;
         for (int i = 0; i < 2; i++) {
-            WRITE(to, unlimited[i], constant(command->unlimited[i]));
-            WRITE(to, effort[i], constant(command->effort[i]));
-            WRITE(to, dintegral[i], constant(0.0));
+            values->unlimited[i] = value_of(command->unlimited[i]);
+            values->effort[i] = value_of(command->effort[i]);
+            values->dintegral[i] = 0.0;
         }
         return;
     }
-    const real w[2] = {READ(from, integral[0]), READ(from, integral[1])};
     real unlimited[2];
-    law_unlimited(p, from[0]->payload_attached != 0, inputs, w, unlimited);
+    law_unlimited(p, values->payload_attached != 0, inputs, values->integral, unlimited);
     for (int i = 0; i < 2; i++) {
-        WRITE(to, unlimited[i], unlimited[i]);
-        WRITE(to, effort[i], law_limited(p, unlimited[i], i));
-        WRITE(to, dintegral[i],
-              p[0]->sample_time > 0.0 ? constant(0.0) // the first sample is still to come
-                                      : law_integral_rate(p, inputs, unlimited[i], i));
+        values->unlimited[i] = unlimited[i];
+        values->effort[i] = law_limited(p, unlimited[i], i);
+        values->dintegral[i] = p->sample_time > 0.0 // the first sample is still to come
+                                   ? 0.0
+                                   : law_integral_rate(p, inputs, unlimited[i], i);
     }
 }
+
+/* Derived: J[i + 2 j] is the derivative of rates[i] by w[j] (1/s). One-sided where an effort just
+ * meets its limit. */
+void rp_controller_jacobian(const struct rp_controller_parameters *p, bool attached,
+                            const struct rp_controller_inputs *inputs, const double w[2],
+                            double J[]);
+
+/* Derived: first and, unless NULL, second derivatives of the calculated fields along a curve, from
+ * those of the other fields. An effort is taken as free strictly within its limits; at and beyond
+ * them it is the limit, which moves only with tau1_max and f2_max. Where it just meets its limit,
+ * derivatives are one-sided. */
+void rp_controller_derivatives(const struct rp_controller_values *values,
+                               struct rp_controller_values *first,
+                               struct rp_controller_values *second);
 
 #endif

@@ -1,5 +1,7 @@
 #include "rp_controller_events.h"
 
+#include "rp_controller_law.h"
+
 #include <math.h>
 #include <stdio.h>
 
@@ -53,10 +55,11 @@ static enum status take_sample(struct rp_controller_values *values) {
     for (int i = 0; i < 2; i++) {
         integral[i] = values->integral[i] + p->sample_time * samples->rate[i];
     }
-    rp_controller_unlimited(p, values->payload_attached != 0, &values->inputs, integral,
-                            command.unlimited);
-    rp_controller_limited(p, command.unlimited, command.effort);
-    rp_controller_integral_rates(p, &values->inputs, command.unlimited, rate);
+    law_unlimited(p, values->payload_attached != 0, &values->inputs, integral, command.unlimited);
+    for (int i = 0; i < 2; i++) {
+        command.effort[i] = law_limited(p, command.unlimited[i], i);
+        rate[i] = law_integral_rate(p, &values->inputs, command.unlimited[i], i);
+    }
     if (!are_finite(integral) || !are_finite(command.unlimited) || !are_finite(rate)) {
         return STATUS_NOT_FINITE;
     }

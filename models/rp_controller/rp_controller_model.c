@@ -1,7 +1,5 @@
 #include "rp_controller_model.h"
 
-#include "arithmetic_double.h"
-#include "calculated.h"
 #include "rp_controller_calculated.h"
 #include "rp_controller_events.h"
 
@@ -16,48 +14,43 @@ _Static_assert(sizeof(struct rp_controller_samples) == sizeof(double[13]),
 static enum status right_hand_side(const void *values_pointer, double t, const double x[],
                                    const double u[], double dx[]) {
     const struct rp_controller_values *values = values_pointer;
-    const struct rp_controller_parameters *p = &values->parameters;
     if (values->form == RP_CONTROLLER_SAMPLED) {
         dx[0] = dx[1] = 0.0;
         return STATUS_OK;
     }
     struct rp_controller_inputs inputs;
     memcpy(&inputs, u, sizeof inputs);
-
-    double unlimited[2];
-    rp_controller_unlimited(p, values->payload_attached != 0, &inputs, x, unlimited);
-    rp_controller_integral_rates(p, &inputs, unlimited, dx);
+    law_integral_rates(&values->parameters, values->payload_attached != 0, &inputs, x, dx);
     return STATUS_OK;
 }
 
 static enum status jacobian(const void *values_pointer, double t, const double x[],
                             const double u[], double J[]) {
     const struct rp_controller_values *values = values_pointer;
-    double by_w[2][2] = {{0.0}};
-    if (values->form != RP_CONTROLLER_SAMPLED) {
-        struct rp_controller_inputs inputs;
-        memcpy(&inputs, u, sizeof inputs);
-        rp_controller_integral_jacobian(&values->parameters, values->payload_attached != 0, &inputs,
-                                        x, by_w);
+    if (values->form == RP_CONTROLLER_SAMPLED) {
+        memset(J, 0, 4 * sizeof J[0]);
+        return STATUS_OK;
     }
-    for (size_t i = 0; i < 2; i++) {
-        J[i] = by_w[i][0];
-        J[i + 2] = by_w[i][1];
-    }
+    struct rp_controller_inputs inputs;
+    memcpy(&inputs, u, sizeof inputs);
+    rp_controller_jacobian(&values->parameters, values->payload_attached != 0, &inputs, x, J);
     return STATUS_OK;
 }
 
-DEFINE_OUTPUTS(rp_controller_values)
+static enum status outputs(void *values, double t) {
+    rp_controller_calculate(values);
+    return STATUS_OK;
+}
+
+static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
+    rp_controller_derivatives(values, first, second);
+    return STATUS_OK;
+}
 
 static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
     const struct rp_controller_parameters *p =
         &((const struct rp_controller_values *)values_pointer)->parameters;
-    const struct rp_parameters *arm = &p->arm;
-    if (!rp_parameters_check(arm)) {
-        (void)snprintf(text, size,
-                       "the inertia m1 lc1^2 + I1z + I2z = %g is refused: it must be above 0 "
-                       "(m1 = %g, lc1 = %g, I1z = %g, I2z = %g)",
-                       rp_fixed_inertia(arm), arm->m1, arm->lc1, arm->I1z, arm->I2z);
+    if (!rp_parameters_check(&p->arm, text, size)) {
         return STATUS_INVALID_PARAMETERS;
     }
     if (p->sample_time > 0.0 && p->sample_time < rp_controller_shortest_sample_time) {
@@ -86,7 +79,7 @@ const struct model rp_controller_model = {
     .right_hand_side = right_hand_side,
     .jacobian = jacobian,
     .outputs = outputs,
-    .propagate = rp_controller_propagate,
+    .propagate = propagate,
     .check_parameters = check_parameters,
     .events = &rp_controller_events,
 };

@@ -46,12 +46,6 @@ struct rp_controller_values {
     double derror[2];    /* rad/s, m/s */
 };
 
-/* propagate of struct model. An effort is taken as free strictly within its limits; at and beyond
- * them it is the limit, which moves only with tau1_max and f2_max. Where it just meets its limit,
- * derivatives are one-sided. */
-enum status rp_controller_propagate(const void *values, double t, double dt, void *first,
-                                    void *second);
-
 extern const struct model rp_controller_model;
 
 #endif

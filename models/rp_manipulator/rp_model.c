@@ -1,52 +1,36 @@
 #include "rp_model.h"
 
-#include "arithmetic_double.h"
-#include "calculated.h"
 #include "rp_calculated.h"
 #include "rp_series.h"
 
-#include <stdio.h>
-
 static enum status right_hand_side(const void *values_pointer, double t, const double x[],
                                    const double u[], double dx[]) {
-    const struct rp_parameters *p = &((const struct rp_values *)values_pointer)->parameters;
-    const struct arm arm = arm_in_state(&p, x, x + 2);
-    dx[0] = x[2];
-    dx[1] = x[3];
-    arm_forward_dynamics(&arm, u, dx + 2);
+    const struct rp_values *values = values_pointer;
+    rp_right_hand_side(&values->parameters, x, u, dx);
     return STATUS_OK;
 }
 
 static enum status jacobian(const void *values_pointer, double t, const double x[],
                             const double u[], double J[]) {
     const struct rp_values *values = values_pointer;
-    struct rp_dynamics_jacobians ddq_by;
-    rp_dynamics_jacobians(&values->parameters, x, x + 2, u, &ddq_by);
-    for (size_t j = 0; j < 2; j++) {
-        double *by_q = J + 4 * j;
-        double *by_dq = J + 4 * (2 + j);
-        for (size_t i = 0; i < 2; i++) {
-            by_q[i] = 0.0;
-            by_q[2 + i] = ddq_by.q[i][j];
-            by_dq[i] = i == j ? 1.0 : 0.0;
-            by_dq[2 + i] = ddq_by.dq[i][j];
-        }
-    }
+    rp_jacobian(&values->parameters, x, u, J);
     return STATUS_OK;
 }
 
-DEFINE_OUTPUTS(rp_values)
+static enum status outputs(void *values, double t) {
+    rp_calculate(values);
+    return STATUS_OK;
+}
+
+static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
+    rp_derivatives(values, first, second);
+    return STATUS_OK;
+}
 
 static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
-    const struct rp_parameters *p = &((const struct rp_values *)values_pointer)->parameters;
-    if (rp_parameters_check(p)) {
-        return STATUS_OK;
-    }
-    (void)snprintf(text, size,
-                   "the inertia m1 lc1^2 + I1z + I2z = %g is refused: it must be above 0 "
-                   "(m1 = %g, lc1 = %g, I1z = %g, I2z = %g)",
-                   rp_fixed_inertia(p), p->m1, p->lc1, p->I1z, p->I2z);
-    return STATUS_INVALID_PARAMETERS;
+    const struct rp_values *values = values_pointer;
+    return rp_parameters_check(&values->parameters, text, size) ? STATUS_OK
+                                                                : STATUS_INVALID_PARAMETERS;
 }
 
 const struct model rp_model = {
@@ -59,7 +43,7 @@ const struct model rp_model = {
     .jacobian = jacobian,
     .series = &rp_series,
     .outputs = outputs,
-    .propagate = rp_propagate,
+    .propagate = propagate,
     .check_parameters = check_parameters,
 };
 

@@ -26,9 +26,6 @@ struct rp_values {
     struct rp_joint_loads loads;
 };
 
-/* propagate of struct model. It is 0 for a field whose arguments do not move. */
-enum status rp_propagate(const void *values, double t, double dt, void *first, void *second);
-
 extern const struct model rp_model;
 
 #endif

@@ -17,6 +17,7 @@
 #include "rp_series.h"
 
 #include "platform.h"
+#include "rp_equations.h"
 #include "rp_model.h"
 
 #include <math.h>
@@ -84,7 +85,7 @@ ALWAYS_INLINE void extend_with(const struct rp_parameters *parameters, const dou
         begin(&p, row);
     }
     const double L0 = row[L][0];
-    const double per_J0 = 1.0 / (rp_fixed_inertia(&p) + p.m2 * L0 * L0);
+    const double per_J0 = 1.0 / (arm_fixed_inertia(&p) + p.m2 * L0 * L0);
     const double m1_lc1 = p.m1 * p.lc1;
     const double a_m2 = p.a * p.m2;
     for (int k = first > 0 ? first : 1; k <= last; k++) {

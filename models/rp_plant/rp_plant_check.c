@@ -4,18 +4,6 @@
 #include <math.h>
 #include <stdio.h>
 
-static enum status check_arm(const struct rp_plant_parameters *p, char *text, size_t size) {
-    const struct rp_parameters *arm = &p->arm;
-    if (rp_parameters_check(arm)) {
-        return STATUS_OK;
-    }
-    (void)snprintf(text, size,
-                   "the inertia m1 lc1^2 + I1z + I2z = %.17g is refused: it must be above 0 "
-                   "(m1 = %.17g, lc1 = %.17g, I1z = %.17g, I2z = %.17g)",
-                   rp_fixed_inertia(arm), arm->m1, arm->lc1, arm->I1z, arm->I2z);
-    return STATUS_INVALID_PARAMETERS;
-}
-
 /* One of the numbers that have to be finite and not negative. */
 struct not_negative {
     const char *name;
@@ -143,10 +131,10 @@ static enum status check_start(const struct rp_plant_values *values, int i, char
 enum status rp_plant_check_parameters(const void *values_pointer, char *text, size_t size) {
     const struct rp_plant_values *values = values_pointer;
     const struct rp_plant_parameters *p = &values->parameters;
-    enum status status = check_arm(p, text, size);
-    if (status == STATUS_OK) {
-        status = check_not_negative(p, text, size);
+    if (!rp_parameters_check(&p->arm, text, size)) {
+        return STATUS_INVALID_PARAMETERS;
     }
+    enum status status = check_not_negative(p, text, size);
     if (status == STATUS_OK) {
         status = check_payload(p, text, size);
     }

@@ -1,13 +1,11 @@
 #include "rp_plant_events.h"
 
-#include "arithmetic_double.h"
 #include "rp_plant_contact.h"
 #include "rp_plant_equations.h"
 #include "rp_plant_impact.h"
 #include "rp_plant_modes.h"
 #include "rp_plant_series.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,21 +22,17 @@ struct triggered {
 
 /* ---- Stops ---------------------------------------------------------------------------------- */
 
-/* rad, m: an event is located far better, up to the rounding of the limit. Where q is farther from
- * it, the limit has been moved since. */
-static double near_limit(double limit) {
-    return 1e-9 + 4.0 * DBL_EPSILON * fabs(limit);
-}
-
 /* Puts joints that have reached a stop, or are past a rigid one, on it; side: of the rigid ones.
+ * Where q is farther from the limit than rp_plant_near, the limit has been moved since.
  * True if a joint is on one of these. */
 static bool arrive(struct rp_plant_values *values, const struct triggered *triggered, int side[2]) {
     const struct rp_plant_parameters *p = &values->parameters;
     bool is_any = false;
     for (int i = 0; i < 2; i++) {
         const double hit = triggered->hit[i] > 0 ? p->lower[i] : p->upper[i];
-        const bool is_near = triggered->hit[i] != 0 && fabs(values->q[i] - hit) <= near_limit(hit);
-        side[i] = rp_plant_closed_stop(p, i, values->q[i]);
+        const bool is_near =
+            triggered->hit[i] != 0 && fabs(values->q[i] - hit) <= rp_plant_near(hit);
+        side[i] = plant_closed_stop(p, i, values->q[i]);
         if (side[i] == 0 && is_near && p->stops[i] == RP_PLANT_STOPS_RIGID) {
             side[i] = triggered->hit[i];
         }
@@ -165,7 +159,7 @@ static void read_triggered(const struct rp_plant_values *values, const bool *at_
             of_joint[k] = at_zero[plant_indicator_index(i, k)];
         }
         const int mode = values->modes.joint[i];
-        triggered->halted[i] = rp_plant_slides(mode) && of_joint[SLIP_FORWARD];
+        triggered->halted[i] = plant_slides(mode) && of_joint[SLIP_FORWARD];
         if (mode == RP_PLANT_STUCK && of_joint[SLIP_FORWARD] != of_joint[SLIP_BACKWARD]) {
             triggered->leaves[i] = of_joint[SLIP_FORWARD] ? 1 : -1;
         }
@@ -190,7 +184,7 @@ bool rp_plant_modes_exist(const struct rp_plant_modes *modes) {
  * friction or on a stop. Contacts follow from the state. */
 static bool fits(const struct rp_plant_values *values, int joint) {
     const struct rp_plant_parameters *p = &values->parameters;
-    const bool has_friction = rp_plant_breakaway(p, joint) > 0.0;
+    const bool has_friction = plant_breakaway(p, joint) > 0.0;
     const int mode = values->modes.joint[joint];
     if (!rp_plant_contact_fits(p, joint, values->q[joint], values->dq[joint],
                                values->modes.contact[joint])) {
@@ -198,9 +192,9 @@ static bool fits(const struct rp_plant_values *values, int joint) {
     }
     if (mode == RP_PLANT_STUCK) {
         return values->dq[joint] == 0.0 &&
-               (has_friction || rp_plant_closed_stop(p, joint, values->q[joint]) != 0);
+               (has_friction || plant_closed_stop(p, joint, values->q[joint]) != 0);
     }
-    return rp_plant_slides(mode) == has_friction;
+    return plant_slides(mode) == has_friction;
 }
 
 static bool modes_are_possible(const void *values_pointer, bool is_held) {
@@ -298,8 +292,8 @@ static void describe_joint(const struct rp_plant_values *values, const struct rp
     }
     if (mode == RP_PLANT_STUCK) {
         const struct indicator of_force = {.kind = INDICATOR_OF_MODEL,
-                                           .offset = rp_plant_breakaway(p, joint)};
-        const int closed = rp_plant_closed_stop(p, joint, values->q[joint]);
+                                           .offset = plant_breakaway(p, joint)};
+        const int closed = plant_closed_stop(p, joint, values->q[joint]);
         if (closed >= 0) {
             *of_joint[SLIP_FORWARD] = of_force;
         }
@@ -308,7 +302,7 @@ static void describe_joint(const struct rp_plant_values *values, const struct rp
         }
         return;
     }
-    if (rp_plant_slides(mode)) {
+    if (plant_slides(mode)) {
         *of_joint[SLIP_FORWARD] =
             (struct indicator){.kind = INDICATOR_OF_STATE, .state = 2 + q, .factor = mode};
     }
@@ -344,7 +338,7 @@ static enum status indicators(const void *values_pointer, double t, const double
     }
     for (int i = 0; i < 2; i++) {
         double of_joint[PLANT_INDICATORS];
-        plant_indicators(&p, &modes, i, x[i], x[2 + i], motion.reaction[i], of_joint);
+        plant_indicators(p, &modes, i, x[i], x[2 + i], motion.reaction[i], of_joint);
         for (int k = 0; k < PLANT_INDICATORS; k++) {
             z[plant_indicator_index(i, k)] = of_joint[k];
         }

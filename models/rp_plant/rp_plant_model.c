@@ -1,7 +1,5 @@
 #include "rp_plant_model.h"
 
-#include "arithmetic_double.h"
-#include "calculated.h"
 #include "rp_plant_calculated.h"
 #include "rp_plant_events.h"
 #include "rp_plant_modes.h"
@@ -47,23 +45,38 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     memcpy(&inputs, u, sizeof inputs);
     struct rp_plant_modes modes;
     rp_plant_modes_in_effect(values, x, x + 2, &inputs, &modes);
-    struct rp_plant_jacobians ddq_by;
-    rp_plant_jacobians(&values->parameters, &modes, x, x + 2, &inputs, &ddq_by);
+    double ddq_by[2 * 4];
+    plant_accelerations_jacobian(&values->parameters, &modes, x, x + 2, &inputs, ddq_by);
     for (size_t j = 0; j < 2; j++) {
         double *by_q = J + 4 * j;
         double *by_dq = J + 4 * (2 + j);
         const bool is_stuck = modes.joint[j] == RP_PLANT_STUCK;
         for (size_t i = 0; i < 2; i++) {
             by_q[i] = 0.0;
-            by_q[2 + i] = is_stuck ? 0.0 : ddq_by.q[i][j];
+            by_q[2 + i] = is_stuck ? 0.0 : ddq_by[i + 2 * j];
             by_dq[i] = i == j ? 1.0 : 0.0;
-            by_dq[2 + i] = is_stuck ? 0.0 : ddq_by.dq[i][j];
+            by_dq[2 + i] = is_stuck ? 0.0 : ddq_by[i + 2 * (2 + j)];
         }
     }
     return STATUS_OK;
 }
 
-DEFINE_OUTPUTS(rp_plant_values)
+static enum status outputs(void *values_pointer, double t) {
+    struct rp_plant_values *values = values_pointer;
+    struct rp_plant_modes modes;
+    rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs, &modes);
+    rp_plant_calculate(values, &modes);
+    return STATUS_OK;
+}
+
+static enum status propagate(const void *values_pointer, double t, double dt, void *first,
+                             void *second) {
+    const struct rp_plant_values *values = values_pointer;
+    struct rp_plant_modes modes;
+    rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs, &modes);
+    rp_plant_derivatives(values, &modes, first, second);
+    return STATUS_OK;
+}
 
 const struct model rp_plant_model = {
     .values_size = sizeof(struct rp_plant_values),
@@ -76,7 +89,7 @@ const struct model rp_plant_model = {
     .jacobian = jacobian,
     .series = &rp_plant_series,
     .outputs = outputs,
-    .propagate = rp_plant_propagate,
+    .propagate = propagate,
     .check_parameters = rp_plant_check_parameters,
     .events = &rp_plant_events,
 };

@@ -46,10 +46,6 @@ struct rp_plant_values {
     double indicators[RP_PLANT_INDICATORS]; /* rad/s, m/s; N.m, N; rad, m; 1; 1: unused */
 };
 
-/* propagate of struct model. Derivatives are those of the equations in the modes in effect at the
- * point, on the side of a closed stop or of the limit of its friction where it lies. */
-enum status rp_plant_propagate(const void *values, double t, double dt, void *first, void *second);
-
 /* check_parameters of struct model (rp_plant_check.c). */
 enum status rp_plant_check_parameters(const void *values, char *text, size_t size);
 

@@ -1,6 +1,7 @@
 #include "rp_plant_modes.h"
 
 #include "rp_plant_contact.h"
+#include "rp_plant_equations.h"
 
 #include <math.h>
 #include <string.h>
@@ -9,7 +10,7 @@
 
 /* Of a joint that moves, or begins to, in a direction. */
 static int moving_mode(const struct rp_plant_parameters *p, int joint, int direction) {
-    if (rp_plant_breakaway(p, joint) > 0.0) {
+    if (plant_breakaway(p, joint) > 0.0) {
         return direction > 0 ? RP_PLANT_FORWARD : RP_PLANT_BACKWARD;
     }
     return RP_PLANT_FREE;
@@ -20,8 +21,8 @@ bool rp_plant_find_rest(const struct rp_plant_parameters *p, const double q[2], 
     bool is_any = false;
     rp_plant_find_contacts(p, q, dq, modes);
     for (int i = 0; i < 2; i++) {
-        rest->breakaway[i] = rp_plant_breakaway(p, i);
-        rest->closed[i] = rp_plant_closed_stop(p, i, q[i]);
+        rest->breakaway[i] = plant_breakaway(p, i);
+        rest->closed[i] = plant_closed_stop(p, i, q[i]);
         rest->at_rest[i] = dq[i] == 0.0 && (rest->breakaway[i] > 0.0 || rest->closed[i] != 0);
         modes->joint[i] =
             rest->at_rest[i] ? RP_PLANT_STUCK : moving_mode(p, i, dq[i] > 0.0 ? 1 : -1);
@@ -66,8 +67,8 @@ static bool stays_stuck(const struct rp_plant_values *values, int joint, double 
     const double margin = 1.0 + 1e-9; // far above the rounding of the forces
     return values->modes.joint[joint] == RP_PLANT_STUCK && values->dq[joint] == 0.0 &&
            values->modes.contact[joint] == RP_PLANT_APART && !rp_plant_has_contacts(p, joint) &&
-           rp_plant_closed_stop(p, joint, values->q[joint]) == 0 &&
-           margin * most_force < rp_plant_breakaway(p, joint);
+           plant_closed_stop(p, joint, values->q[joint]) == 0 &&
+           margin * most_force < plant_breakaway(p, joint);
 }
 
 bool rp_plant_surely_holds(const struct rp_plant_values *values) {

@@ -4,6 +4,7 @@
 #define RP_PLANT_MODES_H
 
 #include "events.h"
+#include "rp_plant_contact.h"
 #include "rp_plant_model.h"
 #include "rp_plant_rest.h"
 
@@ -17,15 +18,6 @@ struct rp_plant_decision {
 static inline bool rp_plant_can_stick(const struct rp_plant_parameters *p, int joint) {
     return p->coulomb_friction[joint] > 0.0 || p->breakaway_friction[joint] > 0.0 ||
            p->stops[joint] == RP_PLANT_STOPS_RIGID;
-}
-
-/* Whether a joint can be in contact with a compliant stop. */
-static inline bool rp_plant_has_contacts(const struct rp_plant_parameters *p, int joint) {
-    return p->stops[joint] == RP_PLANT_STOPS_COMPLIANT;
-}
-
-static inline bool rp_plant_slides(int mode) {
-    return mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD;
 }
 
 /* Writes the contacts, which joints are at rest, and the joints' modes as long as these stay. True:

@@ -19,7 +19,6 @@
  * The reaction of a stuck joint is the rest of its row of the equations, as in plant_motion. */
 #include "rp_plant_series.h"
 
-#include "arithmetic_double.h"
 #include "jet.h"
 #include "platform.h"
 #include "rp_plant_equations.h"
@@ -96,9 +95,9 @@ static void set_bodies(struct series_motion *m, double q2) {
                 .q = {0.0, q2}},
     };
     plant.arm.L = arm->l1 + q2;
-    plant.arm.J = rp_fixed_inertia(arm) + arm->m2 * plant.arm.L * plant.arm.L;
+    plant.arm.J = arm_fixed_inertia(arm) + arm->m2 * plant.arm.L * plant.arm.L;
     if (has_payload(m)) {
-        plant_attach(&plant, &p);
+        plant_attach(&plant, p);
     }
     const double m2 = plant.arm.m2;
     const double a = plant.arm.a;
@@ -131,7 +130,7 @@ static void begin_motion(const struct series_origin *origin, double row[][SERIES
     rp_plant_modes_in_effect(values, q, dq, &inputs, &m->modes);
     m->has_wrench = has_wrench(origin);
     for (int i = 0; i < 2; i++) {
-        m->direction[i] = rp_plant_slides(m->modes.joint[i]) ? m->modes.joint[i] : 0.0;
+        m->direction[i] = plant_slides(m->modes.joint[i]) ? m->modes.joint[i] : 0.0;
         m->depends_on_velocity[i] =
             has_breakaway(m->p, i) && fabs(dq[i]) < (fast + 1.0) * m->p->stribeck_velocity[i];
         m->per_vs[i] = m->depends_on_velocity[i] ? 1.0 / m->p->stribeck_velocity[i] : 0.0;
@@ -237,7 +236,7 @@ static void write_indicators(const struct series_motion *m, int k, const struct 
     };
     for (int i = 0; i < 2; i++) {
         if (is_stuck(m, i)) {
-            const double breakaway = k == 0 ? rp_plant_breakaway(m->p, i) : 0.0;
+            const double breakaway = k == 0 ? plant_breakaway(m->p, i) : 0.0;
             row[FORWARD + i][k] = breakaway - reaction[i];
             row[BACKWARD + i][k] = breakaway + reaction[i];
         }
@@ -289,7 +288,7 @@ void rp_plant_reach(const void *values_pointer, const double x[], double reach[]
     const struct rp_plant_values *values = values_pointer;
     const struct rp_plant_parameters *p = &values->parameters;
     for (int i = 0; i < 2; i++) {
-        const bool is_sliding = rp_plant_slides(values->modes.joint[i]);
+        const bool is_sliding = plant_slides(values->modes.joint[i]);
         const double vs = p->stribeck_velocity[i];
         const double above_fast = fabs(x[2 + i]) - fast * vs;
         reach[i] = INFINITY;

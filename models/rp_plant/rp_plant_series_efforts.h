@@ -5,9 +5,8 @@
 
 #include "jet.h"
 #include "platform.h"
+#include "rp_plant_equations.h"
 #include "rp_plant_model.h"
-
-#include <stdlib.h>
 
 /* Inputs: tau1, f2, and the wrench. */
 enum { FX = 2, FY, MZ };
@@ -122,7 +121,7 @@ static inline double series_compliant_force(const struct series_motion *m, int i
     double *d = row[DEPTH + i];
     d[k] = -contact * q[k];
     if (k == 0) {
-        d[0] = contact > 0 ? m->p->lower[i] - q[0] : q[0] - m->p->upper[i];
+        d[0] = plant_penetration(m->p, contact, i, q[0]);
     }
     const double damped = m->p->stop_damping[i] * jet_product(d, row[W + i], k);
     return m->p->stop_stiffness[i] * (contact * d[k] - damped);

@@ -1,5 +1,7 @@
 #include "rp_sensor_model.h"
 
+#include "rp_sensor_calculated.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -105,15 +107,11 @@ static void find_shown(const struct rp_sensor_values *values, int i, int *now, i
 
 static enum status outputs(void *values_pointer, double t) {
     struct rp_sensor_values *values = values_pointer;
-    const struct rp_sensor_parameters *p = &values->parameters;
+    int before[2];
     for (int i = 0; i < 2; i++) {
-        int now;
-        int before;
-        find_shown(values, i, &now, &before);
-        values->counts[i] = now;
-        values->q_measured[i] = now * p->resolution[i];
-        values->dq_measured[i] = ((double)now - before) * p->resolution[i] / p->sample_time;
+        find_shown(values, i, &values->counts[i], &before[i]);
     }
+    rp_sensor_calculate(values, values->counts, before);
     return STATUS_OK;
 }
 

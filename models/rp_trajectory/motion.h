@@ -1,107 +1,89 @@
-/* Arithmetic with a quantity that moves: its value, velocity and acceleration in time, each of them
- * with its first and second derivative along a curve (taylor.h). The rules are those of taylor.h
- * again, one level up: a curve along time gives the derivatives of orders 3 and 4 as well. */
+/* Arithmetic with a quantity that moves: the rules of sum, product, quotient and chain. */
 #ifndef MOTION_H
 #define MOTION_H
 
-#include "taylor.h"
+#include "real.h"
 
 struct motion {
-    struct taylor position;
-    struct taylor velocity;     /* per s */
-    struct taylor acceleration; /* per s2 */
+    real position;
+    real velocity;     /* per s */
+    real acceleration; /* per s2 */
 };
 
 /* At rest at position. */
-static inline struct motion motion_rest(struct taylor position) {
-    return (struct motion){.position = position};
+static inline struct motion motion_rest(real position) {
+    return (struct motion){.position = position, .velocity = 0.0, .acceleration = 0.0};
 }
 
 static inline struct motion motion_sum(struct motion x, struct motion y) {
     return (struct motion){
-        .position = taylor_sum(x.position, y.position),
-        .velocity = taylor_sum(x.velocity, y.velocity),
-        .acceleration = taylor_sum(x.acceleration, y.acceleration),
+        .position = x.position + y.position,
+        .velocity = x.velocity + y.velocity,
+        .acceleration = x.acceleration + y.acceleration,
     };
 }
 
 static inline struct motion motion_difference(struct motion x, struct motion y) {
     return (struct motion){
-        .position = taylor_difference(x.position, y.position),
-        .velocity = taylor_difference(x.velocity, y.velocity),
-        .acceleration = taylor_difference(x.acceleration, y.acceleration),
+        .position = x.position - y.position,
+        .velocity = x.velocity - y.velocity,
+        .acceleration = x.acceleration - y.acceleration,
     };
 }
 
-static inline struct motion motion_scaled(struct taylor factor, struct motion x) {
+static inline struct motion motion_scaled(real factor, struct motion x) {
     return (struct motion){
-        .position = taylor_product(factor, x.position),
-        .velocity = taylor_product(factor, x.velocity),
-        .acceleration = taylor_product(factor, x.acceleration),
+        .position = factor * x.position,
+        .velocity = factor * x.velocity,
+        .acceleration = factor * x.acceleration,
     };
 }
 
 static inline struct motion motion_product(struct motion x, struct motion y) {
-    const struct taylor twice = taylor_scaled(2.0, taylor_product(x.velocity, y.velocity));
     return (struct motion){
-        .position = taylor_product(x.position, y.position),
-        .velocity = taylor_sum(taylor_product(x.velocity, y.position),
-                               taylor_product(x.position, y.velocity)),
-        .acceleration = taylor_sum(taylor_sum(taylor_product(x.acceleration, y.position), twice),
-                                   taylor_product(x.position, y.acceleration)),
+        .position = x.position * y.position,
+        .velocity = x.velocity * y.position + x.position * y.velocity,
+        .acceleration = x.acceleration * y.position + 2.0 * (x.velocity * y.velocity) +
+                        x.position * y.acceleration,
     };
 }
 
 /* From x = root^2, differentiated. */
 static inline struct motion motion_square_root(struct motion x) {
-    const struct taylor root = taylor_square_root(x.position);
-    const struct taylor twice_root = taylor_scaled(2.0, root);
-    const struct taylor velocity = taylor_quotient(x.velocity, twice_root);
-    const struct taylor rest =
-        taylor_difference(x.acceleration, taylor_scaled(2.0, taylor_square(velocity)));
-    return (struct motion){root, velocity, taylor_quotient(rest, twice_root)};
+    const real root = sqrt(x.position);
+    const real twice_root = 2.0 * root;
+    const real velocity = x.velocity / twice_root;
+    const real rest = x.acceleration - 2.0 * (velocity * velocity);
+    return (struct motion){root, velocity, rest / twice_root};
 }
 
 static inline struct motion motion_sine(struct motion x) {
-    const struct taylor s = taylor_sine(x.position);
-    const struct taylor c = taylor_cosine(x.position);
+    const real s = sin(x.position), c = cos(x.position);
     return (struct motion){
         .position = s,
-        .velocity = taylor_product(c, x.velocity),
-        .acceleration = taylor_difference(taylor_product(c, x.acceleration),
-                                          taylor_product(s, taylor_square(x.velocity))),
+        .velocity = c * x.velocity,
+        .acceleration = c * x.acceleration - s * (x.velocity * x.velocity),
     };
 }
 
 static inline struct motion motion_cosine(struct motion x) {
-    const struct taylor s = taylor_sine(x.position);
-    const struct taylor c = taylor_cosine(x.position);
-    const struct taylor turning =
-        taylor_sum(taylor_product(s, x.acceleration), taylor_product(c, taylor_square(x.velocity)));
+    const real s = sin(x.position), c = cos(x.position);
     return (struct motion){
         .position = c,
-        .velocity = taylor_scaled(-1.0, taylor_product(s, x.velocity)),
-        .acceleration = taylor_scaled(-1.0, turning),
+        .velocity = -(s * x.velocity),
+        .acceleration = -(s * x.acceleration + c * (x.velocity * x.velocity)),
     };
 }
 
 /* From (x^2 + y^2) angle' = x y' - y x', differentiated. */
 static inline struct motion motion_atan2(struct motion y, struct motion x) {
-    const struct taylor r2 = taylor_sum(taylor_square(x.position), taylor_square(y.position));
-    const struct taylor half_r2_rate =
-        taylor_sum(taylor_product(x.position, x.velocity), taylor_product(y.position, y.velocity));
-    const struct taylor area_rate = taylor_difference(taylor_product(x.position, y.velocity),
-                                                      taylor_product(y.position, x.velocity));
-    const struct taylor area_acceleration = taylor_difference(
-        taylor_product(x.position, y.acceleration), taylor_product(y.position, x.acceleration));
-    const struct taylor velocity = taylor_quotient(area_rate, r2);
-    const struct taylor rest = taylor_difference(
-        area_acceleration, taylor_scaled(2.0, taylor_product(velocity, half_r2_rate)));
-    return (struct motion){
-        taylor_atan2(y.position, x.position),
-        velocity,
-        taylor_quotient(rest, r2),
-    };
+    const real r2 = x.position * x.position + y.position * y.position;
+    const real half_r2_rate = x.position * x.velocity + y.position * y.velocity;
+    const real area_rate = x.position * y.velocity - y.position * x.velocity;
+    const real area_acceleration = x.position * y.acceleration - y.position * x.acceleration;
+    const real velocity = area_rate / r2;
+    const real rest = area_acceleration - 2.0 * (velocity * half_r2_rate);
+    return (struct motion){atan2(y.position, x.position), velocity, rest / r2};
 }
 
 #endif

@@ -1,5 +1,7 @@
 #include "rp_trajectory.h"
 
+#include <math.h>
+
 static const double two_pi = 6.28318530717958647693;
 
 static double length(const double v[2]) {
@@ -91,4 +93,8 @@ enum rp_trajectory_fault rp_trajectory_check(const struct rp_trajectory_paramete
     double nearest[2];
     return rp_trajectory_distance(p, nearest) > fabs(p->a) ? RP_TRAJECTORY_VALID
                                                            : RP_TRAJECTORY_OUT_OF_REACH;
+}
+
+bool rp_trajectory_is_attached(const struct rp_trajectory_parameters *p, double t) {
+    return p->grasp_time <= t && t < p->release_time;
 }

@@ -1,10 +1,9 @@
 /* Reference motions of the RP manipulator, twice continuously differentiable in time: from one
  * position of the joints to another, along a straight line, along a circle. Symbols and formulas as
- * in README.md. No function allocates, prints or has state. */
+ * in README.md. The equations are in rp_trajectory_equations.h. No function allocates, prints or
+ * has state. */
 #ifndef RP_TRAJECTORY_H
 #define RP_TRAJECTORY_H
-
-#include "motion.h"
 
 #include <stdbool.h>
 
@@ -42,25 +41,6 @@ struct rp_trajectory_parameters {
     double grasp_time;   /* s */
     double release_time; /* s, >= grasp_time */
 };
-
-/* A point of a curve in the space of parameters and time, with the first and second derivatives of
- * these along it (in which motion and branch mean nothing). */
-struct rp_trajectory_curve {
-    const struct rp_trajectory_parameters *value;
-    const struct rp_trajectory_parameters *first;
-    const struct rp_trajectory_parameters *second;
-    struct taylor time; /* s */
-};
-
-struct rp_trajectory_point {
-    struct motion q[2];  /* rad, m */
-    struct motion ee[2]; /* m, frame 0: its position, velocity and acceleration */
-};
-
-/* The motion at one point of the curve, whose parameters passed rp_trajectory_check. Where two
- * segments of the motion meet, the formulas of the later one hold. */
-void rp_trajectory_evaluate(const struct rp_trajectory_curve *curve,
-                            struct rp_trajectory_point *point);
 
 enum rp_trajectory_fault {
     RP_TRAJECTORY_VALID,

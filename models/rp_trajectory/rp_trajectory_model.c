@@ -1,9 +1,9 @@
 #include "rp_trajectory_model.h"
 
+#include "rp_trajectory_calculated.h"
+
 #include <math.h>
 #include <stdio.h>
-
-static const struct rp_trajectory_parameters at_rest;
 
 static enum status right_hand_side(const void *values, double t, const double x[], const double u[],
                                    double dx[]) {
@@ -12,44 +12,15 @@ static enum status right_hand_side(const void *values, double t, const double x[
 
 static enum status outputs(void *values_pointer, double t) {
     struct rp_trajectory_values *v = values_pointer;
-    const struct rp_trajectory_curve curve = {&v->parameters, &at_rest, &at_rest, {.value = t}};
-    struct rp_trajectory_point point;
-    rp_trajectory_evaluate(&curve, &point);
-    for (int i = 0; i < 2; i++) {
-        v->q[i] = point.q[i].position.value;
-        v->dq[i] = point.q[i].velocity.value;
-        v->ddq[i] = point.q[i].acceleration.value;
-        v->ee_position[i] = point.ee[i].position.value;
-        v->ee_velocity[i] = point.ee[i].velocity.value;
-    }
+    rp_trajectory_calculate(v, t);
     v->payload_attached = v->payload == RP_TRAJECTORY_UNDECIDED
                               ? rp_trajectory_is_attached(&v->parameters, t)
                               : v->payload == RP_TRAJECTORY_ATTACHED;
     return STATUS_OK;
 }
 
-static void put(struct taylor x, double *first, double *second) {
-    *first = x.first;
-    *second = x.second;
-}
-
-static enum status propagate(const void *values_pointer, double t, double dt, void *first_pointer,
-                             void *second_pointer) {
-    const struct rp_trajectory_values *values = values_pointer;
-    struct rp_trajectory_values straight = {0};
-    struct rp_trajectory_values *first = first_pointer;
-    struct rp_trajectory_values *second = second_pointer != NULL ? second_pointer : &straight;
-    const struct rp_trajectory_curve curve = {
-        &values->parameters, &first->parameters, &second->parameters, {t, dt, 0.0}};
-    struct rp_trajectory_point point;
-    rp_trajectory_evaluate(&curve, &point);
-    for (int i = 0; i < 2; i++) {
-        put(point.q[i].position, &first->q[i], &second->q[i]);
-        put(point.q[i].velocity, &first->dq[i], &second->dq[i]);
-        put(point.q[i].acceleration, &first->ddq[i], &second->ddq[i]);
-        put(point.ee[i].position, &first->ee_position[i], &second->ee_position[i]);
-        put(point.ee[i].velocity, &first->ee_velocity[i], &second->ee_velocity[i]);
-    }
+static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
+    rp_trajectory_derivatives(values, t, first, dt, second, 0.0);
     return STATUS_OK;
 }
 

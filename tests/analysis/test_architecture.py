@@ -222,7 +222,7 @@ def test_includes_follow_the_architecture() -> None:
 def test_no_circle_of_c_files() -> None:
     compiled = objects(BUILD)
     sources = [path for path in c_files(ROOT) if path.suffix == ".c" and path in compiled]
-    assert len(sources) > 80, "build the project first"
+    assert len(sources) > 70, "build the project first"
     symbols = {path.relative_to(ROOT).as_posix(): read_symbols(compiled[path]) for path in sources}
     assert circles(graph_of_c_files(ROOT, symbols)) == []
 
@@ -242,7 +242,7 @@ def project(tmp_path: Path) -> Path:
         "src/model/model.h", "src/integrator/ode.h", "src/integrator/method.h",
         "src/instance/instance.h", "src/instance/state/internals.h",
         "src/instance/step/stepping.h", "src/instance/step/step.h", "fmu/component/component.h",
-        "fmu/fmi2/fmi2_calls.h", "fmu/fmi3/fmi3_calls.h", "models/taylor.h",
+        "fmu/fmi2/fmi2_calls.h", "fmu/fmi3/fmi3_calls.h", "models/jet.h",
         "models/rp_manipulator/rp_manipulator.h", "models/rp_trajectory/motion.h",
         "models/rp_plant/rp_plant_model.h", "models/rp_plant/equations/rp_plant.h",
         "fmu/generate.py", "rparm/unit.py", "models/rp_plant/references/make.py",

@@ -1,3 +1,4 @@
+#include "rp_equations.h"
 #include "solvers.h"
 
 #include <math.h>
@@ -10,7 +11,7 @@ const struct rp_parameters problem_parameters = {
 void problem_rhs(const double x[4], const double u[2], double dx[4]) {
     dx[0] = x[2];
     dx[1] = x[3];
-    rp_forward_dynamics(&problem_parameters, x, x + 2, u, dx + 2);
+    arm_accelerations(&problem_parameters, x, x + 2, u, dx + 2);
 }
 
 static void sample_inputs(const struct problem *problem) {

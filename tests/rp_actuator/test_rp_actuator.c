@@ -1,6 +1,7 @@
 /* The drives by closed forms, through the instance and the integrator: step response, limits,
  * torque-speed line. test_actuator.py compares values with the equations. */
 #include "derivatives.h"
+#include "rp_actuator_equations.h"
 #include "rp_actuator_model.h"
 #include "rp_test_support.h"
 #include "run_instance.h"
@@ -143,7 +144,6 @@ static void test_limited_currents_are_the_nearest_that_are_allowed(void) {
     for (int sample = 0; sample < RP_TEST_SAMPLES; sample++) {
         struct rp_actuator_parameters p;
         struct rp_actuator_inputs in;
-        double limited[2];
         for (int i = 0; i < 2; i++) {
             p.torque_constant[i] = rp_test_uniform(&random_source, 0.25, 1.0);
             p.gear_ratio[i] = rp_test_uniform(&random_source, 1.0, 3.0) * (i == 0 ? 1.0 : -1.0);
@@ -154,7 +154,6 @@ static void test_limited_currents_are_the_nearest_that_are_allowed(void) {
             in.effort_cmd[i] = rp_test_uniform(&random_source, -40.0, 40.0);
             in.dq[i] = rp_test_uniform(&random_source, -10.0, 10.0);
         }
-        rp_actuator_limited_currents(&p, &in, limited);
         for (int i = 0; i < 2; i++) {
             const double constant = p.gear_ratio[i] * p.torque_constant[i];
             const double commanded = in.effort_cmd[i] / constant;
@@ -168,7 +167,7 @@ static void test_limited_currents_are_the_nearest_that_are_allowed(void) {
                     best = current, best_over = over, best_miss = miss;
                 }
             }
-            ASSERT_CLOSE(best, limited[i], p.current_max[i] / 256.0);
+            ASSERT_CLOSE(best, drive_limited_current(&p, &in, i), p.current_max[i] / 256.0);
         }
     }
 }

@@ -2,6 +2,7 @@
  * integrator's view with the Jacobian, what is refused. */
 #include "last_text.h"
 #include "model_test.h"
+#include "rp_actuator_equations.h"
 #include "rp_actuator_model.h"
 #include "rp_test_support.h"
 
@@ -147,9 +148,8 @@ static void test_jacobian_is_what_propagation_gives(void) {
 static void test_not_a_number_is_not_limited(void) {
     next_point(FREE);
     at.v.inputs.effort_cmd[0] = NAN;
-    double limited[2];
-    rp_actuator_limited_currents(&at.v.parameters, &at.v.inputs, limited);
-    TEST_ASSERT_TRUE(isnan(limited[0]) && !isnan(limited[1]));
+    TEST_ASSERT_TRUE(isnan(drive_limited_current(&at.v.parameters, &at.v.inputs, 0)));
+    TEST_ASSERT_FALSE(isnan(drive_limited_current(&at.v.parameters, &at.v.inputs, 1)));
 }
 
 /* A command or a back-EMF that overflows is only very large. */
@@ -160,9 +160,8 @@ static void test_what_overflows_meets_the_limit(void) {
     at.v.inputs.effort_cmd[0] = DBL_MAX;
     p->gear_ratio[1] = 1e9;
     at.v.inputs.dq[1] = DBL_MAX;
-    double limited[2];
-    rp_actuator_limited_currents(p, &at.v.inputs, limited);
-    TEST_ASSERT_TRUE(limited[0] == p->current_max[0] && limited[1] == -p->current_max[1]);
+    TEST_ASSERT_TRUE(drive_limited_current(p, &at.v.inputs, 0) == p->current_max[0]);
+    TEST_ASSERT_TRUE(drive_limited_current(p, &at.v.inputs, 1) == -p->current_max[1]);
 }
 
 /* ---- What is refused ------------------------------------------------------------------------ */

@@ -3,6 +3,7 @@
  * with sympy. */
 #include "derivatives.h"
 #include "model_test.h"
+#include "rp_controller_law.h"
 #include "rp_controller_model.h"
 #include "rp_test_support.h"
 #include "run_instance.h"
@@ -60,8 +61,9 @@ static void test_computed_torque_makes_the_error_dynamics_linear(void) {
                        v.parameters.Kp[i] * (in->q_ref[i] - in->q[i]) + v.integral[i];
             state.ddq[i] = asked[i];
         }
-        rp_controller_unlimited(&v.parameters, false, in, v.integral, efforts);
-        rp_forward_dynamics(&v.parameters.arm, in->q, in->dq, efforts, ddq);
+        law_unlimited(&v.parameters, false, in, v.integral, efforts);
+        const struct arm arm = arm_in_state(&v.parameters.arm, in->q, in->dq);
+        arm_forward_dynamics(&arm, efforts, ddq);
 
         double force[2];
         double scale[2];
@@ -87,8 +89,9 @@ static void test_gravity_compensation_holds_the_arm(void) {
         double efforts[2];
         double gravity[2];
         double ddq[2];
-        rp_controller_unlimited(&v.parameters, false, &v.inputs, v.integral, efforts);
-        rp_gravity_forces(&v.parameters.arm, v.inputs.q, gravity);
+        law_unlimited(&v.parameters, false, &v.inputs, v.integral, efforts);
+        const struct arm arm = arm_in_state(&v.parameters.arm, v.inputs.q, v.inputs.dq);
+        arm_gravity_forces(&arm, gravity);
         TEST_ASSERT_TRUE(efforts[0] == gravity[0] && efforts[1] == gravity[1]);
 
         const struct rp_test_state state = {.q = {v.inputs.q[0], v.inputs.q[1]}};
@@ -96,7 +99,7 @@ static void test_gravity_compensation_holds_the_arm(void) {
         double scale[2];
         rp_test_force_scale(&v.parameters.arm, &state, force);
         rp_test_acceleration_scale(&v.parameters.arm, v.inputs.q, force, scale);
-        rp_forward_dynamics(&v.parameters.arm, v.inputs.q, v.inputs.dq, efforts, ddq);
+        arm_forward_dynamics(&arm, efforts, ddq);
         for (int i = 0; i < 2; i++) {
             ASSERT_CLOSE(0.0, ddq[i], 16 * DBL_EPSILON * scale[i]);
         }
@@ -110,13 +113,11 @@ static void test_efforts_stay_within_their_limits(void) {
         {2.75, INFINITY, 2.75, 0.0}, {-INFINITY, -4.0, -3.0, 0.0}, {-2.75, 0.0, -2.75, 0.0},
     };
     for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
-        double effort[2];
-        rp_controller_limited(&p, cases[k], effort);
-        TEST_ASSERT_TRUE(effort[0] == cases[k][2] && effort[1] == cases[k][3]);
+        for (int i = 0; i < 2; i++) {
+            TEST_ASSERT_TRUE(law_limited(&p, cases[k][i], i) == cases[k][2 + i]);
+        }
     }
-    double effort[2];
-    rp_controller_limited(&p, (const double[2]){NAN, NAN}, effort);
-    TEST_ASSERT_TRUE(isnan(effort[0]) && isnan(effort[1]));
+    TEST_ASSERT_TRUE(isnan(law_limited(&p, NAN, 0)) && isnan(law_limited(&p, NAN, 1)));
 }
 
 static void test_calculated_fields_are_written_and_not_read(void) {

@@ -2,6 +2,7 @@
  * compared with sympy in test_controller.py. */
 #include "last_text.h"
 #include "model_test.h"
+#include "rp_controller_law.h"
 #include "rp_controller_model.h"
 #include "rp_test_support.h"
 
@@ -75,7 +76,7 @@ static void next_law(int mode, bool has_both, const int side[2], bool attached) 
     struct rp_controller_parameters *p = &at.v.parameters;
     p->Ki[0] = has_both ? 1.5 : 0.0;
     double unlimited[2];
-    rp_controller_unlimited(p, at.v.payload_attached, &at.v.inputs, at.v.integral, unlimited);
+    law_unlimited(p, at.v.payload_attached, &at.v.inputs, at.v.integral, unlimited);
     for (int i = 0; i < 2; i++) {
         static const double factors[SIDES] = {[BELOW] = 2.0, [AT] = 1.0, [BEYOND] = 0.5};
         p->limit[i] = factors[side[i]] * fabs(unlimited[i]);
@@ -107,7 +108,8 @@ static void test_jacobian_is_that_of_the_integral_rates(void) {
         const struct rp_controller_parameters *p = &at.v.parameters;
         double D[2][2] = {{p->inertia[0], 0.0}, {0.0, p->inertia[1]}};
         if (mode == RP_CONTROLLER_COMPUTED_TORQUE) {
-            rp_mass_matrix(&p->arm, at.v.inputs.q, D);
+            const struct arm arm = arm_in_state(&p->arm, at.v.inputs.q, at.v.inputs.dq);
+            arm_mass_matrix(&arm, D);
         }
         for (int i = 0; i < 2; i++) {
             const bool follows = p->Ki[i] > 0.0 && side[i] != BELOW;

@@ -1,7 +1,8 @@
-/* The arm as the instance sees it: its outputs are those of rp_manipulator.h, its Jacobian is what
+/* The arm as the instance sees it: its outputs are those of its equations, its Jacobian is what
  * propagation gives, which test_rp_propagation.c compares with differences. */
 #include "last_text.h"
 #include "rp_model.h"
+#include "rp_recursion.h"
 #include "rp_test_support.h"
 #include "unity.h"
 
@@ -41,19 +42,20 @@ static void poison_states_and_inputs(void) {
 static void test_outputs_are_the_functions_bit_for_bit(void) {
     for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
         next_sample();
-        const struct rp_parameters *p = &v.parameters;
+        const struct arm arm = arm_in_state(&v.parameters, v.q, v.dq);
         struct rp_values expected = v;
-        rp_forward_dynamics(p, v.q, v.dq, v.tau, expected.ddq);
-        rp_end_effector_position(p, v.q, expected.ee_position);
-        rp_end_effector_velocity(p, v.q, v.dq, expected.ee_velocity);
-        expected.kinetic_energy = rp_kinetic_energy(p, v.q, v.dq);
-        expected.potential_energy = rp_potential_energy(p, v.q);
+        arm_forward_dynamics(&arm, v.tau, expected.ddq);
+        arm_end_effector_position(&arm, expected.ee_position);
+        arm_end_effector_velocity(&arm, expected.ee_velocity);
+        expected.kinetic_energy = arm_kinetic_energy(&arm);
+        expected.potential_energy = arm_potential_energy(&arm);
         expected.total_energy = expected.kinetic_energy + expected.potential_energy;
         expected.actuator_power = v.tau[0] * v.dq[0] + v.tau[1] * v.dq[1];
-        rp_mass_matrix(p, v.q, expected.D);
-        rp_coriolis_forces(p, v.q, v.dq, expected.coriolis);
-        rp_gravity_forces(p, v.q, expected.gravity);
-        rp_newton_euler(p, v.q, v.dq, expected.ddq, &expected.loads);
+        arm_mass_matrix(&arm, expected.D);
+        arm_coriolis_forces(&arm, expected.coriolis);
+        arm_gravity_forces(&arm, expected.gravity);
+        const struct joint_loads loads = loads_of_motion(&arm, v.tau, expected.ddq);
+        write_loads(&loads, &expected.loads);
         ASSERT_OK(rp_model.outputs(&v, 3.0));
         TEST_ASSERT_EQUAL_MEMORY(&expected, &v, sizeof v);
     }

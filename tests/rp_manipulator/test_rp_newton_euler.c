@@ -1,6 +1,6 @@
 /* Newton-Euler recursion against the closed forms of the notes, with (18) corrected, and against
  * the Euler-Lagrange dynamics. */
-#include "rp_manipulator.h"
+#include "rp_recursion.h"
 #include "rp_test_support.h"
 #include "unity.h"
 
@@ -33,6 +33,19 @@ static void next_sample(void) {
     ddq2 = s.ddq[1];
 }
 
+/* The arm in this state, until the next call. */
+static const struct arm *arm_at(const double q[2], const double dq[2]) {
+    static struct arm arm;
+    arm = arm_in_state(&p, q, dq);
+    return &arm;
+}
+
+/* Loads of the joints in the sample. */
+static void find_loads(struct rp_joint_loads *loads) {
+    const struct joint_loads found = loads_of_motion(arm_at(s.q, s.dq), s.tau, s.ddq);
+    write_loads(&found, loads);
+}
+
 /* Bound of the terms of the accelerations of both links, and of the forces on them. */
 static double acceleration_scale(void) {
     double length = p.l1 + p.lc1 + fabs(q2) + fabs(p.a);
@@ -49,6 +62,7 @@ static double moment_scale(void) {
     return arms * force_scale() + (p.I1z + p.I2z) * fabs(ddq1);
 }
 
+#define OF(v)                            ((const double[3]){(v).x, (v).y, (v).z})
 #define ASSERT_VECTOR(x, y, z, v, bound) vector_close(x, y, z, v, bound, __LINE__)
 static void vector_close(double x, double y, double z, const double v[3], double bound, int line) {
     rp_test_close(x, v[0], bound, line);
@@ -60,18 +74,16 @@ static void vector_close(double x, double y, double z, const double v[3], double
 
 static void test_link_motion_is_16_to_18(void) {
     for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
-        struct rp_link_motion motion;
         next_sample();
-        memset(&motion, 0xff, sizeof motion);
-        rp_newton_euler_forward(&p, s.q, s.dq, s.ddq, &motion);
+        const struct link_motion motion = link_motion(arm_at(s.q, s.dq), s.ddq);
         double bound = 8 * EPS * acceleration_scale();
-        ASSERT_VECTOR(0.0, dq1, 0.0, motion.omega, 0.0);
-        ASSERT_VECTOR(0.0, ddq1, 0.0, motion.domega, 0.0);
-        ASSERT_VECTOR(p.lc1 * ddq1, 0.0, -p.lc1 * dq1 * dq1, motion.ac1, bound);
+        ASSERT_VECTOR(0.0, dq1, 0.0, OF(motion.omega), 0.0);
+        ASSERT_VECTOR(0.0, ddq1, 0.0, OF(motion.domega), 0.0);
+        ASSERT_VECTOR(p.lc1 * ddq1, 0.0, -p.lc1 * dq1 * dq1, OF(motion.ac1), bound);
         ASSERT_VECTOR(p.l1 * ddq1 - p.a * dq1 * dq1, 0.0, -p.a * ddq1 - p.l1 * dq1 * dq1,
-                      motion.ae1, bound);
+                      OF(motion.ae1), bound);
         ASSERT_VECTOR(L * ddq1 - p.a * dq1 * dq1 + 2.0 * dq1 * dq2, 0.0,
-                      -p.a * ddq1 - L * dq1 * dq1 + ddq2, motion.ac2, bound);
+                      -p.a * ddq1 - L * dq1 * dq1 + ddq2, OF(motion.ac2), bound);
     }
 }
 
@@ -98,25 +110,13 @@ static void test_joint_loads_are_19_to_25(void) {
         struct rp_joint_loads loads, expected;
         next_sample();
         memset(&loads, 0xff, sizeof loads);
-        rp_newton_euler(&p, s.q, s.dq, s.ddq, &loads);
+        find_loads(&loads);
         loads_as_printed(2.0, &expected);
         double force = 16 * EPS * force_scale(), moment = 16 * EPS * moment_scale();
         ASSERT_VECTOR(expected.f1[0], 0.0, expected.f1[2], loads.f1, force);
         ASSERT_VECTOR(expected.f2[0], 0.0, expected.f2[2], loads.f2, force);
         ASSERT_VECTOR(0.0, expected.tau1[1], 0.0, loads.tau1, moment);
         ASSERT_VECTOR(0.0, expected.tau2[1], 0.0, loads.tau2, moment);
-    }
-}
-
-static void test_both_recursions_together_are_one_after_the_other(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
-        struct rp_link_motion motion;
-        struct rp_joint_loads together, apart;
-        next_sample();
-        rp_newton_euler(&p, s.q, s.dq, s.ddq, &together);
-        rp_newton_euler_forward(&p, s.q, s.dq, s.ddq, &motion);
-        rp_newton_euler_backward(&p, s.q, &motion, &apart);
-        TEST_ASSERT_EQUAL_MEMORY(&apart, &together, sizeof apart);
     }
 }
 
@@ -127,8 +127,8 @@ static void test_newton_euler_gives_the_generalized_forces_of_euler_lagrange(voi
         struct rp_joint_loads loads;
         double tau[2], scale[2];
         next_sample();
-        rp_newton_euler(&p, s.q, s.dq, s.ddq, &loads);
-        rp_inverse_dynamics(&p, s.q, s.dq, s.ddq, tau);
+        find_loads(&loads);
+        arm_inverse_dynamics(arm_at(s.q, s.dq), s.ddq, tau);
         s.tau[0] = s.tau[1] = 0.0;
         rp_test_force_scale(&p, &s, scale);
         ASSERT_CLOSE(tau[0], loads.tau1[1],
@@ -146,7 +146,7 @@ static void test_recursion_as_printed_is_short_of_14(void) {
         double tau[2], scale[2];
         next_sample();
         loads_as_printed(1.0, &printed);
-        rp_inverse_dynamics(&p, s.q, s.dq, s.ddq, tau);
+        arm_inverse_dynamics(arm_at(s.q, s.dq), s.ddq, tau);
         s.tau[0] = s.tau[1] = 0.0;
         rp_test_force_scale(&p, &s, scale);
         double missing = p.m2 * L * dq1 * dq2;

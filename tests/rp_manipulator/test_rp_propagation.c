@@ -6,7 +6,7 @@
  * of the differences; h = R / 128 leaves that far below their rounding. */
 #include "last_text.h"
 #include "model_test.h"
-#include "rp_model.h"
+#include "rp_calculated.h"
 #include "rp_test_support.h"
 #include "unity.h"
 
@@ -182,7 +182,7 @@ static void test_first_derivatives_are_those_of_the_plain_functions(void) {
         for (int k = 0; k < KNOWNS; ++k) {
             union point first = {.all = {0}};
             first.all[k] = 1.0;
-            rp_propagate(&x.v, 0.0, 0.0, &first.v, NULL);
+            rp_derivatives(&x.v, &first.v, NULL);
             /* the plain functions err by 16 epsilons of their terms, differences by 2.1 / h times
              * that */
             double h = rp_test_power_of_two(0.5 * radius(k)) / 128.0;
@@ -209,7 +209,7 @@ static double first_on_curve(const void *context, double t) {
         point.all[k] += t * (curve->velocity.all[k] + 0.5 * t * curve->acceleration.all[k]);
         first.all[k] += t * curve->acceleration.all[k];
     }
-    rp_propagate(&point.v, 0.0, 0.0, &first.v, NULL);
+    rp_derivatives(&point.v, &first.v, NULL);
     return first.all[curve->field];
 }
 
@@ -220,7 +220,7 @@ static void test_second_derivatives_are_those_of_the_first_on_curves(void) {
         next_seed(&curve.velocity);
         next_seed(&curve.acceleration);
         union point first = curve.velocity, second = curve.acceleration;
-        rp_propagate(&x.v, 0.0, 0.0, &first.v, &second.v);
+        rp_derivatives(&x.v, &first.v, &second.v);
 
         /* |t| < R moves each known by 1/31 of its radius, and J by less than half of its value.
          * The terms of a first derivative stay below M / R and err by 32 epsilons. */
@@ -254,7 +254,7 @@ static void test_first_derivatives_of_the_accelerations_are_the_jacobians(void) 
         for (int k = 0; k < 6; ++k) {
             union point first = {.all = {0}};
             first.all[8 + k] = 1.0;
-            rp_propagate(&x.v, 0.0, 0.0, &first.v, NULL);
+            rp_derivatives(&x.v, &first.v, NULL);
             double(*block)[2] = k < 2 ? jacobians.tau : k < 4 ? jacobians.q : jacobians.dq;
             double terms = torque[k] / J;
             ASSERT_CLOSE(block[0][k % 2], first.v.ddq[0], 8 * EPS * terms);
@@ -272,7 +272,7 @@ static void test_derivatives_are_zero_exactly_where_nothing_depends(void) {
         for (int k = 0; k < KNOWNS; ++k) {
             union point first = {.all = {0}}, second = {.all = {0}};
             first.all[k] = second.all[k] = rp_test_uniform(&random_source, 1.0, 2.0);
-            rp_propagate(&x.v, 0.0, 0.0, &first.v, &second.v);
+            rp_derivatives(&x.v, &first.v, &second.v);
             for (int i = 0; i < ALL; ++i) {
                 moved[i][k] += first.all[i] != 0.0 || second.all[i] != 0.0;
             }
@@ -301,9 +301,9 @@ static void test_motion_obeys_its_balances(void) {
             first.v.q[i] = x.v.dq[i];
             first.v.dq[i] = second.v.q[i] = x.v.ddq[i];
         }
-        rp_propagate(&x.v, 0.0, 0.0, &first.v, NULL);
+        rp_derivatives(&x.v, &first.v, NULL);
         memcpy(second.v.dq, first.v.ddq, sizeof first.v.ddq);
-        rp_propagate(&x.v, 0.0, 0.0, &first.v, &second.v);
+        rp_derivatives(&x.v, &first.v, &second.v);
 
         /* the terms of dE/dt are powers of the forces that are behind the accelerations */
         const struct rp_parameters *p = &x.v.parameters;
@@ -356,7 +356,7 @@ static void test_model_offers_it_to_the_instance(void) {
     next_seed(&second);
     expected_first = first;
     expected_second = second;
-    rp_propagate(&x.v, 0.0, 0.0, &expected_first.v, &expected_second.v);
+    rp_derivatives(&x.v, &expected_first.v, &expected_second.v);
     /* the arm does not know the time */
     ASSERT_OK(rp_model.propagate(&x, 3.0, 1.0, &first, &second));
     TEST_ASSERT_EQUAL_MEMORY(&expected_first, &first, sizeof first);

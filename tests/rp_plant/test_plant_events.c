@@ -2,6 +2,7 @@
  * have other files. */
 #include "last_text.h"
 #include "plant_test_support.h"
+#include "rp_plant_equations.h"
 #include "unity.h"
 
 #include <float.h>
@@ -90,7 +91,7 @@ static void test_after_an_update_all_modes_are_valid(void) {
         }
         for (int i = 0; i < 2; i++) {
             const int mode = v.modes.joint[i];
-            const int closed = rp_plant_closed_stop(&v.parameters, i, v.q[i]);
+            const int closed = plant_closed_stop(&v.parameters, i, v.q[i]);
             if (mode == RP_PLANT_STUCK) {
                 TEST_ASSERT_TRUE(v.dq[i] == 0.0 && v.ddq[i] == 0.0);
             } else if (v.dq[i] == 0.0) {

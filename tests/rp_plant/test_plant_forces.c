@@ -2,6 +2,7 @@
  * motion and joint loads with the Lagrangian. */
 #include "last_text.h"
 #include "plant_test_support.h"
+#include "rp_plant_equations.h"
 #include "rp_plant_modes.h"
 #include "unity.h"
 
@@ -47,13 +48,13 @@ static void test_friction_falls_from_breakaway_to_coulomb(void) {
         const double fc = p->coulomb_friction[1];
         const double fb = p->breakaway_friction[1];
         const double vs = p->stribeck_velocity[1];
-        TEST_ASSERT_TRUE(rp_plant_breakaway(p, 1) == fb);
-        TEST_ASSERT_TRUE(rp_plant_sliding_friction(p, 1, 0.0) == fb);
-        TEST_ASSERT_TRUE(rp_plant_sliding_friction(p, 1, 1e6) == fc);
-        TEST_ASSERT_TRUE(rp_plant_sliding_friction(p, 1, 1e300) == fc);
+        TEST_ASSERT_TRUE(plant_breakaway(p, 1) == fb);
+        TEST_ASSERT_TRUE(plant_sliding_friction(p, 1, 0.0) == fb);
+        TEST_ASSERT_TRUE(plant_sliding_friction(p, 1, 1e6) == fc);
+        TEST_ASSERT_TRUE(plant_sliding_friction(p, 1, 1e300) == fc);
         const double dq = rp_test_uniform(&random_source, 0.0, 4.0);
         const double expected = fc + (fb - fc) * exp(-(dq / vs) * (dq / vs));
-        ASSERT_CLOSE(expected, rp_plant_sliding_friction(p, 1, dq), 8 * EPS * fb);
+        ASSERT_CLOSE(expected, plant_sliding_friction(p, 1, dq), 8 * EPS * fb);
     }
 }
 
@@ -67,26 +68,26 @@ static void test_friction_of_a_mode_that_is_over_stays_high(void) {
     p->stribeck_velocity[0] = 0.25;
     for (int n = 1; n <= 1000; n++) {
         const double dq = 0.25 * 8.0 * n / 1000.0;
-        const double before = rp_plant_sliding_friction(p, 0, dq);
-        const double after = rp_plant_sliding_friction(p, 0, -dq);
+        const double before = plant_sliding_friction(p, 0, dq);
+        const double after = plant_sliding_friction(p, 0, -dq);
         const double w = dq / 0.25;
         ASSERT_CLOSE(before + 1.5 / (1.0 + pow(w, -8.0)), after, 8 * EPS * 2.0);
         TEST_ASSERT_TRUE(after > 1.1);
     }
-    TEST_ASSERT_TRUE(rp_plant_sliding_friction(p, 0, -1e6) == 2.0);
-    TEST_ASSERT_TRUE(rp_plant_sliding_friction(p, 0, -1e300) == 2.0);
+    TEST_ASSERT_TRUE(plant_sliding_friction(p, 0, -1e6) == 2.0);
+    TEST_ASSERT_TRUE(plant_sliding_friction(p, 0, -1e300) == 2.0);
 }
 
 static void test_without_breakaway_friction_is_coulombs(void) {
     plant_test_start(&v);
     v.parameters.coulomb_friction[0] = 0.3;
     v.parameters.stribeck_velocity[0] = 1.0;
-    TEST_ASSERT_TRUE(rp_plant_breakaway(&v.parameters, 0) == 0.3);
-    TEST_ASSERT_TRUE(rp_plant_sliding_friction(&v.parameters, 0, 0.5) == 0.3);
+    TEST_ASSERT_TRUE(plant_breakaway(&v.parameters, 0) == 0.3);
+    TEST_ASSERT_TRUE(plant_sliding_friction(&v.parameters, 0, 0.5) == 0.3);
     v.parameters.breakaway_friction[0] = 0.3;
     v.parameters.stribeck_velocity[0] = 0.0;
-    TEST_ASSERT_TRUE(rp_plant_sliding_friction(&v.parameters, 0, 0.5) == 0.3);
-    TEST_ASSERT_TRUE(rp_plant_sliding_friction(&v.parameters, 0, 0.0) == 0.3);
+    TEST_ASSERT_TRUE(plant_sliding_friction(&v.parameters, 0, 0.5) == 0.3);
+    TEST_ASSERT_TRUE(plant_sliding_friction(&v.parameters, 0, 0.0) == 0.3);
 }
 
 /* With the mode frozen the friction keeps its sign where the velocity passes 0. */

@@ -3,6 +3,7 @@
  * 200 000 random cases; those in which a pattern fits or fails by no more than rounding are drawn
  * again, and there are few. */
 #include "plant_test_support.h"
+#include "rp_plant_equations.h"
 #include "rp_plant_modes.h"
 #include "unity.h"
 
@@ -171,7 +172,7 @@ static void test_a_closed_stop_takes_what_friction_cannot(void) {
         const double breakaway = below(4) == 0 ? 0.0 : decades(-1.0, 1.0);
         const double reaction = rp_test_uniform(&random_source, -20.0, 20.0);
         for (int closed = -1; closed <= 1; closed += 2) {
-            const struct rp_plant_hold hold = rp_plant_hold(reaction, breakaway, closed);
+            const struct plant_hold hold = plant_split(reaction, breakaway, closed);
             ASSERT_CLOSE(reaction, hold.friction - hold.stop, 1e-14 * (20.0 + breakaway));
             TEST_ASSERT_TRUE(closed * hold.stop >= 0.0);
             if (closed * reaction < -breakaway) {

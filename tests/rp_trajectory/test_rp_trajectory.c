@@ -4,9 +4,10 @@
 #include "instance.h"
 #include "last_text.h"
 #include "model_description.h"
-#include "rp_manipulator.h"
+#include "rp_equations.h"
 #include "rp_trajectory_example.h"
 #include "rp_trajectory_model.h"
+#include "trajectory_derivatives.h"
 
 #include <math.h>
 #include <unity.h>
@@ -14,8 +15,6 @@
 #define COUNT(array) (sizeof(array) / sizeof((array)[0]))
 
 static const double pi = 3.14159265358979323846;
-static const struct rp_trajectory_parameters at_rest;
-
 static struct rp_trajectory_parameters p;
 
 void setUp(void) {
@@ -32,11 +31,41 @@ static void set_around(void) {
     p.turns = 4.75;
 }
 
-static struct rp_trajectory_point at(double t) {
-    const struct rp_trajectory_curve curve = {&p, &at_rest, &at_rest, {t, 1.0, 0.0}};
-    struct rp_trajectory_point point;
-    rp_trajectory_evaluate(&curve, &point);
-    return point;
+/* A quantity with its derivatives by the time. */
+struct quantity {
+    double value, first, second;
+};
+
+struct moving {
+    struct quantity position, velocity, acceleration;
+};
+
+struct sample {
+    struct moving q[2], ee[2];
+};
+
+static struct quantity quantity(double value, double first, double second) {
+    return (struct quantity){value, first, second};
+}
+
+static struct moving moving(struct motion x, struct motion first, struct motion second) {
+    return (struct moving){
+        .position = quantity(x.position, first.position, second.position),
+        .velocity = quantity(x.velocity, first.velocity, second.velocity),
+        .acceleration = quantity(x.acceleration, first.acceleration, second.acceleration),
+    };
+}
+
+static struct sample at(double t) {
+    struct trajectory_point x, first, second;
+    trajectory_evaluate(&p, t, &x);
+    trajectory_derivatives(&p, t, 1.0, &first, 0.0, &second);
+    struct sample sample;
+    for (int i = 0; i < 2; i++) {
+        sample.q[i] = moving(x.q[i], first.q[i], second.q[i]);
+        sample.ee[i] = moving(x.ee[i], first.ee[i], second.ee[i]);
+    }
+    return sample;
 }
 
 static double end_time(void) {
@@ -65,7 +94,7 @@ static void set_kind(int kind) {
 
 /* ---- Geometry ------------------------------------------------------------------------------- */
 
-static void assert_on_path(const struct rp_trajectory_point *point) {
+static void assert_on_path(const struct sample *point) {
     const double x = point->ee[0].position.value;
     const double y = point->ee[1].position.value;
     if (p.motion == RP_TRAJECTORY_CIRCLE) {
@@ -82,15 +111,16 @@ static void assert_on_path(const struct rp_trajectory_point *point) {
 static void test_forward_kinematics_of_the_joints_gives_the_path(void) {
     for (int kind = 0; kind < KINDS; kind++) {
         set_kind(kind);
-        const struct rp_parameters arm = {.l1 = p.l1, .a = p.a, .m2 = 1.0};
+        const struct rp_parameters parameters = {.l1 = p.l1, .a = p.a, .m2 = 1.0};
         for (int i = 0; i <= 400; i++) {
-            const struct rp_trajectory_point point = at(0.3 + i * end_time() / 390.0);
+            const struct sample point = at(0.3 + i * end_time() / 390.0);
             const double q[2] = {point.q[0].position.value, point.q[1].position.value};
             const double dq[2] = {point.q[0].velocity.value, point.q[1].velocity.value};
             double position[2];
             double velocity[2];
-            rp_end_effector_position(&arm, q, position);
-            rp_end_effector_velocity(&arm, q, dq, velocity);
+            const struct arm arm = arm_in_state(&parameters, q, dq);
+            arm_end_effector_position(&arm, position);
+            arm_end_effector_velocity(&arm, velocity);
             for (int j = 0; j < 2; j++) {
                 TEST_ASSERT_DOUBLE_WITHIN(1e-14, position[j], point.ee[j].position.value);
                 TEST_ASSERT_DOUBLE_WITHIN(1e-13, velocity[j], point.ee[j].velocity.value);
@@ -117,15 +147,13 @@ static void test_the_start_is_the_principal_solution(void) {
                 points[j][0] = c * x - s * points[j][1];
                 points[j][1] = s * x + c * points[j][1];
             }
-            const struct rp_trajectory_point point = at(p.start_time);
-            const struct rp_parameters arm = {.l1 = p.l1, .a = p.a};
-            const double ee[2] = {point.ee[0].position.value, point.ee[1].position.value};
-            double q[2];
-            TEST_ASSERT_TRUE(rp_inverse_kinematics(
-                &arm, ee,
-                p.branch == RP_TRAJECTORY_FORWARD ? RP_BRANCH_FORWARD : RP_BRANCH_BACKWARD, q));
-            TEST_ASSERT_DOUBLE_WITHIN(1e-14, q[0], point.q[0].position.value);
-            TEST_ASSERT_DOUBLE_WITHIN(1e-14, q[1], point.q[1].position.value);
+            const struct sample point = at(p.start_time);
+            const double x = point.ee[0].position.value, y = point.ee[1].position.value;
+            const double reach = sqrt(x * x + y * y - p.a * p.a);
+            const double L = p.branch == RP_TRAJECTORY_FORWARD ? reach : -reach;
+            const double q1 = remainder(atan2(y, x) - atan2(p.a, L), 2.0 * pi);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-14, q1, point.q[0].position.value);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-14, L - p.l1, point.q[1].position.value);
         }
     }
 }
@@ -172,7 +200,7 @@ static void test_a_line_along_an_axis_keeps_the_other_coordinate(void) {
     p.motion = RP_TRAJECTORY_LINE;
     p.ee_to[1] = p.ee_from[1];
     for (int i = 0; i < 100; i++) {
-        const struct motion y = at(i * 0.02).ee[1];
+        const struct moving y = at(i * 0.02).ee[1];
         TEST_ASSERT_TRUE(y.position.value == p.ee_from[1]);
         TEST_ASSERT_TRUE(y.velocity.value == 0.0 && y.acceleration.value == 0.0);
     }
@@ -199,11 +227,11 @@ static void test_joints_are_twice_continuously_differentiable(void) {
         double times[4];
         const size_t count = boundaries(times);
         for (size_t k = 0; k < count; k++) {
-            const struct rp_trajectory_point before = at(times[k] - h);
-            const struct rp_trajectory_point after = at(times[k] + h);
+            const struct sample before = at(times[k] - h);
+            const struct sample after = at(times[k] + h);
             for (int i = 0; i < 2; i++) {
-                const struct motion b = before.q[i];
-                const struct motion a = after.q[i];
+                const struct moving b = before.q[i];
+                const struct moving a = after.q[i];
                 TEST_ASSERT_DOUBLE_WITHIN(1e-7, b.position.value, a.position.value);
                 TEST_ASSERT_DOUBLE_WITHIN(1e-6, b.velocity.value, a.velocity.value);
                 TEST_ASSERT_DOUBLE_WITHIN(1e-5, b.acceleration.value, a.acceleration.value);
@@ -238,10 +266,10 @@ static void test_derivatives_along_time_are_the_rates(void) {
     for (int kind = 0; kind < KINDS; kind++) {
         set_kind(kind);
         for (int i = 0; i <= 200; i++) {
-            const struct rp_trajectory_point point = at(0.4 + i * end_time() / 190.0);
-            const struct motion all[] = {point.q[0], point.q[1], point.ee[0], point.ee[1]};
+            const struct sample point = at(0.4 + i * end_time() / 190.0);
+            const struct moving all[] = {point.q[0], point.q[1], point.ee[0], point.ee[1]};
             for (size_t j = 0; j < COUNT(all); j++) {
-                const struct motion m = all[j];
+                const struct moving m = all[j];
                 const double scale = 1.0 + fabs(m.acceleration.value);
                 TEST_ASSERT_DOUBLE_WITHIN(1e-14 * scale, m.velocity.value, m.position.first);
                 TEST_ASSERT_DOUBLE_WITHIN(1e-13 * scale, m.acceleration.value, m.velocity.first);
@@ -258,12 +286,12 @@ static void test_it_rests_before_and_after(void) {
         set_kind(kind);
         const double times[][2] = {{p.start_time - 1e-12, -1e6}, {end_time() + 1e-12, 1e6}};
         for (size_t k = 0; k < COUNT(times); k++) {
-            const struct rp_trajectory_point near = at(times[k][0]);
-            const struct rp_trajectory_point far = at(times[k][1]);
+            const struct sample near = at(times[k][0]);
+            const struct sample far = at(times[k][1]);
             for (int i = 0; i < 2; i++) {
                 TEST_ASSERT_TRUE(near.q[i].position.value == far.q[i].position.value);
                 TEST_ASSERT_TRUE(near.ee[i].position.value == far.ee[i].position.value);
-                const struct motion q = near.q[i];
+                const struct moving q = near.q[i];
                 TEST_ASSERT_TRUE(q.velocity.value == 0.0 && q.acceleration.value == 0.0);
                 TEST_ASSERT_TRUE(q.position.first == 0.0 && q.position.second == 0.0);
                 TEST_ASSERT_TRUE(q.acceleration.first == 0.0 && q.acceleration.second == 0.0);

@@ -1,4 +1,3 @@
-#include "arithmetic_double.h"
 #include "rp_plant_equations.h"
 
 #include <stddef.h>
@@ -10,34 +9,22 @@ static bool is_attached(const struct rp_plant_modes *modes) {
 }
 
 /* As plant_efforts; what is 0 is not calculated: right-hand sides take a third less time. */
-EQUATION void efforts_of_inputs(const struct plant *plant, const struct rp_plant_parameters *p,
-                                const struct rp_plant_modes *modes,
-                                const struct rp_plant_inputs *inputs, double efforts[2]) {
+static inline void efforts_of_inputs(const struct plant *plant, const struct rp_plant_parameters *p,
+                                     const struct rp_plant_modes *modes,
+                                     const struct rp_plant_inputs *inputs, double efforts[2]) {
     const double *w = inputs->wrench;
     double Q[2] = {0.0, 0.0};
     if (w[0] != 0.0 || w[1] != 0.0 || w[2] != 0.0) {
         plant_wrench_forces(plant, w, Q);
     }
-    plant_efforts(plant, &p, modes, inputs->tau, Q, efforts);
-}
-
-double rp_plant_breakaway(const struct rp_plant_parameters *p, int joint) {
-    return plant_breakaway(&p, joint);
-}
-
-double rp_plant_sliding_friction(const struct rp_plant_parameters *p, int joint, double speed) {
-    return plant_sliding_friction(&p, joint, speed);
-}
-
-int rp_plant_closed_stop(const struct rp_plant_parameters *p, int joint, double q) {
-    return plant_closed_stop(&p, joint, q);
+    plant_efforts(plant, p, modes, inputs->tau, Q, efforts);
 }
 
 /* det D = J (m2 + b2) + m2 a^2 b2 */
 void rp_plant_inertia(const struct rp_plant_parameters *p, bool attached, double q2,
                       struct rp_plant_inertia *inertia) {
     const double q[2] = {0.0, q2}; // D does not depend on q1
-    const struct plant plant = plant_in_state(&p, attached, q, at_rest);
+    const struct plant plant = plant_in_state(p, attached, q, at_rest);
     const struct arm *arm = &plant.arm;
     const double b2 = plant.armature2;
     plant_mass_matrix(&plant, inertia->D);
@@ -46,14 +33,14 @@ void rp_plant_inertia(const struct rp_plant_parameters *p, bool attached, double
 
 double rp_plant_kinetic_energy(const struct rp_plant_parameters *p, bool attached,
                                const double q[2], const double dq[2]) {
-    const struct plant plant = plant_in_state(&p, attached, q, dq);
+    const struct plant plant = plant_in_state(p, attached, q, dq);
     return plant_kinetic_energy(&plant);
 }
 
 void rp_plant_forces(const struct rp_plant_parameters *p, const struct rp_plant_modes *modes,
                      const double q[2], const double dq[2], const struct rp_plant_inputs *inputs,
                      double forces[2]) {
-    const struct plant plant = plant_in_state(&p, is_attached(modes), q, dq);
+    const struct plant plant = plant_in_state(p, is_attached(modes), q, dq);
     double efforts[2];
     efforts_of_inputs(&plant, p, modes, inputs, efforts);
     plant_forces(&plant, efforts, forces);
@@ -62,7 +49,7 @@ void rp_plant_forces(const struct rp_plant_parameters *p, const struct rp_plant_
 void rp_plant_motion(const struct rp_plant_parameters *p, const struct rp_plant_modes *modes,
                      const double q[2], const double dq[2], const struct rp_plant_inputs *inputs,
                      struct rp_plant_motion *motion) {
-    const struct plant plant = plant_in_state(&p, is_attached(modes), q, dq);
+    const struct plant plant = plant_in_state(p, is_attached(modes), q, dq);
     double efforts[2];
     efforts_of_inputs(&plant, p, modes, inputs, efforts);
     if (plant.armature2 == 0.0 && modes->joint[0] != RP_PLANT_STUCK &&
@@ -73,4 +60,14 @@ void rp_plant_motion(const struct rp_plant_parameters *p, const struct rp_plant_
         return;
     }
     plant_motion(&plant, modes->joint, efforts, motion->ddq, motion->reaction);
+}
+
+/* Along the motion, whose velocities and accelerations are the rates of q and q'. */
+void rp_plant_reaction_rates(const struct rp_plant_parameters *p,
+                             const struct rp_plant_modes *modes, const double q[2],
+                             const double dq[2], const struct rp_plant_inputs *inputs,
+                             const struct rp_plant_inputs *du, double rates[2]) {
+    struct rp_plant_motion now;
+    rp_plant_motion(p, modes, q, dq, inputs, &now);
+    plant_reaction_rates(p, modes, q, dq, inputs, dq, now.ddq, du, rates);
 }

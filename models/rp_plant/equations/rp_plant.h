@@ -8,8 +8,8 @@
  * or none; with all off the results are those of the manipulator bit for bit, up to the sign of
  * zero.
  *
- * The equations themselves are in rp_plant_equations.h, once for values and derivatives; the
- * functions here are their values. All functions are pure and allocate nothing. */
+ * The equations are in rp_plant_equations.h; the functions here call them and leave out what is 0.
+ * All functions are pure and allocate nothing. */
 #ifndef RP_PLANT_H
 #define RP_PLANT_H
 
@@ -93,18 +93,6 @@ struct rp_plant_motion {
     double reaction[2]; /* N.m, N: of a stuck joint friction - rigid stop, else 0 */
 };
 
-/* Breakaway friction: the largest of a joint at rest, N.m (joint 0) or N (joint 1). */
-double rp_plant_breakaway(const struct rp_plant_parameters *p, int joint);
-
-/* Friction of a joint that slides at a speed >= 0, by Stribeck's law. Its value at 0 is the
- * breakaway friction: there is no jump when a joint breaks away. Below 0 it is what integrators see
- * past the event that ends the mode. */
-double rp_plant_sliding_friction(const struct rp_plant_parameters *p, int joint, double speed);
-
-/* +1: the joint rests on its lower rigid stop and can only move forward; -1: on its upper one; 0.
- */
-int rp_plant_closed_stop(const struct rp_plant_parameters *p, int joint, double q);
-
 void rp_plant_inertia(const struct rp_plant_parameters *p, bool attached, double q2,
                       struct rp_plant_inertia *inertia);
 
@@ -124,19 +112,8 @@ void rp_plant_motion(const struct rp_plant_parameters *p, const struct rp_plant_
                      const double q[2], const double dq[2], const struct rp_plant_inputs *inputs,
                      struct rp_plant_motion *motion);
 
-/* Derivatives of the accelerations in these modes (rp_plant_jacobian.c): row i, column j is
- * d ddq[i] / d (argument)[j]. */
-struct rp_plant_jacobians {
-    double q[2][2];
-    double dq[2][2];
-};
-
-void rp_plant_jacobians(const struct rp_plant_parameters *p, const struct rp_plant_modes *modes,
-                        const double q[2], const double dq[2], const struct rp_plant_inputs *inputs,
-                        struct rp_plant_jacobians *jacobians);
-
 /* Time derivatives of the reactions along the motion in these modes, the inputs changing at the
- * rates du (rp_plant_rates.c). */
+ * rates du. */
 void rp_plant_reaction_rates(const struct rp_plant_parameters *p,
                              const struct rp_plant_modes *modes, const double q[2],
                              const double dq[2], const struct rp_plant_inputs *inputs,

@@ -1,16 +1,11 @@
 #include "rp_plant_contact.h"
 
-#include <math.h>
-#include <stdlib.h>
-
-static bool is_compliant(const struct rp_plant_parameters *p, int joint) {
-    return p->stops[joint] == RP_PLANT_STOPS_COMPLIANT;
-}
+#include "rp_plant_equations.h"
 
 /* The side of the stop that the joint is in, or is on and moves into (direction: -1, 0, 1). */
 static int side_of_contact(const struct rp_plant_parameters *p, int joint, double q,
                            int direction) {
-    if (!is_compliant(p, joint)) {
+    if (!rp_plant_has_contacts(p, joint)) {
         return 0;
     }
     if (q < p->lower[joint] || (q == p->lower[joint] && direction < 0)) {
@@ -23,15 +18,8 @@ static int sign_of(double x) {
     return (x > 0.0) - (x < 0.0);
 }
 
-/* Of 1 + c d': an event is located far better. */
-static const double near_change = 1e-9;
-
-static double push_at(const struct rp_plant_parameters *p, int joint, int side, double dq) {
-    return 1.0 - side * (p->stop_damping[joint] * dq);
-}
-
 static bool is_near_change(const struct rp_plant_parameters *p, int joint, int side, double dq) {
-    return fabs(push_at(p, joint, side, dq)) <= near_change;
+    return fabs(plant_push(p, side, joint, dq)) <= rp_plant_near(0.0);
 }
 
 static int contact_at(const struct rp_plant_parameters *p, int joint, int side, double dq,
@@ -39,7 +27,7 @@ static int contact_at(const struct rp_plant_parameters *p, int joint, int side, 
     if (side * before > 0 && is_near_change(p, joint, side, dq)) {
         return before;
     }
-    const double push = push_at(p, joint, side, dq);
+    const double push = plant_push(p, side, joint, dq);
     return side * (push > 0.0 ? RP_PLANT_PUSHED : RP_PLANT_LET_GO);
 }
 
@@ -53,13 +41,13 @@ void rp_plant_find_contacts(const struct rp_plant_parameters *p, const double q[
 
 static bool is_at_rest_on_limit(const struct rp_plant_parameters *p, int joint, double q,
                                 double dq) {
-    return is_compliant(p, joint) && dq == 0.0 && (q == p->lower[joint] || q == p->upper[joint]);
+    return rp_plant_has_contacts(p, joint) && dq == 0.0 &&
+           (q == p->lower[joint] || q == p->upper[joint]);
 }
 
 /* A joint that breaks away has no acceleration yet; a stuck one has none at all. */
 static int first_direction(int mode, double ddq) {
-    const bool slides = mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD;
-    return slides ? mode : sign_of(ddq);
+    return plant_slides(mode) ? mode : sign_of(ddq);
 }
 
 void rp_plant_begin_contacts(const struct rp_plant_parameters *p, const double q[2],
@@ -82,7 +70,7 @@ void rp_plant_begin_contacts(const struct rp_plant_parameters *p, const double q
 
 bool rp_plant_contact_fits(const struct rp_plant_parameters *p, int joint, double q, double dq,
                            int contact) {
-    if (!is_compliant(p, joint)) {
+    if (!rp_plant_has_contacts(p, joint)) {
         return contact == RP_PLANT_APART;
     }
     if (contact == RP_PLANT_APART) {

@@ -8,6 +8,20 @@
 
 #include "rp_plant.h"
 
+#include <float.h>
+#include <math.h>
+
+/* Whether a joint can be in contact with a compliant stop. */
+static inline bool rp_plant_has_contacts(const struct rp_plant_parameters *p, int joint) {
+    return p->stops[joint] == RP_PLANT_STOPS_COMPLIANT;
+}
+
+/* How near its limit a quantity is at the event there: that is located far better, up to the
+ * rounding of the limit. */
+static inline double rp_plant_near(double limit) {
+    return 1e-9 + 4.0 * DBL_EPSILON * fabs(limit);
+}
+
 /* Writes modes->contact from positions and velocities; it keeps what a damped stop does at the
  * velocity where that changes. A joint at rest exactly on a limit is apart. */
 void rp_plant_find_contacts(const struct rp_plant_parameters *p, const double q[2],

@@ -1,13 +1,10 @@
-/* The equations of the plant in any arithmetic (equation.h): rp_plant.h is these with doubles, and
- * says what they mean. In given modes they are smooth: a joint that slides forward keeps the sign
- * of its friction also where its velocity passes 0. */
+/* The equations of the plant. rp_plant.h says what they mean. In given modes they are smooth: a
+ * joint that slides forward keeps the sign of its friction also where its velocity passes 0. */
 #ifndef RP_PLANT_EQUATIONS_H
 #define RP_PLANT_EQUATIONS_H
 
 #include "rp_payload.h"
 #include "rp_plant.h"
-
-#include <stdlib.h>
 
 /* The plant in a state, with what many equations share. */
 struct plant {
@@ -20,13 +17,12 @@ struct plant {
 
 /* ---- Bodies --------------------------------------------------------------------------------- */
 
-EQUATION void plant_attach(struct plant *plant,
-                           const struct rp_plant_parameters *const p[SOURCES]) {
+static inline void plant_attach(struct plant *plant, const struct rp_plant_parameters *p) {
     const struct payload payload = {
-        .mass = READ(p, payload_mass),
-        .inertia = READ(p, payload_inertia),
-        .x = READ(p, payload_x),
-        .z = READ(p, payload_z),
+        .mass = p->payload_mass,
+        .inertia = p->payload_inertia,
+        .x = p->payload_x,
+        .z = p->payload_z,
     };
     real offset[2];
     arm_attach(&plant->arm, &payload, offset);
@@ -36,183 +32,203 @@ EQUATION void plant_attach(struct plant *plant,
 
 /* The armature of joint 1 turns as I1z does, so that J takes it up; that of joint 2 is the only one
  * that the manipulator's equations have no place for. */
-EQUATION struct plant plant_in_state(const struct rp_plant_parameters *const p[SOURCES],
-                                     bool attached, const real q[2], const real dq[2]) {
-    const struct rp_parameters *const arm[SOURCES] = PARTS(p, arm);
+static inline struct plant plant_in_state(const struct rp_plant_parameters *p, bool attached,
+                                          const real q[2], const real dq[2]) {
     struct plant plant;
-    plant.hand = arm_in_state(arm, q, dq);
+    plant.hand = arm_in_state(&p->arm, q, dq);
     plant.arm = plant.hand;
-    plant.armature2 = READ(p, armature[1]);
-    plant.offset_x = constant(0.0);
-    plant.offset_z = constant(0.0);
+    plant.armature2 = p->armature[1];
+    plant.offset_x = 0.0;
+    plant.offset_z = 0.0;
     if (attached) {
         plant_attach(&plant, p);
     }
-    plant.arm.J = plus(plant.arm.J, READ(p, armature[0]));
+    plant.arm.J += p->armature[0];
     return plant;
 }
 
-EQUATION void plant_mass_matrix(const struct plant *plant, real D[2][2]) {
+static inline void plant_mass_matrix(const struct plant *plant, real D[2][2]) {
     arm_mass_matrix(&plant->arm, D);
-    D[1][1] = plus(D[1][1], plant->armature2);
+    D[1][1] += plant->armature2;
 }
 
-EQUATION real plant_kinetic_energy(const struct plant *plant) {
+static inline real plant_kinetic_energy(const struct plant *plant) {
     const real dq2 = plant->arm.dq[1];
-    const real drive2 = times(times(plant->armature2, dq2), dq2);
-    return plus(arm_kinetic_energy(&plant->arm), scaled(0.5, drive2));
+    return arm_kinetic_energy(&plant->arm) + 0.5 * (plant->armature2 * dq2 * dq2);
 }
 
 /* ---- Forces --------------------------------------------------------------------------------- */
 
-/* Q = J^T w with the rows of (1) and (3):  Q1 = x fy - y fx + mz,  Q2 = c1 fx + s1 fy */
-EQUATION void plant_wrench_forces(const struct plant *plant, const real wrench[3], real forces[2]) {
+/* Q = J^T w with the rows of (1) and (3). */
+static inline void plant_wrench_forces(const struct plant *plant, const real wrench[3],
+                                       real forces[2]) {
     const struct arm *hand = &plant->hand;
     real position[2];
     arm_end_effector_position(hand, position);
-    const real moment = minus(times(position[0], wrench[1]), times(position[1], wrench[0]));
-    forces[0] = plus(moment, wrench[2]);
-    forces[1] = plus(times(hand->c1, wrench[0]), times(hand->s1, wrench[1]));
+    forces[0] = position[0] * wrench[1] - position[1] * wrench[0] + wrench[2];
+    forces[1] = hand->c1 * wrench[0] + hand->s1 * wrench[1];
 }
 
-/* exp(x): the polynomial of degree 2 about the value of x has its value and its first two
- * derivatives, more than which no arithmetic keeps. */
-EQUATION real plant_exponential(real x) {
-    const double least = -750.0; // exp is 0 below
-    if (value_of(x) < least) {
-        return constant(0.0);
+/* Largest friction of a joint at rest, N.m (joint 0) or N (joint 1). */
+static inline real plant_breakaway(const struct rp_plant_parameters *p, int i) {
+    return p->breakaway_friction[i] > 0.0 ? p->breakaway_friction[i] : p->coulomb_friction[i];
+}
+
+/* exp(x), which is 0 below -750. So are its derivatives there, also where x overflows. */
+static inline real plant_exponential(real x) {
+    return x < -750.0 ? 0.0 : exp(x);
+}
+
+/* What is added to e where a joint has turned back, up to the event that ends its mode, w = v / vs:
+ * 0 at v = 0 with seven derivatives. Otherwise an internal step from a fast motion forward to one
+ * backward would find Fc at both ends, and no trace of what lies between. */
+static inline real plant_turned_back(real w) {
+    const real w2 = w * w;
+    const real w4 = w2 * w2;
+    const real w8 = w4 * w4;
+    if (!(w8 < 1e16)) {
+        return 1.0; // to the last digit
     }
-    const real d = minus(x, constant(value_of(x)));
-    const real polynomial = plus(plus(constant(1.0), d), scaled(0.5, times(d, d)));
-    return scaled(exp(value_of(x)), polynomial);
+    return w8 / (1.0 + w8);
 }
 
-EQUATION real plant_breakaway(const struct rp_plant_parameters *const p[SOURCES], int i) {
-    const real breakaway = READ(p, breakaway_friction[i]);
-    return value_of(breakaway) > 0.0 ? breakaway : READ(p, coulomb_friction[i]);
-}
-
-/* What is added to e where a joint has turned back, up to the event that ends its mode: w^8 / (1 +
- * w^8) of w = v / vs, 0 at v = 0 with seven derivatives. Otherwise an internal step from a fast
- * motion forward to one backward would find Fc at both ends, and no trace of what lies between. */
-EQUATION real plant_turned_back(real w) {
-    const real w2 = times(w, w);
-    const real w4 = times(w2, w2);
-    const real w8 = times(w4, w4);
-    const double most = 1e16; // from there on it is 1
-    if (!(value_of(w8) < most)) {
-        return constant(1.0);
-    }
-    return quotient(w8, plus(constant(1.0), w8));
-}
-
-/* F(v) = Fc + (Fb - Fc) e with e = exp(-(v / vs)^2), summed up so that F(0) is Fb to the bit; v in
- * the direction of the mode. */
-EQUATION real plant_sliding_friction(const struct rp_plant_parameters *const p[SOURCES], int i,
-                                     real v) {
-    const real coulomb = READ(p, coulomb_friction[i]);
-    const real breakaway = READ(p, breakaway_friction[i]);
-    const real velocity = READ(p, stribeck_velocity[i]);
-    if (!(value_of(breakaway) > 0.0 && value_of(velocity) > 0.0)) {
+/* Friction of a joint that slides at a speed v >= 0, by Stribeck's law: F(v) = Fc + (Fb - Fc) e,
+ * summed up so that F(0) is Fb to the bit: there is no jump when a joint breaks away. v < 0 is what
+ * integrators see past the event that ends the mode. */
+static inline real plant_sliding_friction(const struct rp_plant_parameters *p, int i, real v) {
+    const real coulomb = p->coulomb_friction[i];
+    const real breakaway = p->breakaway_friction[i];
+    if (!(breakaway > 0.0 && p->stribeck_velocity[i] > 0.0)) {
         return coulomb;
     }
-    const real w = quotient(v, velocity);
+    const real w = v / p->stribeck_velocity[i];
     // exp(-100) of the difference is left, and rounding leaves Fc
-    if (value_of(w) > 10.0 && value_of(breakaway) < 1e20 * value_of(coulomb)) {
+    if (w > 10.0 && breakaway < 1e20 * coulomb) {
         return coulomb;
     }
-    real e = plant_exponential(negative(times(w, w)));
-    if (value_of(w) < 0.0) {
-        e = plus(e, plant_turned_back(w));
+    real e = plant_exponential(-(w * w));
+    if (w < 0.0) {
+        e += plant_turned_back(w);
     }
-    return plus(times(breakaway, e), times(coulomb, minus(constant(1.0), e)));
+    return breakaway * e + coulomb * (1.0 - e);
+}
+
+static inline bool plant_slides(int mode) {
+    return mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD;
 }
 
 /* Friction of a joint that slides, against its direction; 0 for one that does not. */
-EQUATION real plant_friction(const struct rp_plant_parameters *const p[SOURCES], int mode, int i,
-                             real dq) {
-    if (mode != RP_PLANT_FORWARD && mode != RP_PLANT_BACKWARD) {
-        return constant(0.0);
+static inline real plant_friction(const struct rp_plant_parameters *p, int mode, int i, real dq) {
+    if (!plant_slides(mode)) {
+        return 0.0;
     }
-    return scaled(mode, plant_sliding_friction(p, i, scaled(mode, dq)));
+    return mode * plant_sliding_friction(p, i, mode * dq);
 }
 
 /* ---- Stops ---------------------------------------------------------------------------------- */
 
-/* As rp_plant_closed_stop, of the position's value. */
-EQUATION int plant_closed_stop(const struct rp_plant_parameters *const p[SOURCES], int i, real q) {
-    if (p[0]->stops[i] != RP_PLANT_STOPS_RIGID) {
+/* +1: the joint rests on its lower rigid stop and can only move forward; -1: on its upper one. */
+static inline int plant_closed_stop(const struct rp_plant_parameters *p, int i, real q) {
+    if (p->stops[i] != RP_PLANT_STOPS_RIGID) {
         return 0;
     }
-    if (value_of(q) <= p[0]->lower[i]) {
+    if (q <= p->lower[i]) {
         return 1;
     }
-    return value_of(q) >= p[0]->upper[i] ? -1 : 0;
+    return q >= p->upper[i] ? -1 : 0;
 }
 
 /* d of the stop that the joint is in contact with. */
-EQUATION real plant_penetration(const struct rp_plant_parameters *const p[SOURCES], int contact,
-                                int i, real q) {
-    return contact > 0 ? minus(READ(p, lower[i]), q) : minus(q, READ(p, upper[i]));
+static inline real plant_penetration(const struct rp_plant_parameters *p, int contact, int i,
+                                     real q) {
+    return contact > 0 ? p->lower[i] - q : q - p->upper[i];
 }
 
 /* 1 + c d': the stop pushes while this is above 0. */
-EQUATION real plant_push(const struct rp_plant_parameters *const p[SOURCES], int contact, int i,
-                         real dq) {
-    const real y = times(READ(p, stop_damping[i]), dq);
-    return contact > 0 ? minus(constant(1.0), y) : plus(constant(1.0), y);
+static inline real plant_push(const struct rp_plant_parameters *p, int contact, int i, real dq) {
+    return contact > 0 ? 1.0 - p->stop_damping[i] * dq : 1.0 + p->stop_damping[i] * dq;
 }
 
 /* Hunt and Crossley: k d (1 + c d'), on the joint. In a given contact it continues past d = 0, up
  * to the event that ends the contact. */
-EQUATION real plant_compliant_force(const struct rp_plant_parameters *const p[SOURCES], int contact,
-                                    int i, real q, real dq) {
+static inline real plant_compliant_force(const struct rp_plant_parameters *p, int contact, int i,
+                                         real q, real dq) {
     if (abs(contact) != RP_PLANT_PUSHED) {
-        return constant(0.0);
+        return 0.0;
     }
-    const real elastic = times(READ(p, stop_stiffness[i]), plant_penetration(p, contact, i, q));
-    const real force = times(elastic, plant_push(p, contact, i, dq));
-    return contact > 0 ? force : negative(force);
+    const real elastic = p->stop_stiffness[i] * plant_penetration(p, contact, i, q);
+    const real force = elastic * plant_push(p, contact, i, dq);
+    return contact > 0 ? force : -force;
 }
 
-/* k d^2 / 2, also of a stop that the joint leaves behind: what it does not give back is lost. */
-EQUATION real plant_stop_energy(const struct rp_plant_parameters *const p[SOURCES], int contact,
-                                int i, real q) {
+/* Also of a stop that the joint leaves behind: what it does not give back is lost. */
+static inline real plant_stop_energy(const struct rp_plant_parameters *p, int contact, int i,
+                                     real q) {
     const real d = plant_penetration(p, contact, i, q);
-    return scaled(0.5, times(READ(p, stop_stiffness[i]), times(d, d)));
+    return 0.5 * (p->stop_stiffness[i] * (d * d));
+}
+
+/* What friction and stop of a joint exert. */
+struct plant_hold {
+    real friction; /* N.m, N: against a positive force on the joint */
+    real stop;     /* N.m, N: on the joint, >= 0 of a lower stop, <= 0 of an upper one */
+};
+
+/* Splits the reaction of a joint at rest. At a closed stop statics leave open who carries it:
+ * friction does as far as it can, the stop the rest. */
+static inline struct plant_hold plant_split(real reaction, real breakaway, int closed) {
+    if (closed > 0 && reaction < -breakaway) {
+        return (struct plant_hold){-breakaway, -breakaway - reaction};
+    }
+    if (closed < 0 && reaction > breakaway) {
+        return (struct plant_hold){breakaway, breakaway - reaction};
+    }
+    return (struct plant_hold){reaction, 0.0};
+}
+
+static inline struct plant_hold plant_hold(const struct rp_plant_parameters *p,
+                                           const struct rp_plant_modes *modes, int i, real q,
+                                           real dq, real reaction) {
+    const int mode = modes->joint[i];
+    const int closed = plant_closed_stop(p, i, q);
+    if (mode == RP_PLANT_STUCK && closed != 0) {
+        return plant_split(reaction, plant_breakaway(p, i), closed);
+    }
+    return (struct plant_hold){
+        .friction = mode == RP_PLANT_STUCK ? reaction : plant_friction(p, mode, i, dq),
+        .stop = plant_compliant_force(p, modes->contact[i], i, q, dq),
+    };
 }
 
 /* ---- Efforts -------------------------------------------------------------------------------- */
 
-/* tau + Q - damping q' - friction of the joint where it slides + force of its compliant stop */
-EQUATION real plant_effort(const struct rp_plant_parameters *const p[SOURCES],
-                           const struct rp_plant_modes *modes, int i, real q, real dq,
-                           real applied) {
-    const real damped = minus(applied, times(READ(p, damping[i]), dq));
-    const real rubbed = minus(damped, plant_friction(p, modes->joint[i], i, dq));
+/* applied: tau + Q. */
+static inline real plant_effort(const struct rp_plant_parameters *p,
+                                const struct rp_plant_modes *modes, int i, real q, real dq,
+                                real applied) {
+    const real damped = applied - p->damping[i] * dq;
+    const real rubbed = damped - plant_friction(p, modes->joint[i], i, dq);
     const int contact = modes->contact[i];
     return contact == RP_PLANT_APART ? rubbed
-                                     : plus(rubbed, plant_compliant_force(p, contact, i, q, dq));
+                                     : rubbed + plant_compliant_force(p, contact, i, q, dq);
 }
 
-EQUATION void plant_efforts(const struct plant *plant,
-                            const struct rp_plant_parameters *const p[SOURCES],
-                            const struct rp_plant_modes *modes, const real tau[2], const real Q[2],
-                            real efforts[2]) {
-    const real *q = plant->arm.q;
-    const real *dq = plant->arm.dq;
-    efforts[0] = plant_effort(p, modes, 0, q[0], dq[0], plus(tau[0], Q[0]));
-    efforts[1] = plant_effort(p, modes, 1, q[1], dq[1], plus(tau[1], Q[1]));
+static inline void plant_efforts(const struct plant *plant, const struct rp_plant_parameters *p,
+                                 const struct rp_plant_modes *modes, const real tau[2],
+                                 const real Q[2], real efforts[2]) {
+    for (int i = 0; i < 2; i++) {
+        efforts[i] = plant_effort(p, modes, i, plant->arm.q[i], plant->arm.dq[i], tau[i] + Q[i]);
+    }
 }
 
 /* efforts - C q' - g */
-EQUATION void plant_forces(const struct plant *plant, const real efforts[2], real forces[2]) {
+static inline void plant_forces(const struct plant *plant, const real efforts[2], real forces[2]) {
     real coriolis[2];
     real gravity[2];
     arm_coriolis_forces(&plant->arm, coriolis);
     arm_gravity_forces(&plant->arm, gravity);
     for (int i = 0; i < 2; i++) {
-        forces[i] = minus(minus(efforts[i], coriolis[i]), gravity[i]);
+        forces[i] = efforts[i] - coriolis[i] - gravity[i];
     }
 }
 
@@ -223,47 +239,39 @@ EQUATION void plant_forces(const struct plant *plant, const real efforts[2], rea
  *
  *   q2'' = mu (f2 / m2 + L q1'^2 - g s1 + a q1''),
  *
- * and row 1 plus a mu times row 2 eliminates q2'':
- *
- *   (J + a^2 mu b2) q1'' = tau1 + a mu f2 + m2 L q1' (a mu q1' - 2 q2')
- *                          - g c1 (m1 lc1 + m2 L) + (1 - mu) m2 g a s1
- *
- * At b2 = 0 each operation gives what it gives in arm_forward_dynamics. */
-EQUATION void plant_forward_dynamics(const struct plant *plant, const real efforts[2],
-                                     real ddq[2]) {
+ * and row 1 plus a mu times row 2 eliminates q2''. At b2 = 0 each operation gives what it gives in
+ * arm_forward_dynamics. */
+static inline void plant_forward_dynamics(const struct plant *plant, const real efforts[2],
+                                          real ddq[2]) {
     const struct arm *arm = &plant->arm;
-    const real dq1 = arm->dq[0];
-    const real dq2 = arm->dq[1];
-    const real m2L = times(arm->m2, arm->L);
-    const real moved2 = plus(arm->m2, plant->armature2);
-    const real mu = quotient(arm->m2, moved2);
-    const real a_mu = times(arm->a, mu);
+    const real dq1 = arm->dq[0], dq2 = arm->dq[1];
+    const real m2L = arm->m2 * arm->L;
+    const real b2 = plant->armature2;
+    const real mu = arm->m2 / (arm->m2 + b2);
+    const real a_mu = arm->a * mu;
 
-    const real driven = plus(efforts[0], times(a_mu, efforts[1]));
-    const real velocities = times(times(m2L, dq1), minus(times(a_mu, dq1), scaled(2.0, dq2)));
-    const real weight = times(times(arm->g, arm->c1), plus(times(arm->m1, arm->lc1), m2L));
-    const real weight2 = times(times(arm->m2, arm->g), times(arm->a, arm->s1));
-    const real borne = times(quotient(plant->armature2, moved2), weight2);
-    const real torque = plus(minus(plus(driven, velocities), weight), borne);
-    ddq[0] = quotient(torque, plus(arm->J, times(times(arm->a, a_mu), plant->armature2)));
+    const real driven = efforts[0] + a_mu * efforts[1];
+    const real velocities = m2L * dq1 * (a_mu * dq1 - 2.0 * dq2);
+    const real weight = arm->g * arm->c1 * (arm->m1 * arm->lc1 + m2L);
+    const real weight2 = arm->m2 * arm->g * (arm->a * arm->s1);
+    const real borne = b2 / (arm->m2 + b2) * weight2;
+    ddq[0] = (driven + velocities - weight + borne) / (arm->J + arm->a * a_mu * b2);
 
-    const real push = quotient(efforts[1], arm->m2);
-    const real centrifugal = times(times(arm->L, dq1), dq1);
-    const real fall = times(arm->g, arm->s1);
-    const real free = plus(minus(plus(push, centrifugal), fall), times(arm->a, ddq[0]));
-    ddq[1] = times(mu, free);
+    const real push = efforts[1] / arm->m2;
+    const real centrifugal = arm->L * dq1 * dq1;
+    const real fall = arm->g * arm->s1;
+    ddq[1] = mu * (push + centrifugal - fall + arm->a * ddq[0]);
 }
 
-/* Accelerations, and the reactions of stuck joints: with q_i'' = 0 row i of
- * D q'' = forces is left out, and reaction_i = forces_i - D_ij q_j''. */
-EQUATION void plant_motion(const struct plant *plant, const int mode[2], const real efforts[2],
-                           real ddq[2], real reaction[2]) {
+/* Accelerations, and the reactions of stuck joints, whose rows of D q'' = forces are left out of
+ * the solution and give the reactions. */
+static inline void plant_motion(const struct plant *plant, const int mode[2], const real efforts[2],
+                                real ddq[2], real reaction[2]) {
     const bool stuck[2] = {mode[0] == RP_PLANT_STUCK, mode[1] == RP_PLANT_STUCK};
-    const real zero = constant(0.0);
-    ddq[0] = zero;
-    ddq[1] = zero;
-    reaction[0] = zero;
-    reaction[1] = zero;
+    for (int i = 0; i < 2; i++) {
+        ddq[i] = 0.0;
+        reaction[i] = 0.0;
+    }
     if (!stuck[0] && !stuck[1]) {
         plant_forward_dynamics(plant, efforts, ddq);
         return;
@@ -274,14 +282,28 @@ EQUATION void plant_motion(const struct plant *plant, const int mode[2], const r
     plant_forces(plant, efforts, forces);
     for (int i = 0; i < 2; i++) {
         if (!stuck[i]) {
-            ddq[i] = quotient(forces[i], D[i][i]);
+            ddq[i] = forces[i] / D[i][i];
         }
     }
     for (int i = 0; i < 2; i++) {
         if (stuck[i]) {
-            reaction[i] = minus(forces[i], times(D[i][1 - i], ddq[1 - i]));
+            reaction[i] = forces[i] - D[i][1 - i] * ddq[1 - i];
         }
     }
+}
+
+/* The same from parameters, states and inputs: the right side. */
+static inline void plant_accelerations(const struct rp_plant_parameters *p,
+                                       const struct rp_plant_modes *modes, const real q[2],
+                                       const real dq[2], const struct rp_plant_inputs *inputs,
+                                       real ddq[2], real reaction[2]) {
+    const bool attached = modes->payload == RP_PLANT_ATTACHED;
+    const struct plant plant = plant_in_state(p, attached, q, dq);
+    real applied[2];
+    real efforts[2];
+    plant_wrench_forces(&plant, inputs->wrench, applied);
+    plant_efforts(&plant, p, modes, inputs->tau, applied, efforts);
+    plant_motion(&plant, modes->joint, efforts, ddq, reaction);
 }
 
 /* ---- Event indicators ----------------------------------------------------------------------- */
@@ -289,55 +311,71 @@ EQUATION void plant_motion(const struct plant *plant, const int mode[2], const r
 enum { PLANT_INDICATORS = 5, PLANT_PUSH = 4 }; /* of a joint; the last one of them */
 
 /* Its place among all: the fifth ones come last. */
-static inline size_t plant_indicator_index(int joint, int k) {
-    return k == PLANT_PUSH ? (size_t)(2 * PLANT_PUSH + joint) : (size_t)(PLANT_PUSH * joint + k);
+static inline int plant_indicator_index(int joint, int k) {
+    return k == PLANT_PUSH ? 2 * PLANT_PUSH + joint : PLANT_PUSH * joint + k;
 }
 
-/* Those of a stuck joint on its lower and upper side; a closed stop leaves the one that opens. */
-EQUATION void plant_stuck_indicators(const struct rp_plant_parameters *const p[SOURCES], int i,
-                                     real q, real reaction, real z[2]) {
+/* On the lower and the upper side of a stuck joint; a closed stop leaves the one that opens. */
+static inline void plant_stuck_indicators(const struct rp_plant_parameters *p, int i, real q,
+                                          real reaction, real z[2]) {
     const int closed = plant_closed_stop(p, i, q);
     const real breakaway = plant_breakaway(p, i);
-    z[0] = closed < 0 ? constant(1.0) : minus(breakaway, reaction);
-    z[1] = closed > 0 ? constant(1.0) : plus(breakaway, reaction);
+    z[0] = closed < 0 ? 1.0 : breakaway - reaction;
+    z[1] = closed > 0 ? 1.0 : breakaway + reaction;
 }
 
-/* Those of a moving joint at its stops. In contact with a compliant one it leaves that; whether the
- * stop pushes is a question only if it is damped. */
-EQUATION void plant_stop_indicators(const struct rp_plant_parameters *const p[SOURCES], int contact,
-                                    int i, real q, real dq, real z[PLANT_INDICATORS]) {
+/* Of a moving joint at its stops. In contact with a compliant one it leaves that; whether the stop
+ * pushes is a question only if it is damped. */
+static inline void plant_stop_indicators(const struct rp_plant_parameters *p, int contact, int i,
+                                         real q, real dq, real z[PLANT_INDICATORS]) {
     if (contact == RP_PLANT_APART) {
-        z[2] = minus(q, READ(p, lower[i]));
-        z[3] = minus(READ(p, upper[i]), q);
+        z[2] = q - p->lower[i];
+        z[3] = p->upper[i] - q;
         return;
     }
     z[contact > 0 ? 2 : 3] = plant_penetration(p, contact, i, q);
-    if (p[0]->stop_damping[i] > 0.0) {
+    if (p->stop_damping[i] > 0.0) {
         const real push = plant_push(p, contact, i, dq);
-        z[PLANT_PUSH] = abs(contact) == RP_PLANT_PUSHED ? push : negative(push);
+        z[PLANT_PUSH] = abs(contact) == RP_PLANT_PUSHED ? push : -push;
     }
 }
 
 /* Above 0 while the modes are valid: joint i breaks away forward, or comes to rest if it slides;
  * breaks away backward; reaches its lower stop, or leaves it; its upper stop; the compliant stop
  * that it is in begins or ends to push. 1: unused. */
-EQUATION void plant_indicators(const struct rp_plant_parameters *const p[SOURCES],
-                               const struct rp_plant_modes *modes, int i, real q, real dq,
-                               real reaction, real z[PLANT_INDICATORS]) {
+static inline void plant_indicators(const struct rp_plant_parameters *p,
+                                    const struct rp_plant_modes *modes, int i, real q, real dq,
+                                    real reaction, real z[PLANT_INDICATORS]) {
     const int mode = modes->joint[i];
     for (int k = 0; k < PLANT_INDICATORS; k++) {
-        z[k] = constant(1.0);
+        z[k] = 1.0;
     }
     if (mode == RP_PLANT_STUCK) {
         plant_stuck_indicators(p, i, q, reaction, z);
         return;
     }
-    if (mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD) {
-        z[0] = scaled(mode, dq);
+    if (plant_slides(mode)) {
+        z[0] = mode * dq;
     }
-    if (p[0]->stops[i] == RP_PLANT_STOPS_RIGID || p[0]->stops[i] == RP_PLANT_STOPS_COMPLIANT) {
+    if (p->stops[i] == RP_PLANT_STOPS_RIGID || p->stops[i] == RP_PLANT_STOPS_COMPLIANT) {
         plant_stop_indicators(p, modes->contact[i], i, q, dq, z);
     }
 }
+
+/* ---- Derived -------------------------------------------------------------------------------- */
+
+/* J[i + 2 j] is the derivative of ddq[i] by number j of q and dq. */
+void plant_accelerations_jacobian(const struct rp_plant_parameters *p,
+                                  const struct rp_plant_modes *modes, const double q[2],
+                                  const double dq[2], const struct rp_plant_inputs *inputs,
+                                  double J[]);
+
+/* First derivatives of the reactions along a curve, from those of positions, velocities and inputs;
+ * the parameters rest. */
+void plant_reaction_rates(const struct rp_plant_parameters *p, const struct rp_plant_modes *modes,
+                          const double q[2], const double dq[2],
+                          const struct rp_plant_inputs *inputs, const double q_first[2],
+                          const double dq_first[2], const struct rp_plant_inputs *inputs_first,
+                          double reaction_first[2]);
 
 #endif

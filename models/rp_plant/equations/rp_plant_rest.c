@@ -76,13 +76,3 @@ void rp_plant_rest_decide(const struct rp_plant_rest *rest, struct rp_plant_outc
         }
     }
 }
-
-struct rp_plant_hold rp_plant_hold(double reaction, double breakaway, int closed) {
-    if (closed > 0 && reaction < -breakaway) {
-        return (struct rp_plant_hold){-breakaway, -breakaway - reaction};
-    }
-    if (closed < 0 && reaction > breakaway) {
-        return (struct rp_plant_hold){breakaway, breakaway - reaction};
-    }
-    return (struct rp_plant_hold){reaction, 0.0};
-}

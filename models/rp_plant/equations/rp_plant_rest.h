@@ -37,13 +37,4 @@ double rp_plant_rest_misfit(const struct rp_plant_rest *rest, const int pattern[
  * |reaction| = F, the joint stays. */
 void rp_plant_rest_decide(const struct rp_plant_rest *rest, struct rp_plant_outcome *outcome);
 
-/* Splits the reaction (N.m, N) of a joint at rest. At a closed stop statics leave open who carries
- * it: friction does as far as it can, the stop the rest. */
-struct rp_plant_hold {
-    double friction; /* against a positive force on the joint */
-    double stop;     /* on the joint: >= 0 of a lower stop, <= 0 of an upper one */
-};
-
-struct rp_plant_hold rp_plant_hold(double reaction, double breakaway, int closed);
-
 #endif

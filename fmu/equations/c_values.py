@@ -1,0 +1,343 @@
+"""Whole numbers, conditions and pointers of interpreted C: what is known of them where.
+
+A whole number is an int, a table over an integer leaf, or a choice. What is known on a path through
+the text resolves conditions: a mode that is 2 is not 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from equations.graph import Graph, Value, is_number
+
+RELATION = {
+    "==": lambda a, b: a == b,
+    "!=": lambda a, b: a != b,
+    "<": lambda a, b: a < b,
+    "<=": lambda a, b: a <= b,
+    ">": lambda a, b: a > b,
+    ">=": lambda a, b: a >= b,
+}
+MIRRORED = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "==", "!=": "!="}
+
+
+@dataclass(frozen=True)
+class Table:
+    """What follows from an integer leaf: a result for each of its possible values.
+
+    results is None for a leaf whose possible values are not known: the leaf itself.
+    """
+
+    leaf: Value
+    results: tuple[tuple[int, Any], ...] | None
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The first where the condition holds, else the second."""
+
+    condition: Value
+    first: Any
+    second: Any
+
+
+@dataclass
+class Known:
+    """What holds on a path: conditions, possible values of integer leaves, and alternatives."""
+
+    truths: dict[Value, bool] = field(default_factory=dict)
+    sets: dict[Value, frozenset[int]] = field(default_factory=dict)
+    clauses: tuple[Value, ...] = ()  # compound conditions that are known, but not their parts
+
+
+class Conditions:
+    """Makes conditions in a graph and resolves them."""
+
+    def __init__(self, graph: Graph) -> None:
+        self.graph = graph
+        self.members: dict[Value, tuple[Value, frozenset[int]]] = {}  # where a leaf is one of these
+        self.domains: dict[Value, frozenset[int]] = {}
+        self.true, self.false = graph.number(1.0), graph.number(0.0)
+
+    def leaf(self, name: str, domain: tuple[int, ...] | None) -> Table:
+        """A whole number from outside."""
+        leaf = self.graph.value("integer", name=name)
+        if domain is None:
+            return Table(leaf, None)
+        self.domains[leaf] = frozenset(domain)
+        return Table(leaf, tuple((value, value) for value in domain))
+
+    # ---- Conditions ------------------------------------------------------------------------------
+
+    def constant(self, value: bool) -> Value:
+        return self.true if value else self.false
+
+    def no(self, condition: Value) -> Value:
+        """not condition."""
+        if condition.op == "number":
+            return self.constant(not condition.number)
+        if condition.op == "not":
+            return condition.arguments[0]
+        return self.graph.value("not", condition)
+
+    def both(self, first: Value, second: Value) -> Value:
+        """first and second; of one leaf it is one condition."""
+        if is_number(first, 0.0) or is_number(second, 0.0):
+            return self.false
+        if first.op == "number" or first is second:
+            return second
+        if second.op == "number":
+            return first
+        one, other = self._membership(first), self._membership(second)
+        if one and other and one[0] is other[0]:
+            return self.member(one[0], one[1] & other[1])
+        return self.graph.value("and", first, second)
+
+    def either(self, first: Value, second: Value) -> Value:
+        """first or second."""
+        if first.op != "number" and second.op != "number" and first is not second:
+            one, other = self._membership(first), self._membership(second)
+            if not (one and other and one[0] is other[0]):
+                return self.graph.value("or", first, second)
+            return self.member(one[0], one[1] | other[1])
+        return self.no(self.both(self.no(first), self.no(second)))
+
+    def _membership(self, condition: Value) -> tuple[Value, frozenset[int]] | None:
+        """The leaf that a condition is of, and the values where it holds."""
+        if condition.op == "not":
+            inner = self._membership(condition.arguments[0])
+            return inner and (inner[0], self.domains[inner[0]] - inner[1])
+        return self.members.get(condition)
+
+    def member(self, leaf: Value, values: frozenset[int], known: Known | None = None) -> Value:
+        """Whether a leaf is one of these values, in the shortest form."""
+        possible = known.sets.get(leaf) if known else None
+        possible = self.domains[leaf] if possible is None else possible
+        inside, outside = values & possible, possible - values
+        if not inside or not outside:
+            return self.constant(bool(inside))
+        if len(inside) == 1:
+            return self._compare("==", leaf, *inside)
+        if len(outside) == 1:
+            return self.no(self._compare("==", leaf, *outside))
+        if max(outside) < min(inside):
+            return self._compare(">=", leaf, min(inside))
+        if max(inside) < min(outside):
+            return self._compare("<=", leaf, max(inside))
+        if len(inside) > len(outside):
+            return self.no(self._one_of(leaf, outside))
+        return self._one_of(leaf, inside)
+
+    def _one_of(self, leaf: Value, values: frozenset[int]) -> Value:
+        parts = [self._compare("==", leaf, value) for value in sorted(values)]
+        result = parts[0]
+        for part in parts[1:]:
+            result = self.graph.value("or", result, part)
+        self.members[result] = (leaf, values)
+        return result
+
+    def _compare(self, op: str, leaf: Value, number: int) -> Value:
+        condition = self.graph.value(op, leaf, self.graph.number(float(number)))
+        if leaf in self.domains:
+            holds = frozenset(v for v in self.domains[leaf] if RELATION[op](v, number))
+            self.members[condition] = (leaf, holds)
+        return condition
+
+    # ---- What is known ---------------------------------------------------------------------------
+
+    def resolve(self, condition: Value, known: Known) -> Value:
+        """The condition, or a constant if it is known."""
+        truth = self._truth(condition, known)
+        return condition if truth is None else self.constant(truth)
+
+    def _truth(self, condition: Value, known: Known) -> bool | None:
+        if condition.op == "number":
+            return condition.number != 0.0
+        if condition in known.truths:
+            return known.truths[condition]
+        if condition in self.members:
+            leaf, holds = self.members[condition]
+            possible = known.sets.get(leaf, self.domains[leaf])
+            if possible <= holds:
+                return True
+            return False if not possible & holds else None
+        if condition.op == "not":
+            inner = self._truth(condition.arguments[0], known)
+            return None if inner is None else not inner
+        if condition.op in ("and", "or"):
+            parts = [self._truth(part, known) for part in condition.arguments]
+            decides = condition.op == "or"
+            if decides in parts:
+                return decides
+            return None if None in parts else not decides
+        return None
+
+    def assume(self, condition: Value, holds: bool, known: Known) -> Known | None:
+        """What is known where the condition holds, or does not; None: nowhere."""
+        found = Known(dict(known.truths), dict(known.sets), known.clauses)
+        return found if self._assume(condition, holds, found) else None
+
+    def _assume(self, condition: Value, holds: bool, known: Known) -> bool:
+        truth = self._truth(condition, known)
+        if truth is not None:
+            return truth is holds
+        if condition.op == "not":
+            return self._assume(condition.arguments[0], not holds, known)
+        known.truths[condition] = holds
+        if condition in self.members:
+            leaf, inside = self.members[condition]
+            possible = known.sets.get(leaf, self.domains[leaf])
+            known.sets[leaf] = possible & inside if holds else possible - inside
+        elif condition.op in ("and", "or"):
+            if holds is (condition.op == "and"):
+                return all(self._assume(part, holds, known) for part in condition.arguments)
+            known.clauses += (condition,)
+        elif condition.op == "==" and condition.arguments[0].op == "integer" and holds:
+            known.sets[condition.arguments[0]] = frozenset([int(condition.arguments[1].number)])
+        return self._propagate(known)
+
+    def _propagate(self, known: Known) -> bool:
+        """Conclude from alternatives: if all parts but one are known, that one is too."""
+        for clause in known.clauses:
+            open_parts = [p for p in clause.arguments if self._truth(p, known) is None]
+            decided = clause.op == "or"  # a part with this truth satisfies the clause
+            satisfied = any(self._truth(p, known) is decided for p in clause.arguments)
+            if satisfied or len(open_parts) > 1:
+                continue
+            if not open_parts:
+                return False
+            if not self._assume(open_parts[0], decided, known):
+                return False
+        return True
+
+    # ---- Whole numbers ---------------------------------------------------------------------------
+
+    def simplified(self, value: Any, known: Known) -> Any:
+        """A whole number or a pointer with what is known."""
+        while isinstance(value, Choice):
+            condition = self.resolve(value.condition, known)
+            if condition.op != "number":
+                return value
+            value = value.first if condition.number else value.second
+        if isinstance(value, Table):
+            possible = known.sets.get(value.leaf)
+            if value.results is None:
+                return next(iter(possible)) if possible and len(possible) == 1 else value
+            results = value.results
+            if possible is not None:
+                results = tuple(pair for pair in results if pair[0] in possible)
+            if len({result for _, result in results}) == 1:
+                return results[0][1]
+            return Table(value.leaf, results)
+        return value
+
+    def choice(self, condition: Value, first: Any, second: Any) -> Any:
+        """A choice between two whole numbers or pointers."""
+        if condition.op == "number":
+            return first if condition.number else second
+        if condition.op == "not":
+            return self.choice(condition.arguments[0], second, first)
+        return first if first == second else Choice(condition, first, second)
+
+    def each(self, function: Callable[[Any, Known], Any], value: Any, known: Known) -> Any:
+        """The function of a whole number or a pointer: of each that it may be."""
+        value = self.simplified(value, known)
+        if isinstance(value, Table) and value.results is not None:
+            results = tuple((at, function(result, known)) for at, result in value.results)
+            if all(isinstance(result, int) for _, result in results):
+                return self.simplified(Table(value.leaf, results), known)
+            value = self.as_choice(Table(value.leaf, results), known)
+            return value
+        if isinstance(value, Choice):
+            yes = self.assume(value.condition, True, known)
+            no = self.assume(value.condition, False, known)
+            if yes is None or no is None:
+                return self.each(function, value.second if yes is None else value.first, known)
+            return self.choice(
+                value.condition,
+                self.each(function, value.first, yes),
+                self.each(function, value.second, no),
+            )
+        return function(value, known)
+
+    def as_choice(self, table: Table, known: Known) -> Any:
+        """A table as choices between its results."""
+        groups: dict[Any, set[int]] = {}
+        for at, result in table.results or ():
+            groups.setdefault(result, set()).add(at)
+        left = list(groups.items())
+        value = left[-1][0]
+        for result, ats in left[-2::-1]:
+            value = self.choice(self.member(table.leaf, frozenset(ats), known), result, value)
+        return value
+
+    def truth(self, value: Any, known: Known) -> Value:
+        """The condition that a whole number is not 0."""
+        value = self.simplified(value, known)
+        if isinstance(value, Table):
+            if value.results is None:
+                return self.resolve(self.no(self._compare("==", value.leaf, 0)), known)
+            holds = frozenset(at for at, result in value.results if result)
+            return self.resolve(self.member(value.leaf, holds, known), known)
+        if isinstance(value, Choice):
+            c = value.condition
+            yes, no = self.assume(c, True, known), self.assume(c, False, known)
+            first = self.truth(value.first, yes) if yes else self.false
+            second = self.truth(value.second, no) if no else self.false
+            if first.op == "number":
+                return self.either(c, second) if first.number else self.both(self.no(c), second)
+            if second.op == "number":
+                return self.either(self.no(c), first) if second.number else self.both(c, first)
+            return self.either(self.both(c, first), self.both(self.no(c), second))
+        return self.constant(bool(value))
+
+    def compare(self, op: str, left: Any, right: Any, known: Known) -> Any:
+        """A relation of two whole numbers, as a whole number: 1 or 0."""
+        left, right = self.simplified(left, known), self.simplified(right, known)
+        if isinstance(right, Table) and isinstance(left, int):
+            op, left, right = MIRRORED[op], right, left
+        if isinstance(left, Table) and left.results is None and isinstance(right, int):
+            negated = op == "!="
+            condition = self._compare("==" if negated else op, left.leaf, right)
+            condition = self.resolve(condition, known)
+            return self.choice(self.no(condition) if negated else condition, 1, 0)
+        return self.binary(lambda a, b: int(RELATION[op](a, b)), left, right, known)
+
+    def binary(
+        self, function: Callable[[int, int], int], left: Any, right: Any, known: Known
+    ) -> Any:
+        """A function of two whole numbers."""
+
+        def of_left(a: Any, known: Known) -> Any:
+            return self.each(lambda b, _: function(a, b), right, known)
+
+        left = self.simplified(left, known)
+        if isinstance(left, Table) and not isinstance(self.simplified(right, known), int):
+            left = self.as_choice(left, known)
+        return self.each(of_left, left, known)
+
+    def real(self, value: Any, known: Known) -> Value:
+        """A whole number as a real one."""
+        value = self.simplified(value, known)
+        if isinstance(value, Table):
+            if value.results is None or all(at == result for at, result in value.results):
+                return value.leaf
+            value = self.as_choice(value, known)
+        if isinstance(value, Choice):
+            first, second = self.real(value.first, known), self.real(value.second, known)
+            return self.select(value.condition, first, second)
+        return self.graph.number(float(value))
+
+    def select(self, condition: Value, first: Value, second: Value) -> Value:
+        """A choice between two real numbers."""
+        if condition.op == "number":
+            return first if condition.number else second
+        if condition.op == "not":
+            return self.select(condition.arguments[0], second, first)
+        if first.op == "if" and first.arguments[0] is condition:
+            first = first.arguments[1]
+        if second.op == "if" and second.arguments[0] is condition:
+            second = second.arguments[2]
+        return first if first is second else self.graph.value("if", condition, first, second)

@@ -1,0 +1,399 @@
+"""Equations in plain C: what is refused, and derivatives of what is read.
+
+Derived C is compiled and compared with sympy, and values that the graph has with the text itself.
+"""
+
+import ctypes
+import math
+import random
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy
+
+from tests.support.paths import ROOT
+
+sys.path.insert(0, str(ROOT / "fmu"))
+from equations.c_derived import Derived, Wanted  # noqa: E402
+from equations.c_interpreter import Interpreter  # noqa: E402
+from equations.c_text import CTextError, read  # noqa: E402
+from equations.graph import Graph  # noqa: E402
+
+REAL = '#include "real.h"\n'
+WARNINGS = ["-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wpedantic", "-Werror"]
+GENERATOR = np.random.default_rng(1)
+
+
+def written(folder: Path, text: str, name: str = "text.h") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def refusal(folder: Path, text: str) -> str:
+    """Message of the error for a text with a function f."""
+    with pytest.raises(CTextError) as error:
+        program = read(written(folder, text), [ROOT / "models"])
+        graph = Graph(has_switches=False, is_guarded=False)
+        doubles_move = "real" not in program.typedefs
+        interpreter = Interpreter(program, graph, doubles_move=doubles_move)
+        interpreter.run("f", lambda place, kind: (
+            interpreter.conditions.leaf(place[0], None) if kind in ("int", "bool")
+            else graph.value("state", name=".".join(map(str, place)))
+        ))  # fmt: skip
+    return str(error.value)
+
+
+def body(*lines: str) -> str:
+    """A function whose first statement is in line 2."""
+    return "double f(double x) {\n" + "\n".join(lines) + "\n}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "says"),
+    [
+        (body("while (x > 0.0) x -= 1.0;", "return x;"), 2, "use for"),
+        (body("do x -= 1.0; while (x > 0.0);", "return x;"), 2, "use for"),
+        (body("goto end;", "end: return x;"), 2, "early return"),
+        (body("switch (1) { default: return x; }"), 2, "use if"),
+        (body("for (int i = 0; i < 2; i++) { break; }", "return x;"), 2, "use a loop"),
+        (body("for (int i = 0; i < 2; i++) { continue; }", "return x;"), 2, "use if"),
+        (body("return (double)1;"), 2, "casts"),
+        (body("static double kept;", "return x;"), 2, "keeps a value"),
+        (body("float y = 1.0;", "return x;"), 2, "use double"),
+        (body("unsigned n = 1;", "return x;"), 2, "only int"),
+        (body("return f(x);"), 2, "calls itself"),
+        (body("return lgamma(x);"), 2, "lgamma is not known"),
+        (body("return y;"), 2, "y is not declared"),
+        (body("double y;", "return y;"), 3, "y has no value"),
+        (body("double y;", "if (x > 0.0) y = 1.0;", "return y;"), 4, "y has no value"),
+        (body("double y[2] = {1.0, 2.0};", "return y[2];"), 3, "outside"),
+        (body("double y[2] = {1.0, 2.0, 3.0};", "return y[0];"), 2, "3 initializers"),
+        (body("for (int i = 0; i < x; i++) { }", "return x;"), 2, "not fixed"),
+        (body("for (;;) { }", "return x;"), 2, "no end"),
+        (body("for (int i = 0; i < 1; ) { }", "return x;"), 2, "rounds"),
+        (body("int n = x;", "return n;"), 2, "becomes a whole one"),
+        (body("if (x) return 1.0;", "return x;"), 2, "compare it with 0.0"),
+        (body("return sin(x, x);"), 2, "sin has 1 arguments, not 2"),
+        (body("return x % 2.0;"), 2, "whole numbers"),
+        (body("return 1 & 2;"), 2, "&&"),
+        (body("return 1 / 0;"), 2, "division by 0"),
+        (body("return 1.0f;"), 2, "without the last letter"),
+        (body("return abs(x);"), 2, "use fabs"),
+        (body("double *y = &x;", "return y[1];"), 3, "not to an array"),
+        (body("return sizeof(x);"), 2, "sizeof"),
+        (body("if (x > 0.0) { return x; }"), 1, "on every path"),
+        (body("return x"), 3, "a ; is missing before it"),
+        ("double f(double x) {\nreturn x;\n", 2, "the file ends too early"),
+        ("#define N 3\ndouble f(double x) { return x; }\n", 1, "write an enum"),
+        ("#if 1\n#endif\n", 1, "only include guards"),
+        ("#include <stdio.h>\n", 1, "<math.h>"),
+        ('#include "nowhere.h"\n', 1, "nowhere.h is not there"),
+        ("static double kept = 1.0;\n", 1, "write const"),
+        ("double kept;\n", 1, "keeps a value"),
+        ("double f(double (*g)(double)) { return g(1.0); }\n", 1, "pointers to functions"),
+        ("double f(struct s *p) { return p->x; }\n", 1, "struct s is not defined"),
+        (REAL + body("real y = x;", "double z = sin(y);", "return z;").replace("double f(double",
+         "real f(real"), 4, "loses its derivatives"),
+    ],
+)  # fmt: skip
+def test_what_is_refused(tmp_path: Path, text: str, line: int, says: str) -> None:
+    message = refusal(tmp_path, text)
+    assert "\n" not in message
+    assert message.startswith(f"text.h:{line}: "), message
+    assert says in message
+
+
+def test_deep_nesting_is_refused_in_a_line(tmp_path: Path) -> None:
+    message = refusal(tmp_path, body("return " + "(" * 3000 + "x" + ")" * 3000 + ";"))
+    assert "\n" not in message
+    assert "nested" in message
+
+
+def test_division_of_whole_numbers_is_warned_of(tmp_path: Path) -> None:
+    program = read(written(tmp_path, body("return 1 / 2 * x;")))
+    graph, warnings = Graph(has_switches=False), []
+    Interpreter(program, graph, warn=warnings.append).run("f", lambda *_: graph.value("state"))
+    assert warnings == ["text.h:2: warning: 1 / 2 of whole numbers is 0: write 1.0 / 2.0"]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_mutants_are_read_or_refused_in_a_line(tmp_path: Path, seed: int) -> None:
+    """Words of the arm's equations put in each other's place: never a traceback."""
+    text = (ROOT / "models/rp_manipulator/rp_equations.h").read_text(encoding="utf-8")
+    words = list(re.finditer(r"\w+|[^\w\s]", text))
+    generator = random.Random(seed)
+    word, other = generator.choice(words), generator.choice(words)[0]
+    mutant = f"{text[: word.start()]} {other} {text[word.end() :]}"
+    folders = [ROOT / "models", ROOT / "models/rp_manipulator"]
+    wanted = Wanted.read("J = jacobian of arm_accelerations by q dq tau")
+    try:
+        Derived(read(written(tmp_path, mutant), folders)).text([wanted], "text.h")
+    except CTextError as error:
+        assert re.match(r"\w+\.h:\d+: [^\n]+$", str(error))
+
+
+# ---- Derivatives ---------------------------------------------------------------------------------
+
+
+class Compiled:
+    """f(x, y), its Jacobian by x and its derivatives along a curve of x; m: an int."""
+
+    def __init__(self, folder: Path, text: str, n: int, compiler: str = "gcc") -> None:
+        text = REAL + f"enum {{ N = {n} }};\n" + text + (
+            "void f_jacobian(const double x[N], int m, double J[]);\n"
+            "void f_derivatives(const double x[N], int m, const double first[N], double y_first[2],"
+            " const double second[N], double y_second[2]);\n"
+        )  # fmt: skip
+        header = written(folder, text)
+        wanted = ("f_jacobian = jacobian of f by x", "f_derivatives = derivatives of f by x")
+        program = read(header, [ROOT / "models"])
+        derived = Derived(program, {"m": ("0", "1", "2")})
+        source = written(folder, derived.text(map(Wanted.read, wanted), "text.h"), "derived.c")
+        head = "void g(const double x[N], int m, double y[2])"
+        call = f'#include "text.h"\n{head};\n{head} {{ f(x, m, y); }}\n'
+        values = written(folder, call, "g.c")
+        library = folder / "derived.so"
+        subprocess.run(
+            [compiler, "-std=c17", "-O1", "-ffp-contract=off", *WARNINGS, "-Wno-unused-parameter",
+             f"-I{ROOT / 'models'}", "-shared", "-fPIC", source, values, "-lm", "-o", library],
+            check=True,
+        )  # fmt: skip
+        self.library, self.n = ctypes.CDLL(str(library)), n
+
+    def value(self, x: np.ndarray, m: int) -> np.ndarray:
+        y = np.zeros(2)
+        self.library.g(pointer(x), m, pointer(y))
+        return y
+
+    def jacobian(self, x: np.ndarray, m: int) -> np.ndarray:
+        result = np.zeros((self.n, 2))
+        self.library.f_jacobian(pointer(x), m, pointer(result))
+        return result.T
+
+    def derivatives(self, x: np.ndarray, m: int, first: np.ndarray, second: np.ndarray) -> list:
+        results = [np.zeros(2), np.zeros(2)]
+        given = pointer(x), m, pointer(first), pointer(results[0]), pointer(second)
+        self.library.f_derivatives(*given, pointer(results[1]))
+        alone = np.zeros(2)
+        self.library.f_derivatives(*given[:3], pointer(alone), pointer(second), None)
+        assert np.array_equal(alone, results[0])
+        return results
+
+
+def pointer(x: np.ndarray) -> ctypes.c_void_p:
+    return x.ctypes.data_as(ctypes.c_void_p)
+
+
+Formula = Callable[[list, int], list]
+
+# five from textbooks, and one that has all that the rules allow
+TEXTS: dict[str, tuple[str, int, Formula]] = {
+    "pendulum on a cart": (
+        """static inline void f(const real x[N], int m, real y[2]) {
+    const real s = sin(x[0]), c = cos(x[0]);
+    const real mass = 1.0 + 0.5 * s * s;
+    y[0] = (x[3] + 0.5 * s * (x[1] * x[1] + 9.81 * c)) / mass;
+    y[1] = (-x[3] * c - 0.5 * x[1] * x[1] * c * s - 1.5 * 9.81 * s) / (2.0 * mass);
+}
+""",
+        4,
+        lambda x, m: [
+            (x[3] + sympy.sin(x[0]) * (x[1] ** 2 + 9.81 * sympy.cos(x[0])) / 2)
+            / (1 + sympy.sin(x[0]) ** 2 / 2),
+            (-x[3] * sympy.cos(x[0]) - x[1] ** 2 * sympy.cos(x[0]) * sympy.sin(x[0]) / 2
+             - 1.5 * 9.81 * sympy.sin(x[0])) / (2 + sympy.sin(x[0]) ** 2),
+        ],
+    ),
+    "Van der Pol and Duffing": (
+        """static inline void f(const real x[N], int m, real y[2]) {
+    const real x3 = x[0] * x[0] * x[0];
+    y[0] = m == 1 ? (1.0 - x[0] * x[0]) * x[1] - x[0] : x[0] - x3 - 0.2 * x[1];
+    y[1] = x[1];
+}
+""",
+        2,
+        lambda x, m: [
+            (1 - x[0] ** 2) * x[1] - x[0] if m == 1 else x[0] - x[0] ** 3 - x[1] / 5, x[1],
+        ],
+    ),
+    "Arrhenius and Monod": (
+        """struct tank { real c, T; };
+static real rate(struct tank tank) { return 3.0 * exp(-2.0 / tank.T) * tank.c; }
+static inline void f(const real x[N], int m, real y[2]) {
+    const struct tank tank = {.T = x[1], .c = x[0]};
+    y[0] = rate(tank);
+    y[1] = tank.c / (0.5 + tank.c) * sqrt(tank.T) + log(tank.T) * atan2(tank.c, tank.T);
+}
+""",
+        2,
+        lambda x, m: [
+            3 * sympy.exp(-2 / x[1]) * x[0],
+            x[0] / (sympy.Rational(1, 2) + x[0]) * sympy.sqrt(x[1])
+            + sympy.log(x[1]) * sympy.atan2(x[0], x[1]),
+        ],
+    ),
+    "two link arm": (
+        """static void mass_matrix(const real q[2], real D[2][2]) {
+    D[0][0] = 3.0 + 2.0 * cos(q[1]);
+    D[0][1] = D[1][0] = 1.0 + cos(q[1]);
+    D[1][1] = 1.0;
+}
+static inline void f(const real x[N], int m, real y[2]) {
+    real D[2][2];
+    mass_matrix(x, D);
+    const real det = D[0][0] * D[1][1] - D[0][1] * D[1][0];
+    const real *tau = x + 2;
+    for (int i = 0; i < 2; i++) {
+        y[i] = 0.0;
+        for (int j = 0; j < 2; ++j) {
+            const real sign = i == j ? 1.0 : -1.0;
+            y[i] += sign * D[1 - i][1 - j] * tau[j] / det;
+        }
+    }
+}
+""",
+        4,
+        lambda x, m: list(
+            sympy.Matrix([[3 + 2 * sympy.cos(x[1]), 1 + sympy.cos(x[1])],
+                          [1 + sympy.cos(x[1]), 1]]).inv() * sympy.Matrix(x[2:4])
+        ),
+    ),
+    "drag and pow": (
+        """static inline void f(const real x[N], int m, real y[2]) {
+    const real speed = sqrt(x[0] * x[0] + x[1] * x[1]);
+    y[0] = -0.3 * speed * x[0] + tanh(x[1]) * fabs(x[0]);
+    y[1] = pow(speed, 1.7) - acos(0.3 * x[0]) * cosh(x[1]);
+}
+""",
+        2,
+        lambda x, m: [
+            -0.3 * sympy.sqrt(x[0] ** 2 + x[1] ** 2) * x[0] + sympy.tanh(x[1]) * x[0],
+            sympy.sqrt(x[0] ** 2 + x[1] ** 2) ** 1.7 - sympy.acos(0.3 * x[0]) * sympy.cosh(x[1]),
+        ],
+    ),
+    "all that is read": (
+        """struct inner { real a[2]; int side; };
+struct outer { struct inner in[2]; real sum; };
+static const double weight[2] = {0.5, 2.0};
+static real early(const real x[N], int m) {
+    if (m == 0) {
+        return x[0] * x[1];
+    }
+    for (int i = 0; i < 2; i++) {
+        if (m == i + 1) {
+            return x[i] / (1.0 + x[2] * x[2]);
+        }
+    }
+    return 0.0;
+}
+static struct outer made(const real x[N], int m) {
+    struct outer o = {.sum = 0.0};
+    for (int i = 0; i < 2; i++) {
+        o.in[i] = (struct inner){{x[i], x[i + 1]}, m > 0 ? i : 1 - i};
+        o.sum += weight[o.in[i].side] * o.in[i].a[0];
+    }
+    return o;
+}
+static inline void f(const real x[N], int m, real y[2]) {
+    const struct outer o = made(x, m);
+    real z[3] = {1.0, 1.0, 1.0};
+    z[m > 1 ? 2 : 0] = o.sum * x[2];
+    const bool is_mixed = m != 1 && !(m > 1);
+    y[0] = z[0] + 3.0 * z[2] + early(x, m) * value_of(x[0]);
+    y[1] = moving_as(x[1], x[0] * x[0]);
+    y[1] *= m;
+    if (is_mixed) {
+        y[1] -= o.in[1].a[1];
+    } else {
+        y[1] += sin(o.in[0].a[1]);
+    }
+}
+""",
+        3,
+        lambda x, m: all_that_is_read(x, m),
+    ),
+}  # fmt: skip
+
+
+def all_that_is_read(x: list, m: int) -> list:
+    """Of value_of and moving_as as they are derived: `held` is a symbol that rests."""
+    weights = [sympy.Rational(1, 2), 2] if m > 0 else [2, sympy.Rational(1, 2)]
+    total = weights[0] * x[0] + weights[1] * x[1]
+    z = [1, 1, 1]
+    z[2 if m > 1 else 0] = total * x[2]
+    early = x[0] * x[1] if m == 0 else x[m - 1] / (1 + x[2] ** 2)
+    held, shift = sympy.Symbol("held"), sympy.Symbol("shift")
+    last = -x[2] if m == 0 else sympy.sin(x[1])
+    return [z[0] + 3 * z[2] + early * held, m * (x[0] ** 2 + shift) + last]
+
+
+@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_derivatives_are_those_of_sympy(tmp_path: Path, name: str, compiler: str) -> None:
+    text, n, formula = TEXTS[name]
+    try:
+        compiled = Compiled(tmp_path, text, n, compiler)
+    except FileNotFoundError:
+        pytest.skip(f"{compiler} is not there")
+    symbols = list(sympy.symbols(f"x:{n}"))
+    t = sympy.Symbol("t")
+    for m in range(3):
+        x, first, second = GENERATOR.uniform(0.3, 1.5, (3, n))
+        rest = {"held": x[0], "shift": x[1] - x[0] ** 2}
+        at = dict(zip(symbols, x, strict=True)) | {sympy.Symbol(k): v for k, v in rest.items()}
+        y = sympy.Matrix(formula(symbols, m))
+        assert compiled.value(x, m) == pytest.approx(numbers(y, at), rel=1e-13)
+        assert compiled.jacobian(x, m) == pytest.approx(numbers(y.jacobian(symbols), at), rel=1e-12)
+
+        curve = {s: a + b * t + c * t**2 / 2
+                 for s, a, b, c in zip(symbols, x, first, second, strict=True)}  # fmt: skip
+        along = y.subs(curve)
+        start = {t: 0} | {sympy.Symbol(k): v for k, v in rest.items()}
+        expected = [numbers(along.diff(t, order), start) for order in (1, 2)]
+        found = compiled.derivatives(x, m, first, second)
+        assert found[0] == pytest.approx(expected[0], rel=1e-12)
+        assert found[1] == pytest.approx(expected[1], rel=1e-11, abs=1e-11)
+
+
+def numbers(matrix: sympy.Matrix, at: dict) -> np.ndarray:
+    found = np.array(matrix.subs(at).evalf(30).tolist(), dtype=float)
+    return found[:, 0] if found.shape[1] == 1 else found
+
+
+def test_only_the_branch_of_a_mode_is_calculated(tmp_path: Path) -> None:
+    """A root that is not defined in another mode is not taken there."""
+    text = """static inline void f(const real x[N], int m, real y[2]) {
+    y[0] = m == 2 ? sqrt(x[0]) * exp(x[1]) * sin(x[1]) : x[0];
+    y[1] = m == 2 ? sqrt(x[0]) * exp(x[1]) * cos(x[1]) : x[1];
+}
+"""
+    compiled = Compiled(tmp_path, text, 2)
+    source = (tmp_path / "derived.c").read_text(encoding="utf-8")
+    first = source[source.index("f_derivatives_first") : source.index("f_derivatives_second")]
+    assert first.count("if (") == 1
+    assert first.count("exp(") == 1
+    x = np.array([-1.0, 0.5])
+    assert np.isfinite(compiled.jacobian(x, 0)).all()
+    assert math.isnan(compiled.jacobian(x, 2)[0, 0])
+
+
+def test_names_and_order_are_those_of_the_source(tmp_path: Path) -> None:
+    text = """static inline void f(const real x[N], int m, real y[2]) {
+    const real inertia = 1.0 + x[0] * x[0];
+    y[0] = x[1] / inertia;
+    y[1] = x[1] * inertia;
+}
+"""
+    Compiled(tmp_path, text, 2)
+    source = (tmp_path / "derived.c").read_text(encoding="utf-8")
+    assert "const double inertia = 1.0 + x_0 * x_0;" in source
+    assert "inertia_by_x0" in source
+    assert "d_inertia" in source
+    assert "Derived from equations in plain C" in source
+    assert "text.h" in source.partition("*/")[0]
