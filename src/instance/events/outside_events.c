@@ -31,15 +31,15 @@ static void write_bands(struct instance *instance, double bands[]) {
     }
     for (size_t i = 0; i < events->indicator_count; i++) {
         const struct indicator *indicator = &instance->indicators[i];
-        if (indicator->kind == INDICATOR_UNUSED) {
-            bands[i] = 0.0;
-        } else if (indicator->kind == INDICATOR_OF_STATE) {
+        if (indicator->kind == INDICATOR_OF_STATE) {
             const double nominal = instance_nominal(instance, indicator->state);
             bands[i] = 1e-12 * fabs(indicator->factor) * nominal + 1e-14 * fabs(indicator->offset);
         } else if (events->errors == NULL) {
             bands[i] = 2.0 * near_root + 1e-9 * fabs(indicator->offset);
-        } else if (!isfinite(bands[i])) {
-            bands[i] = 0.0; // of a value that is not finite, or close to where it is not
+        }
+        // close to where a value is not finite, its error is not known
+        if (indicator->kind == INDICATOR_UNUSED || !isfinite(bands[i])) {
+            bands[i] = 0.0;
         }
     }
 }
