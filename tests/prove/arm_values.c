@@ -1,5 +1,5 @@
-/* Reads states, parameters and the efforts' cubics of arms, and writes balls: coefficients of t^k of
- * the states' motion from the start, order by order from 1 on, then the outputs at the start. */
+/* Reads states, parameters and the efforts' cubics of arms, and writes balls: coefficients of t^k
+ * of the states' motion from the start, order by order from 1 on, then the outputs at the start. */
 #include "arm_outputs.h"
 
 #include <stdio.h>
