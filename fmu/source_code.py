@@ -3,6 +3,7 @@
 The build writes a manifest (source_code.cmake): the libraries in the FMU with their files, and the
 folders that these come from. In sources/ lie the C files, in folders below it the headers that they
 need. They differ from the originals in their includes, which are relative: no folder is searched.
+Files of SUNDIALS keep the comment with their copyright only: the others are a third of their size.
 
 The functions of musl get other names. Compilers know the standard ones and calculate some of them
 in their own way, and a program that links the FMU statically has them already.
@@ -40,6 +41,14 @@ OF_IMPORTERS |= {"fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"
 # behind conditions that never hold: options of SUNDIALS, and C++
 NOT_REACHED = {"caliper/cali.h", "mpi.h", "sundials/sundials_context.hpp"}
 
+# most of the sources, and read in the original by who needs its comments
+WITHOUT_COMMENTS = {"sundials"}
+
+# a comment, or a string or character, in which there is none
+COMMENT_OR_LITERAL = re.compile(
+    r"""/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*'""", re.DOTALL
+)
+COPYRIGHT = re.compile(r"copyright|licen[sc]e", re.IGNORECASE)
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 WORD = re.compile(r"\w+(?=\s*\(|\.h\")")  # called, or in a header's name: log_data.h
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"\n]+)[>"]', re.MULTILINE)
@@ -78,6 +87,17 @@ def includes(text: str) -> Iterator[Include]:
     code = COMMENT.sub(lambda comment: re.sub(r"[^\n]", " ", comment[0]), text)
     for line in INCLUDE.finditer(code):
         yield Include(line.start(), line.end(), line[1] == '"', line[2])
+
+
+def without_comments(text: str) -> str:
+    """Text whose comments are spaces, but those about its copyright."""
+
+    def kept(found: re.Match[str]) -> str:
+        is_comment = found[0].startswith(("/*", "//"))
+        return " " if is_comment and not COPYRIGHT.search(found[0]) else found[0]
+
+    text = re.sub(r"[ \t]+$", "", COMMENT_OR_LITERAL.sub(kept, text), flags=re.MULTILINE)
+    return re.sub(r"\n{3,}", "\n\n", text)
 
 
 def read(path: Path) -> str:
@@ -161,6 +181,8 @@ class SourceFolder:
     def with_relative_includes(self, path: Path, name: str, library: Library) -> str:
         """Text of a file that is called `name` in sources/."""
         text = read(path)
+        if self.root_of(path)[0] in WITHOUT_COMMENTS:
+            text = without_comments(text)
         parts = []
         end = 0
         for line in includes(text):

@@ -112,7 +112,27 @@ def guarded(
             break
         targets, found = guards.rewritten()
         became = {value: found[now] for value, now in became.items() if now in found}
-    return dict(targets), became
+    targets, found = settled(targets, conditions)
+    return targets, {value: found[now] for value, now in became.items() if now in found}
+
+
+def settled(
+    targets: Mapping[str, Value], conditions: Conditions
+) -> tuple[dict[str, Value], dict[Value, Value]]:
+    """Values without choices that the blocks around them have made, and what became of each."""
+    places = paths(targets)
+    found: dict[Value, Value] = {}
+    for value in in_order(targets.values()):
+        now = _with(value, [found[a] for a in value.arguments], conditions)
+        if value.op == "if" and places[value]:
+            known = Known()
+            for condition, holds in places[value]:
+                known = conditions.assume(condition, holds, known) or known
+            choice = conditions.resolve(value.arguments[0], known)
+            if choice.op == "number":
+                now = now.arguments[1 if choice.number else 2]
+        found[value] = now
+    return {target: found[value] for target, value in targets.items()}, found
 
 
 class Guards:

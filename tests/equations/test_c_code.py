@@ -21,7 +21,9 @@ from tests.support.paths import ROOT
 sys.path.insert(0, str(ROOT / "fmu"))
 from equations.c_derived import Derived, Wanted  # noqa: E402
 from equations.c_interpreter import Interpreter  # noqa: E402
+from equations.c_placement import settled  # noqa: E402
 from equations.c_text import CTextError, read  # noqa: E402
+from equations.c_values import Conditions  # noqa: E402
 from equations.graph import Graph  # noqa: E402
 
 REAL = '#include "real.h"\n'
@@ -136,6 +138,19 @@ def test_mutants_are_read_or_refused_in_a_line(tmp_path: Path, seed: int) -> Non
         Derived(read(written(tmp_path, mutant), folders)).text([wanted], "text.h")
     except CTextError as error:
         assert re.match(r"\w+\.h:\d+: [^\n]+$", str(error))
+
+
+def test_a_choice_that_the_block_around_it_has_made_is_gone() -> None:
+    graph = Graph(has_switches=False, is_guarded=False)
+    x, zero = graph.value("state", name="x"), graph.number(0.0)
+    is_low, is_high = (graph.value(op, x, graph.number(1.0)) for op in ("<", ">"))
+    both = graph.value("and", is_low, graph.value("not", is_high))
+    square, other = graph.value("*", x, x), graph.value("+", x, x)
+    inner = graph.value("if", is_low, graph.value("if", is_high, other, square), zero)
+    value = graph.value("if", both, graph.value("sin", inner), zero)
+    targets, became = settled({"y": value, "z": other}, Conditions(graph))
+    assert targets["y"] is graph.value("if", both, graph.value("sin", square), zero)
+    assert became[inner] is square and targets["z"] is other
 
 
 # ---- Derivatives ---------------------------------------------------------------------------------

@@ -117,6 +117,25 @@ def test_only_includes_are_changed_and_what_is_not_called_is_left_out(toy: Toy) 
     }
 
 
+def test_of_sundials_comments_on_its_copyright_stay_only(toy: Toy) -> None:
+    toy.write("sundials/step.c", (
+        '/* Copyright (c) Them\n * See the LICENSE. */\n\n/* The step. */\n\n'
+        '#include "step.h" // below\n#define HALF 0.5 /* of\n two */\n'
+        "char slash = '\"', *text = \"/* \\\" kept */\"; /* gone */\nint a = HALF/* */*2; \n"
+    ))  # fmt: skip
+    toy.write("sundials/step.h", "int step(/* nothing */ void);\n/**/\n")
+    toy.libraries.append(toy.library("sundials", ["sundials/step.c"]))
+    toy.roots["sundials"] = str(toy.folder / "sundials")
+    assert toy.run().returncode == 0
+    found = toy.contents()
+    assert found["sundials/step.h"] == "int step(  void);\n\n"
+    _, _, own = found["sundials_step.c"].partition("/* C")
+    assert own == (
+        'opyright (c) Them\n * See the LICENSE. */\n\n#include "sundials/step.h"\n'
+        '#define HALF 0.5\nchar slash = \'"\', *text = "/* \\" kept */";\nint a = HALF *2;\n'
+    )
+
+
 def test_headers_of_the_project_come_with_what_they_include(toy: Toy) -> None:
     toy.run()
     prelude = toy.output / "project" / "fmu" / "source_code.h"
