@@ -149,7 +149,7 @@ static void place_actuator(int n) {
 /* Each motion on each branch, at rest, in ramps and between; the circle beside and around the axis.
  */
 static void place_trajectory(int n) {
-    static const double times[] = {0.25, 0.875, 1.0, 2.0, 5.0, 7.0};
+    static const double times[] = {0.25, 0.875, 1.25, 2.0, 5.0, 7.0};
     struct rp_trajectory_parameters *p = &at.trajectory.parameters;
     *p = rp_trajectory_example;
     p->motion = RP_TRAJECTORY_POINT_TO_POINT + n % 3;

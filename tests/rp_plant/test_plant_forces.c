@@ -1,5 +1,5 @@
-/* The smooth part: friction law, balance of power, rates of the reactions. test_plant_lagrangian.py compares
- * motion and joint loads with the Lagrangian. */
+/* The smooth part: friction law, balance of power, rates of the reactions. test_plant_lagrangian.py
+ * compares motion and joint loads with the Lagrangian. */
 #include "last_text.h"
 #include "plant_test_support.h"
 #include "rp_plant_equations.h"
