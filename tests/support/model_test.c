@@ -1,6 +1,5 @@
 #include "model_test.h"
 
-#include <string.h>
 #include <unity.h>
 
 void model_test_accepted(const struct model *model, const void *values) {
