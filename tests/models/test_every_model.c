@@ -183,6 +183,7 @@ static void place_wall(int n) {
     const double x = v->v_ee_x + v->v_tip_z * c - v->v_tip_x * s;
     const double y = v->v_ee_y + v->v_tip_z * s + v->v_tip_x * c;
     v->v_position = x * normal[0] + y * normal[1] + (n % 3 == 2 ? -0.5 : 0.5);
+    v->v_stiffness *= n % 3 == 0 ? 1024.0 : 1.0;
     v->v_ee_vx += n % 3 == 1 ? 64.0 * normal[0] : 0.0;
     v->v_ee_vy += n % 3 == 1 ? 64.0 * normal[1] : 0.0;
 }
