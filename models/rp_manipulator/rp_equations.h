@@ -189,8 +189,4 @@ static inline void arm_accelerations(const struct rp_parameters *p, const real q
     arm_forward_dynamics(&arm, tau, ddq);
 }
 
-/* Derived: J[i + 2 j] is the derivative of ddq[i] by number j of q, dq and tau. */
-void arm_accelerations_jacobian(const struct rp_parameters *p, const double q[2],
-                                const double dq[2], const double tau[2], double J[]);
-
 #endif

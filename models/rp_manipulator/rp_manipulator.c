@@ -25,16 +25,3 @@ bool rp_parameters_check(const struct rp_parameters *p, char *text, size_t size)
                    arm_fixed_inertia(p), p->m1, p->lc1, p->I1z, p->I2z);
     return false;
 }
-
-void rp_dynamics_jacobians(const struct rp_parameters *p, const double q[2], const double dq[2],
-                           const double tau[2], struct rp_dynamics_jacobians *jacobians) {
-    double J[2 * 6];
-    arm_accelerations_jacobian(p, q, dq, tau, J);
-    for (int i = 0; i < 2; i++) {
-        for (int j = 0; j < 2; j++) {
-            jacobians->q[i][j] = J[i + 2 * j];
-            jacobians->dq[i][j] = J[i + 2 * (2 + j)];
-            jacobians->tau[i][j] = J[i + 2 * (4 + j)];
-        }
-    }
-}

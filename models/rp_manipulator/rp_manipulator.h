@@ -36,17 +36,6 @@ struct rp_parameters {
  * without inertia. False: why is in text, for parameters in their ranges. */
 bool rp_parameters_check(const struct rp_parameters *p, char *text, size_t size);
 
-/* Derivatives of arm_forward_dynamics: row i, column j is
- * d ddq[i] / d (argument)[j]. */
-struct rp_dynamics_jacobians {
-    double q[2][2];
-    double dq[2][2];
-    double tau[2][2]; /* the inverse of D(q) */
-};
-
-void rp_dynamics_jacobians(const struct rp_parameters *p, const double q[2], const double dq[2],
-                           const double tau[2], struct rp_dynamics_jacobians *jacobians);
-
 /* Force and moment that each link receives through its joint, in the frame of the link. */
 struct rp_joint_loads {
     double f1[3];   /* N */

@@ -128,14 +128,14 @@ static enum status propagate(const void *values_pointer, double t, double dt, vo
         int before;
         find_shown(values, i, &now, &before);
         const double counts = (double)now - before; // dq T = counts resolution
+        const double dq = counts * values->parameters.resolution[i] / period;
         first->q_measured[i] = now * first->parameters.resolution[i];
-        first->dq_measured[i] =
-            (counts * first->parameters.resolution[i] - values->dq_measured[i] * dperiod) / period;
+        first->dq_measured[i] = (counts * first->parameters.resolution[i] - dq * dperiod) / period;
         if (second != NULL) {
             second->q_measured[i] = now * second->parameters.resolution[i];
             second->dq_measured[i] =
                 (counts * second->parameters.resolution[i] - 2.0 * first->dq_measured[i] * dperiod -
-                 values->dq_measured[i] * second->parameters.sample_time) /
+                 dq * second->parameters.sample_time) /
                 period;
         }
     }

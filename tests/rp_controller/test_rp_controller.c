@@ -2,7 +2,6 @@
  * part through the instance and the integrator. test_controller.py compares values and derivatives
  * with sympy. */
 #include "derivatives.h"
-#include "model_test.h"
 #include "rp_controller_law.h"
 #include "rp_controller_model.h"
 #include "rp_test_support.h"
@@ -118,18 +117,6 @@ static void test_efforts_stay_within_their_limits(void) {
         }
     }
     TEST_ASSERT_TRUE(isnan(law_limited(&p, NAN, 0)) && isnan(law_limited(&p, NAN, 1)));
-}
-
-static void test_calculated_fields_are_written_and_not_read(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        struct rp_controller_values values, first, second;
-        random_values(&values);
-        random_values(&first);
-        random_values(&second);
-        values.parameters.mode = 1 + n % 3;
-        model_test_calculated_fields(&rp_controller_model, &values, &first, &second,
-                                     offsetof(struct rp_controller_values, dintegral));
-    }
 }
 
 /* ---- The integral part ---------------------------------------------------------------------- */

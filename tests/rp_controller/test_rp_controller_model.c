@@ -1,5 +1,5 @@
-/* The controller as its integrator sees it, with the Jacobian, and what is refused. Derivatives are
- * compared with sympy in test_controller.py. */
+/* The Jacobian of the controller, also where an effort is at its limit, and what is refused.
+ * Derivatives are compared with sympy in test_controller.py. */
 #include "last_text.h"
 #include "model_test.h"
 #include "rp_controller_law.h"
@@ -27,41 +27,18 @@ static struct rp_test_random random_source;
 void setUp(void) {
     random_source.state = 7;
 }
-/* Integral gain only at joint 2; limits that are far or exceeded everywhere. */
-static void next_point(int mode, bool is_limited) {
+static void next_point(int mode) {
     memset(&at, 0, sizeof at);
     for (int i = 0; i < KNOWNS; i++) {
         if (i < PARAMETERS || i >= INPUTS) {
             at.all[i] = rp_test_uniform(&random_source, 0.5, 2.0);
         }
     }
-    at.v.payload_attached = (int)(rp_test_random_bits(&random_source) % 2);
-    struct rp_controller_parameters *p = &at.v.parameters;
-    p->mode = mode;
-    p->Ki[0] = 0.0;
-    for (int i = 0; i < 2; i++) {
-        p->limit[i] = is_limited ? 0.0625 : 1e3;
-    }
+    at.v.parameters.mode = mode;
     // efforts of both signs
     const double side = rp_test_uniform(&random_source, -1.0, 1.0) < 0.0 ? -64.0 : 64.0;
     at.v.integral[0] += side;
     at.v.integral[1] -= side;
-}
-
-static void test_what_is_integrated_are_the_rates_that_are_output(void) {
-    for (int n = 0; n < 12; n++) {
-        next_point(RP_CONTROLLER_PD + n % 3, n % 2 == 1);
-        const struct rp_controller_inputs inputs = at.v.inputs;
-        double u[sizeof inputs / sizeof(double)];
-        double dx[2];
-        memcpy(u, &inputs, sizeof inputs);
-        memset(&at.v.inputs, 0, sizeof at.v.inputs); // they are arguments
-        ASSERT_OK(rp_controller_model.right_hand_side(&at.v, 0.0, at.v.integral, u, dx));
-        at.v.inputs = inputs;
-        ASSERT_OK(rp_controller_model.outputs(&at.v, 0.0));
-        TEST_ASSERT_EQUAL_MEMORY(at.v.dintegral, dx, sizeof dx);
-        TEST_ASSERT_TRUE(dx[0] == 0.0 && dx[1] != 0.0);
-    }
 }
 
 /* ---- Jacobian ------------------------------------------------------------------------------- */
@@ -71,7 +48,7 @@ enum { BELOW, AT, BEYOND, SIDES }; /* an effort and its limit */
 /* A law with integral parts at both joints, or only at joint 2; each joint's effort is below, at or
  * beyond its limit. */
 static void next_law(int mode, bool has_both, const int side[2], bool attached) {
-    next_point(mode, false);
+    next_point(mode);
     at.v.payload_attached = attached;
     struct rp_controller_parameters *p = &at.v.parameters;
     p->Ki[0] = has_both ? 1.5 : 0.0;
@@ -122,20 +99,6 @@ static void test_jacobian_is_that_of_the_integral_rates(void) {
     }
 }
 
-static void test_jacobian_is_what_propagation_gives(void) {
-    for (int n = 0; n < 3 * SIDES * SIDES * 2; n++) {
-        double J[2][2];
-        next_law(RP_CONTROLLER_PD + n % 3, n / 27 == 0,
-                 (const int[2]){n / 3 % SIDES, n / 9 % SIDES}, n % 2 == 0);
-        jacobian(J);
-        for (int j = 0; j < 2; j++) {
-            struct rp_controller_values first = {.integral = {j == 0, j == 1}};
-            ASSERT_OK(rp_controller_model.propagate(&at.v, 3.0, 0.0, &first, NULL));
-            TEST_ASSERT_TRUE(J[j][0] == first.dintegral[0] && J[j][1] == first.dintegral[1]);
-        }
-    }
-}
-
 /* ---- What is refused ------------------------------------------------------------------------ */
 
 static void assert_refused(const char *expected) {
@@ -143,7 +106,7 @@ static void assert_refused(const char *expected) {
 }
 
 static void test_times_that_do_not_fit_are_refused(void) {
-    next_point(RP_CONTROLLER_PD, false);
+    next_point(RP_CONTROLLER_PD);
     struct rp_controller_parameters *p = &at.v.parameters;
     p->delay = 0.0625;
     assert_refused("delay = 0.0625 s is refused: it must not be above sample_time = 0 s");
@@ -157,7 +120,7 @@ static void test_times_that_do_not_fit_are_refused(void) {
 }
 
 static void test_an_arm_without_inertia_is_refused(void) {
-    next_point(RP_CONTROLLER_PD, false);
+    next_point(RP_CONTROLLER_PD);
     struct rp_parameters *arm = &at.v.parameters.arm;
     model_test_accepted(&rp_controller_model, &at);
     arm->m1 = 2.0;

@@ -1,5 +1,5 @@
-/* The wall: where it touches and lets go, and derivatives along curves. test_environment.py
- * compares force and moment with sympy. */
+/* The wall: where it touches and lets go. test_environment.py compares force and moment with sympy.
+ */
 #include "equations.h"
 #include "last_text.h"
 #include "model_test.h"
@@ -135,71 +135,6 @@ static void test_what_is_no_number_stays_so(void) {
     v.v_ee_vx = NAN;
     outputs();
     TEST_ASSERT_TRUE(v.v_penetration > 0.0 && isnan(v.v_wall_force));
-}
-
-/* ---- Derivatives ---------------------------------------------------------------------------- */
-
-enum {
-    CALCULATED = offsetof(struct equations_values, v_n_x) / sizeof(double),
-    DOUBLES = sizeof(struct equations_values) / sizeof(double),
-};
-
-union point {
-    struct equations_values v;
-    double all[DOUBLES];
-};
-
-static union point at, first, second;
-
-static double field_at(const void *field, double t) {
-    union point moved = at;
-    for (int i = 0; i < CALCULATED; i++) {
-        moved.all[i] += t * first.all[i] + 0.5 * t * t * second.all[i];
-    }
-    ASSERT_OK(model->outputs(&moved.v, t));
-    return moved.all[*(const int *)field];
-}
-
-static void next_curve(double depth, double speed) {
-    next_at_depth(depth);
-    v.v_ee_vx += speed * cos(v.v_angle);
-    v.v_ee_vy += speed * sin(v.v_angle);
-    at.v = v;
-    memset(&first, 0xff, sizeof first); // NaN
-    memset(&second, 0xff, sizeof second);
-    for (int i = 0; i < CALCULATED; i++) {
-        first.all[i] = uniform(-0.5, 0.5);
-        second.all[i] = uniform(-0.5, 0.5);
-    }
-}
-
-static void test_derivatives_along_curves_are_those_of_the_fields(void) {
-    const double h = 1.0 / 256.0;
-    for (int n = 0; n < 200; n++) {
-        // pressed; on the way out, where the wall does not pull; outside
-        const double depth = n % 3 == 2 ? -0.5 : 0.5;
-        next_curve(depth, n % 3 == 1 ? 4096.0 : 0.0);
-        ASSERT_OK(model->propagate(&at.v, 0.0, 1.0, &first.v, &second.v));
-        for (int field = CALCULATED; field < DOUBLES; field++) {
-            const double scale = 1e4;
-            ASSERT_CLOSE(rp_test_derivative(field_at, &field, 0.0, h), first.all[field],
-                         1e-11 * scale);
-            ASSERT_CLOSE(rp_test_second_derivative(field_at, &field, 0.0, h), second.all[field],
-                         1e-9 * scale);
-        }
-        TEST_ASSERT_TRUE((first.v.v_wall_force != 0.0) == (n % 3 == 0));
-        TEST_ASSERT_TRUE((first.v.v_penetration != 0.0) == (n % 3 != 2));
-    }
-}
-
-static void test_first_derivatives_do_not_need_the_second(void) {
-    for (int n = 0; n < 20; n++) {
-        next_curve(0.5, 0.0);
-        union point only = first;
-        ASSERT_OK(model->propagate(&at.v, 0.0, 1.0, &first.v, &second.v));
-        ASSERT_OK(model->propagate(&at.v, 0.0, 1.0, &only.v, NULL));
-        TEST_ASSERT_EQUAL_MEMORY(&first, &only, sizeof only);
-    }
 }
 
 static void test_there_is_no_state(void) {

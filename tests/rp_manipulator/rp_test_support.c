@@ -91,16 +91,6 @@ double rp_test_derivative(rp_test_function *f, const void *context, double x, do
     return sum / h;
 }
 
-double rp_test_second_derivative(rp_test_function *f, const void *context, double x, double h) {
-    static const double weights[4] = {8.0 / 5.0, -1.0 / 5.0, 8.0 / 315.0, -1.0 / 560.0};
-    double center = f(context, x), sum = 0.0;
-    for (int k = 4; k >= 1; --k) {
-        sum +=
-            weights[k - 1] * ((f(context, x + k * h) - center) + (f(context, x - k * h) - center));
-    }
-    return sum / (h * h);
-}
-
 double rp_test_power_of_two(double x) {
     return ldexp(1.0, ilogb(x));
 }

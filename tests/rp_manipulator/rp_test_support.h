@@ -51,12 +51,10 @@ void rp_test_force_scale(const struct rp_parameters *p, const struct rp_test_sta
 void rp_test_acceleration_scale(const struct rp_parameters *p, const double q[2],
                                 const double force_scale[2], double scale[2]);
 
-/* Central differences of eighth order, exact for polynomials up to degree 8 (9 for the second).
- * Truncation: h^8 f(9) / 630 and h^8 f(10) / 3150. Rounding: 2.1 and 6.4 times the error of f, by h
- * and h^2. Steps are powers of two. */
+/* Central differences of eighth order, exact for polynomials up to degree 8. Truncation:
+ * h^8 f(9) / 630. Rounding: 2.1 times the error of f, by h. Steps are powers of two. */
 typedef double rp_test_function(const void *context, double x);
 double rp_test_derivative(rp_test_function *f, const void *context, double x, double h);
-double rp_test_second_derivative(rp_test_function *f, const void *context, double x, double h);
 
 /* Largest power of two that is not above x > 0. */
 double rp_test_power_of_two(double x);

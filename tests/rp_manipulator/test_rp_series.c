@@ -191,29 +191,3 @@ static void test_derivatives_are_those_of_the_forward_dynamics(void) {
         assert_derivative(second.ddq, 3, 64.0);
     }
 }
-
-/* ---- Bits ----------------------------------------------------------------------------------- */
-
-static void test_any_number_of_orders_at_once_gives_the_same_bits(void) {
-    for (int n = 0; n < SAMPLES; n++) {
-        next_sample();
-        expand();
-        static jet at_once[MAX_ROWS];
-        memcpy(at_once, row, sizeof row);
-        for (size_t i = 4; i < rp_series.row_count; i++) {
-            row[i][0] = NAN;
-        }
-        for (int i = 0; i < MAX_ROWS; i++) {
-            for (int k = 1; k < SERIES_LENGTH; k++) {
-                row[i][k] = NAN;
-            }
-        }
-        for (int first = 0; first < SERIES_LENGTH;) {
-            const int more = n == 0 ? 0 : (int)(rp_test_random_bits(&random_source) % 5);
-            const int last = first + more < SERIES_LENGTH ? first + more : SERIES_LENGTH - 1;
-            extend(first, last);
-            first = last + 1;
-        }
-        TEST_ASSERT_EQUAL_MEMORY(at_once, row, rp_series.row_count * sizeof row[0]);
-    }
-}

@@ -1,5 +1,5 @@
-/* The smooth part: friction law, balance of power, derivatives. test_plant_lagrangian.py compares
- * motion and joint loads with the Lagrangian. */
+/* The smooth part: friction law, balance of power, rates of the reactions. test_plant_lagrangian.py
+ * compares motion and joint loads with the Lagrangian. */
 #include "last_text.h"
 #include "plant_test_support.h"
 #include "rp_plant_equations.h"
@@ -156,33 +156,6 @@ static void test_end_effector_moves_as_its_derivatives_say(void) {
 }
 
 /* ---- Derivatives ---------------------------------------------------------------------------- */
-
-/* The joint of a state rests, so that nothing depends on the state while the modes last. */
-static bool state_rests(int state) {
-    struct rp_plant_modes modes;
-    rp_plant_modes_in_effect(&v, v.q, v.dq, &v.inputs, &modes);
-    return modes.joint[state % 2] == RP_PLANT_STUCK;
-}
-
-static void test_jacobian_is_what_propagation_gives(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        double J[PLANT_STATES][PLANT_STATES];
-        next_sample_at_stops(n);
-        double u[PLANT_INPUTS];
-        const double x[PLANT_STATES] = {v.q[0], v.q[1], v.dq[0], v.dq[1]};
-        memcpy(u, &v.inputs, sizeof u);
-        ASSERT_OK(rp_plant_model.jacobian(&v, 3.0, x, u, J[0]));
-        for (int j = 0; j < PLANT_STATES; j++) {
-            struct rp_plant_values first = {.q = {0.0}};
-            (j < 2 ? first.q : first.dq)[j % 2] = 1.0;
-            ASSERT_OK(rp_plant_model.propagate(&v, 3.0, 0.0, &first, NULL));
-            for (int i = 0; i < 2; i++) {
-                ASSERT_SAME(first.dq[i], J[j][i]);
-                ASSERT_SAME(state_rests(j) ? 0.0 : first.ddq[i], J[j][2 + i]);
-            }
-        }
-    }
-}
 
 static void test_rates_of_the_reactions(void) {
     for (int n = 0; n < RP_TEST_SAMPLES; n++) {

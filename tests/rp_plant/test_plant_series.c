@@ -64,23 +64,6 @@ static void extend(const struct series *series, const void *values, int first, i
     ASSERT_OK(series->extend(&origin, first, last, all));
 }
 
-static void test_any_number_of_orders_at_once_gives_the_same_bits(void) {
-    static row at_once[MAX_ROWS];
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        next_plant();
-        clear(at_once);
-        clear(rows);
-        extend(&rp_plant_series, &plant, 0, SERIES_LENGTH - 1, at_once);
-        for (int first = 0; first < SERIES_LENGTH;) {
-            const int more = n == 0 ? 0 : (int)(rp_test_random_bits(&random_source) % 5);
-            const int last = first + more < SERIES_LENGTH ? first + more : SERIES_LENGTH - 1;
-            extend(&rp_plant_series, &plant, first, last, rows);
-            first = last + 1;
-        }
-        TEST_ASSERT_EQUAL_MEMORY(at_once, rows, rp_plant_series.row_count * sizeof rows[0]);
-    }
-}
-
 /* With every feature off it is the manipulator's. */
 static void test_start_values_give_the_bits_of_the_manipulator(void) {
     static row of_arm[MAX_ROWS];

@@ -168,64 +168,6 @@ static void test_resolutions_that_give_no_finite_velocity_are_refused(void) {
                        "of 2^32 counts in one sample time is not finite");
 }
 
-/* ---- Derivatives ---------------------------------------------------------------------------- */
-
-static void test_derivatives_by_inputs_are_zero(void) {
-    struct rp_sensor_values first = {.q = {1.0, 2.0}, .q_measured = {3.0, 4.0}};
-    struct rp_sensor_values second = {.dq_measured = {3.0, 4.0}};
-    start(0.0);
-    ASSERT_OK(rp_sensor_model.propagate(&v, 0.0, 1.0, &first, &second));
-    for (int i = 0; i < 2; i++) {
-        TEST_ASSERT_TRUE(first.q_measured[i] == 0.0 && first.dq_measured[i] == 0.0);
-        TEST_ASSERT_TRUE(second.q_measured[i] == 0.0 && second.dq_measured[i] == 0.0);
-    }
-}
-
-static void test_first_derivatives_without_second_ones(void) {
-    struct rp_sensor_values first = {.q_measured = {3.0, 4.0}, .dq_measured = {5.0, 6.0}};
-    ASSERT_OK(rp_sensor_model.propagate(&v, 0.0, 1.0, &first, NULL));
-    for (int i = 0; i < 2; i++) {
-        TEST_ASSERT_TRUE(first.q_measured[i] == 0.0 && first.dq_measured[i] == 0.0);
-    }
-}
-
-/* Along resolution(s) and sample_time(s), against the values there: the counts rest. */
-static void test_derivatives_along_resolution_and_sample_time(void) {
-    enum { VALUE, FIRST, SECOND, ORDERS };
-    const double resolution[ORDERS] = {0.01, 0.002, -0.003};
-    const double period[ORDERS] = {0.05, 0.004, 0.006};
-    const double ds = 1e-3;
-    double q[3];
-    double dq[3];
-    v.parameters.resolution[0] = resolution[VALUE];
-    v.parameters.sample_time = period[VALUE];
-    v.q[0] = 0.3;
-    start(0.0);
-    v.q[0] = 0.7;
-    tick();
-    for (int k = -1; k <= 1; k++) {
-        const double s = k * ds;
-        struct rp_sensor_values at = v;
-        at.parameters.resolution[0] += s * resolution[FIRST] + s * s / 2.0 * resolution[SECOND];
-        at.parameters.sample_time += s * period[FIRST] + s * s / 2.0 * period[SECOND];
-        ASSERT_OK(rp_sensor_model.outputs(&at, 0.0));
-        q[k + 1] = at.q_measured[0];
-        dq[k + 1] = at.dq_measured[0];
-    }
-    struct rp_sensor_values first = {
-        .parameters = {.sample_time = period[FIRST], .resolution = {resolution[FIRST]}}};
-    struct rp_sensor_values second = {
-        .parameters = {.sample_time = period[SECOND], .resolution = {resolution[SECOND]}}};
-    ASSERT_OK(rp_sensor_model.outputs(&v, 0.0));
-    ASSERT_OK(rp_sensor_model.propagate(&v, 0.0, 0.0, &first, &second));
-    TEST_ASSERT_TRUE(fabs(q[1]) > 0.5 && fabs(dq[1]) > 5.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, (q[2] - q[0]) / (2.0 * ds), first.q_measured[0]);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-5, (dq[2] - dq[0]) / (2.0 * ds), first.dq_measured[0]);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-8, (q[2] - 2.0 * q[1] + q[0]) / (ds * ds), second.q_measured[0]);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-4, (dq[2] - 2.0 * dq[1] + dq[0]) / (ds * ds),
-                              second.dq_measured[0]);
-}
-
 static void test_there_is_no_continuous_state(void) {
     TEST_ASSERT_EQUAL_UINT64(0, rp_sensor_model.states.size);
     ASSERT_OK(rp_sensor_model.right_hand_side(&v, 0.0, NULL, NULL, NULL));

@@ -1,4 +1,4 @@
-/* The reference motions as the instance sees them: rates, the payload, what is refused.
+/* The reference motions as the instance sees them: the payload, what is refused.
  * Derivatives by parameters are compared with 40 digits in test_trajectory.py. */
 #include "last_text.h"
 #include "model_test.h"
@@ -17,24 +17,6 @@ static struct rp_trajectory_values v;
 void setUp(void) {
     v = (struct rp_trajectory_values){.parameters = rp_trajectory_example};
     v.parameters.start_angle = 0.25;
-}
-
-static void test_rates_along_time_are_the_fields(void) {
-    for (size_t i = 0; i < 3; i++) {
-        struct rp_trajectory_values first = {0};
-        struct rp_trajectory_values second = {0};
-        v.parameters.motion = motions[i];
-        ASSERT_OK(rp_trajectory_model.outputs(&v, 1.1));
-        ASSERT_OK(rp_trajectory_model.propagate(&v, 1.1, 1.0, &first, &second));
-        for (int k = 0; k < 2; k++) {
-            TEST_ASSERT_DOUBLE_WITHIN(1e-12, v.dq[k], first.q[k]);
-            TEST_ASSERT_DOUBLE_WITHIN(1e-12, v.ddq[k], first.dq[k]);
-            TEST_ASSERT_DOUBLE_WITHIN(1e-12, v.ee_velocity[k], first.ee_position[k]);
-            TEST_ASSERT_DOUBLE_WITHIN(1e-12, v.ddq[k], second.q[k]);
-            TEST_ASSERT_DOUBLE_WITHIN(1e-10, first.ddq[k], second.dq[k]);
-            TEST_ASSERT_DOUBLE_WITHIN(1e-12, first.ee_velocity[k], second.ee_position[k]);
-        }
-    }
 }
 
 static void test_there_is_no_state(void) {

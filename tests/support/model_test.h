@@ -8,9 +8,4 @@
 void model_test_accepted(const struct model *model, const void *values);
 void model_test_refused(const struct model *model, const void *values, const char *expected);
 
-/* propagate writes all calculated fields, from this offset on, and reads none of them; the first
- * derivatives do not depend on whether there are second ones. */
-void model_test_calculated_fields(const struct model *model, const void *values, const void *first,
-                                  const void *second, size_t calculated);
-
 #endif

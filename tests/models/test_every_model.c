@@ -1,0 +1,437 @@
+/* What every struct model promises, at random points in all modes: derivatives are what differences
+ * give, the Jacobian is what derivatives give, what is integrated is what is output, and nothing is
+ * read that is not given. Models themselves have tests in their folders. */
+#include "equations.h" /* of RPEnvironment */
+#include "last_text.h"
+#include "rp_actuator_model.h"
+#include "rp_controller_model.h"
+#include "rp_model.h"
+#include "rp_plant_model.h"
+#include "rp_plant_modes.h"
+#include "rp_sensor_model.h"
+#include "rp_test_support.h"
+#include "rp_trajectory_example.h"
+#include "rp_trajectory_model.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+enum { ARM, PLANT, CONTROLLER, ACTUATOR, TRAJECTORY, SENSOR, WALL, SUBJECTS };
+enum { DOUBLES = 256, STATES = 4, INPUTS = 10, ROWS = 64, POINTS = 2000 };
+
+/* A value structure, of any model. */
+union point {
+    double all[DOUBLES];
+    struct rp_values arm;
+    struct rp_plant_values plant;
+    struct rp_controller_values controller;
+    struct rp_actuator_values actuator;
+    struct rp_trajectory_values trajectory;
+    struct rp_sensor_values sensor;
+    struct equations_values wall;
+};
+
+/* Doubles of the value structure, and ends of their ranges. */
+#define PLACE(type, field) (offsetof(struct type, field) / sizeof(double))
+#define END(type)          (sizeof(struct type) / sizeof(double))
+struct doubles {
+    size_t first, end;
+};
+
+struct subject {
+    const struct model *model;
+    struct doubles knowns[2];     /* parameters, inputs, states */
+    struct doubles calculated[2]; /* by outputs and propagate */
+    void (*place)(int n); /* makes a point of kind n of random knowns, far from where it changes */
+};
+
+static struct rp_test_random random_source;
+static const struct subject *subject;
+static const struct model *model;
+static union point at, first, second;
+static double now;
+static size_t knowns[DOUBLES], fields[DOUBLES]; /* places of the subject's */
+static int known_count, field_count;
+
+static double uniform(double low, double high) {
+    return rp_test_uniform(&random_source, low, high);
+}
+
+static int one_of(int count) {
+    return (int)(rp_test_random_bits(&random_source) % (unsigned)count);
+}
+
+static double sign(void) {
+    return one_of(2) == 0 ? 1.0 : -1.0;
+}
+
+/* ---- Points --------------------------------------------------------------------------------- */
+
+/* A feature that is off: what is 0 stays 0 on curves. */
+static void sometimes_zero(double *values, int count) {
+    for (int i = 0; i < count; i++) {
+        values[i] = one_of(4) == 0 ? 0.0 : values[i];
+    }
+}
+
+static void place_arm(int n) {
+    (void)n;
+    struct rp_parameters *p = &at.arm.parameters;
+    double *const may_be_zero[] = {&p->m1, &p->I2z, &p->lc1, &p->a, &p->g};
+    for (int i = 0; i < 5; i++) {
+        sometimes_zero(may_be_zero[i], 1);
+    }
+    p->a *= sign();
+}
+
+static void place_plant(int n) {
+    struct rp_plant_values *v = &at.plant;
+    struct rp_plant_parameters *p = &v->parameters;
+    sometimes_zero(p->armature, 4); // and damping
+    sometimes_zero(&p->payload_mass, 4);
+    v->payload_attached = one_of(2);
+    v->modes.payload = v->payload_attached == 1 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED;
+    if (n % 5 == 0) { // modes follow from velocities
+        v->modes.payload = RP_PLANT_UNDECIDED;
+    }
+    p->grasp = RP_PLANT_KEEP_VELOCITY;
+    for (int i = 0; i < 2; i++) {
+        p->breakaway_friction[i] = one_of(3) == 0 ? 0.0 : 2.0 * p->coulomb_friction[i];
+        p->coulomb_friction[i] *= one_of(3);
+        p->breakaway_friction[i] += p->coulomb_friction[i];
+        p->stops[i] = RP_PLANT_STOPS_NONE + one_of(n % 5 == 0 ? 2 : 3);
+        const bool is_decided = n % 5 != 0 && rp_plant_can_stick(p, i);
+        v->modes.joint[i] = is_decided ? one_of(4) - 1 : RP_PLANT_FREE;
+        if (v->modes.joint[i] == RP_PLANT_STUCK) {
+            v->dq[i] = 0.0;
+        }
+        if (p->stops[i] == RP_PLANT_STOPS_COMPLIANT) {
+            v->modes.contact[i] = one_of(5) - 2;
+        }
+        p->lower[i] = v->q[i] - (v->modes.contact[i] > 0 ? -0.25 : 1.0);
+        p->upper[i] = v->q[i] + (v->modes.contact[i] < 0 ? -0.25 : 1.0);
+    }
+}
+
+/* Each effort below its limit or beyond, with an integral part or without; also sampled. */
+static void place_controller(int n) {
+    struct rp_controller_values *v = &at.controller;
+    struct rp_controller_parameters *p = &v->parameters;
+    p->mode = RP_CONTROLLER_PD + n % 3;
+    v->payload_attached = one_of(2);
+    v->form = RP_CONTROLLER_CONTINUOUS;
+    sometimes_zero(p->Ki, 2);
+    v->integral[0] += copysign(64.0, v->integral[0]);
+    v->integral[1] -= copysign(64.0, v->integral[0]); // which D does not cancel
+    ASSERT_OK(model->outputs(v, now));
+    for (int i = 0; i < 2; i++) {
+        p->limit[i] = (one_of(2) == 0 ? 2.0 : 0.5) * fabs(v->unlimited[i]);
+    }
+    v->form = one_of(4) == 0 ? RP_CONTROLLER_SAMPLED : RP_CONTROLLER_CONTINUOUS;
+    v->samples = (struct rp_controller_samples){
+        .taken = 2.0, .shown = 1.0, .rate = {3.0, 4.0}, .command = {{5.0, 6.0}, {7.0, 8.0}}};
+}
+
+/* What decides a current: the command, the current's limits, the voltage's, or both, beyond the
+ * no-load speed. */
+static void place_actuator(int n) {
+    struct rp_actuator_values *v = &at.actuator;
+    for (int i = 0; i < 2; i++) {
+        const int side = i == 0 ? n % 4 : one_of(4);
+        v->inputs.effort_cmd[i] *= side == 1 || side == 2 ? 1e4 : 1.0;
+        v->inputs.dq[i] *= side == 3 ? 1e5 : 1.0;
+        v->parameters.current_max[i] *= side == 2 ? 1e3 : 32.0;
+        v->parameters.voltage_max[i] *= side == 2 ? 16.0 : 1e3;
+    }
+}
+
+/* Each motion and branch, at rest, in ramps and between; circles beside and around the axis. */
+static void place_trajectory(int n) {
+    static const double times[] = {0.25, 0.875, 1.25, 2.0, 5.0, 7.0};
+    struct rp_trajectory_parameters *p = &at.trajectory.parameters;
+    *p = rp_trajectory_example;
+    p->motion = RP_TRAJECTORY_POINT_TO_POINT + n % 3;
+    p->branch = n / 3 % 2 == 0 ? RP_TRAJECTORY_BACKWARD : RP_TRAJECTORY_FORWARD;
+    p->radius = one_of(2) == 0 ? 0.1 : 0.75;
+    p->frequency *= sign();
+    p->start_angle = 0.25;
+    now = times[n / 6 % 6];
+}
+
+static void place_sensor(int n) {
+    struct rp_sensor_values *v = &at.sensor;
+    v->parameters.latency = n % 3;
+    if (n % 5 == 0) { // no sample has been: counts follow the inputs
+        v->q[0] = v->q[1] = 0.0;
+        v->parameters.noise[0] = v->parameters.noise[1] = 0.0;
+    }
+    for (int k = 0; k < n % 5; k++) {
+        const struct event event = {.t = k == 0 ? 0.0 : model->events->next_time(v),
+                                    .is_timed = k > 0};
+        v->q[0] += 3.0;
+        ASSERT_OK(model->events->update(v, &event));
+    }
+}
+
+/* Pressed; on the way out, where the wall does not pull; outside. */
+static void place_wall(int n) {
+    struct equations_values *v = &at.wall;
+    const double c = cos(v->v_ee_angle), s = sin(v->v_ee_angle);
+    const double normal[2] = {cos(v->v_angle), sin(v->v_angle)};
+    const double x = v->v_ee_x + v->v_tip_z * c - v->v_tip_x * s;
+    const double y = v->v_ee_y + v->v_tip_z * s + v->v_tip_x * c;
+    v->v_position = x * normal[0] + y * normal[1] + (n % 3 == 2 ? -0.5 : 0.5);
+    v->v_stiffness *= n % 3 == 0 ? 1024.0 : 1.0;
+    v->v_ee_vx += n % 3 == 1 ? 64.0 * normal[0] : 0.0;
+    v->v_ee_vy += n % 3 == 1 ? 64.0 * normal[1] : 0.0;
+}
+
+// clang-format off
+static const struct subject subjects[SUBJECTS] = {
+    [ARM] = {&rp_model, {{0, PLACE(rp_values, ddq)}},
+     {{PLACE(rp_values, ddq), END(rp_values)}}, place_arm},
+    [PLANT] = {&rp_plant_model,
+     {{0, PLACE(rp_plant_values, parameters.stops)},
+      {PLACE(rp_plant_values, inputs), PLACE(rp_plant_values, ddq)}},
+     {{PLACE(rp_plant_values, ddq), PLACE(rp_plant_values, payload_attached)},
+      {PLACE(rp_plant_values, ee_position), END(rp_plant_values)}}, place_plant},
+    [CONTROLLER] = {&rp_controller_model,
+     {{0, PLACE(rp_controller_values, parameters.sample_time)},
+      {PLACE(rp_controller_values, inputs), PLACE(rp_controller_values, payload_attached)}},
+     {{PLACE(rp_controller_values, dintegral), END(rp_controller_values)}}, place_controller},
+    [ACTUATOR] = {&rp_actuator_model, {{0, PLACE(rp_actuator_values, dcurrent)}},
+     {{PLACE(rp_actuator_values, dcurrent), END(rp_actuator_values)}}, place_actuator},
+    [TRAJECTORY] = {&rp_trajectory_model,
+     {{PLACE(rp_trajectory_values, parameters.l1), PLACE(rp_trajectory_values, payload)}},
+     {{PLACE(rp_trajectory_values, q), PLACE(rp_trajectory_values, payload_attached)}},
+     place_trajectory},
+    [SENSOR] = {&rp_sensor_model,
+     {{0, PLACE(rp_sensor_values, parameters.latency)},
+      {PLACE(rp_sensor_values, q), PLACE(rp_sensor_values, q_measured)}},
+     {{PLACE(rp_sensor_values, q_measured), PLACE(rp_sensor_values, counts)}}, place_sensor},
+    [WALL] = {&equations_model, {{0, PLACE(equations_values, v_n_x)}},
+     {{PLACE(equations_values, v_n_x), END(equations_values)}}, place_wall},
+};
+// clang-format on
+
+static int places(const struct doubles ranges[2], size_t list[DOUBLES]) {
+    int count = 0;
+    for (int k = 0; k < 2; k++) {
+        for (size_t i = ranges[k].first; i < ranges[k].end; i++) {
+            list[count++] = i;
+        }
+    }
+    return count;
+}
+
+/* Knowns of magnitudes 0.5 to 2, inputs and states with any sign, as the model places them; a curve
+ * that changes each by half of its value in a unit of time at most, or only one of them. */
+static void next_point(int n) {
+    memset(&at, 0, sizeof at);
+    memset(&first, 0, sizeof first);
+    memset(&second, 0, sizeof second);
+    now = 3.0;
+    for (int k = 0; k < known_count; k++) {
+        const bool has_sign =
+            knowns[k] * sizeof(double) >= model->parameters.offset + model->parameters.size;
+        at.all[knowns[k]] = uniform(0.5, 2.0) * (has_sign ? sign() : 1.0);
+    }
+    subject->place(n);
+    ASSERT_OK(model->outputs(&at, now));
+    const int alone = one_of(known_count);
+    for (int k = 0; k < known_count; k++) {
+        const double size = n % 2 == 0 || k == alone ? at.all[knowns[k]] : 0.0;
+        first.all[knowns[k]] = size * uniform(-0.5, 0.5);
+        second.all[knowns[k]] = size * uniform(-0.5, 0.5);
+    }
+}
+
+static void poison(union point *point, size_t offset, size_t size) {
+    memset((char *)point + offset, 0xff, size); // NaN
+}
+
+static void poison_calculated(union point *point) {
+    for (int k = 0; k < field_count; k++) {
+        poison(point, fields[k] * sizeof(double), sizeof(double));
+    }
+}
+
+/* ---- Properties ----------------------------------------------------------------------------- */
+
+/* The slope of values at -4 h ... 4 h, by differences of order 8. Over this part of a curve knowns
+ * change by 0.2 percent, angles of a circle by some hundredths: what is left out is below 1e-16 of
+ * the values, so that the rounding of their terms counts, by 2.1 / h. */
+static const double h = 1.0 / 1024, speed = 0.25; /* of the time */
+
+static double slope(const union point points[9], size_t i) {
+    static const double weights[4] = {4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0};
+    double sum = 0.0;
+    for (int k = 4; k >= 1; k--) {
+        sum += weights[k - 1] * (points[4 + k].all[i] - points[4 - k].all[i]);
+    }
+    return sum / h;
+}
+
+static void check_derivatives(void) {
+    static union point values[9], rates[9];
+    union point rate = first, curvature = second;
+    ASSERT_OK(model->propagate(&at, now, speed, &rate, &curvature));
+    for (int n = 0; n < 9; n++) {
+        const double t = (n - 4) * h;
+        values[n] = at;
+        rates[n] = first;
+        for (int k = 0; k < known_count; k++) {
+            const size_t i = knowns[k];
+            values[n].all[i] += t * (first.all[i] + 0.5 * t * second.all[i]);
+            rates[n].all[i] += t * second.all[i];
+        }
+        ASSERT_OK(model->outputs(&values[n], now + t * speed));
+        ASSERT_OK(model->propagate(&values[n], now + t * speed, speed, &rates[n], NULL));
+    }
+    double scale = 1.0; // of the largest: fields are sums of terms that others show
+    for (int k = 0; k < field_count; k++) {
+        const size_t i = fields[k];
+        scale = fmax(scale, fmax(fabs(values[4].all[i]), fabs(rate.all[i])));
+        scale = fmax(scale, fabs(curvature.all[i]));
+    }
+    for (int k = 0; k < field_count; k++) {
+        const double bound = 128 * DBL_EPSILON / h * scale;
+        ASSERT_CLOSE(slope(values, fields[k]), rate.all[fields[k]], bound);
+        ASSERT_CLOSE(slope(rates, fields[k]), curvature.all[fields[k]], bound);
+    }
+}
+
+/* Whatever stands in the calculated fields before. Without second derivatives the first are the
+ * same. */
+static void check_what_is_read(void) {
+    union point clean = at, clean_first = first, clean_second = second;
+    union point dirty = at, dirty_first = first, dirty_second = second, alone = first;
+    poison_calculated(&dirty);
+    poison_calculated(&dirty_first);
+    poison_calculated(&dirty_second);
+    poison_calculated(&alone);
+    ASSERT_OK(model->propagate(&dirty, now, speed, &dirty_first, &dirty_second));
+    ASSERT_OK(model->propagate(&dirty, now, speed, &alone, NULL));
+    ASSERT_OK(model->outputs(&clean, now));
+    ASSERT_OK(model->propagate(&clean, now, speed, &clean_first, &clean_second));
+    ASSERT_OK(model->outputs(&dirty, now));
+    TEST_ASSERT_EQUAL_MEMORY(&clean, &dirty, model->values_size);
+    TEST_ASSERT_EQUAL_MEMORY(&clean_first, &dirty_first, model->values_size);
+    TEST_ASSERT_EQUAL_MEMORY(&clean_first, &alone, model->values_size);
+    TEST_ASSERT_EQUAL_MEMORY(&clean_second, &dirty_second, model->values_size);
+}
+
+/* The right-hand side and the Jacobian take states and inputs from their arguments; bit for bit
+ * what outputs and propagate give. A joint that is stuck rests. */
+static void check_integration(void) {
+    double x[STATES], u[INPUTS], dx[STATES], J[STATES * STATES];
+    const size_t count = model->states.size / sizeof(double);
+    union point expected = at, given = at;
+    ASSERT_OK(model->outputs(&expected, now));
+    memcpy(x, (char *)&at + model->states.offset, model->states.size);
+    memcpy(u, (char *)&at + model->inputs.offset, model->inputs.size);
+    poison_calculated(&given);
+    poison(&given, model->states.offset, model->states.size);
+    poison(&given, model->inputs.offset, model->inputs.size);
+    ASSERT_OK(model->right_hand_side(&given, now, x, u, dx));
+    TEST_ASSERT_TRUE(count == 0 || memcmp((char *)&expected + model->derivatives.offset, dx,
+                                          model->derivatives.size) == 0);
+    memset(J, 0xff, sizeof J);
+    if (count > 0) {
+        ASSERT_OK(model->jacobian(&given, now, x, u, J));
+    }
+    for (size_t j = 0; j < count; j++) {
+        union point column;
+        memset(&column, 0, sizeof column);
+        ((double *)((char *)&column + model->states.offset))[j] = 1.0;
+        ASSERT_OK(model->propagate(&at, now, 0.0, &column, NULL));
+        const double *rate = (const double *)((char *)&column + model->derivatives.offset);
+        const bool rests =
+            model == &rp_plant_model && at.plant.modes.joint[j % 2] == RP_PLANT_STUCK;
+        for (size_t i = 0; i < count; i++) {
+            TEST_ASSERT_TRUE(J[i + count * j] == (rests && i >= 2 ? 0.0 : rate[i]));
+        }
+    }
+}
+
+static void begin_series(double rows[ROWS][SERIES_LENGTH]) {
+    memset(rows, 0xff, sizeof(double[ROWS][SERIES_LENGTH])); // NaN: what is read has been written
+    for (size_t i = 0; i < model->states.size / sizeof(double); i++) {
+        rows[i][0] = ((const double *)((const char *)&at + model->states.offset))[i];
+    }
+}
+
+/* Any number of orders at once gives the same bits. */
+static void check_series(int n) {
+    static double at_once[ROWS][SERIES_LENGTH], rows[ROWS][SERIES_LENGTH];
+    double inputs[INPUTS][SERIES_INPUT_LENGTH];
+    for (int i = 0; i < INPUTS; i++) {
+        for (int k = 0; k < SERIES_INPUT_LENGTH; k++) {
+            inputs[i][k] = uniform(-2.0, 2.0);
+        }
+    }
+    const struct series_origin origin = {
+        .values = &at,
+        .t = now,
+        .time_scale = 1.0 / 64,
+        .inputs = (const double(*)[SERIES_INPUT_LENGTH])inputs,
+    };
+    TEST_ASSERT_LESS_OR_EQUAL_size_t(ROWS, model->series->row_count);
+    begin_series(at_once);
+    begin_series(rows);
+    ASSERT_OK(model->series->extend(&origin, 0, SERIES_LENGTH - 1, at_once));
+    for (int from = 0, last; from < SERIES_LENGTH; from = last + 1) {
+        last = from + (n == 0 ? 0 : one_of(5));
+        last = last < SERIES_LENGTH ? last : SERIES_LENGTH - 1;
+        ASSERT_OK(model->series->extend(&origin, from, last, rows));
+    }
+    TEST_ASSERT_EQUAL_MEMORY(at_once, rows, model->series->row_count * sizeof rows[0]);
+}
+
+static void check(int which) {
+    subject = &subjects[which];
+    model = subject->model;
+    random_source.state = 41;
+    known_count = places(subject->knowns, knowns);
+    field_count = places(subject->calculated, fields);
+    TEST_ASSERT_LESS_OR_EQUAL_size_t(sizeof at, model->values_size);
+    for (int n = 0; n < POINTS; n++) {
+        next_point(n);
+        check_what_is_read();
+        check_integration();
+        if (model->series != NULL && model->series->row_count > 0) {
+            check_series(n);
+        }
+        check_derivatives();
+    }
+}
+
+static void test_arm(void) {
+    check(ARM);
+}
+
+static void test_plant(void) {
+    check(PLANT);
+}
+
+static void test_controller(void) {
+    check(CONTROLLER);
+}
+
+static void test_actuator(void) {
+    check(ACTUATOR);
+}
+
+static void test_trajectory(void) {
+    check(TRAJECTORY);
+}
+
+static void test_sensor(void) {
+    check(SENSOR);
+}
+
+static void test_wall(void) {
+    check(WALL);
+}
