@@ -1,7 +1,7 @@
 """First and second derivatives along a curve, by the rules of polynomials of degree 2.
 
-x, x' and x'' of a product, a quotient and a function follow from those of the arguments. To derive
-twice gives more operations, and other rounding.
+The rules give x, x' and x'' of a product, a quotient and a function from x, x' and x'' of its
+arguments. To derive twice would give more operations, and other rounding.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ Rates = Callable[[Value], tuple[Value, Value] | None]  # of a leaf; None: it res
 
 
 class Curve:
-    """Derivatives of a graph's values; `rates` gives those of the leaves."""
+    """Derivatives of a graph's values, from the derivatives of its leaves, `rates`."""
 
     def __init__(self, graph: Graph, rates: Rates) -> None:
         self.graph, self.rates = graph, rates

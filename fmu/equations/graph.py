@@ -104,7 +104,7 @@ class Graph:
     known: dict[tuple, Value] = field(default_factory=dict)
     relations: dict[str, Relation] = field(default_factory=dict)
     has_switches: bool = True  # else relations are evaluated with the values
-    is_guarded: bool = True  # else derivatives are not finite where a slope is not, as those of C
+    is_guarded: bool = True  # else an infinite slope makes derivatives infinite, as in C
 
     @property
     def located(self) -> list[Relation]:

@@ -24,9 +24,9 @@ void rp_actuator_jacobian(const struct rp_actuator_parameters *p,
                           const struct rp_actuator_inputs *inputs, const double current[2],
                           double J[]);
 
-/* Derived: first and, unless NULL, second derivatives of the calculated fields along a curve, from
- * those of the other fields. A current is taken as free strictly within its limits; at and beyond
- * one it moves as this limit does. */
+/* Derived: first and, unless NULL, second derivatives of the calculated fields along a curve.
+ * The other fields of first and second give the curve. A current is taken as free strictly within
+ * its limits; at and beyond one it moves as this limit does. */
 void rp_actuator_derivatives(const struct rp_actuator_values *values,
                              struct rp_actuator_values *first, struct rp_actuator_values *second);
 

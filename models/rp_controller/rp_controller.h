@@ -44,7 +44,7 @@ struct rp_controller_inputs {
 
 /* Efforts u (N.m, N) that the law asks for, with the integral parts w of the commanded
  * accelerations (rad/s2, m/s2), in rp_controller_law.h. With a payload that the controller knows
- * of, D, C and g are those of link 2 with the payload. With the errors e = q_ref - q and
+ * of, link 2 has it in D, C and g. With the errors e = q_ref - q and
  * de = dq_ref - dq and, for each joint, v = Kp e + Kd de + w:
  *
  *   PD               M v                                       M: inertia

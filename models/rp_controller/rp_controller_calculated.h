@@ -40,10 +40,10 @@ void rp_controller_jacobian(const struct rp_controller_parameters *p, bool attac
                             const struct rp_controller_inputs *inputs, const double w[2],
                             double J[]);
 
-/* Derived: first and, unless NULL, second derivatives of the calculated fields along a curve, from
- * those of the other fields. An effort is taken as free strictly within its limits; at and beyond
- * them it is the limit, which moves only with tau1_max and f2_max. Where it just meets its limit,
- * derivatives are one-sided. */
+/* Derived: first and, unless NULL, second derivatives of the calculated fields along a curve.
+ * The other fields of first and second give the curve. An effort is taken as free strictly within
+ * its limits; at and beyond them it is the limit, which moves only with tau1_max and f2_max. Where
+ * it just meets its limit, derivatives are one-sided. */
 void rp_controller_derivatives(const struct rp_controller_values *values,
                                struct rp_controller_values *first,
                                struct rp_controller_values *second);

@@ -92,9 +92,9 @@ static inline void rp_plant_calculate(struct rp_plant_values *values,
     write_loads(&loads, &values->loads);
 }
 
-/* Derived: first and, unless NULL, second derivatives of the calculated fields along a curve, from
- * those of the other fields. They are those of the equations in these modes, on the side of a
- * closed stop or of the limit of its friction where it lies. */
+/* Derived: first and, unless NULL, second derivatives of the calculated fields along a curve.
+ * The other fields of first and second give the curve. They belong to these modes, and at a
+ * closed stop or a limit of friction to the side on which the joint is. */
 void rp_plant_derivatives(const struct rp_plant_values *values, const struct rp_plant_modes *modes,
                           struct rp_plant_values *first, struct rp_plant_values *second);
 
