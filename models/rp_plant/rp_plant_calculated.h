@@ -93,8 +93,8 @@ static inline void rp_plant_calculate(struct rp_plant_values *values,
 }
 
 /* Derived: first and, unless NULL, second derivatives of the calculated fields along a curve.
- * The other fields of first and second give the curve. They belong to these modes, and at a
- * closed stop or a limit of friction to the side on which the joint is. */
+ * The other fields of first and second give the curve. The modes are fixed; at a closed
+ * stop or a limit of friction, derivatives belong to the side on which the joint is. */
 void rp_plant_derivatives(const struct rp_plant_values *values, const struct rp_plant_modes *modes,
                           struct rp_plant_values *first, struct rp_plant_values *second);
 
