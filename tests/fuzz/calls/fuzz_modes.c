@@ -1,6 +1,7 @@
 /* Calls that lead from one state of FMI to another, and those of time in Model Exchange. */
 #include "fuzz_arguments.h"
 #include "fuzz_session.h"
+#include "model_description.h"
 
 #include <math.h>
 #include <string.h>
