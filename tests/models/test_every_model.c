@@ -347,7 +347,8 @@ static void check_integration(void) {
         memset(&column, 0, sizeof column);
         ((double *)((char *)&column + model->states.offset))[j] = 1.0;
         ASSERT_OK(model->propagate(&at, now, 0.0, &column, NULL));
-        const double *rate = (const double *)((char *)&column + model->derivatives.offset);
+        const double *rate =
+            (const double *)(const void *)((const char *)&column + model->derivatives.offset);
         const bool rests =
             model == &rp_plant_model && at.plant.modes.joint[j % 2] == RP_PLANT_STUCK;
         for (size_t i = 0; i < count; i++) {
@@ -359,7 +360,7 @@ static void check_integration(void) {
 static void begin_series(double rows[ROWS][SERIES_LENGTH]) {
     memset(rows, 0xff, sizeof(double[ROWS][SERIES_LENGTH])); // NaN: what is read has been written
     for (size_t i = 0; i < model->states.size / sizeof(double); i++) {
-        rows[i][0] = ((const double *)((const char *)&at + model->states.offset))[i];
+        rows[i][0] = ((const double *)(const void *)((const char *)&at + model->states.offset))[i];
     }
 }
 
