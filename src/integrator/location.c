@@ -94,10 +94,8 @@ static enum status restart_model(struct location *location, const double x[]) {
         }
         location->is_armed[i] = location->z[i] > 0.0;
         if (ode->rounding != NULL) {
-            // nothing is known of an indicator that begins at infinity
-            const double rounding = isfinite(location->first[i]) ? location->first[i] : 0.0;
-            location->noise[i] = larger(rounding, DBL_MIN);
-            location->touch[i] = 4.0 * rounding;
+            location->noise[i] = larger(location->first[i], DBL_MIN);
+            location->touch[i] = 4.0 * location->first[i];
             location->rounding[i] = location->noise[i];
             location->is_armed[i] = location->z[i] > location->noise[i];
         }

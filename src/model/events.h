@@ -88,7 +88,8 @@ struct model_events {
 
     /* Writes by how much each indicator of the model may be wrong where the states have these
      * errors (in their units), the time and the inputs the relative error `relative`, and where all
-     * operations are rounded. NULL: errors follow from the limits that describe gives. */
+     * operations are rounded; 0 where that is not known, as close to where one is not finite. NULL:
+     * errors follow from the limits that describe gives. */
     void (*errors)(const void *values, double t, const double state_errors[], double relative,
                    double errors[]);
 

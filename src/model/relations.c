@@ -245,7 +245,8 @@ void relations_errors(const struct relations *model, struct relations_room room,
     model->compare(values, t, &given, room.compared);
     for (int k = 0; k < model->relation_count; k++) {
         if (!model->relation[k].is_timed) {
-            errors[model->relation[k].indicator] = room.compared[k].noise;
+            const double noise = room.compared[k].noise;
+            errors[model->relation[k].indicator] = isfinite(noise) ? noise : 0.0;
         }
     }
 }

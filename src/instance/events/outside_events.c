@@ -31,15 +31,13 @@ static void write_bands(struct instance *instance, double bands[]) {
     }
     for (size_t i = 0; i < events->indicator_count; i++) {
         const struct indicator *indicator = &instance->indicators[i];
-        if (indicator->kind == INDICATOR_OF_STATE) {
+        if (indicator->kind == INDICATOR_UNUSED) {
+            bands[i] = 0.0;
+        } else if (indicator->kind == INDICATOR_OF_STATE) {
             const double nominal = instance_nominal(instance, indicator->state);
             bands[i] = 1e-12 * fabs(indicator->factor) * nominal + 1e-14 * fabs(indicator->offset);
         } else if (events->errors == NULL) {
             bands[i] = 2.0 * near_root + 1e-9 * fabs(indicator->offset);
-        }
-        // close to where a value is not finite, its error is not known
-        if (indicator->kind == INDICATOR_UNUSED || !isfinite(bands[i])) {
-            bands[i] = 0.0;
         }
     }
 }
@@ -87,28 +85,36 @@ static enum status evaluate(struct instance *instance, double t, const double x[
     return model->events->indicators(instance->memory.values, t, x, u, z);
 }
 
+/* Writes all indicators now and, along the motion that begins here while the inputs stay, after
+ * each slope_time: at so many points, 3 at most. */
+static enum status look_ahead(struct instance *instance, size_t points) {
+    const struct model *model = instance->model;
+    const double *u = doubles_of(instance->memory.values, model->inputs);
+    double *x = doubles_of(instance->first_derivatives, model->states);
+    double *dx = doubles_of(instance->second_derivatives, model->derivatives);
+    memcpy(x, instance->memory.values + model->states.offset, model->states.size);
+    enum status status = STATUS_OK;
+    for (size_t k = 0; k < points && status == STATUS_OK; k++) {
+        const double t = instance->state.time.s + (double)k * slope_time;
+        status = evaluate(instance, t, x, instance->z + k * model->events->indicator_count);
+        if (status == STATUS_OK && k + 1 < points) {
+            status = model->right_hand_side(instance->memory.values, t, x, u, dx);
+            for (size_t i = 0; i < count_of(model->states); i++) {
+                x[i] += slope_time * dx[i];
+            }
+        }
+    }
+    return status;
+}
+
 /* Writes which indicators have triggered while the inputs stay. */
 static enum status find_triggered(struct instance *instance, bool triggered[], bool *is_any) {
     const struct model *model = instance->model;
-    char *values = instance->memory.values;
     const double now = instance->state.time.s;
-    const double *x = doubles_of(values, model->states);
-    const double *u = doubles_of(values, model->inputs);
-    double *dx = doubles_of(instance->first_derivatives, model->derivatives);
-    double *ahead = doubles_of(instance->second_derivatives, model->states);
-    double *z = instance->z;
-    double *z_ahead = z + model->events->indicator_count;
-    double *bands = z_ahead + model->events->indicator_count;
-    enum status status = model->right_hand_side(values, now, x, u, dx);
-    for (size_t i = 0; i < count_of(model->states); i++) {
-        ahead[i] = x[i] + slope_time * dx[i];
-    }
-    if (status == STATUS_OK) {
-        status = evaluate(instance, now, x, z);
-    }
-    if (status == STATUS_OK) {
-        status = evaluate(instance, now + slope_time, ahead, z_ahead);
-    }
+    const double *z = instance->z;
+    const double *z_ahead = z + model->events->indicator_count;
+    double *bands = instance->z + 2 * model->events->indicator_count;
+    const enum status status = look_ahead(instance, 2);
     if (status == STATUS_OK) {
         write_bands(instance, bands);
     }
@@ -146,16 +152,27 @@ void instance_forget_unhandled(struct instance *instance) {
     instance->state.event_point = NO_EVENT;
 }
 
+/* Some indicator is below 0: else no event can have been missed, which is so after most steps. */
+static bool is_any_below(struct instance *instance) {
+    const double *x = doubles_of(instance->memory.values, instance->model->states);
+    bool is_below = false;
+    if (evaluate(instance, instance->state.time.s, x, instance->z) == STATUS_OK) {
+        for (size_t i = 0; i < instance->model->events->indicator_count; i++) {
+            is_below |= instance->z[i] < 0.0;
+        }
+    }
+    return is_below;
+}
+
 bool instance_has_missed_event(struct instance *instance) {
-    const struct model_events *events = instance->model->events;
     bool is_any = false;
-    if (events == NULL || events->errors == NULL || !can_fire(instance) ||
+    if (!can_fire(instance) || instance->model->events->errors == NULL || !is_any_below(instance) ||
         find_triggered(instance, instance->triggered, &is_any) != STATUS_OK) {
         return false;
     }
     // one that only comes to 0 will be seen
     bool is_missed = false;
-    for (size_t i = 0; is_any && i < events->indicator_count; i++) {
+    for (size_t i = 0; is_any && i < instance->model->events->indicator_count; i++) {
         is_missed |= instance->triggered[i] && instance->z[i] < 0.0;
     }
     return is_missed;
@@ -186,33 +203,11 @@ static bool turns_before_zero(double z, double ahead, double far_ahead) {
     return slope < 0.0 && bend > 0.0 && side * z - slope * slope / (2.0 * bend) >= 0.0;
 }
 
-/* Writes all indicators along the motion that begins now, after no, one and two slope_time. */
-static enum status look_ahead(struct instance *instance) {
-    const struct model *model = instance->model;
-    const size_t count = model->events->indicator_count;
-    const double *u = doubles_of(instance->memory.values, model->inputs);
-    double *x = doubles_of(instance->first_derivatives, model->states);
-    double *dx = doubles_of(instance->second_derivatives, model->derivatives);
-    memcpy(x, instance->memory.values + model->states.offset, model->states.size);
-    enum status status = STATUS_OK;
-    for (size_t k = 0; k < 3 && status == STATUS_OK; k++) {
-        const double t = instance->state.time.s + (double)k * slope_time;
-        status = evaluate(instance, t, x, instance->z + k * count);
-        if (status == STATUS_OK) {
-            status = model->right_hand_side(instance->memory.values, t, x, u, dx);
-        }
-        for (size_t i = 0; i < count_of(model->states); i++) {
-            x[i] += slope_time * dx[i];
-        }
-    }
-    return status;
-}
-
 /* Where impacts follow each other ever faster, an event that leaves the state beyond its limit is
  * followed by a flight that ends before it. No further event would come. */
 static enum status refuse_unseen_events(struct instance *instance, const bool triggered[]) {
     const size_t count = instance->model->events->indicator_count;
-    if (instance->model->events->errors == NULL || look_ahead(instance) != STATUS_OK) {
+    if (instance->model->events->errors == NULL || look_ahead(instance, 3) != STATUS_OK) {
         return STATUS_OK;
     }
     const double *z = instance->z;
