@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 
 from equations.c_code import indented, number
-from equations.c_placement import Path, cost, guarded, paths, stripped
+from equations.c_placement import Path, costs_inside, guarded, paths, stripped
 from equations.c_values import RELATION, Conditions
 from equations.graph import CONDITIONS, DERIVATIVES, LEAVES, Value
 from rparm.expressions.tree import in_order
@@ -117,11 +117,7 @@ class Blocks:
 
     def _block_values(self) -> dict[Value, None]:
         """Choices with calculations in a branch; the others are `?:`."""
-        inside: Counter[tuple[Path, Value]] = Counter()
-        for value in self.order:
-            path = self.paths[value]
-            for i in range(len(path)):
-                inside[path[:i], path[i][0]] += cost(value)
+        inside = costs_inside(self.order, self.paths)
         return {
             value: None for value in self.order
             if value.op == "if" and inside[self.paths[value], value.arguments[0]] > MOST_CHOSEN
@@ -301,10 +297,10 @@ class Blocks:
                 continue
             seen.add(value)
             if len(self.paths[value]) > len(path):
-                todo += [a for a in value.arguments[::-1]]
+                todo += value.arguments[::-1]
             elif self.paths[value] == path and value not in members and self._is_constant(value):
                 if value.op in CONDITIONS:
-                    todo += [a for a in value.arguments[::-1]]
+                    todo += value.arguments[::-1]
                 else:
                     found.append(value)
         return found

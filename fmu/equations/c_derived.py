@@ -58,7 +58,7 @@ class Derived:
 
     def text(self, wanted: Iterable[Wanted], header: str) -> str:
         """Text of the C file; header: what it includes, with the prototypes."""
-        parts = [self._one(w) for w in wanted]
+        parts = [Function(self, each).text() for each in wanted]
         own = [path.name for path in self.program.files]
         lines = [
             "/* Derived from equations in plain C by the build: change those, not this file.",
@@ -73,9 +73,6 @@ class Derived:
             "#include <stddef.h>",
         ]
         return "\n".join([*lines, "", "\n\n".join(parts), ""])
-
-    def _one(self, wanted: Wanted) -> str:
-        return Function(self, wanted).text()
 
 
 class Function:

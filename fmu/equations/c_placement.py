@@ -8,7 +8,7 @@ own.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from equations.c_values import Conditions, Known
@@ -101,6 +101,26 @@ def common(first: Path, second: Path) -> Path:
     return first[:length]
 
 
+def known_on(path: Path, conditions: Conditions) -> Known:
+    """What is known in a branch."""
+    known = Known()
+    for condition, holds in path:
+        known = conditions.assume(condition, holds, known) or known
+    return known
+
+
+def costs_inside(
+    values: Iterable[Value], places: Mapping[Value, Path]
+) -> Counter[tuple[Path, Value]]:
+    """Cost of both branches of each condition, by where it stands."""
+    found: Counter[tuple[Path, Value]] = Counter()
+    for value in values:
+        path = places[value]
+        for i in range(len(path)):
+            found[path[:i], path[i][0]] += cost(value)
+    return found
+
+
 def guarded(
     targets: Mapping[str, Value], conditions: Conditions
 ) -> tuple[dict[str, Value], dict[Value, Value]]:
@@ -125,9 +145,7 @@ def settled(
     for value in in_order(targets.values()):
         now = _with(value, [found[a] for a in value.arguments], conditions)
         if value.op == "if" and places[value]:
-            known = Known()
-            for condition, holds in places[value]:
-                known = conditions.assume(condition, holds, known) or known
+            known = known_on(places[value], conditions)
             choice = conditions.resolve(value.arguments[0], known)
             if choice.op == "number":
                 now = now.arguments[1 if choice.number else 2]
@@ -187,18 +205,11 @@ class Guards:
         """Conditions that are stronger than where the uses are, and worth a branch."""
         found: dict[Value, Value] = {}
         costs: Counter[tuple[Path, Value]] = Counter()
-        inside: Counter[tuple[Path, Value]] = Counter()
-        for value in self.order:
-            path = self.paths[value]
-            for i in range(len(path)):
-                inside[path[:i], path[i][0]] += cost(value)
+        inside = costs_inside(self.order, self.paths)
         for value in self.order:
             if cost(value) == 0 and value.op != "if":
                 continue
-            known = Known()
-            for condition, holds in self.paths[value]:
-                known = self.conditions.assume(condition, holds, known) or known
-            guard = self._condition(self.needs[value], known)
+            guard = self._condition(self.needs[value], known_on(self.paths[value], self.conditions))
             has_it = value.op == "if" and value.arguments[0] in (guard, self.conditions.no(guard))
             if guard.op != "number" and not has_it:
                 found[value] = guard
