@@ -5,8 +5,8 @@
 #include "rp_controller_law.h"
 #include "rp_controller_model.h"
 
-/* Writes them from the parameters, inputs and states; in the sampled form efforts are those of a
- * sample, which do not move. */
+/* Writes them from the parameters, inputs and states; in the sampled form efforts belong to a
+ * sample and do not move. */
 static inline void rp_controller_calculate(struct rp_controller_values *values) {
     const struct rp_controller_parameters *p = &values->parameters;
     const struct rp_controller_inputs *inputs = &values->inputs;

@@ -1,5 +1,5 @@
-/* The equations of the notes, (1)-(15): kinematics and the Euler-Lagrange formulation. Equation
- * numbers, frames and symbols are those of rp_manipulator.h. A comment that begins with a number
+/* The equations of the notes, (1)-(15): kinematics and the Euler-Lagrange formulation. See
+ * rp_manipulator.h for equation numbers, frames and symbols. A comment that begins with a number
  * stands above this equation of the notes. */
 #ifndef RP_EQUATIONS_H
 #define RP_EQUATIONS_H

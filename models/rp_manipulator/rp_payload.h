@@ -11,9 +11,9 @@ struct payload {
     real z;       /* m: the same, along z2 (the slide) */
 };
 
-/* Makes link 2 and the payload one rigid body, in dynamics and energies: m2, a, l1 and I2z become
- * those of both, by their common center of mass and the parallel axes through it. offset (m): the
- * center of mass of both, from that of link 2. */
+/* Makes link 2 and the payload one rigid body, in dynamics and energies: m2, a, l1 and I2z then
+ * describe both, by their common center of mass and the parallel axes through it. offset (m): from
+ * the center of mass of link 2 to the common one. */
 static inline void arm_attach(struct arm *arm, const struct payload *payload, real offset[2]) {
     const real mass = arm->m2 + payload->mass;
     const real share = payload->mass / mass;
