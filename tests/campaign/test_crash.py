@@ -10,9 +10,9 @@ import pytest
 from rparm.campaign import cluster, engine
 from tests.campaign.files import ARM, campaign, write
 from tests.campaign.runners import engine_of, rows, runner
-from tests.support.paths import ROOT
+from tests.support.paths import FMI_HEADERS, ROOT
 from tests.support.rparm_project import FMUS, Console, declared
-from tests.support.ssp_files import HEADERS, edited
+from tests.support.ssp_files import edited
 
 CHANGES = [
     ("sobol", "grid"),
@@ -33,7 +33,7 @@ def crashing(tmp_path: Path) -> Path:
         own.write_bytes(archive.read(name))
     reference = declared("rp_manipulator").variables["m2"].reference
     flags = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", f"-DM2={reference}"]
-    flags += ["-isystem", str(HEADERS), "-L", str(tmp_path), "-Wl,-rpath,$ORIGIN"]
+    flags += ["-isystem", str(FMI_HEADERS), "-L", str(tmp_path), "-Wl,-rpath,$ORIGIN"]
     source = ROOT / "tests" / "campaign" / "crashing.c"
     subprocess.run(["gcc", *flags, source, "-l:own.so", "-o", library], check=True)
     change = {name: lambda _: library.read_bytes()}

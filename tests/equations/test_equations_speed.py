@@ -11,7 +11,7 @@ import pytest
 
 from tests.equations.examples import METHODS, build
 from tests.support.missing import missing
-from tests.support.paths import ROOT
+from tests.support.paths import FMI_HEADERS, ROOT
 
 MOST = {"cvode_bdf": 1.03, "erk": 1.03, "taylor": 1.10}
 SOURCE = Path(__file__).with_name("steps.c")
@@ -24,8 +24,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if shutil.which("valgrind") is None:
         missing("valgrind: ./setup.sh --platforms")
     folder = tmp_path_factory.mktemp("speed")
-    headers = Path(fmpy.__file__).parent / "c-code"
-    command = ["cc", f"-I{headers}", SOURCE, "-o", folder / "steps", "-ldl", "-lm"]
+    command = ["cc", f"-I{FMI_HEADERS}", SOURCE, "-o", folder / "steps", "-ldl", "-lm"]
     subprocess.run(command, check=True)
     build(copy(ROOT / "tests" / "equations" / "arm.toml", folder), folder)
     return folder

@@ -26,6 +26,17 @@ from tests.equations.hybrid_runs import (
 COUNT = int(os.environ.get("HYBRID_MODELS", "15"))
 G = 9.81
 EACH_METHOD = pytest.mark.parametrize("method", METHODS)
+EACH_KIND = pytest.mark.parametrize("kind", [*METHODS, "model_exchange"])
+
+
+def run_of(
+    unit: Unit, kind: str, step: float, count: int,
+    inputs: dict[str, Polynomial] | None = None, tolerance: float = 1e-8,
+) -> Run:  # fmt: skip
+    """A run by a method in Co-Simulation, or in Model Exchange."""
+    if kind == "model_exchange":
+        return model_exchange(unit, tolerance, step, count, inputs or {})
+    return co_simulation(unit, kind, tolerance, step, count, inputs or {})
 
 
 def test_random_models_follow_the_event_loop() -> None:
@@ -82,10 +93,7 @@ def test_a_ball_does_not_fall_through_a_rising_floor(
 ) -> None:
     """Above the floor it flies with the same speed after each impact."""
     rising, inputs = unit(RISING.format(floor=floor)), {"f": Polynomial(0.0, 0.1, 0.0)}
-    if kind == "model_exchange":
-        run = model_exchange(rising, 1e-8, step, round(3 / step), inputs)
-    else:
-        run = co_simulation(rising, kind, 1e-8, step, round(3 / step), inputs)
+    run = run_of(rising, kind, step, round(3 / step), inputs)
     speed = np.sqrt(0.1**2 + 2 * G)
     impacts = [(speed - 0.1) / G + 2 * speed / G * k for k in range(3)]
     assert impacts == pytest.approx([0.4414, 1.3447, 2.2480], abs=1e-4)
@@ -225,15 +233,12 @@ class Sine(Polynomial):
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-2])
-@pytest.mark.parametrize("kind", [*METHODS, "model_exchange"])
+@EACH_KIND
 def test_an_input_that_moves_makes_an_event_a_period(
     unit: Callable, kind: str, size: float
 ) -> None:
     inputs = {"f": Sine(size, 0.0, 0.0)}
-    if kind == "model_exchange":
-        run = model_exchange(unit(INPUT), 1e-5, 0.01, 500, inputs)
-    else:
-        run = co_simulation(unit(INPUT), kind, 1e-5, 0.01, 500, inputs)
+    run = run_of(unit(INPUT), kind, 0.01, 500, inputs, 1e-5)
     assert not run.failure
     assert run.x[-1][1] == 5.0
 
@@ -255,13 +260,6 @@ while = "positive"
 reinit = {{ n = "n + 1"{reinit} }}
 set = {{ positive = "not positive" }}
 """
-EACH_KIND = pytest.mark.parametrize("kind", [*METHODS, "model_exchange"])
-
-
-def run_of(unit: Unit, kind: str, step: float, count: int) -> Run:
-    if kind == "model_exchange":
-        return model_exchange(unit, 1e-8, step, count, {})
-    return co_simulation(unit, kind, 1e-8, step, count, {})
 
 
 @pytest.mark.parametrize("step", [0.01, 0.003])

@@ -11,19 +11,13 @@ import numpy as np
 import pytest
 
 import rparm
-from tests.support.paths import ROOT
+from tests.support.paths import FMI_HEADERS, ROOT
 
 EXAMPLES = ROOT / "examples"
 # warnings of the project's own build, without those for code of GNU
 STRICT = ("-std=c11", "-D_GNU_SOURCE", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror")
 SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 PNG = b"\x89PNG"
-
-
-def headers() -> Path:
-    import fmpy
-
-    return Path(fmpy.__file__).parent / "c-code"
 
 
 def run(*command: object, **options: object) -> subprocess.CompletedProcess[str]:
@@ -39,7 +33,7 @@ def importer(request: pytest.FixtureRequest, fmu: Path, tmp_path_factory) -> tup
     version, folder = request.param, tmp_path_factory.mktemp("importer")
     program = folder / "importer"
     source = EXAMPLES / f"fmi{version}_importer.c"
-    command = ("cc", *STRICT, *SANITIZED, "-I", headers(), source, "-o", program, "-ldl", "-lm")
+    command = ("cc", *STRICT, *SANITIZED, "-I", FMI_HEADERS, source, "-o", program, "-ldl", "-lm")
     run(*command, check=True)
     archive = fmu if version == 2 else fmu.parent / "fmi3" / fmu.name
     with zipfile.ZipFile(archive) as opened:

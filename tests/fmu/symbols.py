@@ -5,7 +5,7 @@ import re
 import subprocess
 from pathlib import Path
 
-import fmpy
+from tests.support.paths import FMI_HEADERS
 
 COUNTS = {"fmi2": 44, "fmi3": 75}
 
@@ -20,7 +20,7 @@ def listed(*arguments: object, tools: str = "") -> set[str]:
 
 def standard(version: str) -> set[str]:
     """Functions of "fmi2" or "fmi3", by its header."""
-    header = (Path(fmpy.__file__).parent / "c-code" / f"{version}Functions.h").read_text()
+    header = (FMI_HEADERS / f"{version}Functions.h").read_text()
     names = set(re.findall(rf"{version}FullName\(({version}\w+)\)", header))
     assert len(names) == COUNTS[version]
     return names

@@ -20,7 +20,7 @@ from tests.fmu.symbols import libm, listed, standard
 from tests.rp_manipulator.random_motions import random_case, simulate
 from tests.support.instances import Instance, LoadedFmu
 from tests.support.missing import missing
-from tests.support.paths import EVERY, FOLDERS, ROOT
+from tests.support.paths import EVERY, FMI_HEADERS, FOLDERS, ROOT
 from tests.support.rparm_project import load
 
 TAYLOR = {"RPManipulator"}  # compared with the Taylor method, too
@@ -194,7 +194,7 @@ def compiled(compiler: str, options: tuple[str, ...], files: list[Path], folder:
     """Compile files to objects in the folder, in two processes."""
     if not shutil.which(compiler):
         missing(f"{compiler} is not installed: ./setup.sh --platforms installs it")
-    command = [compiler, *options, f"-I{Path(fmpy.__file__).parent / 'c-code'}", "-c"]
+    command = [compiler, *options, f"-I{FMI_HEADERS}", "-c"]
     with ThreadPoolExecutor(2) as executor:
         halves = [executor.submit(run, *command, *files[i::2], folder=folder) for i in (0, 1)]
         for half in halves:

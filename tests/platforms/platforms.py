@@ -16,7 +16,7 @@ from pathlib import Path
 from tests.equations.examples import build
 from tests.platforms.scripts import Model, Script, read_model
 from tests.support.missing import missing
-from tests.support.paths import EXAMPLES, ROOT
+from tests.support.paths import EXAMPLES, FMI_HEADERS, ROOT
 
 BUILD = ROOT / "build"
 NATIVE_HOST = (
@@ -131,10 +131,6 @@ def compiler_of(row: Platform) -> list[str]:
     raise Missing(f"zig or {row.compiler}, for the host of {row.name}: ./setup.sh --platforms")
 
 
-def headers_of_fmi() -> str:
-    return str(Path(importlib.util.find_spec("fmpy").origin).parent / "c-code")
-
-
 @functools.cache
 def host_of(row: Platform) -> Path:
     """The host for a platform, compiled if it is older than its sources."""
@@ -146,7 +142,7 @@ def host_of(row: Platform) -> Path:
         return host
     host.parent.mkdir(parents=True, exist_ok=True)
     # -O3 and -s as for the release: zig has the C library for these options
-    command += ["-std=c17", "-O3", "-s", "-isystem", headers_of_fmi(), "-o", str(host)]
+    command += ["-std=c17", "-O3", "-s", "-isystem", str(FMI_HEADERS), "-o", str(host)]
     command += ["-I", str(ROOT / "fmu" / "fmi2")]  # fmi2_functions.h
     command += [str(sources / name) for name in HOST_SOURCES]
     if row.system == "Linux":
@@ -226,7 +222,7 @@ class Runner:
         sources = self.folder / "sources"
         files = sorted(path.name for path in sources.glob("*.c"))
         position = [] if row.system == "Windows" else ["-fPIC"]
-        finish([row.compiler, *position, f"-I{headers_of_fmi()}", "-c", *files], sources)
+        finish([row.compiler, *position, f"-I{FMI_HEADERS}", "-c", *files], sources)
         objects = [path.name for path in sorted(sources.glob("*.o"))]
         (self.folder / self.library).unlink()
         finish([row.compiler, "-shared", "-o", f"../{self.library}", *objects], sources)

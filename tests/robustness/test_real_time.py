@@ -8,10 +8,10 @@ import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
-import fmpy
 import pytest
 
 from tests.support.missing import missing
+from tests.support.paths import FMI_HEADERS
 from tests.support.rparm_project import BUILD
 
 STEPS = os.environ.get("REAL_TIME_STEPS", "100000")
@@ -51,7 +51,7 @@ def counting(tmp_path_factory: pytest.TempPathFactory) -> Path:
         opened.extractall(folder, names)
     library = folder / "RPPlant.so"
     options = ["-O3", "-ffp-contract=off", "-fPIC", "-shared", "-w", "-fsanitize-coverage=trace-pc"]
-    options.append(f"-I{Path(fmpy.__file__).parent / 'c-code'}")
+    options.append(f"-I{FMI_HEADERS}")
     output("gcc", *options, "-o", library, *sorted((folder / "sources").glob("*.c")), "-lm")
     return library
 

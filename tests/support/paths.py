@@ -1,9 +1,11 @@
 """Where the project is, and all FMUs and systems of its CMakeLists.txt: tests of one are of all."""
 
+import importlib.util
 import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+FMI_HEADERS = Path(importlib.util.find_spec("fmpy").origin).parent / "c-code"
 
 _TEXT = (ROOT / "CMakeLists.txt").read_text()
 _FMU = re.compile(

@@ -7,14 +7,12 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
-import fmpy
 import numpy as np
 
-from tests.support.paths import ROOT
+from tests.support.paths import FMI_HEADERS, ROOT
 
 SSP = ROOT / "build" / "ClosedLoop.ssp"
 MACHINE = ROOT / "build" / "Machine.ssp"
-HEADERS = Path(fmpy.__file__).parent / "c-code"
 # what an SSP may leave out
 SETS = r"<ssd:ParameterBindings>.*?</ssd:ParameterBindings>"
 EXPERIMENT = r"<ssd:DefaultExperiment.*</ssd:DefaultExperiment>"
@@ -83,6 +81,6 @@ def not_a_number(reference: int, steps: int, folder: Path) -> Edit:
     """Edit that puts tests/support/not_a_number.c in the place of an FMU's shared object."""
     library = folder / f"not_a_number_{reference}_{steps}.so"
     command = ["gcc", "-std=c17", "-shared", "-fPIC", f"-DBROKEN={reference}", f"-DSTEPS={steps}"]
-    command += ["-I", str(HEADERS), "-o", str(library)]
+    command += ["-I", str(FMI_HEADERS), "-o", str(library)]
     subprocess.run([*command, str(Path(__file__).with_name("not_a_number.c"))], check=True)
     return lambda _: library.read_bytes()

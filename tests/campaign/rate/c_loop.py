@@ -4,12 +4,11 @@ import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 
-import fmpy
 import numpy as np
 
 from rparm.campaign.job import Job
 from rparm.fmi.fmu_file import Fmu
-from tests.support.paths import ROOT
+from tests.support.paths import FMI_HEADERS, ROOT
 
 KINDS = {"Real": "reals", "Integer": "integers", "Enumeration": "integers", "Boolean": "booleans"}
 
@@ -33,12 +32,11 @@ class CLoop:
         self._read = job.columns - len(job.reals.names)  # what is watched, among the outputs
         self._outputs = sum(len(c.reals.outputs) for c in job.components)
         (folder / "work.h").write_text(_header(job, fmus, points), encoding="utf-8")
-        headers = Path(fmpy.__file__).parent / "c-code"
         source = ROOT / "tests" / "campaign" / "rate" / "c_loop.c"
         flags = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Wno-unused-parameter", "-Werror"]
         flags.append(f"-I{folder}")
         libraries = ["-lm", "-ldl", "-lpthread"]
-        command = ["gcc", *flags, "-isystem", headers, source, "-o", self._program, *libraries]
+        command = ["gcc", *flags, "-isystem", FMI_HEADERS, source, "-o", self._program, *libraries]
         subprocess.run(list(map(str, command)), check=True)
 
     def run(self, runs: int, threads: int) -> tuple[float, float]:

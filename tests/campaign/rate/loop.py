@@ -16,7 +16,6 @@ from ctypes import CDLL, Structure, addressof, c_int64, c_void_p
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import fmpy
 import numpy as np
 
 from rparm.campaign import campaign_file
@@ -24,7 +23,7 @@ from rparm.campaign.runs import Runner
 from rparm.fmi.compiled.loop import Wires
 from tests.campaign.rate.works import WORKS
 from tests.campaign.runners import runner
-from tests.support.paths import ROOT
+from tests.support.paths import FMI_HEADERS, ROOT
 
 
 class _Wires(Structure):
@@ -46,13 +45,12 @@ def _as_c(wires: Wires) -> _Wires:
 
 def compiled(folder: Path) -> CDLL:
     """The loop in C."""
-    headers = Path(fmpy.__file__).parent / "c-code"
     library = folder / "c_runner.so"
     source = ROOT / "tests" / "campaign" / "rate" / "c_runner.c"
     flags = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Wno-unused-parameter", "-Werror"]
     flags += ["-shared", "-fPIC"]
     subprocess.run(
-        ["gcc", *flags, "-isystem", str(headers), str(source), "-o", str(library)], check=True
+        ["gcc", *flags, "-isystem", str(FMI_HEADERS), str(source), "-o", str(library)], check=True
     )
     return CDLL(str(library))
 
