@@ -345,7 +345,8 @@ static void check_integration(void) {
     for (size_t j = 0; j < count; j++) {
         union point column;
         memset(&column, 0, sizeof column);
-        ((double *)((char *)&column + model->states.offset))[j] = 1.0;
+        const double one = 1.0;
+        memcpy((char *)&column + model->states.offset + j * sizeof one, &one, sizeof one);
         ASSERT_OK(model->propagate(&at, now, 0.0, &column, NULL));
         const double *rate =
             (const double *)(const void *)((const char *)&column + model->derivatives.offset);
