@@ -15,7 +15,7 @@ HEAD = '''\
 # Python
 
 Made from the docstrings by `build/venv/bin/python -m docs.python_api`.
-[How to install](../fmu/release.md#the-wheel) the package.
+[How to install](release.md#the-wheel) the package.
 
 The plant falls for two seconds while a torque holds it back:
 

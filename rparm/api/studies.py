@@ -30,7 +30,7 @@ def linearize(
     without: Sequence[str] = (),
     fmi: int = 2,
 ) -> "Linear":
-    """The linear model of an FMU or a system at a point; rparm/linearization/README.md explains.
+    """The linear model of an FMU or a system at a point; docs/linear-models.md explains.
 
     Parameters
     ----------

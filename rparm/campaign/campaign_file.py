@@ -1,6 +1,6 @@
 """Campaign files: what to run, over which parameters, and what to keep, read from TOML.
 
-README.md beside this module explains the format. Here a file is checked by itself; what it says of
+docs/campaigns.md explains the format. Here a file is checked by itself; what it says of
 a model or system is checked by `rparm.campaign.planning`.
 """
 

@@ -51,5 +51,5 @@ def test_the_workflow_may_only_read() -> None:
 
 
 def test_it_is_said_that_the_workflow_has_not_run() -> None:
-    page = (ROOT / "fmu" / "release.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "release.md").read_text(encoding="utf-8")
     assert re.search(r"`\.github/workflows/release\.yml` .*has not run yet", page, re.DOTALL)

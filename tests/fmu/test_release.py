@@ -18,7 +18,7 @@ from tests.support.paths import NAMES, ROOT, SYSTEMS
 
 BELOW = {"fmi2": "", "fmi3": "fmi3/"}  # folder of the archives of a version of FMI
 # bytes of an FMU, by version, and of the wheel: what the page says
-SIZES = re.findall(r"less than ([\d.]+) MB", (ROOT / "fmu" / "release.md").read_text())
+SIZES = re.findall(r"less than ([\d.]+) MB", (ROOT / "docs" / "release.md").read_text())
 LARGEST = dict(zip(("fmi2", "fmi3", "wheel"), (1e6 * float(x) for x in SIZES), strict=True))
 
 # what the loader of each platform has

@@ -2,7 +2,7 @@
 
     build/venv/bin/python -m tests.identification.coverage 200
 
-prints the table of rparm/identification/README.md; exit code 1 if a bound is missed.
+prints the table of docs/identification.md; exit code 1 if a bound is missed.
 """
 
 import argparse
