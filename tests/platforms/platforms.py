@@ -3,9 +3,9 @@ what runs it here."""
 
 import functools
 import importlib.util
+import json
 import os
 import platform
-import re
 import shutil
 import subprocess
 import sys
@@ -123,8 +123,9 @@ def emulator_of(row: Platform) -> tuple[str, ...]:
 
 def compiler_of(row: Platform) -> list[str]:
     if importlib.util.find_spec("ziglang") is not None:
-        toolchain = ROOT / "cmake" / "toolchains" / f"zig-{row.preset}.cmake"
-        target = re.search(r"\(ZIG_TARGET (\S+)\)", toolchain.read_text()).group(1)
+        presets = json.loads((ROOT / "CMakePresets.json").read_text())["configurePresets"]
+        (preset,) = (each for each in presets if each["name"] == row.preset)
+        target = preset["cacheVariables"]["ZIG_TARGET"]
         return [sys.executable, "-m", "ziglang", "cc", "-target", target]
     if shutil.which(row.compiler) is not None:
         return [row.compiler]
