@@ -2,7 +2,7 @@
 # Sets up, builds and runs the tests, all by ctest.
 #
 #   ./test.sh               optimized, C and Python, and C with gcc's sanitizers
-#   ./test.sh --all         then what takes long, clang, threads, fuzzing, analysers, mutants, other platforms, other importers, browsers
+#   ./test.sh --all         then slow tests, clang, threads, fuzzing, analysers, mutants, other platforms, other importers, browsers
 #   ./test.sh --long        all, then the long campaigns, an hour and a half, with a table of their figures
 #   ./test.sh ARGUMENTS     optimized only; of all tests those that ctest chooses by ARGUMENTS: ./test.sh -R instance
 #

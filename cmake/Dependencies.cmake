@@ -7,7 +7,7 @@ if(POLICY CMP0135)
 endif()
 
 # find_sources(NAME FILE f URL url SHA256 hash): the folder of foreign sources with the file f, as
-# NAME_SOURCE_DIR: one that is given, build/deps/name, or what lies at the URL.
+# NAME_SOURCE_DIR: a folder that is given, else build/deps/name, else fetched from the URL.
 function(find_sources name)
   cmake_parse_arguments(ARG "" "FILE;URL;SHA256" "" ${ARGN})
   string(TOLOWER ${name} folder)
@@ -34,7 +34,7 @@ find_sources(MUSL FILE src/math/sincos.c
 include(ElementaryFunctions)
 include(Sundials)
 
-# The environment that setup.sh makes, or any Python that has what requirements/run.txt lists.
+# The environment that setup.sh makes, or any Python with the packages of requirements/run.txt.
 if(NOT Python3_EXECUTABLE AND EXISTS ${PROJECT_SOURCE_DIR}/build/venv/bin/python)
   set(Python3_EXECUTABLE ${PROJECT_SOURCE_DIR}/build/venv/bin/python)
 endif()

@@ -1,9 +1,9 @@
-# Target elementary_functions: sin, cos and what else the project and SUNDIALS call of libm, from musl's
+# Target elementary_functions: sin, cos and all other functions of libm that the project and SUNDIALS call, from musl's
 # sources, so that results do not depend on the libm of the platform. FMUs link no other: a function that
 # is not in the list below is missing when they are linked. Objects that use it find it first by its
 # standard name; no symbol is exported.
 
-option(OWN_LIBM "Compile musl's elementary functions into the FMUs; OFF: they call those of the system" ON)
+option(OWN_LIBM "Compile musl's elementary functions into the FMUs; OFF: they call the system's" ON)
 
 if(NOT OWN_LIBM)
   add_library(elementary_functions INTERFACE)

@@ -48,7 +48,7 @@ set(warning_options -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wmissing-pro
 # Of sources that are not the project's own: they are taken as they are, and not all of them is used.
 set(foreign_options -w $<$<C_COMPILER_ID:GNU>:-fno-analyzer>)
 
-# No path in what is delivered: two builds in two folders are the same.
+# Paths of the build do not appear in the binaries: two builds in two folders are the same.
 set(reproducible_options
   $<$<CONFIG:Release>:-ffile-prefix-map=${PROJECT_BINARY_DIR}=build>
   $<$<CONFIG:Release>:-ffile-prefix-map=${PROJECT_SOURCE_DIR}=.>)
@@ -59,7 +59,7 @@ set(hardening_options
   $<$<CONFIG:Release>:-U_FORTIFY_SOURCE>
   $<$<CONFIG:Release>:-D_FORTIFY_SOURCE=2>)
 
-# ---- The shared object in an FMU: it leaves out what is not used, names all that it needs, and is read-only
+# ---- The shared object in an FMU: unused sections are left out, undefined symbols are errors, and it is read-only
 # where it can be. What it exports is marked in the FMI header.
 
 list(APPEND language_options -ffunction-sections -fdata-sections)

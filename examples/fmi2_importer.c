@@ -18,7 +18,7 @@
 
 enum { M2 = 2, Q1 = 10, Q2 = 11, TAU1 = 20, F2 = 21 }; /* value references, of the model's page */
 
-/* The functions that are called; their types are those of fmi2FunctionTypes.h. */
+/* Functions that are called; fmi2FunctionTypes.h has their types. */
 static struct {
     fmi2InstantiateTYPE *instantiate;
     fmi2SetupExperimentTYPE *setup_experiment;
@@ -31,8 +31,8 @@ static struct {
     fmi2FreeInstanceTYPE *free_instance;
 } fmu;
 
-static void fail(const char *what) {
-    fprintf(stderr, "fmi2_importer: %s\n", what);
+static void fail(const char *reason) {
+    fprintf(stderr, "fmi2_importer: %s\n", reason);
     exit(EXIT_FAILURE);
 }
 

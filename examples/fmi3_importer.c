@@ -17,7 +17,7 @@
 
 enum { M2 = 2, Q1 = 10, Q2 = 11, TAU1 = 20, F2 = 21 }; /* value references, of the model's page */
 
-/* The functions that are called; their types are those of fmi3FunctionTypes.h. */
+/* Functions that are called; fmi3FunctionTypes.h has their types. */
 static struct {
     fmi3InstantiateCoSimulationTYPE *instantiate;
     fmi3EnterInitializationModeTYPE *enter_initialization_mode;
@@ -29,8 +29,8 @@ static struct {
     fmi3FreeInstanceTYPE *free_instance;
 } fmu;
 
-static void fail(const char *what) {
-    fprintf(stderr, "fmi3_importer: %s\n", what);
+static void fail(const char *reason) {
+    fprintf(stderr, "fmi3_importer: %s\n", reason);
     exit(EXIT_FAILURE);
 }
 

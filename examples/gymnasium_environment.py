@@ -44,7 +44,7 @@ class ArmEnvironment(gymnasium.Env):
         return state, float(reward), False, self.steps >= STEPS, {}
 
 
-if __name__ == "__main__":  # three episodes of a PD controller: what learning has to beat
+if __name__ == "__main__":  # three episodes of a PD controller, the baseline for learning
     environment = ArmEnvironment()
     for seed in range(3):
         states, ended = [environment.reset(seed=seed)[0]], False

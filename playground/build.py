@@ -48,7 +48,7 @@ def joined(paths: tuple[Path, ...]) -> str:
 
 
 def notices(licenses: list[str]) -> str:
-    """Licenses of what is in the modules, each NAME=FILE."""
+    """Return the licenses of the code in the modules, each given as NAME=FILE."""
     texts = []
     for name, _, path in (entry.partition("=") for entry in licenses):
         texts.append(

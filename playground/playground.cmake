@@ -6,7 +6,7 @@ set(page ${PROJECT_BINARY_DIR}/playground/index.html)
 
 if(NOT CAN_RELEASE)
   add_custom_target(playground
-    COMMAND ${CMAKE_COMMAND} -E echo "The playground needs what a release needs: ./setup.sh --release"
+    COMMAND ${CMAKE_COMMAND} -E echo "The playground needs the tools of a release: ./setup.sh --release"
     COMMAND ${CMAKE_COMMAND} -E false VERBATIM)
   return()
 endif()

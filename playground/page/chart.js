@@ -48,7 +48,7 @@ class Chart {
     return list;
   }
 
-  /** Add the values at `time` (s), unless the last ones are as new; drop what lies after it. */
+  /** Add the values at `time` (s), unless there are values at this time already; drop later ones. */
   add(time) {
     while (this.rows.length && this.rows.at(-1)[0] > time) this.rows.pop();
     if (this.rows.length && time - this.rows.at(-1)[0] < Chart.INTERVAL) return;

@@ -64,7 +64,7 @@ class Controls {
     row.append(slider, field);
     const show = () => {
       const value = read();
-      // what was typed has more digits than are shown
+      // the text that was typed may have more digits than are shown
       if (document.activeElement !== field || field.valueAsNumber !== value) {
         field.value = String(Number(value.toPrecision(6)));
       }
@@ -103,7 +103,7 @@ class Controls {
     this.refreshers.push(() => { choice.value = read(); });
   }
 
-  /** Show what the FMUs have: after they were reset or restored. */
+  /** Show the FMUs' values after a reset or a restore. */
   refresh() {
     for (const refresh of this.refreshers) refresh();
   }

@@ -13,7 +13,7 @@ class FmuError extends Error {
 class Fmu {
   static CO_SIMULATION = 1;
   static WARNING = 1; // the worst fmi2Status of a call that succeeded
-  // what the C library of an FMU asks its host for: there are no files, and there is one thread
+  // functions that the C library of an FMU imports: there are no files and one thread
   static NO_FILE = 8;
   static SYSTEM = {
     fd_close: () => Fmu.NO_FILE,
@@ -22,7 +22,7 @@ class Fmu {
     fd_write: () => Fmu.NO_FILE,
     sched_yield: () => 0,
   };
-  // a module that exports what it imports, a function of six int32: as such it fits into the table
+  // a module that exports the function of six int32 that it imports: only functions of modules fit into the table
   // of an FMU, where functions of JavaScript have no place
   static LOGGER = new Uint8Array([
     0, 0x61, 0x73, 0x6d, 1, 0, 0, 0,

@@ -133,7 +133,7 @@ class Playground {
     });
   }
 
-  // ---- what the user does
+  // ---- actions of the user
 
   play(isRunning) {
     this.isRunning = isRunning;
@@ -148,12 +148,12 @@ class Playground {
     this.#arrive();
   }
 
-  /** Set a variable of an FMU; where that is refused, show what the FMU says. */
+  /** Set a variable of an FMU, or show why the FMU refuses it. */
   change(name, variable, value) {
     this.#attempt(variable, value, () => this.simulation.change(name, variable.name, value));
   }
 
-  /** Do what gives a variable this value; where an FMU refuses it, show what the FMU says. */
+  /** Call a function that gives a variable this value, or show why the FMU refuses it. */
   #attempt(variable, value, act) {
     try {
       act();

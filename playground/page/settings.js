@@ -1,11 +1,11 @@
 'use strict';
 
-/** What the playground starts with and what it has sliders for. Names and units are the FMUs'. */
+/** Start values and sliders. Names and units are the FMUs'. */
 const Settings = {
   /** In all scenes: erk, the method for inputs that change in each step. */
   common: {plant: {solver_method: 3}, controller: {solver_method: 3}},
 
-  /** Scenes: what else differs from the start values of the FMUs, by FMU. */
+  /** Scenes: further values that differ from the start values, by FMU. */
   scenes: {
     'Friction and stops': {
       plant: {

@@ -14,7 +14,7 @@ class Simulation {
   /** @param {Fmu} plant @param {Fmu} controller */
   constructor(plant, controller) {
     this.fmus = {plant, controller};
-    this.scene = ''; // name of what it was started with
+    this.scene = ''; // name of the scene that it started with
     this.run = Symbol(); // another one after each start
     this.motion = plant.reals(['q1', 'q2', 'dq1', 'dq2']);
     this.tip = plant.reals(['ee_x', 'ee_y', 'ee_vx', 'ee_vy']);
@@ -170,7 +170,7 @@ class Simulation {
 
   // ---- states
 
-  /** The state of both FMUs and what the user set; `free` it when it is not needed. */
+  /** Return the state of both FMUs and the user's settings; `free` it later. */
   save() {
     const states = Object.fromEntries(
       Object.entries(this.fmus).map(([name, fmu]) => [name, fmu.saveState()]));

@@ -5,7 +5,7 @@ class Stage {
   static PUSH = 20; // N, of an arrow key
   static PATH = 300; // points
   static GRIP = 70; // px from the end effector within which it can be taken
-  static SLIDE = [-0.5, 0.5]; // m, what is seen at least where joint 2 has no stops
+  static SLIDE = [-0.5, 0.5]; // m, least range in view where joint 2 has no stops
   static KEYS = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]};
 
   /** @param {HTMLCanvasElement} canvas @param {Simulation} simulation */
@@ -30,7 +30,7 @@ class Stage {
     return Object.fromEntries(names.map(name => [name, style.getPropertyValue(`--${name}`).trim()]));
   }
 
-  // ---- what is drawn
+  // ---- drawing
 
   /** Geometry of the arm by the plant's parameters, as Arm takes it. */
   arm() {
@@ -66,7 +66,7 @@ class Stage {
     return Math.hypot(Math.max(...along.map(Math.abs)), a);
   }
 
-  /** Choose the view for a reach in m; what the pointer holds stays below it. */
+  /** Choose the view for a reach in m; the point under the pointer stays there. */
   #choose(reach) {
     const {g, stops} = this.geometry;
     this.reach = reach;

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # clang_tidy.sh SOURCE BUILD --checks=CHANGES PATTERN ...: checks the C files below SOURCE that BUILD
-# compiles and that match a pattern (of grep). CHANGES are those of the checks in .clang-tidy.
+# compiles and that match a pattern (of grep). CHANGES apply to the checks of .clang-tidy.
 # Version 14: others know other checks. Needs a built tree, for the generated headers.
 set -euo pipefail
 source=$(realpath "$1")

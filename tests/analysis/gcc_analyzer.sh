@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# gcc_analyzer.sh SOURCE BUILD: compiles what goes into the FMUs with gcc -fanalyzer; a finding is
+# gcc_analyzer.sh SOURCE BUILD: compiles the FMUs' sources with gcc -fanalyzer; a finding is
 # an error, as any warning.
 set -euo pipefail
 cd "$1"
