@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
 
-from atomic_write import atomic_write
 from cyclonedx.model import ExternalReference, ExternalReferenceType, HashAlgorithm, HashType, XsUri
 from cyclonedx.model.bom import Bom
 from cyclonedx.model.component import Component, ComponentType
@@ -21,8 +20,7 @@ from cyclonedx.output.json import JsonV1Dot6
 from cyclonedx.spdx import is_supported_id
 from cyclonedx.validation.json import JsonStrictValidator
 from packageurl import PackageURL
-from program import program
-from provenance import license_texts
+from program import atomic_write, license_texts, program
 
 CHECKSUMS = "SHA256SUMS"
 BILL = "sbom.cdx.json"

@@ -18,8 +18,7 @@ import tarfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from atomic_write import atomic_write
-from program import program
+from program import atomic_write, program
 from source_code import SourceFolder, manifest
 
 

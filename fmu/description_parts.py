@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 
 from declaration.load import Declaration
 from declaration.schema import Boolean, Enumeration, Experiment, Unit, Variable
-from provenance import Provenance
+from program import Provenance
 
 LOG_CATEGORIES = {
     "logEvents": "Events, for example initialization and reset",

@@ -19,14 +19,13 @@ from itertools import chain, pairwise
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from atomic_write import atomic_write
 from jinja2 import Environment, FileSystemLoader
 from latex_to_mathml import FormulaError, mathml
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 from mdit_py_plugins.anchors import anchors_plugin
 from mdit_py_plugins.dollarmath import dollarmath_plugin
-from program import WrongInputError, program, read_text
+from program import WrongInputError, atomic_write, program, read_text
 
 STYLE_SHEET = Path(__file__).with_suffix(".css")
 TEMPLATE = Path(__file__).with_suffix(".html")

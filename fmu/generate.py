@@ -10,15 +10,12 @@ import os
 import sys
 from pathlib import Path
 
-from atomic_write import atomic_write
 from declaration.c_tables import value_references, variable_table
 from declaration.load import Declaration, load
 from fmi2.model_description import model_description as fmi2_description
-from fmi3.build_description import build_description
+from fmi3.model_description import build_description, terminals_and_icons
 from fmi3.model_description import model_description as fmi3_description
-from fmi3.terminals import terminals_and_icons
-from program import program
-from provenance import Provenance, build_date, license_texts
+from program import Provenance, atomic_write, build_date, license_texts, program
 
 
 def write_if_changed(path: Path, text: str) -> None:

@@ -114,8 +114,7 @@ function(add_fmu name)
 
   # tables and model descriptions, again whenever a declaration changes
   file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/declaration/*.toml ${FMU_SOURCE_DIR}/fmi*/*.py)
-  list(APPEND generator ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/provenance.py
-                        ${FMU_SOURCE_DIR}/description_parts.py ${FMU_SOURCE_DIR}/atomic_write.py ${FMU_SOURCE_DIR}/program.py)
+  list(APPEND generator ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/description_parts.py ${FMU_SOURCE_DIR}/program.py)
   set(generate ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${variables}
                --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE)
   file(GLOB declarations CONFIGURE_DEPENDS
@@ -150,7 +149,7 @@ function(add_fmu name)
             --readme ${readme} ${derivation} --model-description ${out}/modelDescription.xml
             --output ${out}/documentation
     DEPENDS ${FMU_SOURCE_DIR}/document.py ${FMU_SOURCE_DIR}/document.css ${FMU_SOURCE_DIR}/document.html
-            ${FMU_SOURCE_DIR}/latex_to_mathml.py ${FMU_SOURCE_DIR}/atomic_write.py ${FMU_SOURCE_DIR}/program.py
+            ${FMU_SOURCE_DIR}/latex_to_mathml.py ${FMU_SOURCE_DIR}/program.py
             ${readme} ${derivation} ${pictures} ${out}/modelDescription.xml
     COMMENT "Writing the documentation of ${name}"
     VERBATIM)
@@ -191,7 +190,7 @@ function(add_fmu name)
       documentation/licenses/sundials.txt=${SUNDIALS_LICENSE}
       $<$<BOOL:${OWN_LIBM}>:documentation/licenses/musl.txt=${MUSL_LICENSE}>)
   set(files ${out}/documentation/index.html ${out}/terminalsAndIcons.xml ${references} ${icon} ${PROJECT_SOURCE_DIR}/LICENSE
-            ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/atomic_write.py ${FMU_SOURCE_DIR}/program.py)
+            ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/program.py)
 
   foreach(version IN LISTS ARG_VERSIONS)
     set(target ${name}${${version}_suffix})

@@ -9,8 +9,7 @@ import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from atomic_write import atomic_write
-from program import program
+from program import atomic_write, program
 
 FIXED_DATE = (1980, 1, 1, 0, 0, 0)
 UNIX = 3

@@ -16,11 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from atomic_write import atomic_write
 from declaration.load import Declaration, load
 from declaration.schema import Boolean, Enumeration, Float64, Variable
 from description_parts import document
-from program import WrongInputError, program
+from program import WrongInputError, atomic_write, program
 
 MANIFEST = "fmi-ls-manifest.xml"
 NAME = "org.fmi-standard.fmi-ls-ref"

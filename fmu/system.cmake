@@ -6,7 +6,7 @@
 function(add_ssp name)
   cmake_parse_arguments(ARG "" "FOLDER" "FMUS" ${ARGN})
   set(folder ${PROJECT_SOURCE_DIR}/${ARG_FOLDER})
-  set(files ${folder}/SystemStructure.ssd ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/atomic_write.py ${FMU_SOURCE_DIR}/program.py)
+  set(files ${folder}/SystemStructure.ssd ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/program.py)
   set(entries SystemStructure.ssd=${folder}/SystemStructure.ssd)
   file(GLOB parameter_sets CONFIGURE_DEPENDS ${folder}/resources/*.ssv)
   foreach(file ${parameter_sets})

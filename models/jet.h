@@ -10,7 +10,7 @@
 #ifndef JET_H
 #define JET_H
 
-#include "series.h"
+#include "model.h"
 
 #include <math.h>
 

@@ -14,9 +14,9 @@ from document import document
 from equations import declaration, lock
 from equations.model_file import ModelFile
 from fmi2.model_description import model_description as fmi2_description
-from fmi3.terminals import terminals_and_icons
+from fmi3.model_description import terminals_and_icons
 from generate import release_files
-from provenance import Provenance
+from program import Provenance
 from source_code import Library, collect, write
 
 from building.runtime import Runtime

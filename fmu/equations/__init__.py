@@ -6,7 +6,6 @@ A module imports only from lines above its own:
     model_file    the graph of a file, which equations_file reads
     c_code        a graph as statements in C
     errors        by how much values in C may be wrong
-    guards        when a relation matters
     c_series      the Taylor series of the states
     c_events      modes and events
     c_model       equations.h and equations.c: a struct model (src/model/model.h)

@@ -1,16 +1,20 @@
-"""The events of a model in C (src/model/events.h).
+"""The events of a model in C (src/model/model.h).
 
 Each relation has a mode: whether it holds. Its indicator is its distance with the sign of that
 mode, and 1 while no value that is needed reads it. An event of the file fires when its relation
 comes to hold in its modes. What all models do with that is in src/model/relations.c.
 """
 
+from collections.abc import Iterable
+
 from equations_file.tables import Event, ModelFile
 
 from equations.c_code import Code, Leaves, filled, indented, text
 from equations.errors import NONE, Errors
-from equations.graph import MOVING, Relation, Value
-from equations.guards import guards
+from equations.graph import MOVING, Graph, Relation, Value, is_unknown
+from rparm.expressions.tree import in_order
+
+Guards = dict[Value, Value | None]  # conditions; None: always
 
 FIELD = "v_{}"
 MODE = "m_{}"
@@ -51,7 +55,7 @@ class Events:
         for event in file.events:
             during = event.during and event.during.value
             read += [(event.when.value, during), *([(during, None)] if during else [])]
-        used = guards(graph, read)
+        used = _guards(graph, read)
         # condition under which each matters; None: always
         self.used = {r.name: used.get(r.mode, graph.number(0.0)) for r in self.relations}
         self.located = graph.located
@@ -198,3 +202,47 @@ class Events:
                 return f"relations_state_indicator({place}, {holds}, {factor}, {offset}, {rate})"
         limit = code.of(relation.limit or zero)
         return f"(struct indicator){{.kind = INDICATOR_OF_MODEL, .offset = fabs({limit})}}"
+
+
+def _guards(graph: Graph, roots: Iterable[tuple[Value, Value | None]]) -> Guards:
+    """Return, for each mode that is read, under which modes and parameters it is.
+
+    roots: values that are needed, each with its condition.
+    """
+    found: Guards = {}
+    modes: dict[Value, list[Value]] = {}  # by the distance that they follow from
+    for relation in graph.relations.values():
+        modes.setdefault(relation.distance, []).append(relation.mode)
+    for value, guard in roots:
+        _widen(graph, found, value, guard)
+    for value in reversed(in_order([*modes, *found])):  # each before what it reads
+        for mode in modes.get(value, []):
+            if mode in found:
+                _widen(graph, found, value, found[mode])
+        if value not in found:
+            continue
+        conditions = [found[value]] * len(value.arguments)
+        if value.op == "if" and not is_unknown(value):
+            condition = value.arguments[0]
+            for i, chosen in enumerate((condition, graph.value("not", condition)), 1):
+                own = found[value]
+                conditions[i] = _both(graph, own, chosen)
+        if value.op in ("and", "or"):  # the second one decides where the first one does not
+            first = value.arguments[0]
+            open_ = first if value.op == "and" else graph.value("not", first)
+            conditions[1] = _both(graph, found[value], open_)
+        for argument, guard in zip(value.arguments, conditions, strict=True):
+            _widen(graph, found, argument, guard)
+    return {value: guard for value, guard in found.items() if value.op == "mode"}
+
+
+def _both(graph: Graph, guard: Value | None, condition: Value) -> Value:
+    return condition if guard is None else graph.value("and", guard, condition)
+
+
+def _widen(graph: Graph, found: Guards, value: Value, guard: Value | None) -> None:
+    """Let a value matter under this condition, too."""
+    if value not in found:
+        found[value] = guard
+    elif found[value] is not None and found[value] is not guard:
+        found[value] = None if guard is None else graph.value("or", found[value], guard)

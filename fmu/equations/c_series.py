@@ -1,4 +1,4 @@
-"""The Taylor series of the states in C (src/model/series.h).
+"""The Taylor series of the states in C (src/model/model.h).
 
 Each value that moves has its coefficients; products, quotients and functions have sums over those
 of lower orders, which one loop adds up for all of them. A function y of x has

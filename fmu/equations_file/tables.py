@@ -22,7 +22,7 @@ from rparm.expressions.units import ANGLE, BASE, exponents
 LARGEST = 10**6  # bytes
 MOST_VARIABLES = 1000
 LONGEST_TEXT = 1000  # characters of a description
-LONGEST_MESSAGE = 500  # bytes: src/instance/state/settings.c has no room for more
+LONGEST_MESSAGE = 500  # bytes: src/instance/settings.c has no room for more
 NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,99}", re.ASCII)
 # files that Windows cannot have, with any suffix
 DEVICE = re.compile("(?i:con|prn|aux|nul|com[1-9]|lpt[1-9])")

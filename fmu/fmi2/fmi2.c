@@ -1,15 +1,66 @@
-/* The functions that Model Exchange and Co-Simulation share (FMI 2.0, section 2.1): checks of
- * arguments that only FMI has, conversion of types and status, and nothing else. */
-#include "fmi2_component.h"
-#include "fmu_state.h"
+/* All functions of FMI 2.0: checks of arguments that only FMI has, conversion of types and status,
+ * and nothing else. */
+#include "component.h"
+#include "fmi2Functions.h"
+#include "fmi2_functions.h"
 #include "model_description.h"
-#include "modes.h"
-#include "variable_access.h"
+#include "shared_calls.h"
+#include "stepping.h"
 
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* ---- Rules of calls -------------------------------------------------------------------------- */
+
+#define FMI2_CALL_CODE(name, kinds, states) CALL_fmi2##name,
+enum fmi2_call { FMI2_FUNCTION_LIST(FMI2_CALL_CODE) FMI2_CALL_COUNT };
+#undef FMI2_CALL_CODE
+
+#define INSTANTIATED    STATE_INSTANTIATED
+#define INITIALIZATION  STATE_INITIALIZATION
+#define TERMINATED      STATE_TERMINATED
+#define ERROR_STATE     STATE_ERROR
+#define STEP_COMPLETE   STATE_STEP_COMPLETE
+#define STEP_FAILED     STATE_STEP_FAILED
+#define EVENT           STATE_EVENT
+#define CONTINUOUS_TIME STATE_CONTINUOUS_TIME
+#define ANY_STATE                                                                                  \
+    (INSTANTIATED | INITIALIZATION | TERMINATED | ERROR_STATE | STEP_COMPLETE | STEP_FAILED |      \
+     EVENT | CONTINUOUS_TIME)
+
+#define MODEL_EXCHANGE KIND_MODEL_EXCHANGE
+#define CO_SIMULATION  KIND_CO_SIMULATION
+#define ANY_KIND       (MODEL_EXCHANGE | CO_SIMULATION)
+
+#define FMI2_CALL_RULE(name, kinds, states) [CALL_fmi2##name] = {"fmi2" #name, kinds, states},
+static const struct call_rule fmi2_call_rules[FMI2_CALL_COUNT] = {
+    FMI2_FUNCTION_LIST(FMI2_CALL_RULE)};
+
+/* ---- Component ------------------------------------------------------------------------------- */
+
+/* The structure that an fmi2Component points to. */
+struct fmi2_component {
+    struct component base;     /* first */
+    fmi2CallbackLogger logger; /* NULL: no log */
+    fmi2ComponentEnvironment environment;
+    char name[];
+};
+
+_Static_assert((int)COMPONENT_OK == fmi2OK && (int)COMPONENT_WARNING == fmi2Warning &&
+                   (int)COMPONENT_DISCARD == fmi2Discard && (int)COMPONENT_ERROR == fmi2Error &&
+                   (int)COMPONENT_FATAL == fmi2Fatal,
+               "a component_status is converted by a cast");
+
+static inline fmi2Status fmi2_status(enum component_status status) {
+    return (fmi2Status)status;
+}
+
+static inline fmi2Status fmi2_result(struct component *component, enum status status) {
+    return fmi2_status(component_result(component, status));
+}
 
 /* ---- Versions, life and logging -------------------------------------------------------------- */
 
@@ -150,7 +201,7 @@ fmi2Status fmi2Reset(fmi2Component c) {
     return fmi2_status(mode_reset(c, CALL_fmi2Reset));
 }
 
-/* ---- Values --------------------------------------------------------------------------------- */
+/* ---- Values ---------------------------------------------------------------------------------- */
 
 #define ACCESS(Verb, verb, Type, type, element)                                                    \
     fmi2Status fmi2##Verb##Type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,        \
@@ -174,7 +225,7 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     return fmi2_status(access_none(c, CALL_fmi2SetString, "String", vr, nvr, value));
 }
 
-/* ---- FMU state ------------------------------------------------------------------------------ */
+/* ---- FMU state ------------------------------------------------------------------------------- */
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
     return fmi2_status(fmu_state_save(c, CALL_fmi2GetFMUstate, FMUstate));
@@ -213,4 +264,166 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
     return fmi2_status(access_get_directional_derivative(c, CALL_fmi2GetDirectionalDerivative,
                                                          vUnknown_ref, nUnknown, vKnown_ref, nKnown,
                                                          dvKnown, dvUnknown));
+}
+
+/* ---- Model Exchange: modes (section 3.2) ----------------------------------------------------- */
+
+fmi2Status fmi2EnterEventMode(fmi2Component c) {
+    return fmi2_status(mode_enter_event(c, CALL_fmi2EnterEventMode));
+}
+
+fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo) {
+    const enum fmi2_call call = CALL_fmi2NewDiscreteStates;
+    struct component *component = c;
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, 1, fmi2eventInfo, fmi2eventInfo)) {
+        return fmi2Error;
+    }
+    struct discrete_update update;
+    const enum component_status status = mode_update_discrete_states(component, &update);
+    const bool has_next_time = isfinite(update.next_time);
+    *fmi2eventInfo = (fmi2EventInfo){
+        .newDiscreteStatesNeeded = update.is_incomplete ? fmi2True : fmi2False,
+        .terminateSimulation = fmi2False,
+        .nominalsOfContinuousStatesChanged = fmi2False,
+        .valuesOfContinuousStatesChanged = update.states_changed ? fmi2True : fmi2False,
+        .nextEventTimeDefined = has_next_time ? fmi2True : fmi2False,
+        .nextEventTime = has_next_time ? update.next_time : 0.0,
+    };
+    return fmi2_status(status);
+}
+
+fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
+    return fmi2_status(mode_enter_continuous_time(c, CALL_fmi2EnterContinuousTimeMode));
+}
+
+fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
+                                       fmi2Boolean noSetFMUStatePriorToCurrentPoint,
+                                       fmi2Boolean *enterEventMode,
+                                       fmi2Boolean *terminateSimulation) {
+    bool is_event = false;
+    const enum component_status status = continuous_complete_step(
+        c, CALL_fmi2CompletedIntegratorStep, enterEventMode, terminateSimulation, &is_event);
+    if (status == COMPONENT_OK) {
+        *enterEventMode = is_event;
+        *terminateSimulation = fmi2False;
+    }
+    return fmi2_status(status);
+}
+
+/* ---- Model Exchange: time and states --------------------------------------------------------- */
+
+fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
+    return fmi2_status(continuous_set_time(c, CALL_fmi2SetTime, time));
+}
+
+fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx) {
+    return fmi2_status(continuous_set_states(c, CALL_fmi2SetContinuousStates, x, nx));
+}
+
+fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx) {
+    return fmi2_status(continuous_get_derivatives(c, CALL_fmi2GetDerivatives, derivatives, nx));
+}
+
+fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni) {
+    return fmi2_status(
+        continuous_get_indicators(c, CALL_fmi2GetEventIndicators, eventIndicators, ni));
+}
+
+fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx) {
+    return fmi2_status(continuous_get_states(c, CALL_fmi2GetContinuousStates, x, nx));
+}
+
+fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx) {
+    return fmi2_status(
+        continuous_get_nominals(c, CALL_fmi2GetNominalsOfContinuousStates, x_nominal, nx));
+}
+
+/* ---- Co-Simulation: derivatives of inputs and outputs (section 4.2) -------------------------- */
+
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                       const fmi2Integer order[], const fmi2Real value[]) {
+    return fmi2_status(
+        access_set_input_derivatives(c, CALL_fmi2SetRealInputDerivatives, vr, nvr, order, value));
+}
+
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                        const fmi2Integer order[], fmi2Real value[]) {
+    return fmi2_status(
+        access_get_output_derivatives(c, CALL_fmi2GetRealOutputDerivatives, vr, nvr, order, value));
+}
+
+/* ---- Co-Simulation: steps -------------------------------------------------------------------- */
+
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
+                      fmi2Real communicationStepSize,
+                      fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
+    // importers say true, and roll back nevertheless
+    struct component *component = c;
+    if (!component_enter(component, CALL_fmi2DoStep)) {
+        return fmi2Error;
+    }
+    const enum status status =
+        instance_do_step(component->instance, currentCommunicationPoint, communicationStepSize);
+    if (status_severity(status) == SEVERITY_DISCARD) {
+        component->state = STATE_STEP_FAILED;
+    }
+    return fmi2_result(component, status);
+}
+
+fmi2Status fmi2CancelStep(fmi2Component c) {
+    // no state allows it: no step is ever pending
+    return component_enter(c, CALL_fmi2CancelStep) ? fmi2OK : fmi2Error;
+}
+
+/* ---- Co-Simulation: status ------------------------------------------------------------------- */
+
+static bool may_ask(struct component *component, enum fmi2_call call, const void *value) {
+    return component_enter(component, call) &&
+           component_has_arrays(component, call, 1, value, value);
+}
+
+static fmi2Status no_status(struct component *component, enum fmi2_call call, const void *value) {
+    if (!may_ask(component, call, value)) {
+        return fmi2Error;
+    }
+    component_log(component, COMPONENT_DISCARD, LOG_STATUS_DISCARD,
+                  "%s: this status cannot be known, no step is ever pending",
+                  fmi2_call_rules[call].name);
+    return fmi2Discard;
+}
+
+fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value) {
+    return no_status(c, CALL_fmi2GetStatus, value);
+}
+
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value) {
+    struct component *component = c;
+    if (s != fmi2LastSuccessfulTime) {
+        return no_status(component, CALL_fmi2GetRealStatus, value);
+    }
+    if (!may_ask(component, CALL_fmi2GetRealStatus, value)) {
+        return fmi2Error;
+    }
+    *value = instance_time(component->instance);
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Integer *value) {
+    return no_status(c, CALL_fmi2GetIntegerStatus, value);
+}
+
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value) {
+    if (s != fmi2Terminated) {
+        return no_status(c, CALL_fmi2GetBooleanStatus, value);
+    }
+    if (!may_ask(c, CALL_fmi2GetBooleanStatus, value)) {
+        return fmi2Error;
+    }
+    *value = fmi2False; // the FMU never ends a simulation by itself
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String *value) {
+    return no_status(c, CALL_fmi2GetStringStatus, value);
 }

@@ -6,7 +6,7 @@
 #ifndef FMI2_FUNCTIONS_H
 #define FMI2_FUNCTIONS_H
 
-/* X(name, kinds, states), by the names of fmi2_calls.c */
+/* X(name, kinds, states), by the names of fmi2.c */
 #define FMI2_FUNCTION_LIST(X)                                                                      \
     X(GetTypesPlatform, ANY_KIND, ANY_STATE)                                                       \
     X(GetVersion, ANY_KIND, ANY_STATE)                                                             \

@@ -17,7 +17,7 @@ from description_parts import (
     type_name,
     value_attributes,
 )
-from provenance import Provenance
+from program import Provenance
 
 TYPES = {
     "float64": "Real",

@@ -1,10 +1,10 @@
-/* The functions that Model Exchange and Co-Simulation share (FMI 3.0, section 2.3), but for values:
- * checks of arguments that only FMI has, conversion of types and status, and nothing else. */
-#include "fmi3_component.h"
-#include "fmu_state.h"
+/* All supported functions of FMI 3.0: checks of arguments that only FMI has, conversion of types
+ * and status, and nothing else. */
+#include "continuous_states.h"
+#include "fmi3_calls.h"
 #include "model_description.h"
-#include "modes.h"
-#include "variable_access.h"
+#include "shared_calls.h"
+#include "stepping.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -53,16 +53,67 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, siz
     return fmi3_status(component_set_logging(component, loggingOn, nCategories, categories));
 }
 
-fmi3Status fmi3_unsupported(fmi3Instance instance, enum fmi3_call call, const char *reason) {
-    struct component *component = instance;
-    if (!component_enter(component, call)) {
-        return fmi3Error;
-    }
-    return fmi3_status(
-        component_fail(component, "%s is not supported: %s", fmi3_call_rules[call].name, reason));
+/* ---- Intermediate updates -------------------------------------------------------------------- */
+
+/* What the importer has asked for. */
+struct answer {
+    fmi3Boolean returns_early;
+    fmi3Float64 early_time;
+};
+
+/* Calls the importer in intermediate update mode; an error there ends the step. */
+static enum status update(struct fmi3_component *component, double time, bool can_return_early,
+                          struct answer *answer) {
+    struct component *base = &component->base;
+    *answer = (struct answer){.returns_early = fmi3False, .early_time = time};
+    base->state = STATE_INTERMEDIATE_UPDATE;
+    base->has_failed_inside = false;
+    component->update(component->environment, time, component->can_set, component->can_get,
+                      component->can_get, can_return_early, &answer->returns_early,
+                      &answer->early_time);
+    base->state = STATE_STEP_COMPLETE;
+    return base->has_failed_inside ? STATUS_INVALID_ARGUMENT : STATUS_OK;
 }
 
-/* ---- Life ----------------------------------------------------------------------------------- */
+/* Before the step: the importer sets the inputs at this time. */
+static enum status ask_inputs(void *component_pointer, double time) {
+    struct fmi3_component *component = component_pointer;
+    struct answer answer;
+    component->can_set = true;
+    component->can_get = false;
+    return update(component, time, false, &answer);
+}
+
+/* After an internal step: the importer gets outputs, and may ask for the end of the step. */
+static enum status accept(void *component_pointer, double time, double *end) {
+    struct fmi3_component *component = component_pointer;
+    const bool can_return_early = component->early_return_allowed && time < *end;
+    struct answer answer;
+    component->can_set = false;
+    component->can_get = true;
+    const enum status status = update(component, time, can_return_early, &answer);
+    if (can_return_early && answer.returns_early && answer.early_time < *end) {
+        *end = answer.early_time;
+    }
+    return status;
+}
+
+/* Prepares steps with these settings. Allocates the snapshot for undoing a step, since steps
+ * allocate nothing. */
+static enum status prepare_steps(struct fmi3_component *component) {
+    component->options.context = component;
+    if (component->early_return_allowed) {
+        const bool handles_events = component->base.kind == KIND_CO_SIMULATION_WITH_EVENTS;
+        component->options.at_event = handles_events ? EVENTS_LEFT : EVENTS_END;
+    }
+    if (component->update != NULL) {
+        component->options.ask_inputs = component->asks_inputs ? ask_inputs : NULL;
+        component->options.accept = accept;
+    }
+    return instance_save(component->base.instance, 0, &component->options.undo);
+}
+
+/* ---- Life ------------------------------------------------------------------------------------ */
 
 /* Where texts go while there is no instance. */
 struct receiver {
@@ -174,7 +225,7 @@ fmi3Instance fmi3InstantiateCoSimulation(
     created->early_return_allowed = earlyReturnAllowed;
     if (!note_intermediate(created, requiredIntermediateVariables,
                            nRequiredIntermediateVariables) ||
-        fmi3_prepare_steps(created) != STATUS_OK) {
+        prepare_steps(created) != STATUS_OK) {
         free_component(created);
         return NULL;
     }
@@ -206,7 +257,7 @@ void fmi3FreeInstance(fmi3Instance instance) {
     free_component(component);
 }
 
-/* ---- Modes ---------------------------------------------------------------------------------- */
+/* ---- Modes ----------------------------------------------------------------------------------- */
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined,
                                        fmi3Float64 tolerance, fmi3Float64 startTime,
@@ -266,7 +317,76 @@ fmi3Status fmi3Reset(fmi3Instance instance) {
     return fmi3_status(mode_reset(instance, CALL_fmi3Reset));
 }
 
-/* ---- FMU state ------------------------------------------------------------------------------ */
+/* ---- Values ---------------------------------------------------------------------------------- */
+
+/* Of one type; `access` reads or sets the values. */
+#define FUNCTION(name, element, access)                                                            \
+    fmi3Status name(fmi3Instance instance, const fmi3ValueReference valueReferences[],             \
+                    size_t nValueReferences, element values[], size_t nValues) {                   \
+        const enum fmi3_call call = CALL_##name;                                                   \
+        if (!fmi3_has_count(instance, call, nValues, nValueReferences)) {                          \
+            return fmi3Error;                                                                      \
+        }                                                                                          \
+        return fmi3_status(access);                                                                \
+    }
+
+/* Types that variables have, and their names in shared_calls.h. */
+#define OF_VARIABLES(Type, type)                                                                   \
+    FUNCTION(fmi3Get##Type, fmi3##Type,                                                            \
+             access_get_##type(instance, call, valueReferences, nValueReferences, values))         \
+    FUNCTION(fmi3Set##Type, const fmi3##Type,                                                      \
+             access_set_##type(instance, call, valueReferences, nValueReferences, values))
+OF_VARIABLES(Float64, real)
+OF_VARIABLES(Int32, int32)
+OF_VARIABLES(Int64, enumeration)
+OF_VARIABLES(Boolean, bool)
+
+/* Types that no variable has. */
+static enum component_status none(struct component *component, enum fmi3_call call, bool setting,
+                                  const char *type, const fmi3ValueReference references[],
+                                  size_t count, const void *values) {
+    return fmi3_may_access(component, call, setting, references, count)
+               ? access_none(component, call, type, references, count, values)
+               : COMPONENT_ERROR;
+}
+
+#define OF_NONE(Type)                                                                              \
+    FUNCTION(fmi3Get##Type, fmi3##Type,                                                            \
+             none(instance, call, false, #Type, valueReferences, nValueReferences, values))        \
+    FUNCTION(fmi3Set##Type, const fmi3##Type,                                                      \
+             none(instance, call, true, #Type, valueReferences, nValueReferences, values))
+OF_NONE(Float32)
+OF_NONE(Int8)
+OF_NONE(UInt8)
+OF_NONE(Int16)
+OF_NONE(UInt16)
+OF_NONE(UInt32)
+OF_NONE(UInt64)
+OF_NONE(String)
+
+fmi3Status fmi3GetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                         size_t nValueReferences, size_t valueSizes[], fmi3Binary values[],
+                         size_t nValues) {
+    const enum fmi3_call call = CALL_fmi3GetBinary;
+    if (!fmi3_has_count(instance, call, nValues, nValueReferences)) {
+        return fmi3Error;
+    }
+    return fmi3_status(
+        none(instance, call, false, "Binary", valueReferences, nValueReferences, values));
+}
+
+fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                         size_t nValueReferences, const size_t valueSizes[],
+                         const fmi3Binary values[], size_t nValues) {
+    const enum fmi3_call call = CALL_fmi3SetBinary;
+    if (!fmi3_has_count(instance, call, nValues, nValueReferences)) {
+        return fmi3Error;
+    }
+    return fmi3_status(
+        none(instance, call, true, "Binary", valueReferences, nValueReferences, values));
+}
+
+/* ---- FMU state ------------------------------------------------------------------------------- */
 
 fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
     return fmi3_status(fmu_state_save(instance, CALL_fmi3GetFMUState, FMUState));
@@ -322,4 +442,129 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
     }
     return fmi3_status(access_get_adjoint_derivative(instance, call, unknowns, nUnknowns, knowns,
                                                      nKnowns, seed, sensitivity));
+}
+
+/* ---- Co-Simulation (section 4.2) ------------------------------------------------------------- */
+
+fmi3Status fmi3EnterStepMode(fmi3Instance instance) {
+    return fmi3_status(mode_enter_step(instance, CALL_fmi3EnterStepMode));
+}
+
+fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance,
+                                    const fmi3ValueReference valueReferences[],
+                                    size_t nValueReferences, const fmi3Int32 orders[],
+                                    fmi3Float64 values[], size_t nValues) {
+    const enum fmi3_call call = CALL_fmi3GetOutputDerivatives;
+    if (!fmi3_has_count(instance, call, nValues, nValueReferences) ||
+        !fmi3_may_access(instance, call, false, valueReferences, nValueReferences)) {
+        return fmi3Error;
+    }
+    return fmi3_status(access_get_output_derivatives(instance, call, valueReferences,
+                                                     nValueReferences, orders, values));
+}
+
+fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint,
+                      fmi3Float64 communicationStepSize,
+                      fmi3Boolean noSetFMUStatePriorToCurrentPoint,
+                      fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
+                      fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
+    // importers say true, and roll back nevertheless
+    const enum fmi3_call call = CALL_fmi3DoStep;
+    struct component *base = instance;
+    if (!component_enter(base, call) ||
+        !component_has_arrays(base, call, 1, eventHandlingNeeded, terminateSimulation) ||
+        !component_has_arrays(base, call, 1, earlyReturn, lastSuccessfulTime)) {
+        return fmi3Error;
+    }
+    const struct fmi3_component *component = instance;
+    const enum status status = instance_do_step_with(base->instance, currentCommunicationPoint,
+                                                     communicationStepSize, &component->options);
+    if (status == STATUS_OK) {
+        *eventHandlingNeeded =
+            base->kind == KIND_CO_SIMULATION_WITH_EVENTS && instance_met_event(base->instance);
+        *terminateSimulation = fmi3False;
+        *lastSuccessfulTime = instance_time(base->instance);
+        *earlyReturn = *lastSuccessfulTime < currentCommunicationPoint + communicationStepSize;
+    }
+    return fmi3_status(component_result(base, status));
+}
+
+/* ---- Model Exchange: modes (section 3.2) ----------------------------------------------------- */
+
+fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance) {
+    return fmi3_status(mode_enter_continuous_time(instance, CALL_fmi3EnterContinuousTimeMode));
+}
+
+fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance,
+                                       fmi3Boolean noSetFMUStatePriorToCurrentPoint,
+                                       fmi3Boolean *enterEventMode,
+                                       fmi3Boolean *terminateSimulation) {
+    bool is_event = false;
+    const enum component_status status = continuous_complete_step(
+        instance, CALL_fmi3CompletedIntegratorStep, enterEventMode, terminateSimulation, &is_event);
+    if (status == COMPONENT_OK) {
+        *enterEventMode = is_event;
+        *terminateSimulation = fmi3False;
+    }
+    return fmi3_status(status);
+}
+
+/* ---- Model Exchange: time and states --------------------------------------------------------- */
+
+fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time) {
+    return fmi3_status(continuous_set_time(instance, CALL_fmi3SetTime, time));
+}
+
+fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 continuousStates[],
+                                   size_t nContinuousStates) {
+    return fmi3_status(continuous_set_states(instance, CALL_fmi3SetContinuousStates,
+                                             continuousStates, nContinuousStates));
+}
+
+fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuousStates[],
+                                   size_t nContinuousStates) {
+    return fmi3_status(continuous_get_states(instance, CALL_fmi3GetContinuousStates,
+                                             continuousStates, nContinuousStates));
+}
+
+fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 derivatives[],
+                                             size_t nContinuousStates) {
+    return fmi3_status(continuous_get_derivatives(instance, CALL_fmi3GetContinuousStateDerivatives,
+                                                  derivatives, nContinuousStates));
+}
+
+fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[],
+                                             size_t nContinuousStates) {
+    return fmi3_status(continuous_get_nominals(instance, CALL_fmi3GetNominalsOfContinuousStates,
+                                               nominals, nContinuousStates));
+}
+
+fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndicators[],
+                                  size_t nEventIndicators) {
+    return fmi3_status(continuous_get_indicators(instance, CALL_fmi3GetEventIndicators,
+                                                 eventIndicators, nEventIndicators));
+}
+
+/* ---- Model Exchange: numbers ----------------------------------------------------------------- */
+
+fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators) {
+    const enum fmi3_call call = CALL_fmi3GetNumberOfEventIndicators;
+    struct component *component = instance;
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, 1, nEventIndicators, nEventIndicators)) {
+        return fmi3Error;
+    }
+    *nEventIndicators = model_description.indicator_count;
+    return fmi3OK;
+}
+
+fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates) {
+    const enum fmi3_call call = CALL_fmi3GetNumberOfContinuousStates;
+    struct component *component = instance;
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, 1, nContinuousStates, nContinuousStates)) {
+        return fmi3Error;
+    }
+    *nContinuousStates = instance_state_count(component->instance);
+    return fmi3OK;
 }

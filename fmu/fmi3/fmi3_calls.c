@@ -1,5 +1,9 @@
 #include "fmi3_calls.h"
 
+#include "model_description.h"
+
+/* ---- Rules ----------------------------------------------------------------------------------- */
+
 #define INSTANTIATED        STATE_INSTANTIATED
 #define INITIALIZATION      STATE_INITIALIZATION
 #define TERMINATED          STATE_TERMINATED
@@ -18,3 +22,151 @@
 
 #define FMI3_CALL_RULE(name, kinds, states) [CALL_##name] = {#name, kinds, states},
 const struct call_rule fmi3_call_rules[FMI3_CALL_COUNT] = {FMI3_CALL_LIST(FMI3_CALL_RULE)};
+
+/* ---- Checks ---------------------------------------------------------------------------------- */
+
+bool fmi3_has_count(struct component *component, enum fmi3_call call, size_t count,
+                    size_t expected) {
+    if (component != NULL && count != expected) {
+        component_fail(component, "%s: an array has %zu values: %zu are expected",
+                       fmi3_call_rules[call].name, count, expected);
+        return false;
+    }
+    return true;
+}
+
+bool fmi3_may_access(struct component *component, unsigned call, bool setting,
+                     const fmi3ValueReference references[], size_t count) {
+    if (component == NULL || component->state != STATE_INTERMEDIATE_UPDATE) {
+        return true;
+    }
+    const struct fmi3_component *inside = (const struct fmi3_component *)component;
+    if (!(setting ? inside->can_set : inside->can_get)) {
+        component_fail(component, "%s: this intermediate update does not allow it",
+                       fmi3_call_rules[call].name);
+        return false;
+    }
+    for (size_t i = 0; references != NULL && i < count; i++) {
+        const struct variable *variable = variable_find(&model_description, references[i]);
+        if (variable == NULL || !inside->is_intermediate[variable - model_description.variables] ||
+            (setting && variable->causality != CAUSALITY_INPUT)) {
+            component_fail(component,
+                           "%s: value reference %u is refused: in an intermediate update %s that "
+                           "was named at instantiation is expected",
+                           fmi3_call_rules[call].name, references[i],
+                           setting ? "an input" : "a variable");
+            return false;
+        }
+    }
+    return true;
+}
+
+/* ---- Unsupported functions --------------------------------------------------------------------
+ * Every FMU exports them, but modelDescription.xml declares nothing that they serve: clocks,
+ * configuration mode, dependencies at run time, Scheduled Execution. */
+
+/* A call of the table that this FMU does not support: an error that says why. */
+static fmi3Status unsupported(fmi3Instance instance, enum fmi3_call call, const char *reason) {
+    struct component *component = instance;
+    if (!component_enter(component, call)) {
+        return fmi3Error;
+    }
+    return fmi3_status(
+        component_fail(component, "%s is not supported: %s", fmi3_call_rules[call].name, reason));
+}
+
+static const char no_clocks[] = "the model has no clocks";
+static const char no_structure[] = "the model has no structural parameters";
+static const char no_dependencies[] =
+    "the dependencies of variables are those in modelDescription.xml";
+
+fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                        size_t nValueReferences, fmi3Clock values[]) {
+    return unsupported(instance, CALL_fmi3GetClock, no_clocks);
+}
+
+fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                        size_t nValueReferences, const fmi3Clock values[]) {
+    return unsupported(instance, CALL_fmi3SetClock, no_clocks);
+}
+
+fmi3Status fmi3GetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                  size_t nValueReferences, fmi3Float64 intervals[],
+                                  fmi3IntervalQualifier qualifiers[]) {
+    return unsupported(instance, CALL_fmi3GetIntervalDecimal, no_clocks);
+}
+
+fmi3Status fmi3GetIntervalFraction(fmi3Instance instance,
+                                   const fmi3ValueReference valueReferences[],
+                                   size_t nValueReferences, fmi3UInt64 counters[],
+                                   fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[]) {
+    return unsupported(instance, CALL_fmi3GetIntervalFraction, no_clocks);
+}
+
+fmi3Status fmi3GetShiftDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                               size_t nValueReferences, fmi3Float64 shifts[]) {
+    return unsupported(instance, CALL_fmi3GetShiftDecimal, no_clocks);
+}
+
+fmi3Status fmi3GetShiftFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                size_t nValueReferences, fmi3UInt64 counters[],
+                                fmi3UInt64 resolutions[]) {
+    return unsupported(instance, CALL_fmi3GetShiftFraction, no_clocks);
+}
+
+fmi3Status fmi3SetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                  size_t nValueReferences, const fmi3Float64 intervals[]) {
+    return unsupported(instance, CALL_fmi3SetIntervalDecimal, no_clocks);
+}
+
+fmi3Status fmi3SetIntervalFraction(fmi3Instance instance,
+                                   const fmi3ValueReference valueReferences[],
+                                   size_t nValueReferences, const fmi3UInt64 counters[],
+                                   const fmi3UInt64 resolutions[]) {
+    return unsupported(instance, CALL_fmi3SetIntervalFraction, no_clocks);
+}
+
+fmi3Status fmi3SetShiftDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                               size_t nValueReferences, const fmi3Float64 shifts[]) {
+    return unsupported(instance, CALL_fmi3SetShiftDecimal, no_clocks);
+}
+
+fmi3Status fmi3SetShiftFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                size_t nValueReferences, const fmi3UInt64 counters[],
+                                const fmi3UInt64 resolutions[]) {
+    return unsupported(instance, CALL_fmi3SetShiftFraction, no_clocks);
+}
+
+fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference clockReference,
+                                      fmi3Float64 activationTime) {
+    return unsupported(instance, CALL_fmi3ActivateModelPartition, no_clocks);
+}
+
+/* ---- Discrete states, structure -------------------------------------------------------------- */
+
+fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance) {
+    return unsupported(instance, CALL_fmi3EvaluateDiscreteStates,
+                       "fmi3UpdateDiscreteStates does it all");
+}
+
+fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance) {
+    return unsupported(instance, CALL_fmi3EnterConfigurationMode, no_structure);
+}
+
+fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance) {
+    return unsupported(instance, CALL_fmi3ExitConfigurationMode, no_structure);
+}
+
+fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance instance,
+                                               fmi3ValueReference valueReference,
+                                               size_t *nDependencies) {
+    return unsupported(instance, CALL_fmi3GetNumberOfVariableDependencies, no_dependencies);
+}
+
+fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference dependent,
+                                       size_t elementIndicesOfDependent[],
+                                       fmi3ValueReference independents[],
+                                       size_t elementIndicesOfIndependents[],
+                                       fmi3DependencyKind dependencyKinds[], size_t nDependencies) {
+    return unsupported(instance, CALL_fmi3GetVariableDependencies, no_dependencies);
+}

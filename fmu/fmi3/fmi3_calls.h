@@ -1,5 +1,7 @@
-/* Which function of FMI 3.0 may be called in which state: sections 2.3, 3.2 (Model Exchange)
- * and 4.2 (Co-Simulation) of the specification, as data. Functions that need no instance, and
+/* Rules of the calls of FMI 3.0, and the structure that an fmi3Instance points to.
+ *
+ * The rules say which function may be called in which state: sections 2.3, 3.2 (Model Exchange) and
+ * 4.2 (Co-Simulation) of the specification, as data. Functions that need no instance, and
  * fmi3FreeInstance, are not in it. There are no structural parameters, so that no instance is ever
  * in configuration mode. Some functions answer in more states, because importers call them there:
  * those that return constants in every state, fmi3SetTime and fmi3GetOutputDerivatives in event
@@ -7,7 +9,11 @@
 #ifndef FMI3_CALLS_H
 #define FMI3_CALLS_H
 
-#include "calls.h"
+#include "component.h"
+#include "fmi3Functions.h"
+#include "stepping.h"
+
+#include <stdint.h>
 
 #define FMI3_CALL_LIST(X)                                                                          \
     X(fmi3SetDebugLogging, ANY_KIND, OUTSIDE_STEP)                                                 \
@@ -86,5 +92,42 @@ enum fmi3_call { FMI3_CALL_LIST(FMI3_CALL_CODE) FMI3_CALL_COUNT };
 #undef FMI3_CALL_CODE
 
 extern const struct call_rule fmi3_call_rules[FMI3_CALL_COUNT];
+
+/* ---- Component ------------------------------------------------------------------------------- */
+
+struct fmi3_component {
+    struct component base;         /* first */
+    fmi3LogMessageCallback logger; /* NULL: no log */
+    fmi3InstanceEnvironment environment;
+
+    /* Co-Simulation */
+    fmi3IntermediateUpdateCallback update; /* NULL: no intermediate updates */
+    bool early_return_allowed;
+    bool asks_inputs;            /* inputs are among the variables of intermediate updates */
+    bool can_set;                /* in intermediate update mode: inputs */
+    bool can_get;                /* in intermediate update mode */
+    struct step_options options; /* of every step */
+    bool is_intermediate[];      /* by row of the table of variables: it was named for intermediate
+                                    updates */
+};
+
+_Static_assert((int)COMPONENT_OK == fmi3OK && (int)COMPONENT_WARNING == fmi3Warning &&
+                   (int)COMPONENT_DISCARD == fmi3Discard && (int)COMPONENT_ERROR == fmi3Error &&
+                   (int)COMPONENT_FATAL == fmi3Fatal,
+               "a component_status is converted by a cast");
+_Static_assert(sizeof(int) == sizeof(fmi3Int32), "an fmi3Int32 is an int");
+
+static inline fmi3Status fmi3_status(enum component_status status) {
+    return (fmi3Status)status;
+}
+
+/* Whether the number of values is the one expected; if not, fails as component_fail. */
+bool fmi3_has_count(struct component *component, enum fmi3_call call, size_t count,
+                    size_t expected);
+
+/* Whether the variables may be read or set in intermediate update mode; if not, fails as
+ * component_fail. Other modes are not checked here. */
+bool fmi3_may_access(struct component *component, unsigned call, bool setting,
+                     const fmi3ValueReference references[], size_t count);
 
 #endif

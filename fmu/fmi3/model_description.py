@@ -1,11 +1,15 @@
-"""Writes modelDescription.xml of FMI 3.0 (section 2.4 of the specification)."""
+"""Writes the XML files of FMI 3.0: modelDescription.xml (section 2.4 of the specification),
+terminalsAndIcons.xml (section 2.4.9) and buildDescription.xml (section 2.5.1.4.1)."""
 
 from __future__ import annotations
 
+import struct
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from declaration.load import Declaration
-from declaration.schema import Enumeration, Float64, Unit, Variable
+from declaration.schema import Enumeration, Float64, Terminal, Unit, Variable
 from description_parts import (
     add_experiment,
     add_items,
@@ -16,7 +20,7 @@ from description_parts import (
     type_name,
     value_attributes,
 )
-from provenance import Provenance
+from program import Provenance
 
 TYPES = {
     "float64": "Float64",
@@ -24,6 +28,9 @@ TYPES = {
     "enumeration": "Enumeration",
     "boolean": "Boolean",
 }
+HALF_WIDTH = 100.0  # of the icon, in units of the coordinate system
+MM_PER_UNIT = 0.1
+PNG_START = b"\x89PNG\r\n\x1a\n"
 
 
 def model_description(declaration: Declaration, provenance: Provenance) -> str:
@@ -168,3 +175,71 @@ def add_structure(root: ET.Element, declaration: Declaration) -> None:
                     for reference in sorted(variables[known].reference for known in knowns)
                 ),
             )
+
+
+def terminals_and_icons(declaration: Declaration) -> str:
+    """Return the text of terminalsAndIcons.xml.
+
+    The icon is model.png beside the declaration, if it exists.
+    """
+    root = ET.Element("fmiTerminalsAndIcons", fmiVersion="3.0")
+    icon = declaration.path.with_name("model.png")
+    if icon.is_file():
+        add_icon(root, icon)
+    if declaration.terminals:
+        add_terminals(ET.SubElement(root, "Terminals"), declaration.terminals)
+    return document(root)
+
+
+def add_icon(root: ET.Element, icon: Path) -> None:
+    """Write GraphicalRepresentation: the icon fills the coordinate system and keeps its shape."""
+    width, height = png_size(icon)
+    half_height = HALF_WIDTH * height / width
+    box = {"x1": -HALF_WIDTH, "y1": -half_height, "x2": HALF_WIDTH, "y2": half_height}
+    corners = {key: repr(value) for key, value in box.items()}
+    graphics = ET.SubElement(root, "GraphicalRepresentation")
+    ET.SubElement(
+        graphics, "CoordinateSystem", corners, suggestedScalingFactorTo_mm=repr(MM_PER_UNIT)
+    )
+    ET.SubElement(graphics, "Icon", corners)
+
+
+def png_size(path: Path) -> tuple[int, int]:
+    head = path.read_bytes()[:24]
+    if len(head) < 24 or not head.startswith(PNG_START):
+        raise OSError(f"{path}: is not a PNG file")
+    return struct.unpack(">II", head[16:])
+
+
+def add_terminals(parent: ET.Element, terminals: Mapping[str, Terminal]) -> None:
+    """Write terminals, each with its members and the terminals in it."""
+    for name, terminal in terminals.items():
+        element = ET.SubElement(
+            parent,
+            "Terminal",
+            name=name,
+            matchingRule=terminal.rule,
+            description=terminal.description,
+        )
+        for kind, member, variable in terminal.members:
+            ET.SubElement(
+                element,
+                "TerminalMemberVariable",
+                variableName=variable,
+                memberName=member,
+                variableKind=kind,
+            )
+        add_terminals(element, terminal.terminals)
+
+
+def build_description(identifier: str, sources: Sequence[str]) -> str:
+    """Return the text of buildDescription.xml.
+
+    sources: files beside it, each compiled by itself.
+    """
+    root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
+    configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
+    files = ET.SubElement(configuration, "SourceFileSet", language="C11")
+    for name in sources:
+        ET.SubElement(files, "SourceFile", name=name)
+    return document(root)

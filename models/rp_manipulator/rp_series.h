@@ -2,8 +2,8 @@
 #ifndef RP_SERIES_H
 #define RP_SERIES_H
 
+#include "model.h"
 #include "rp_manipulator.h"
-#include "series.h"
 
 /* The states q1, q2, q1', q2', then l1 + q2, (l1 + q2) q1', sin q1, cos q1. */
 enum { RP_SERIES_ROWS = 8 };

@@ -3,7 +3,7 @@
 #ifndef RP_PLANT_MODES_H
 #define RP_PLANT_MODES_H
 
-#include "events.h"
+#include "model.h"
 #include "rp_plant_contact.h"
 #include "rp_plant_model.h"
 #include "rp_plant_rest.h"

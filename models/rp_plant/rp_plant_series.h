@@ -2,7 +2,7 @@
 #ifndef RP_PLANT_SERIES_H
 #define RP_PLANT_SERIES_H
 
-#include "series.h"
+#include "model.h"
 
 /* Of struct rp_plant_values: states q1, q2, q1', q2', inputs tau1, f2 and the wrench. */
 extern const struct series rp_plant_series;

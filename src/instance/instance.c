@@ -1,10 +1,10 @@
 #include "instance.h"
 
-#include "fields.h"
-#include "model_modes.h"
-#include "right_hand_side.h"
+#include "history.h"
+#include "modes.h"
 #include "settings.h"
 #include "snapshot.h"
+#include "state.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -8,7 +8,7 @@
 #ifndef INSTANCE_H
 #define INSTANCE_H
 
-#include "instance_types.h"
+#include "variables.h"
 
 /* Allocates all that the instance needs; steps allocate nothing. description must outlive the
  * instance, sink is copied. On failure *instance is NULL. */

@@ -10,33 +10,12 @@
 #define INTEGRATOR_H
 
 #include "ode.h"
-
-#include "message.h"
 #include "platform.h"
 
 #include <stdbool.h>
 #include <stdint.h>
 
 struct integrator;
-
-/* Every method: its code, whose number is the value of solver_method, and the struct method that
- * its file defines. A new method is a file and a line here. */
-#define INTEGRATOR_METHOD_LIST(X)                                                                  \
-    /* CVODE, multistep of orders 1 to 12, fixed-point iteration */                                \
-    X(INTEGRATOR_CVODE_ADAMS, integrator_cvode_adams)                                              \
-    /* CVODE, for stiff equations: orders 1 to 5, Newton with the Jacobian */                      \
-    X(INTEGRATOR_CVODE_BDF, integrator_cvode_bdf)                                                  \
-    /* explicit Runge-Kutta of order 5 (ARKODE's ERKStep) */                                       \
-    X(INTEGRATOR_ERK, integrator_erk)                                                              \
-    /* Taylor series of orders 5 to 25 */                                                          \
-    X(INTEGRATOR_TAYLOR, integrator_taylor)
-
-#define INTEGRATOR_METHOD_CODE(code, symbol) code,
-enum integrator_method {
-    INTEGRATOR_NO_METHOD,
-    INTEGRATOR_METHOD_LIST(INTEGRATOR_METHOD_CODE) INTEGRATOR_METHODS,
-};
-#undef INTEGRATOR_METHOD_CODE
 
 /* As in the variable solver_method. */
 const char *integrator_method_name(enum integrator_method method);
@@ -53,23 +32,6 @@ int64_t integrator_longest_history(enum integrator_method method, bool has_event
  */
 NONNULL bool integrator_is_possible(enum integrator_method method, const struct ode *ode);
 
-struct integrator_settings {
-    enum integrator_method method;
-    double relative_tolerance;         /* > 0, of every internal step */
-    const double *absolute_tolerances; /* > 0, one per state in its unit; copied */
-    double max_step;                   /* s: of internal steps; 0: no limit */
-};
-
-/* Totals since integrator_configure, and the last internal step. */
-struct integrator_statistics {
-    int64_t steps;           /* internal steps */
-    int64_t rhs_evaluations; /* calls of the right-hand side, or series begun */
-    int64_t failed_steps;    /* attempts that were refused */
-    int64_t restarts;
-    double last_step; /* s: length of the last internal step */
-    int last_order;   /* its order */
-};
-
 /* ode and sink are copied, what they point to must outlive the handle. On failure *integrator is
  * NULL. */
 MUST_CHECK NONNULL enum status integrator_create(const struct ode *ode,
@@ -85,19 +47,6 @@ void integrator_destroy(struct integrator *integrator);
 MUST_CHECK NONNULL enum status integrator_configure(struct integrator *integrator,
                                                     const struct integrator_settings *settings);
 
-/* Times in s after the restart. */
-struct integrator_start {
-    double origin;  /* time of the simulation at the restart, s: for messages only */
-    double horizon; /* > 0: the right-hand side is not evaluated beyond, nor may integrator_advance
-                    go there; INFINITY: no limit */
-    double first_step; /* what integrator_next_step gave for a solution like this one; 0: none is
-                          known */
-    bool continues; /* the solution is the one that was integrated up to here: further advances are
-                     likely */
-    const struct indicator *indicators; /* those of the ode until the next restart; they must stay.
-                                           NULL: no events are looked for */
-};
-
 /* Starts from x at time 0 with no history. */
 MUST_CHECK NONNULL enum status integrator_restart(struct integrator *integrator, const double x[],
                                                   const struct integrator_start *start);
@@ -108,10 +57,6 @@ NONNULL double integrator_next_step(const struct integrator *integrator);
 /* After an advance: where the last internal step ended, s since the restart. Up to there
  * integrator_interpolate gives states. */
 NONNULL double integrator_passed_time(const struct integrator *integrator);
-
-/* Called after each internal step that ends before the t of an advance, with the state x there
- * (t, s since the last restart). True: the advance ends there. */
-typedef bool integrator_observer(void *context, double t, const double x[]);
 
 /* Of the next advances; NULL: none. Watching changes neither states nor internal steps; a method
  * may evaluate the right-hand side more often. */

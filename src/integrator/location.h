@@ -1,13 +1,12 @@
 /* Where events are: on each finished internal step, the states are polynomials of time, and what
- * indicators follow from them is searched for roots. So neither the requested times nor the sign at
- * the end of a step decide whether an event is found. */
+ * indicators follow from them is searched for falls to 0. So neither the requested times nor the
+ * sign at the end of a step decide whether an event is found. */
 #ifndef LOCATION_H
 #define LOCATION_H
 
-#include "chebyshev.h"
 #include "ode.h"
-
 #include "platform.h"
+#include "roots.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -96,5 +95,24 @@ NONNULL void location_lead_from_restart(struct location *location);
 
 /* Writes the states at s of location->step, 0 to 1 from its begin on. */
 NONNULL void location_write_states(const struct location *location, double s, double x[]);
+
+/* ---- Falls ----------------------------------------------------------------------------------- */
+
+struct fall {
+    double error;    /* of p */
+    double touch;    /* no fall leads less far below 0 before the indicator rises again */
+    double latest;   /* s: falls behind it need not be located */
+    bool is_restart; /* p begins at a restart */
+    bool *is_armed;  /* the indicator has been above 0 since the restart; set where it rises */
+    double *noise;   /* how far from 0 it may be without having risen; grows where it is farther
+                        below 0 at the restart */
+};
+
+/* The first s in (0, 1] at which an indicator falls to 0; INFINITY: it does not, or it does behind
+ * `latest`.
+ *
+ * p represents it over the step, up to an error. A fall counts only once the indicator is armed:
+ * rounding may leave it on either side at a restart. */
+MUST_CHECK NONNULL double fall_first(const struct roots_polynomial *p, const struct fall *fall);
 
 #endif

@@ -6,7 +6,7 @@
 #ifndef TAYLOR_SERIES_H
 #define TAYLOR_SERIES_H
 
-#include "problem.h"
+#include "method.h"
 
 /* At most so many rows are on the stack where no later call reads them: there they are in a cache
  * although many instances are stepped in turn. */

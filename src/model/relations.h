@@ -6,7 +6,7 @@
 #ifndef RELATIONS_H
 #define RELATIONS_H
 
-#include "events.h"
+#include "model.h"
 
 #include <math.h>
 

@@ -1,6 +1,13 @@
-/* Result of a call. One list holds every status, what a caller can do about it, and its text. */
+/* Result of a call: one list holds every status, what a caller can do about it, and its text. And
+ * the messages that explain it, which go to one function that the owner of the instance supplies.
+ */
 #ifndef STATUS_H
 #define STATUS_H
+
+#include "platform.h"
+
+#include <stdarg.h>
+#include <stddef.h>
 
 /* Severity of a status, in rising order. */
 enum severity {
@@ -32,5 +39,23 @@ enum severity status_severity(enum status status);
 
 /* Static text, never NULL. */
 const char *status_text(enum status status);
+
+/* ---- Messages -------------------------------------------------------------------------------- */
+
+/* text: finished, one line, valid during the call only. */
+typedef void message_function(void *context, enum status status, const char *text);
+
+struct message_sink {
+    message_function *write; /* NULL: texts are dropped */
+    void *context;
+};
+
+/* vsnprintf, with numbers that look the same on every platform and have no more digits than needed:
+ * %.17g writes 0.8 and 0.30000000000000004. */
+PRINTF_FORMAT(3, 0)
+void message_format(char *text, size_t size, const char *format, va_list arguments);
+
+PRINTF_FORMAT(3, 4)
+void message_write(const struct message_sink *sink, enum status status, const char *format, ...);
 
 #endif

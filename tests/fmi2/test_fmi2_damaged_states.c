@@ -1,5 +1,5 @@
 /* Serialized FMU states that are damaged, foreign or forged are refused, or at least do no harm.
- * FMI 2.0, section 2.1.8; src/instance/snapshot/serialization.h defines the format of a serialized
+ * FMI 2.0, section 2.1.8; src/instance/serialization.h defines the format of a serialized
  * state. */
 #define _POSIX_C_SOURCE 200809L
 #include "each_method.h"
@@ -116,7 +116,7 @@ static void test_trailing_bytes_are_refused(void) {
 
 /* ---- Valid checksums ------------------------------------------------------------------------ */
 
-/* FNV-1a over all but the checksum itself: src/instance/snapshot/serialization.h. */
+/* FNV-1a over all but the checksum itself: src/instance/serialization.h. */
 static void set_checksum(struct fmu_bytes *bytes) {
     uint64_t hash = 0xcbf29ce484222325u;
     for (size_t i = 0; i < bytes->size - CHECKSUM_SIZE; i++) {

@@ -12,7 +12,7 @@ from tests.support.paths import ROOT
 sys.path.insert(0, str(ROOT / "fmu"))
 from declaration.load import DeclarationError, load  # noqa: E402
 from fmi2.model_description import model_description  # noqa: E402
-from provenance import Provenance  # noqa: E402
+from program import Provenance  # noqa: E402
 
 EXPERIMENT = "[experiment]\nstart = 0.0\nstop = 2.0\ntolerance = 1e-8\nstep = 0.001\n"
 

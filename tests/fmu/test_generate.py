@@ -264,7 +264,6 @@ def compile_table(folder: Path, model: str = "rp_manipulator") -> None:
             "src/model",
             "src/integrator",
             "src/instance",
-            "src/instance/state",
             "fmu/component",
             "models",
             f"models/{model}",

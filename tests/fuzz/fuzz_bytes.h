@@ -16,7 +16,7 @@ void fuzz_serialize(struct fuzz_instance *instance, struct fuzz_bytes *bytes);
 
 bool fuzz_are_same_bytes(const struct fuzz_bytes *one, const struct fuzz_bytes *other);
 
-/* src/instance/snapshot/serialization.h: magic, version, length and length of the GUID, the GUID,
+/* src/instance/serialization.h: magic, version, length and length of the GUID, the GUID,
  * fields of 8 bytes, FNV-1a of all that. */
 enum { FUZZ_LENGTH_AT = 12, FUZZ_FIELD = 8 };
 size_t fuzz_fields_begin(void);

@@ -28,8 +28,8 @@ from declaration.load import DeclarationError  # noqa: E402
 from declaration.load import load as load_declaration  # noqa: E402
 from fmi2.model_description import model_description  # noqa: E402
 from fmi3.model_description import model_description as fmi3_model_description  # noqa: E402
-from fmi3.terminals import terminals_and_icons  # noqa: E402
-from provenance import Provenance  # noqa: E402
+from fmi3.model_description import terminals_and_icons  # noqa: E402
+from program import Provenance  # noqa: E402
 from rparm.models.closed_loop.study import EXPERIMENT  # noqa: E402
 
 from rparm.errors import UserError  # noqa: E402

@@ -1,8 +1,8 @@
 /* The Jacobian that the implicit method gets from the model, and the evaluations it saves. */
 #include "derivatives.h"
+#include "history.h"
 #include "one_instance.h"
 #include "oscillator_by_hand.h"
-#include "right_hand_side.h"
 
 #include <float.h>
 

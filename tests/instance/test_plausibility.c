@@ -2,10 +2,10 @@
  * message. */
 #include "plausibility.h"
 
-#include "fields.h"
 #include "one_instance.h"
 #include "oscillator_by_hand.h"
 #include "settings.h"
+#include "state.h"
 
 #include <limits.h>
 

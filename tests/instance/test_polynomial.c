@@ -1,4 +1,4 @@
-#include "polynomial.h"
+#include "clock.h"
 
 #include <unity.h>
 

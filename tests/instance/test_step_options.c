@@ -1,10 +1,10 @@
 /* What a step does on its way: inputs at four times, reports of internal steps, and nothing at all
  * where it fails. With each method, on the oscillator. */
 #include "allocations.h"
+#include "clock.h"
 #include "each_method.h"
 #include "one_instance.h"
 #include "oscillator_by_hand.h"
-#include "polynomial.h"
 #include "snapshot.h"
 
 void setUp(void) {

@@ -1,5 +1,5 @@
 /* Polynomials through values of functions that are known. */
-#include "chebyshev.h"
+#include "roots.h"
 
 #include <float.h>
 #include <math.h>

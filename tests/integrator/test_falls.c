@@ -1,5 +1,5 @@
 /* Falls of an indicator: a later one need not be located where an event comes before it. */
-#include "falls.h"
+#include "location.h"
 
 #include <stdint.h>
 #include <unity.h>

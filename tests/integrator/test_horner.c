@@ -1,5 +1,5 @@
 /* Values of polynomials whose factors are known. */
-#include "horner.h"
+#include "roots.h"
 
 #include <float.h>
 #include <unity.h>

@@ -2,6 +2,7 @@
 #include "workspace.h"
 
 #include "allocator.h"
+#include "integrator.h"
 #include "method.h"
 
 #include <pthread.h>

@@ -1,4 +1,4 @@
-#include "message.h"
+#include "status.h"
 
 #include <string.h>
 #include <unity.h>

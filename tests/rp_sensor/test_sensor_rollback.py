@@ -77,7 +77,7 @@ def test_noise_does_not_depend_on_the_latency(sensor: Fmu) -> None:
 
 
 def integers(values: list[int]) -> bytes:
-    """As src/instance/snapshot/codec.h writes ints."""
+    """As src/instance/serialization.h writes ints."""
     return struct.pack(f"<{len(values)}q", *values)
 
 

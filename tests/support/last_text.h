@@ -2,7 +2,7 @@
 #ifndef LAST_TEXT_H
 #define LAST_TEXT_H
 
-#include "message.h"
+#include "status.h"
 
 extern char last_text[512];
 extern const struct message_sink last_text_sink;

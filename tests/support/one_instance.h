@@ -3,8 +3,8 @@
 #define ONE_INSTANCE_H
 
 #include "instance.h"
-#include "internals.h"
 #include "last_text.h"
+#include "state.h"
 #include "stepping.h"
 #include "values.h"
 

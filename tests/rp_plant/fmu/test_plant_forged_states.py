@@ -20,7 +20,7 @@ SLIDING_MODES = (1, -1, RELEASED)
 
 
 def field(mode: int) -> bytes:
-    """Of 8 bytes, as src/instance/snapshot/codec.h writes an int."""
+    """Of 8 bytes, as src/instance/serialization.h writes an int."""
     return struct.pack("<q", mode)
 
 

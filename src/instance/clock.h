@@ -1,0 +1,104 @@
+/* Time of an instance, kept as an unevaluated sum of two doubles, and inputs as polynomials of it.
+ * Communication points far from zero are coarse (1e-10 s apart at 1e6 s) and masters round them
+ * again at every step; with the rounding carried along, the time that is integrated is exactly the
+ * time that has passed. */
+#ifndef CLOCK_H
+#define CLOCK_H
+
+#include <float.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stddef.h>
+
+struct clock_time {
+    double s;    /* s: the time, rounded to double */
+    double rest; /* s: what the rounding left over */
+};
+
+/* Exact sum of two doubles (Knuth, The Art of Computer Programming, vol. 2, section 4.2.2). */
+static inline struct clock_time clock_two_sum(double x, double y) {
+    const double s = x + y;
+    const double y_part = s - x;
+    const double x_part = s - y_part;
+    return (struct clock_time){.s = s, .rest = (x - x_part) + (y - y_part)};
+}
+
+/* time + duration */
+static inline struct clock_time clock_add(struct clock_time time, double duration) {
+    const struct clock_time sum = clock_two_sum(time.s, duration);
+    return clock_two_sum(sum.s, sum.rest + time.rest);
+}
+
+/* later - earlier in s, rounded once. */
+static inline double clock_difference(struct clock_time later, struct clock_time earlier) {
+    const struct clock_time difference = clock_two_sum(later.s, -earlier.s);
+    return difference.s + (difference.rest + (later.rest - earlier.rest));
+}
+
+/* ---- Rounding -------------------------------------------------------------------------------
+ * In s. Times up to a given size (s, the largest magnitude among the start time and the times at
+ * hand) are computed by different ways: products, sums, decimal numbers. */
+
+/* Of doubles, at most. */
+static inline double clock_spacing(double size) {
+    return DBL_EPSILON * fabs(size);
+}
+
+/* How far two doubles may be apart that stand for one time, each after a few operations. */
+static inline double clock_rounding(double size) {
+    return 4.0 * clock_spacing(size);
+}
+
+/* How far the communication point of a master may be from the time of the instance for a step of
+ * length h > 0 to be followed: min(1e-9 max(size, h), h / 100), and never less than clock_rounding.
+ */
+double clock_slack(double size, double h);
+
+/* By how much a step adds to the drift of a master: the mismatch that was accepted at its beginning
+ * or, where the master hides it, what a sum of times is rounded by. */
+static inline double clock_step_drift(double size, double mismatch) {
+    return fmax(fabs(mismatch), 0.5 * clock_spacing(size));
+}
+
+/* How far a time event may be from the end of a step of length h > 0 to be there: the drift, summed
+ * over all steps, up to h / 100, and never less than clock_rounding. So a master that adds up its
+ * steps meets each event where it means to, and for one with exact times no event comes early. */
+double clock_tick_slack(double size, double h, double drift);
+
+/* ---- Polynomials ----------------------------------------------------------------------------
+ * An input over a step: a Taylor polynomial of degree 3 from the beginning of the step. */
+
+enum { POLYNOMIAL_DEGREE = 3 };
+
+/* d[k]: the k-th derivative at the origin, in the unit of the input over s^k. */
+struct polynomial {
+    double d[POLYNOMIAL_DEGREE + 1];
+};
+
+/* It is not constant. */
+static inline bool polynomial_moves(const struct polynomial *polynomial) {
+    const double *d = polynomial->d;
+    return fabs(d[1]) + fabs(d[2]) + fabs(d[3]) != 0.0; // with one branch
+}
+
+/* One of them is not constant. */
+static inline bool polynomials_move(const struct polynomial polynomials[], size_t count) {
+    bool found = false;
+    for (size_t i = 0; i < count; i++) {
+        found |= polynomial_moves(&polynomials[i]);
+    }
+    return found;
+}
+
+/* Value at time t (s) after the origin. */
+double polynomial_value(const struct polynomial *polynomial, double t);
+
+/* The polynomial with values[k] at k h / (POLYNOMIAL_NODES - 1), h > 0 (s). With equal values, all
+ * its derivatives are 0. */
+enum { POLYNOMIAL_NODES = POLYNOMIAL_DEGREE + 1 };
+struct polynomial polynomial_through(const double values[POLYNOMIAL_NODES], double h);
+
+/* The same polynomial with its origin moved by t (s). */
+struct polynomial polynomial_shifted(const struct polynomial *polynomial, double t);
+
+#endif

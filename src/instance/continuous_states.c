@@ -1,0 +1,141 @@
+#include "continuous_states.h"
+
+#include "modes.h"
+#include "settings.h"
+#include "state.h"
+#include "values.h"
+
+#include <math.h>
+#include <string.h>
+
+enum status instance_enter_continuous_time(struct instance *instance) {
+    const enum status status = instance_check_parameters(instance);
+    if (status == STATUS_OK) {
+        instance->state.phase = PHASE_CONTINUOUS_TIME;
+        instance_forget_unhandled(instance);
+    }
+    return status;
+}
+
+void instance_enter_event_mode(struct instance *instance) {
+    instance->state.phase = PHASE_STEPPING;
+    if (instance->is_integrated_outside) {
+        instance_note_unhandled(instance);
+    }
+}
+
+bool instance_complete_step(struct instance *instance) {
+    return instance_has_missed_event(instance);
+}
+
+static enum status update_discrete_states(struct instance *instance, bool *states_changed) {
+    if (instance->is_integrated_outside) {
+        return instance_update_at_point(instance, states_changed);
+    }
+    *states_changed = false; // continuous states are the integrator's own
+    if (instance->state.event_point == EVENT_UNHANDLED) {
+        struct event_counts none = {0};
+        return instance_handle_event(instance, &none);
+    }
+    return instance_is_unchanged(instance) ? STATUS_OK : instance_update_modes(instance, NULL);
+}
+
+enum status instance_update_discrete_states(struct instance *instance,
+                                            struct discrete_update *update) {
+    const enum status status = update_discrete_states(instance, &update->states_changed);
+    update->next_time = instance_next_time(instance);
+    update->is_incomplete =
+        instance->is_integrated_outside && update->next_time <= instance->state.time.s;
+    return status;
+}
+
+enum status instance_set_time(struct instance *instance, double time) {
+    if (!isfinite(time)) {
+        message_write(&instance->sink, STATUS_NOT_FINITE,
+                      "time %g is refused: a finite time is expected", time);
+        return STATUS_NOT_FINITE;
+    }
+    instance_set_clock(instance, (struct clock_time){.s = time});
+    return STATUS_OK;
+}
+
+size_t instance_state_count(const struct instance *instance) {
+    return count_of(instance->model->states);
+}
+
+static enum status check_count(const struct instance *instance, size_t count) {
+    if (count == instance_state_count(instance)) {
+        return STATUS_OK;
+    }
+    message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
+                  "%zu continuous states are accessed: there are %zu", count,
+                  instance_state_count(instance));
+    return STATUS_INVALID_ARGUMENT;
+}
+
+enum status instance_set_states(struct instance *instance, const double x[], size_t count) {
+    const enum status status = check_count(instance, count);
+    if (status != STATUS_OK) {
+        return status;
+    }
+    for (size_t i = 0; i < count; i++) {
+        if (!isfinite(x[i])) {
+            message_write(&instance->sink, STATUS_NOT_FINITE,
+                          "state %zu = %g is refused: a finite value is expected", i + 1, x[i]);
+            return STATUS_NOT_FINITE;
+        }
+    }
+    if (count > 0) {
+        memcpy(doubles_of(instance->memory.values, instance->model->states), x,
+               count * sizeof(double));
+    }
+    instance->outputs_are_valid = false;
+    return STATUS_OK;
+}
+
+static enum status copy_finite(const struct instance *instance, const char *what,
+                               const double from[], double to[], size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        if (!isfinite(from[i])) {
+            return instance_not_finite(instance, what);
+        }
+    }
+    if (count > 0) {
+        memcpy(to, from, count * sizeof(double));
+    }
+    return STATUS_OK;
+}
+
+enum status instance_get_states(struct instance *instance, double x[], size_t count) {
+    const enum status status = check_count(instance, count);
+    return status != STATUS_OK
+               ? status
+               : copy_finite(instance, "a state",
+                             doubles_of(instance->memory.values, instance->model->states), x,
+                             count);
+}
+
+enum status instance_get_derivatives(struct instance *instance, double dx[], size_t count) {
+    enum status status = check_count(instance, count);
+    if (status == STATUS_OK) {
+        status = instance_update_outputs(instance);
+    }
+    return status != STATUS_OK ? status
+                               : copy_finite(instance, "the derivative of a state",
+                                             doubles_of(instance_shown_values(instance),
+                                                        instance->model->derivatives),
+                                             dx, count);
+}
+
+enum status instance_get_nominals(struct instance *instance, double nominals[], size_t count) {
+    const struct range states = instance->model->states;
+    const enum status status = check_count(instance, count);
+    for (size_t i = 0; status == STATUS_OK && i < instance->description->variable_count; i++) {
+        const struct variable *variable = &instance->description->variables[i];
+        const size_t from_states = variable->offset - states.offset;
+        if (variable->owner == VARIABLE_OF_MODEL && from_states < states.size) {
+            nominals[from_states / sizeof(double)] = variable->nominal;
+        }
+    }
+    return status;
+}

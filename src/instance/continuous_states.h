@@ -1,0 +1,39 @@
+/* Integration from outside (Model Exchange): continuous time, and all states at once. */
+#ifndef CONTINUOUS_STATES_H
+#define CONTINUOUS_STATES_H
+
+#include "variables.h"
+
+/* While the time is continuous only continuous inputs may be set. */
+MUST_CHECK NONNULL enum status instance_enter_continuous_time(struct instance *instance);
+NONNULL void instance_enter_event_mode(struct instance *instance);
+
+/* The integrator outside has ended a step; true: event mode is needed. */
+MUST_CHECK NONNULL bool instance_complete_step(struct instance *instance);
+
+struct discrete_update {
+    bool states_changed; /* states integrated outside have jumped */
+    bool is_incomplete;  /* integrated outside: the next time event is not later than now */
+    double next_time;    /* s: of the next time event; INFINITY: there is none */
+};
+
+/* In event mode: updates the modes for the values set and the event at the present time. That is
+ * the one that a step has left unhandled; with integration from outside, a time event, or one where
+ * an event indicator is near 0 and falls. */
+MUST_CHECK NONNULL enum status instance_update_discrete_states(struct instance *instance,
+                                                               struct discrete_update *update);
+
+MUST_CHECK NONNULL enum status instance_set_time(struct instance *instance, double time);
+
+/* count must be instance_state_count; the arrays may be NULL where it is 0. All or nothing. */
+NONNULL size_t instance_state_count(const struct instance *instance);
+MUST_CHECK NONNULL_ARGUMENTS(1) enum status
+    instance_set_states(struct instance *instance, const double x[], size_t count);
+MUST_CHECK NONNULL_ARGUMENTS(1) enum status
+    instance_get_states(struct instance *instance, double x[], size_t count);
+MUST_CHECK NONNULL_ARGUMENTS(1) enum status
+    instance_get_derivatives(struct instance *instance, double dx[], size_t count);
+MUST_CHECK NONNULL_ARGUMENTS(1) enum status
+    instance_get_nominals(struct instance *instance, double nominals[], size_t count);
+
+#endif

@@ -1,0 +1,464 @@
+#include "modes.h"
+
+#include "settings.h"
+#include "state.h"
+
+#include <limits.h>
+#include <math.h>
+#include <string.h>
+
+double instance_next_time(const struct instance *instance) {
+    const struct model_events *events = instance->model->events;
+    return events != NULL && events->next_time != NULL ? events->next_time(instance->memory.values)
+                                                       : INFINITY;
+}
+
+bool instance_is_at_rest(const struct instance *instance) {
+    const struct model_events *events = instance->model->events;
+    return events != NULL && events->is_at_rest != NULL &&
+           events->is_at_rest(instance->memory.values);
+}
+
+const struct indicator *instance_describe_indicators(struct instance *instance) {
+    if (!instance_is_searched(instance)) {
+        return NULL;
+    }
+    instance->model->events->describe(instance->memory.restart_values, instance->indicators);
+    return instance->indicators;
+}
+
+double instance_nominal(const struct instance *instance, size_t state) {
+    const double relative = instance->state.own.effective_relative_tolerance;
+    return instance->absolute_tolerances[state] / (INSTANCE_ABSOLUTE_FRACTION * relative);
+}
+
+void instance_write_location_errors(const struct instance *instance, double errors[]) {
+    const struct range states = instance->model->states;
+    const double *x = doubles_of(instance->memory.values, states);
+    for (size_t i = 0; i < count_of(states); i++) {
+        errors[i] = 2e-10 * (instance_nominal(instance, i) + fabs(x[i]));
+    }
+}
+
+/* Error of each state at an event: what the integrator allows or, outside, twice the error of the
+ * location, since indicators fall to 0 beyond their roots. */
+static void write_tolerances(struct instance *instance) {
+    const struct range states = instance->model->states;
+    const double *x = doubles_of(instance->memory.values, states);
+    const bool is_located_outside =
+        instance->is_integrated_outside && instance->model->events->errors != NULL;
+    double *tolerances = instance->tolerances;
+    if (is_located_outside) {
+        instance_write_location_errors(instance, tolerances);
+    }
+    for (size_t i = 0; i < count_of(states); i++) {
+        const double allowed = instance->absolute_tolerances[i] +
+                               instance->state.own.effective_relative_tolerance * fabs(x[i]);
+        tolerances[i] = is_located_outside ? fmax(allowed, 2.0 * tolerances[i]) : allowed;
+    }
+}
+
+/* triggered, of struct instance, says that a time event has come. */
+static bool is_timed(const struct instance *instance, const bool *triggered) {
+    return triggered != NULL && triggered[instance->model->events->indicator_count];
+}
+
+/* Time events must not follow each other at the same time without end. */
+static enum status check_next_time(const struct instance *instance, double passed) {
+    const double next = instance_next_time(instance);
+    if (next > passed) {
+        return STATUS_OK;
+    }
+    message_write(&instance->sink, STATUS_INTERNAL,
+                  "a time event at t = %.17g is followed by one at t = %.17g", passed, next);
+    return STATUS_INTERNAL;
+}
+
+static enum status update(struct instance *instance, const bool *triggered) {
+    const struct model_events *events = instance->model->events;
+    write_tolerances(instance);
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        instance->du[i] = instance->memory.current_inputs[i].d[1];
+    }
+    char reason[200];
+    reason[0] = '\0';
+    const struct event event = {
+        .t = instance->state.time.s,
+        .triggered = triggered,
+        .is_timed = is_timed(instance, triggered),
+        .du = instance->du,
+        .du_is_known = !instance->is_integrated_outside,
+        .tolerance = instance->tolerances,
+        .max_events = instance->state.own.max_events,
+        .reason = reason,
+        .reason_size = sizeof reason,
+    };
+    const double passed = event.is_timed ? instance_next_time(instance) : -INFINITY;
+    enum status status = events->update(instance->memory.values, &event);
+    if (status == STATUS_OK && event.is_timed) {
+        status = check_next_time(instance, passed);
+    }
+    if (status != STATUS_OK) {
+        message_write(&instance->sink, status, "no modes at t = %.17g: %s", event.t,
+                      reason[0] != '\0' ? reason : status_text(status));
+    }
+    return status;
+}
+
+enum status instance_update_modes(struct instance *instance, const bool *triggered) {
+    if (instance->model->events == NULL) {
+        return STATUS_OK;
+    }
+    instance->outputs_are_valid = false;
+    return update(instance, triggered);
+}
+
+static void refuse_state_event(const struct instance *instance, const bool triggered[]) {
+    size_t first = 0;
+    while (!triggered[first]) {
+        first++;
+    }
+    message_write(&instance->sink, STATUS_TOO_MANY_EVENTS,
+                  "the step ended at t = %.17g: %s fell to 0, one more event than "
+                  "max_events = %d",
+                  instance->state.own.time, instance->model->events->indicator_names[first],
+                  instance->state.own.max_events);
+}
+
+static void refuse_time_event(const struct instance *instance) {
+    message_write(&instance->sink, STATUS_TOO_MANY_EVENTS,
+                  "the step ended at t = %.17g: a time event is due there, one more than "
+                  "max_internal_steps = %d",
+                  instance->state.own.time, instance->state.own.max_internal_steps);
+}
+
+enum status instance_count_event(struct instance *instance, const bool triggered[],
+                                 struct event_counts *in_step) {
+    struct instance_values *own = &instance->state.own;
+    const bool is_time_event = is_timed(instance, triggered);
+    if (is_time_event && in_step->of_time >= own->max_internal_steps) {
+        refuse_time_event(instance);
+        return STATUS_TOO_MANY_EVENTS;
+    }
+    if (!is_time_event && in_step->of_states >= own->max_events) {
+        refuse_state_event(instance, triggered);
+        return STATUS_TOO_MANY_EVENTS;
+    }
+    *(is_time_event ? &in_step->of_time : &in_step->of_states) += 1;
+    own->event_count += own->event_count < INT_MAX ? 1 : 0;
+    own->last_event_time = own->time;
+    return STATUS_OK;
+}
+
+/* ---- The event at which a step has ended ----------------------------------------------------- */
+
+void instance_leave_event(struct instance *instance, const bool triggered[],
+                          struct clock_time end) {
+    memcpy(instance->memory.unhandled, triggered, instance_event_size(instance->model));
+    instance->state.event_point = EVENT_UNHANDLED;
+    instance->state.cut_end = end;
+}
+
+void instance_note_handled_event(struct instance *instance, struct clock_time end) {
+    instance->state.event_point = EVENT_HANDLED;
+    instance->state.cut_end = end;
+}
+
+/* After a change of inputs or parameters, forces may no longer trigger the event; states still do.
+ */
+static void forget_unhandled_forces(struct instance *instance) {
+    const struct model_events *events = instance->model->events;
+    if (events->describe != NULL) {
+        events->describe(instance->memory.values, instance->indicators);
+    }
+    for (size_t i = 0; i < events->indicator_count; i++) {
+        if (instance->indicators[i].kind == INDICATOR_OF_MODEL) {
+            instance->memory.unhandled[i] = false;
+        }
+    }
+}
+
+enum status instance_handle_event(struct instance *instance, struct event_counts *in_step) {
+    struct instance_state *state = &instance->state;
+    if (state->event_point != EVENT_UNHANDLED) {
+        return STATUS_OK;
+    }
+    const bool is_unchanged = instance_is_unchanged(instance);
+    enum status status = instance_count_event(instance, instance->memory.unhandled, in_step);
+    if (!is_unchanged) {
+        forget_unhandled_forces(instance);
+    }
+    if (status == STATUS_OK) {
+        status = instance_update_modes(instance, instance->memory.unhandled);
+    }
+    if (status == STATUS_OK) {
+        state->event_point = is_unchanged ? EVENT_HANDLED : NO_EVENT;
+        memset(instance->memory.unhandled, 0, instance_event_size(instance->model));
+    }
+    return status;
+}
+
+bool instance_is_unchanged(const struct instance *instance) {
+    return (instance->state.has_history || instance->state.event_point != NO_EVENT) &&
+           !polynomials_move(instance->memory.active_inputs, count_of(instance->model->inputs)) &&
+           instance_values_are_active(instance);
+}
+
+struct clock_time instance_resumed_end(const struct instance *instance, struct clock_time end) {
+    const struct instance_state *state = &instance->state;
+    const double difference = clock_difference(end, state->cut_end);
+    const double rounding = clock_rounding(instance_size_of_times(instance, end.s));
+    return fabs(difference) <= rounding ? state->cut_end : end;
+}
+
+/* ---- Events for an integrator outside -------------------------------------------------------- */
+
+/* Of the size of an indicator: how far from its root integrators stop. */
+static const double near_root = 1e-10;
+
+/* The size of an indicator of a state. */
+static double size_of(const struct instance *instance, const struct indicator *indicator) {
+    return fabs(indicator->factor) * instance_nominal(instance, indicator->state) +
+           fabs(indicator->offset);
+}
+
+/* Writes what is added to each indicator: it falls to 0 only this far beyond its root. A mode may
+ * begin at the root, and integrators miss falls that begin at 0. For an indicator of a state: far
+ * above the rounding of its two parts, which are the state's nominal value and the offset, and far
+ * below the error of integrators. For one of the model: so large that the force is past its limit
+ * wherever an integrator stops, however the inputs move. Writes the kinds of indicators, too. */
+static void write_bands(struct instance *instance, double bands[]) {
+    const struct model_events *events = instance->model->events;
+    events->describe(instance->memory.values, instance->indicators);
+    if (events->errors != NULL) {
+        double *errors = doubles_of(instance->first_derivatives, instance->model->states);
+        instance_write_location_errors(instance, errors);
+        events->errors(instance->memory.values, instance->state.time.s, errors, 1e-12, bands);
+    }
+    for (size_t i = 0; i < events->indicator_count; i++) {
+        const struct indicator *indicator = &instance->indicators[i];
+        if (indicator->kind == INDICATOR_UNUSED) {
+            bands[i] = 0.0;
+        } else if (indicator->kind == INDICATOR_OF_STATE) {
+            const double nominal = instance_nominal(instance, indicator->state);
+            bands[i] = 1e-12 * fabs(indicator->factor) * nominal + 1e-14 * fabs(indicator->offset);
+        } else if (events->errors == NULL) {
+            bands[i] = 2.0 * near_root + 1e-9 * fabs(indicator->offset);
+        }
+    }
+}
+
+void instance_add_bands(struct instance *instance) {
+    const struct model_description *description = instance->description;
+    if (description->indicator_count == 0) {
+        return;
+    }
+    write_bands(instance, instance->z);
+    for (size_t i = 0; i < description->indicator_count; i++) {
+        double *z = instance_field(instance, variable_of(description, description->indicators[i]));
+        *z += instance->z[i];
+    }
+}
+
+/* s: the slope of an indicator is its difference over this time. */
+static const double slope_time = 1e-7;
+
+/* An indicator that has come to 0. */
+struct arrival {
+    double z;
+    double slope; /* 1/s, while the inputs stay */
+    double band;
+};
+
+/* It falls. Where a mode has just begun at 0, rounding may let it fall, but not past the band. */
+static bool has_state_fallen(const struct arrival *at, double size) {
+    const double ahead = at->z + slope_time * at->slope;
+    return at->z <= near_root * size && ahead <= at->z && ahead + at->band <= 0.0;
+}
+
+/* It is below 0. How inputs move is not known, so that it may fall though it seems to rise; but one
+ * that rises since the last event, from not far below 0, has not fallen. since: s. */
+static bool has_model_fallen(const struct arrival *at, double since) {
+    const bool has_risen = at->slope > 0.0 && at->z - at->slope * since > -4.0 * at->band;
+    return at->z < 0.0 && !has_risen;
+}
+
+/* Writes all indicators, and their kinds. */
+static enum status evaluate(struct instance *instance, double t, const double x[], double z[]) {
+    const struct model *model = instance->model;
+    const double *u = doubles_of(instance->memory.values, model->inputs);
+    model->events->describe(instance->memory.values, instance->indicators);
+    return model->events->indicators(instance->memory.values, t, x, u, z);
+}
+
+/* Writes all indicators now and, along the motion that begins here while the inputs stay, after
+ * each slope_time: at so many points, 3 at most. */
+static enum status look_ahead(struct instance *instance, size_t points) {
+    const struct model *model = instance->model;
+    const double *u = doubles_of(instance->memory.values, model->inputs);
+    double *x = doubles_of(instance->first_derivatives, model->states);
+    double *dx = doubles_of(instance->second_derivatives, model->derivatives);
+    memcpy(x, instance->memory.values + model->states.offset, model->states.size);
+    enum status status = STATUS_OK;
+    for (size_t k = 0; k < points && status == STATUS_OK; k++) {
+        const double t = instance->state.time.s + (double)k * slope_time;
+        status = evaluate(instance, t, x, instance->z + k * model->events->indicator_count);
+        if (status == STATUS_OK && k + 1 < points) {
+            status = model->right_hand_side(instance->memory.values, t, x, u, dx);
+            for (size_t i = 0; i < count_of(model->states); i++) {
+                x[i] += slope_time * dx[i];
+            }
+        }
+    }
+    return status;
+}
+
+/* Writes which indicators have triggered while the inputs stay. */
+static enum status find_triggered(struct instance *instance, bool triggered[], bool *is_any) {
+    const struct model *model = instance->model;
+    const double now = instance->state.time.s;
+    const double *z = instance->z;
+    const double *z_ahead = z + model->events->indicator_count;
+    double *bands = instance->z + 2 * model->events->indicator_count;
+    const enum status status = look_ahead(instance, 2);
+    if (status == STATUS_OK) {
+        write_bands(instance, bands);
+    }
+    const double since = now - instance->state.own.last_event_time;
+    for (size_t i = 0; status == STATUS_OK && i < model->events->indicator_count; i++) {
+        const struct indicator *indicator = &instance->indicators[i];
+        const struct arrival at = {z[i], (z_ahead[i] - z[i]) / slope_time, bands[i]};
+        if (indicator->kind == INDICATOR_OF_STATE) {
+            triggered[i] = has_state_fallen(&at, size_of(instance, indicator));
+        } else {
+            triggered[i] = indicator->kind == INDICATOR_OF_MODEL && has_model_fallen(&at, since);
+        }
+        *is_any |= triggered[i];
+    }
+    return status;
+}
+
+static bool can_fire(const struct instance *instance) {
+    const struct model_events *events = instance->model->events;
+    return events != NULL && events->are_possible != NULL &&
+           events->are_possible(instance->memory.values);
+}
+
+void instance_note_unhandled(struct instance *instance) {
+    instance_forget_unhandled(instance);
+    bool is_any = false;
+    if (can_fire(instance) &&
+        find_triggered(instance, instance->memory.unhandled, &is_any) == STATUS_OK && is_any) {
+        instance->state.event_point = EVENT_UNHANDLED;
+    }
+}
+
+void instance_forget_unhandled(struct instance *instance) {
+    memset(instance->memory.unhandled, 0, instance_event_size(instance->model));
+    instance->state.event_point = NO_EVENT;
+}
+
+/* Some indicator is below 0: else no event can have been missed, which is so after most steps. */
+static bool is_any_below(struct instance *instance) {
+    const double *x = doubles_of(instance->memory.values, instance->model->states);
+    bool is_below = false;
+    if (evaluate(instance, instance->state.time.s, x, instance->z) == STATUS_OK) {
+        for (size_t i = 0; i < instance->model->events->indicator_count; i++) {
+            is_below |= instance->z[i] < 0.0;
+        }
+    }
+    return is_below;
+}
+
+bool instance_has_missed_event(struct instance *instance) {
+    bool is_any = false;
+    if (!can_fire(instance) || instance->model->events->errors == NULL || !is_any_below(instance) ||
+        find_triggered(instance, instance->triggered, &is_any) != STATUS_OK) {
+        return false;
+    }
+    // one that only comes to 0 will be seen
+    bool is_missed = false;
+    for (size_t i = 0; is_any && i < instance->model->events->indicator_count; i++) {
+        is_missed |= instance->triggered[i] && instance->z[i] < 0.0;
+    }
+    return is_missed;
+}
+
+/* Takes forces out of triggered that are not below 0 with the values set now. */
+static enum status forget_past_forces(struct instance *instance, bool triggered[]) {
+    if (!can_fire(instance)) {
+        return STATUS_OK;
+    }
+    double *x = doubles_of(instance->memory.values, instance->model->states);
+    if (evaluate(instance, instance->state.time.s, x, instance->z) != STATUS_OK) {
+        return instance_not_finite(instance, "an event indicator");
+    }
+    for (size_t i = 0; i < instance->model->events->indicator_count; i++) {
+        triggered[i] = triggered[i] &&
+                       (instance->indicators[i].kind != INDICATOR_OF_MODEL || instance->z[i] < 0.0);
+    }
+    return STATUS_OK;
+}
+
+/* z: an indicator at three times in equal distances. It moves to 0 and turns before it comes there.
+ */
+static bool turns_before_zero(double z, double ahead, double far_ahead) {
+    const double side = z < 0.0 ? -1.0 : 1.0;
+    const double slope = side * (ahead - z);
+    const double bend = side * (far_ahead - 2.0 * ahead + z);
+    return slope < 0.0 && bend > 0.0 && side * z - slope * slope / (2.0 * bend) >= 0.0;
+}
+
+/* Where impacts follow each other ever faster, an event that leaves the state beyond its limit is
+ * followed by a flight that ends before it. No further event would come. */
+static enum status refuse_unseen_events(struct instance *instance, const bool triggered[]) {
+    const size_t count = instance->model->events->indicator_count;
+    if (instance->model->events->errors == NULL || look_ahead(instance, 3) != STATUS_OK) {
+        return STATUS_OK;
+    }
+    const double *z = instance->z;
+    for (size_t i = 0; i < count; i++) {
+        if (triggered[i] && instance->indicators[i].kind != INDICATOR_UNUSED &&
+            turns_before_zero(z[i], z[count + i], z[2 * count + i])) {
+            message_write(&instance->sink, STATUS_INTERNAL,
+                          "at t = %.17g: events at which %s falls to 0 follow each other faster "
+                          "than they can be seen from outside: let a mode rest, or set the states "
+                          "onto the limit",
+                          instance->state.time.s, instance->model->events->indicator_names[i]);
+            return STATUS_INTERNAL;
+        }
+    }
+    return STATUS_OK;
+}
+
+enum status instance_update_at_point(struct instance *instance, bool *states_changed) {
+    const struct model_events *events = instance->model->events;
+    const struct range states = instance->model->states;
+    *states_changed = false;
+    if (events == NULL) {
+        return STATUS_OK;
+    }
+    bool *triggered = instance->triggered;
+    memcpy(triggered, instance->memory.unhandled, instance_event_size(instance->model));
+    const double now = instance->state.time.s;
+    triggered[events->indicator_count] =
+        instance_next_time(instance) - now <= clock_rounding(instance_size_of_times(instance, now));
+    const bool is_any =
+        instance->state.event_point == EVENT_UNHANDLED || triggered[events->indicator_count];
+    instance_forget_unhandled(instance);
+    enum status status = STATUS_OK;
+    if (is_any) {
+        struct event_counts none = {0};
+        status = instance_count_event(instance, triggered, &none);
+    }
+    if (status == STATUS_OK) {
+        status = forget_past_forces(instance, triggered);
+    }
+    char *before = instance->second_derivatives + states.offset;
+    memcpy(before, instance->memory.values + states.offset, states.size);
+    if (status == STATUS_OK) {
+        status = instance_update_modes(instance, is_any ? triggered : NULL);
+    }
+    *states_changed = memcmp(before, instance->memory.values + states.offset, states.size) != 0;
+    return status == STATUS_OK && is_any ? refuse_unseen_events(instance, triggered) : status;
+}

@@ -1,0 +1,282 @@
+/* What an instance consists of, where each value lies, and which values the integrator runs with.
+ * Private to this library. */
+#ifndef STATE_H
+#define STATE_H
+
+#include "clock.h"
+#include "integrator.h"
+#include "variables.h"
+
+#include <stddef.h>
+#include <string.h>
+
+/* Bounds of what the integrator can run at: below, rounding stops its error test from converging;
+ * above, results have no digit left. */
+#define INSTANCE_FINEST_TOLERANCE   1e-14
+#define INSTANCE_COARSEST_TOLERANCE 1e-2
+
+/* The experiment's tolerance is taken up to here: masters pass their own, made for coarser models
+ * (Maestro's is 0.1), and results would lose their digits. */
+#define INSTANCE_COARSEST_EXPERIMENT_TOLERANCE 1e-4
+
+/* Whether a step has ended at an event and the instance is still there. */
+enum event_point {
+    NO_EVENT,
+    EVENT_UNHANDLED, /* the modes are still those before it */
+    EVENT_HANDLED,   /* the modes are those after it */
+};
+
+/* With the values in struct instance_memory, all that later results depend on. A snapshot is a copy
+ * of both. */
+struct instance_state {
+    enum phase phase;
+    bool experiment_defined;
+    struct instance_experiment experiment;
+    struct instance_values own;
+    struct clock_time time;
+    double drift; /* s: sum of clock_step_drift over all steps */
+
+    /* The integrator's history, from which it continues while nothing changes. A replay needs only
+     * the restart and the first and the last advance since then (integrator_advance). */
+    bool has_history;
+    struct clock_time restart_time;
+    double horizon;     /* s since the restart that the integrator may not pass */
+    double first_time;  /* s since the restart */
+    double latest_time; /* s since the restart */
+    double passed_time; /* s since the restart: where the last internal step ended */
+    struct integrator_statistics statistics;
+    int64_t steps_before_restart; /* internal steps */
+    double restart_step; /* s: first internal step of the last restart; 0: the method found one */
+    double next_step;    /* s: the same, for a restart now */
+    bool restart_continues; /* the last restart was on the solution before it */
+
+    enum event_point event_point;
+    struct clock_time cut_end; /* where the step would have ended without that event */
+};
+
+/* Parts of one block of memory, of which a snapshot is a copy, in this order. */
+struct instance_memory {
+    struct polynomial *next_inputs; /* inputs of the next step: last value set, and derivatives */
+    struct polynomial *current_inputs; /* inputs at the current time */
+    struct polynomial *active_inputs;  /* inputs since the last restart */
+    bool *unhandled;      /* causes of the unhandled event, as triggered of struct instance */
+    char *restart_values; /* the value structure at the last restart: what the integrator runs
+                             with */
+    char *values;         /* the model's value structure, as set and read from outside; its
+                             inputs are those at the current time */
+
+    char *block;
+    size_t size; /* bytes */
+    /* Of the block: what a step writes, but the first two and what is calculated from the rest. */
+    struct range written_at_restart; /* active_inputs to restart_values */
+    struct range written;            /* of values */
+};
+
+/* Of each value reference. */
+struct instance_real {
+    const double *value; /* NULL: it is no float64 */
+    bool is_calculated;  /* by the outputs of the model: it has to be brought up to date */
+    bool is_kept;        /* by events: in initialization mode it is calculated, too */
+};
+
+/* What each step reads or writes stands first: of many instances stepped in turn, few lines of a
+ * cache each are used. */
+struct instance {
+    const struct model_description *description;
+    const struct model *model;
+    struct instance_state state;
+
+    struct instance_real *reals; /* by value reference */
+
+    bool is_integrated_outside;
+    bool states_are_settable;   /* in event mode, too */
+    bool step_met_event;        /* the last one */
+    bool outputs_are_valid;     /* the calculated values belong to the others */
+    bool parameters_are_valid;  /* they are consistent; false: not known */
+    bool parameters_are_active; /* as instance_parameters_are_active; false: not known */
+    bool history_is_lost;       /* the integrator is not where state says: replay first */
+    bool inputs_are_held;       /* those of the next step are constant, and current_inputs are the
+                                   same; false: not known */
+    bool inputs_move;           /* since the last restart; false: u has their constant values */
+    double *u;                  /* one value per input, as the right-hand side sees them */
+    double (*input_series)[SERIES_INPUT_LENGTH]; /* coefficients of each input */
+    struct integrator *integrator;               /* NULL: the model has no states */
+    struct integrator_settings configured; /* what the integrator was configured with, without the
+                                              tolerances of the states */
+    struct instance_memory memory;
+
+    struct message_sink sink;
+    struct ode ode;
+    double *absolute_tolerances;  /* one per state, as the integrator has them; NULL: the model has
+                                     no events */
+    double *tolerances;           /* one per state, at its value at the last event */
+    struct indicator *indicators; /* one per indicator, since the last restart */
+    double *du;                   /* derivative of each input by the time */
+    double *z;                    /* three per indicator */
+    bool *triggered;              /* one per indicator: it falls to 0; last: a time event */
+    double *nodes;           /* POLYNOMIAL_NODES values per input, of the step that asks for them */
+    char *first_derivatives; /* value structures, along a curve (struct model) */
+    char *second_derivatives;
+    char *initial_values; /* value structure, see values.c; NULL: the model has no events */
+    struct instance_snapshot *newest; /* snapshots that belong to the instance, a list */
+    struct instance_snapshot *oldest;
+};
+
+/* A saved instance; snapshot.h. */
+struct instance_snapshot {
+    struct instance_snapshot *newer;
+    struct instance_snapshot *older;
+    unsigned tag;
+    bool history_is_lost; /* of instance_keep, as the next one */
+    bool inputs_are_held;
+    struct instance_state state;
+    max_align_t memory[]; /* copy of instance_memory.block */
+};
+
+static inline size_t count_of(struct range range) {
+    return range.size / sizeof(double);
+}
+
+/* The instance integrates the states of its model itself. */
+static inline bool instance_has_integrator(const struct instance *instance) {
+    return instance->integrator != NULL && !instance->is_integrated_outside;
+}
+
+/* The largest magnitude (s) among the start time and t: times are rounded as numbers of this size.
+ */
+static inline double instance_size_of_times(const struct instance *instance, double t) {
+    return fmax(fabs(t), fabs(instance->state.experiment.start_time));
+}
+
+/* The doubles at a range of a value structure. */
+static inline double *doubles_of(char *values, struct range range) {
+    return (double *)(void *)(values + range.offset);
+}
+
+/* The ints at a range of a value structure. */
+static inline int *ints_of(char *values, struct range range) {
+    return (int *)(void *)(values + range.offset);
+}
+
+/* Of a model without events: no indicators and empty ranges. */
+static inline struct model_events events_of(const struct model *model) {
+    return model->events != NULL ? *model->events : (struct model_events){0};
+}
+
+/* Bytes of the array triggered of struct instance. */
+static inline size_t instance_event_size(const struct model *model) {
+    return model->events != NULL ? (model->events->indicator_count + 1) * sizeof(bool) : 0;
+}
+
+/* ---- Values that the integrator runs with ---------------------------------------------------- */
+
+/* The inputs of the next step are constant and equal to the active ones. Polynomials need no
+ * comparison: the horizon of the integrator ends with the step that they are for. */
+static inline bool instance_inputs_are_active(const struct instance *instance) {
+    const struct instance_memory *memory = &instance->memory;
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        const struct polynomial *next = &memory->next_inputs[i];
+        if (next->d[0] != memory->active_inputs[i].d[0] ||
+            (!instance->inputs_are_held && polynomial_moves(next))) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static inline bool instance_range_is_active(const struct instance *instance, struct range range) {
+    const struct instance_memory *memory = &instance->memory;
+    return memcmp(memory->restart_values + range.offset, memory->values + range.offset,
+                  range.size) == 0;
+}
+
+/* The same for parameters and Boolean inputs. */
+static inline bool instance_parameters_are_active(const struct instance *instance) {
+    const struct model_events *events = instance->model->events;
+    return instance->parameters_are_active ||
+           (instance_range_is_active(instance, instance->model->parameters) &&
+            (events == NULL || instance_range_is_active(instance, events->discrete_inputs)));
+}
+
+static inline bool instance_values_are_active(const struct instance *instance) {
+    return instance_inputs_are_active(instance) && instance_parameters_are_active(instance);
+}
+
+/* ---- Places of values ------------------------------------------------------------------------ */
+
+/* Says in a message why there is no variable with this reference and type; NULL. */
+NONNULL const struct variable *instance_refuse_reference(const struct instance *instance,
+                                                         unsigned reference,
+                                                         enum variable_type type);
+
+/* The variable with this reference and type; NULL, with a message, if there is none. These and
+ * instance_write_field are inline: they run once or more for each value that is set or read. */
+static inline const struct variable *instance_find(const struct instance *instance,
+                                                   unsigned reference, enum variable_type type) {
+    const struct variable *variable = variable_find(instance->description, reference);
+    return variable != NULL && variable->type == type
+               ? variable
+               : instance_refuse_reference(instance, reference, type);
+}
+
+/* Location of a variable's value. */
+static inline void *instance_field(struct instance *instance, const struct variable *variable) {
+    char *structure = variable->owner == VARIABLE_OF_MODEL ? instance->memory.values
+                                                           : (char *)(void *)&instance->state.own;
+    return structure + variable->offset;
+}
+
+static inline bool instance_is_state(const struct instance *instance,
+                                     const struct variable *variable) {
+    return variable->owner == VARIABLE_OF_MODEL &&
+           variable->offset - instance->model->states.offset < instance->model->states.size;
+}
+
+/* Index of an input of type float64 among the inputs. */
+static inline size_t instance_input_index(const struct instance *instance,
+                                          const struct variable *variable) {
+    return (variable->offset - instance->model->inputs.offset) / sizeof(double);
+}
+
+/* Writes the value; that of an input of type float64 also into its polynomial of the next step. */
+static inline void instance_write_field(struct instance *instance, const struct variable *variable,
+                                        double value) {
+    void *field = instance_field(instance, variable);
+    if (variable->causality == CAUSALITY_INPUT && variable->type == VARIABLE_FLOAT64) {
+        const size_t i = instance_input_index(instance, variable);
+        instance->memory.next_inputs[i].d[0] = value;
+        instance->memory.current_inputs[i] = instance->memory.next_inputs[i];
+        *(double *)field = value;
+        return;
+    }
+    instance->parameters_are_active = false;
+    instance->parameters_are_valid &= variable->causality != CAUSALITY_PARAMETER;
+    if (variable->type == VARIABLE_FLOAT64) {
+        *(double *)field = value;
+    } else {
+        *(int *)field = (int)value;
+    }
+}
+
+/* Returns the value structure from which calculated values are read once they are up to date. In
+ * initialization mode it is what the end of this mode will make of the values. */
+static inline char *instance_shown_values(const struct instance *instance) {
+    const bool is_initializing = instance->state.phase == PHASE_INITIALIZATION;
+    return is_initializing && instance->initial_values != NULL ? instance->initial_values
+                                                               : instance->memory.values;
+}
+
+static inline void instance_set_clock(struct instance *instance, struct clock_time time) {
+    instance->state.time = time;
+    instance->state.own.time = time.s;
+    instance->outputs_are_valid = false;
+}
+
+/* Writes the variables that show totals of the integrator. */
+NONNULL void instance_write_statistics(const struct integrator_statistics *statistics,
+                                       struct instance_values *own);
+
+/* Returns STATUS_NOT_FINITE, with a message that `what` cannot be computed. */
+NONNULL enum status instance_not_finite(const struct instance *instance, const char *what);
+
+#endif

@@ -1,0 +1,576 @@
+#include "stepping.h"
+
+#include "history.h"
+#include "modes.h"
+#include "settings.h"
+#include "snapshot.h"
+#include "state.h"
+
+#include <math.h>
+#include <string.h>
+
+struct step {
+    struct instance *instance;
+    const struct step_options *options;
+    struct clock_time begin;
+    struct clock_time end;          /* where it will end; may become earlier */
+    struct clock_time until;        /* end of its present part: the same, or a time event before */
+    bool meets_time_event;          /* at the end of its present part */
+    double drift;                   /* s: of the communication points, up to its beginning */
+    bool is_early;                  /* end has become earlier */
+    bool is_over;                   /* the step ends where it is */
+    struct instance_snapshot *kept; /* the instance before the step; NULL: not needed so far */
+    enum status answer;             /* of options->accept */
+    struct event_counts events;     /* so far */
+    int64_t steps_before;           /* internal ones, since initialization */
+};
+
+/* ---- Times ---------------------------------------------------------------------------------- */
+
+/* s: integrators go beyond the end of a step, by up to 1e4 times its length. With times that then
+ * overflow cvode_bdf would try the same step without end. */
+static const double latest_time = 1e300;
+
+/* mismatch (s): of t from the time of the instance. */
+static enum status refuse_times(const struct instance *instance, double t, double h,
+                                double mismatch) {
+    const struct instance_experiment *experiment = &instance->state.experiment;
+    const double slack = clock_slack(instance_size_of_times(instance, t), h);
+    if (!(h > 0.0 && h <= latest_time && fabs(t) <= latest_time)) {
+        message_write(
+            &instance->sink, STATUS_INVALID_TIME,
+            "a step of %g s from t = %.17g is refused: a time up to %g s and a step above "
+            "0 are expected",
+            h, t, latest_time);
+        return STATUS_INVALID_TIME;
+    }
+    if (t + h == t) {
+        message_write(&instance->sink, STATUS_INVALID_TIME,
+                      "a step of %g s from t = %.17g is refused: it does not change the time", h,
+                      t);
+        return STATUS_INVALID_TIME;
+    }
+    if (!(fabs(mismatch) <= slack && mismatch + h > 0.0)) {
+        message_write(&instance->sink, STATUS_INVALID_TIME,
+                      "a step from t = %.17g is refused: the instance is at t = %.17g", t,
+                      instance->state.time.s);
+        return STATUS_INVALID_TIME;
+    }
+    if (experiment->stop_time_defined && t + h - experiment->stop_time > slack) {
+        message_write(&instance->sink, STATUS_INVALID_TIME,
+                      "a step from t = %.17g to t = %.17g is refused: the stop time is %.17g", t,
+                      t + h, experiment->stop_time);
+        return STATUS_INVALID_TIME;
+    }
+    return STATUS_OK;
+}
+
+/* Sets the end of the next part of the step. A time event that differs from the end of the step by
+ * no more than rounding is at the end, be it earlier or later. */
+static void set_part(struct step *step) {
+    const double time = instance_next_time(step->instance);
+    step->until = step->end;
+    step->meets_time_event = false;
+    if (time == INFINITY) {
+        return;
+    }
+    const double slack = clock_tick_slack(instance_size_of_times(step->instance, step->end.s),
+                                          clock_difference(step->end, step->begin), step->drift);
+    const double left = clock_difference(step->end, (struct clock_time){.s = time});
+    step->meets_time_event = left >= -slack;
+    if (left > slack) {
+        const struct clock_time now = step->instance->state.time;
+        step->until = time <= now.s ? now : (struct clock_time){.s = time};
+    }
+}
+
+/* Internal steps that the step may still take. */
+static int64_t steps_left(const struct step *step) {
+    const struct instance_state *state = &step->instance->state;
+    return state->own.max_internal_steps - (state->statistics.steps - step->steps_before);
+}
+
+/* ---- Inputs --------------------------------------------------------------------------------- */
+
+/* Sets the inputs to those at the beginning of a step. Until then, inputs have the values to which
+ * the derivatives of the last step led. */
+static void begin_inputs(struct instance *instance) {
+    if (instance->inputs_are_held) {
+        return;
+    }
+    struct instance_memory *memory = &instance->memory;
+    double *u = doubles_of(memory->values, instance->model->inputs);
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        memory->current_inputs[i] = memory->next_inputs[i];
+        u[i] = memory->next_inputs[i].d[0];
+    }
+}
+
+/* Evaluates the inputs at the time of the instance, elapsed s after the beginning of the step. */
+static void evaluate_inputs(struct instance *instance, double elapsed) {
+    struct instance_memory *memory = &instance->memory;
+    instance->inputs_are_held = false;
+    double *u = doubles_of(memory->values, instance->model->inputs);
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        memory->current_inputs[i] = polynomial_shifted(&memory->next_inputs[i], elapsed);
+        u[i] = memory->current_inputs[i].d[0];
+    }
+}
+
+/* After a step that has asked for inputs: they keep the value given for its end or, where the step
+ * ended earlier, the value there. */
+static void keep_last_nodes(const struct step *step) {
+    struct instance *instance = step->instance;
+    const struct instance_memory *memory = &instance->memory;
+    instance->inputs_are_held = false;
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        const double *nodes = instance->nodes + i * POLYNOMIAL_NODES;
+        memory->next_inputs[i].d[0] =
+            step->is_early ? memory->current_inputs[i].d[0] : nodes[POLYNOMIAL_NODES - 1];
+    }
+}
+
+static bool is_finite(const struct polynomial *polynomial) {
+    bool found = true;
+    for (int k = 0; k <= POLYNOMIAL_DEGREE; k++) {
+        found &= isfinite(polynomial->d[k]) != 0;
+    }
+    return found;
+}
+
+/* Returns STATUS_NOT_FINITE, with a message, if the polynomial of an input overflows within the
+ * step, which no integrator notices in a model without states. */
+static enum status check_inputs(const struct step *step) {
+    const struct instance *instance = step->instance;
+    const double h = clock_difference(step->end, step->begin);
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        const struct polynomial *input = &instance->memory.next_inputs[i];
+        if (polynomial_moves(input)) {
+            const struct polynomial at_end = polynomial_shifted(input, h);
+            if (!is_finite(&at_end)) {
+                return instance_not_finite(instance, "an input at the end of the step");
+            }
+        }
+    }
+    return STATUS_OK;
+}
+
+static enum status set_polynomials(struct instance *instance, double h) {
+    struct instance_memory *memory = &instance->memory;
+    double *u = doubles_of(memory->values, instance->model->inputs);
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        const struct polynomial input =
+            polynomial_through(instance->nodes + i * POLYNOMIAL_NODES, h);
+        if (!is_finite(&input)) {
+            return instance_not_finite(instance, "a derivative of an input");
+        }
+        memory->next_inputs[i] = input;
+        memory->current_inputs[i] = input;
+        u[i] = input.d[0];
+    }
+    instance->inputs_are_held = false;
+    instance->outputs_are_valid = false;
+    return STATUS_OK;
+}
+
+/* Sets the inputs of the step to polynomials through the values that the importer gives. */
+static enum status ask_inputs(const struct step *step, double t, double h) {
+    struct instance *instance = step->instance;
+    for (int k = 0; k < POLYNOMIAL_NODES; k++) {
+        const double time =
+            k == POLYNOMIAL_NODES - 1 ? step->end.s : t + k * (h / (POLYNOMIAL_NODES - 1));
+        const enum status status = step->options->ask_inputs(step->options->context, time);
+        if (status != STATUS_OK) {
+            return status;
+        }
+        for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+            instance->nodes[i * POLYNOMIAL_NODES + (size_t)k] =
+                instance->memory.next_inputs[i].d[0];
+        }
+    }
+    return set_polynomials(instance, clock_difference(step->end, step->begin));
+}
+
+/* Inputs at the end of a step. Their derivatives applied to it only. */
+static void end_inputs(const struct step *step) {
+    struct instance *instance = step->instance;
+    const double elapsed = clock_difference(instance->state.time, step->begin);
+    struct instance_memory *memory = &instance->memory;
+    double *u = doubles_of(memory->values, instance->model->inputs);
+    instance->inputs_are_held = true;
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        struct polynomial *next = &memory->next_inputs[i];
+        if (polynomial_moves(next)) {
+            memory->current_inputs[i] = polynomial_shifted(next, elapsed);
+            *next = (struct polynomial){{next->d[0]}};
+            instance->inputs_are_held = false;
+        } else {
+            memory->current_inputs[i] = *next;
+        }
+        u[i] = memory->current_inputs[i].d[0];
+    }
+}
+
+/* ---- Parts without an event ----------------------------------------------------------------- */
+
+/* Reports the time of the instance to options->accept; true: the step will end earlier. */
+static bool report(struct step *step) {
+    const double now = step->instance->state.time.s;
+    double end = step->end.s;
+    step->answer = step->options->accept(step->options->context, now, &end);
+    if (step->answer != STATUS_OK || end < step->end.s) {
+        step->is_over = step->answer != STATUS_OK ||
+                        !(end - now > clock_rounding(instance_size_of_times(step->instance, now)));
+        step->end = step->is_over ? step->instance->state.time : (struct clock_time){.s = end};
+        step->is_early = true;
+        if (clock_difference(step->until, step->end) > 0.0) {
+            set_part(step);
+        }
+        return true;
+    }
+    return false;
+}
+
+/* An integrator_observer. */
+static bool observe(void *step_pointer, double t, const double x[]) {
+    struct step *step = step_pointer;
+    struct instance *instance = step->instance;
+    memcpy(doubles_of(instance->memory.values, instance->model->states), x,
+           instance->model->states.size);
+    instance_set_clock(instance, clock_add(instance->state.restart_time, t));
+    evaluate_inputs(instance, clock_difference(instance->state.time, step->begin));
+    return report(step);
+}
+
+static bool is_at_event(const struct instance *instance) {
+    return instance->model->events != NULL && integrator_event(instance->integrator) != NULL;
+}
+
+/* To step->until, which may become earlier on the way. */
+static enum status advance(struct step *step) {
+    struct instance *instance = step->instance;
+    struct instance_state *state = &instance->state;
+    double *x = doubles_of(instance->memory.values, instance->model->states);
+    if (step->options->accept != NULL) {
+        integrator_set_observer(instance->integrator, observe, step);
+    }
+    double target = clock_difference(step->until, state->restart_time);
+    enum status status;
+    for (;;) {
+        const int64_t left = steps_left(step);
+        status = integrator_advance(instance->integrator, target, left > 1 ? left : 1,
+                                    &state->latest_time, x);
+        if (step->options->accept == NULL || status != STATUS_OK || step->is_over ||
+            is_at_event(instance)) {
+            break;
+        }
+        target = clock_difference(step->until, state->restart_time);
+        if (!(state->latest_time < target)) {
+            break;
+        }
+        // to the new end; the step that the observer cut short counts
+        integrator_get_statistics(instance->integrator, &state->statistics);
+    }
+    if (step->options->accept != NULL) {
+        integrator_set_observer(instance->integrator, NULL, NULL);
+    }
+    return status;
+}
+
+/* Advances to step->until, or to an earlier state event. Both may become earlier on the way. */
+static enum status move(struct step *step, enum continuation continuation) {
+    struct instance *instance = step->instance;
+    struct instance_state *state = &instance->state;
+    enum status status = instance_prepare_history(instance, step->end, continuation);
+    if (status != STATUS_OK) {
+        return status;
+    }
+    status = advance(step);
+    if (status != STATUS_OK) {
+        instance_set_clock(instance, clock_add(state->restart_time, state->latest_time));
+    }
+
+    // a step that ended early cannot be replayed: its end was not known when it began
+    const bool is_whole = !step->is_early && !step->meets_time_event && !is_at_event(instance);
+    state->has_history = status == STATUS_OK && is_whole && instance_longest_history(instance) > 0;
+    state->passed_time = integrator_passed_time(instance->integrator);
+    if (!state->has_history) {
+        state->next_step = status == STATUS_OK ? integrator_next_step(instance->integrator) : 0.0;
+    }
+    integrator_get_statistics(instance->integrator, &state->statistics);
+    instance_write_statistics(&state->statistics, &state->own);
+    return status;
+}
+
+/* ---- Events --------------------------------------------------------------------------------- */
+
+/* As instance_move in modes in which no state moves: time passes until an input ends them. */
+static enum status rest(struct step *step, enum continuation continuation) {
+    struct instance *instance = step->instance;
+    struct instance_state *state = &instance->state;
+    const struct polynomial *inputs = continuation == CONTINUE_AFTER_EVENT
+                                          ? instance->memory.current_inputs
+                                          : instance->memory.next_inputs;
+    // constant inputs end no mode; the active values matter only after an event
+    const bool is_searched =
+        !instance->inputs_are_held && polynomials_move(inputs, count_of(instance->model->inputs));
+    if (is_searched || step->meets_time_event) {
+        instance_activate_values(instance, step->end, inputs);
+    } else {
+        instance_end_history(instance);
+    }
+    const struct integrator_start start = {
+        .indicators = is_searched ? instance_describe_indicators(instance) : NULL,
+    };
+    state->next_step = 0.0;
+    return integrator_rest(instance->integrator,
+                           doubles_of(instance->memory.values, instance->model->states), &start,
+                           clock_difference(step->until, state->restart_time), &state->latest_time);
+}
+
+/* The instance goes to the time of an event and handles it, or the step ends there. */
+static enum status meet_event(struct step *step, struct clock_time time) {
+    struct instance *instance = step->instance;
+    struct instance_state *state = &instance->state;
+    const bool *triggered = instance->triggered;
+    const struct clock_time end = step->end;
+    instance_set_clock(instance, time);
+    evaluate_inputs(instance, clock_difference(state->time, step->begin));
+    instance->step_met_event = true;
+    if (step->options->at_event != EVENTS_PASSED && state->time.s > step->begin.s) {
+        step->is_early = clock_difference(end, state->time) > 0.0;
+        step->end = state->time;
+        if (step->options->at_event == EVENTS_LEFT) {
+            instance_leave_event(instance, triggered, end);
+            return STATUS_OK;
+        }
+    }
+    enum status status = instance_count_event(instance, triggered, &step->events);
+    if (status == STATUS_OK) {
+        status = instance_update_modes(instance, triggered);
+    }
+    if (status == STATUS_OK && !(clock_difference(step->end, state->time) > 0.0)) {
+        instance_note_handled_event(instance, end);
+    }
+    return status;
+}
+
+/* The modes at the beginning of a step, and how the integrator continues from there. */
+static enum status begin_modes(struct step *step, enum continuation *continuation) {
+    struct instance *instance = step->instance;
+    struct instance_state *state = &instance->state;
+    if (state->event_point == EVENT_UNHANDLED) {
+        const enum status status = instance_handle_event(instance, &step->events);
+        if (status != STATUS_OK) {
+            return status;
+        }
+        *continuation =
+            instance_continuation(instance, clock_difference(step->end, state->restart_time));
+    }
+    state->event_point = NO_EVENT;
+    if (*continuation != CONTINUE_AFTER_CHANGE) {
+        return STATUS_OK;
+    }
+    begin_inputs(instance);
+    return instance_update_modes(instance, NULL);
+}
+
+/* To the end of the present part of the step, or to a state event before it. */
+static enum status move_part(struct step *step, enum continuation continuation) {
+    struct instance *instance = step->instance;
+    if (instance->integrator == NULL) {
+        return STATUS_OK;
+    }
+    if (instance_is_at_rest(instance)) {
+        return rest(step, continuation);
+    }
+    return continuation == CONTINUE_AFTER_EVENT && steps_left(step) <= 0 ? STATUS_TOO_MANY_STEPS
+                                                                         : move(step, continuation);
+}
+
+/* Writes the event to which the last part has come, and its time; false: there is none. */
+static bool find_event(const struct step *step, bool has_moved, struct clock_time *time) {
+    const struct instance *instance = step->instance;
+    const size_t count = instance->model->events->indicator_count;
+    const bool *triggered =
+        has_moved && instance->integrator != NULL ? integrator_event(instance->integrator) : NULL;
+    if (triggered == NULL && !step->meets_time_event) {
+        return false;
+    }
+    memset(instance->triggered, 0, instance_event_size(instance->model));
+    if (triggered != NULL) {
+        memcpy(instance->triggered, triggered, count * sizeof *triggered);
+        *time = clock_add(instance->state.restart_time, instance->state.latest_time);
+    } else {
+        instance->triggered[count] = true;
+        *time = step->until;
+    }
+    return true;
+}
+
+/* At the end of the step, and no other time event is there. */
+static bool is_done(struct step *step) {
+    if (clock_difference(step->end, step->instance->state.time) > 0.0) {
+        return false;
+    }
+    set_part(step);
+    return step->options->at_event != EVENTS_PASSED || !step->meets_time_event;
+}
+
+/* Advances to step->end over all events on the way. */
+static enum status move_over_events(struct step *step, enum continuation continuation) {
+    struct instance *instance = step->instance;
+    enum status status = begin_modes(step, &continuation);
+    while (status == STATUS_OK) {
+        set_part(step);
+        const bool moves = clock_difference(step->until, instance->state.time) > 0.0;
+        if (moves) {
+            status = move_part(step, continuation);
+        }
+        struct clock_time time;
+        if (status != STATUS_OK || !find_event(step, moves, &time)) {
+            break;
+        }
+        status = meet_event(step, time);
+        if (is_done(step)) {
+            break;
+        }
+        continuation = CONTINUE_AFTER_EVENT;
+    }
+    return status;
+}
+
+/* ---- Steps ---------------------------------------------------------------------------------- */
+
+static void keep(struct step *step) {
+    if (step->options->undo != NULL && step->kept == NULL) {
+        step->kept = step->options->undo;
+        instance_keep(step->instance, step->kept);
+    }
+}
+
+/* The instance is at the time where the step has ended. */
+static void arrive(const struct step *step, struct clock_time time) {
+    instance_set_clock(step->instance, time);
+    if (!step->instance->inputs_are_held) {
+        end_inputs(step);
+    }
+}
+
+/* To a point that an internal step may have passed already: then nothing can fail, and nothing is
+ * counted. Otherwise false. */
+static bool interpolate(const struct step *step, double target) {
+    struct instance *instance = step->instance;
+    if (!integrator_interpolate(instance->integrator, target,
+                                doubles_of(instance->memory.values, instance->model->states))) {
+        return false;
+    }
+    instance->state.latest_time = target;
+    arrive(step, step->end);
+    return true;
+}
+
+static enum status integrate(struct step *step) {
+    struct instance *instance = step->instance;
+    struct instance_state *state = &instance->state;
+    const double target = clock_difference(step->end, state->restart_time);
+    const enum continuation continuation = instance_continuation(instance, target);
+    set_part(step);
+    if (continuation == CONTINUE_NOW && !step->meets_time_event && interpolate(step, target)) {
+        return STATUS_OK;
+    }
+    keep(step);
+    const enum status status = instance->model->events == NULL
+                                   ? move(step, continuation)
+                                   : move_over_events(step, continuation);
+    arrive(step, status == STATUS_OK ? step->end : state->time);
+    return status;
+}
+
+/* The same for a model without states. */
+static enum status pass_time(struct step *step) {
+    enum status status = check_inputs(step);
+    if (status != STATUS_OK) {
+        return status;
+    }
+    if (step->instance->model->events != NULL) {
+        keep(step);
+        status = move_over_events(step, CONTINUE_AFTER_CHANGE);
+    }
+    arrive(step, status == STATUS_OK ? step->end : step->instance->state.time);
+    return status;
+}
+
+static enum status do_step(struct step *step, double communication_point, double h) {
+    struct instance *instance = step->instance;
+    enum status status = STATUS_OK;
+    if (step->options->ask_inputs != NULL) {
+        instance->inputs_are_held = false;
+        keep(step);
+        status = ask_inputs(step, communication_point, h);
+        if (status != STATUS_OK) {
+            return status;
+        }
+    }
+    status = instance->integrator == NULL ? pass_time(step) : integrate(step);
+    if (status == STATUS_TOO_MANY_EVENTS) {
+        return status; // the message has been sent
+    }
+    if (status != STATUS_OK) {
+        message_write(
+            &instance->sink, status, "the step from t = %.17g to t = %.17g ended at %.17g: %s",
+            communication_point, step->end.s, instance->state.time.s, status_text(status));
+        return status;
+    }
+    if (step->options->ask_inputs != NULL) {
+        keep_last_nodes(step);
+    }
+    const bool ends_at_event = instance->state.event_point != NO_EVENT;
+    if (step->options->accept != NULL && (!step->is_early || ends_at_event)) {
+        (void)report(step);
+    }
+    return step->answer;
+}
+
+enum status instance_do_step_with(struct instance *instance, double communication_point,
+                                  double step_size, const struct step_options *options) {
+    const double mismatch =
+        clock_difference((struct clock_time){.s = communication_point}, instance->state.time);
+    enum status status = refuse_times(instance, communication_point, step_size, mismatch);
+    if (status == STATUS_OK) {
+        status = instance_check_parameters(instance);
+    }
+    if (status != STATUS_OK) {
+        return status;
+    }
+    struct step step = {
+        .instance = instance,
+        .options = options,
+        .begin = instance->state.time,
+        .end = clock_add((struct clock_time){.s = communication_point}, step_size),
+        .drift = instance->state.drift +
+                 clock_step_drift(instance_size_of_times(instance, communication_point), mismatch),
+        .answer = STATUS_OK,
+        .steps_before = instance->state.statistics.steps,
+    };
+    if (instance->state.event_point != NO_EVENT) {
+        step.end = instance_resumed_end(instance, step.end);
+    }
+    instance->step_met_event = false;
+    status = do_step(&step, communication_point, step_size);
+    if (step.kept != NULL && status_severity(status) == SEVERITY_DISCARD) {
+        const enum status restored = instance_undo(instance, step.kept);
+        return restored == STATUS_OK ? status : restored;
+    }
+    instance->state.drift = step.drift;
+    return status;
+}
+
+enum status instance_do_step(struct instance *instance, double communication_point, double step) {
+    static const struct step_options none = {0};
+    return instance_do_step_with(instance, communication_point, step, &none);
+}
+
+bool instance_met_event(const struct instance *instance) {
+    return instance->step_met_event;
+}
