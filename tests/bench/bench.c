@@ -15,9 +15,10 @@ static const struct {
     const char *name;
     void (*measure)(struct bench *bench);
 } groups[] = {
-    {"steps", measure_steps},         {"free-motion", measure_free_motion},
-    {"instances", measure_instances}, {"threads", measure_threads},
-    {"life", measure_life},           {"plant", measure_plant},
+    {"steps", measure_steps},
+    {"free-motion", measure_free_motion},
+    {"life", measure_life},
+    {"plant", measure_plant},
 };
 enum { GROUPS = sizeof groups / sizeof groups[0] };
 

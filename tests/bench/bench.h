@@ -10,13 +10,6 @@ struct report {
     bool has_rows;
 };
 
-/* What a figure must be. */
-enum comparison { NO_TARGET, AT_MOST, AT_LEAST };
-struct target {
-    enum comparison comparison;
-    double limit;
-};
-
 /* The object begins with compiler and libraries, and the repeats. */
 void report_open(struct report *report, int repeats);
 void report_close(struct report *report);
@@ -26,8 +19,8 @@ void report_row(struct report *report, const char *group, const char *work, cons
 void report_number(struct report *report, const char *name, double value);
 void report_row_end(struct report *report);
 
-/* A number that has a target, with the target. */
-void report_judged(struct report *report, const char *name, double value, struct target target);
+/* Writes a number and its target: the largest value it may have, or 0 if it has none. */
+void report_judged(struct report *report, const char *name, double value, double most);
 
 /* ---- race.c: several solvers do the same work in turns, again and again */
 
@@ -94,10 +87,6 @@ void measure_free_motion(struct bench *bench);
 
 /* plant.c: friction and stops, against the arm without them */
 void measure_plant(struct bench *bench);
-
-/* instances.c: many instances stepped in turn, two threads with an instance each */
-void measure_instances(struct bench *bench);
-void measure_threads(struct bench *bench);
 
 /* life.c: from fmi2Instantiate to fmi2FreeInstance, and memory */
 void measure_life(struct bench *bench);

@@ -1,4 +1,4 @@
-"""The benchmark: the program bench and the Python peers in turns, tables and a JSON file.
+"""The benchmark: the program bench and heyoka in turns, tables and a JSON file.
 
     cmake --build build --target benchmark
 
@@ -11,33 +11,16 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import operator
 import os
 import re
 import statistics
 import subprocess
 import sys
-import tempfile
 from collections import defaultdict
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
-from arm import Work
-from peers import (
-    LoadedFmu,
-    Run,
-    build_python_plant,
-    run_co_simulation,
-    run_compiled,
-    run_dop853,
-    run_heyoka,
-    run_model_exchange,
-    run_mujoco,
-)
-from table import markdown, summary
+from by_heyoka import Peer, Work
 
 ROOT = Path(__file__).resolve().parents[2]
 FREE = {
@@ -56,9 +39,8 @@ OTHERS = (
     Work("1 ms steps, inputs changing, tolerance 1e-11", 1e-3, 2000, "changing"),
     Work("one step of 2 s, inputs constant", 2.0, 1, "constant"),
 )
-METHODS = {"erk": 3, "cvode_adams": 1, "taylor": 4}
 ROUNDING = 1e-14  # an error that no peer need stay below
-PACKAGES = ("fmpy", "heyoka", "scipy", "mujoco", "pythonfmu")  # Python packages of the peers
+PACKAGES = ("heyoka", "mujoco")  # peers
 TURNS = 5  # of free motion in a round: its targets are near, and bench and the peers take turns
 
 
@@ -99,34 +81,22 @@ RATIOS += [
 ]
 PLAIN = "plain loop"
 LARGEST_ERROR_OF_TAYLOR = 1e-12  # in steps of 1 ms
-
-
-@dataclass
-class Peer:
-    """Which solver does which work at which tolerance, and the rows for its results."""
-
-    name: str
-    run: Callable[[Work, float], Run]
-    work: Work
-    tolerance: float
-
-    def row(self) -> dict:
-        """Of one turn."""
-        us, error = once(self)
-        work = self.work
-        return {
-            "group": "steps", "work": work.name, "run": self.name, "step": work.step,
-            "steps": work.steps, "error": error, "tolerance": self.tolerance, "us": us,
-        }  # fmt: skip
-
-
-def once(peer: Peer) -> tuple[float, float]:
-    """Time of a communication step in us, mean of at least 2 ms, and the error."""
-    seconds, states = peer.run(peer.work, peer.tolerance)
-    passes = max(1, min(200, round(2e-3 / seconds)))
-    for _ in range(passes - 1):
-        seconds += peer.run(peer.work, peer.tolerance)[0]
-    return 1e6 * seconds / passes / peer.work.steps, peer.work.error(states)
+# by group: title, figures
+GROUPS = {
+    "steps": ("Communication steps", ("us", "ratio", "error")),
+    "against": ("One against another", ("ratio", "error", "error_of_peer")),
+    "plant": ("Friction and stops, steps of 1 ms", ("us", "ratio", "events")),
+    "life": ("An instance", ("us", "kib")),
+}
+# columns of the table of ratios: heading and work
+WORKS = {
+    "1 ms": "1 ms steps, inputs changing",
+    "10 ms": "10 ms steps, inputs changing",
+    "0.1 s": "0.1 s steps, inputs changing",
+    "1 ms, constant": "1 ms steps, inputs constant",
+    "10 ms, constant": "10 ms steps, inputs constant",
+    "2 s": "one step of 2 s, free motion, error <= 1e-8",
+}
 
 
 def tuned(peer: Peer, bound: float) -> Peer:
@@ -138,7 +108,7 @@ def tuned(peer: Peer, bound: float) -> Peer:
     lowest = max(1e-4 * bound, sys.float_info.epsilon)
     for quarter in range(math.ceil(4.0 * math.log10(lowest) - 1e-6), -11):
         peer.tolerance = 10.0 ** (quarter / 4)
-        if peer.work.error(peer.run(peer.work, peer.tolerance)[1]) > bound:
+        if peer.error() > bound:
             break
         best = peer.tolerance
     if best is None:
@@ -159,51 +129,22 @@ def find(rows: list[dict], work: str, run: str) -> dict:
 
 
 def heyoka_like(run: str, work: Work, first: list[dict]) -> Peer:
-    """heyoka with an error no larger than that of a run of bench, or ROUNDING."""
-    peer = Peer(f"heyoka, error no larger than {run}'s", run_heyoka, work, 0.0)
+    """Return heyoka with an error no larger than a run of bench has, or ROUNDING."""
+    peer = Peer(f"heyoka, error no larger than {run}'s", work, 0.0)
     return tuned(peer, max(find(first, work.name, run)["error"], ROUNDING))
 
 
-def make_peers(fmu: Path, own: LoadedFmu, plant: LoadedFmu, first: list[dict]) -> list[Peer]:
-    """All peers at their tolerances; first: rows of bench, to know how exact its runs are.
-
-    fmu: the file of which own is made.
-    """
-    tuned_ones = [
-        ("heyoka", run_heyoka),
-        ("scipy DOP853", run_dop853),
-        ("model exchange, CVode of fmpy", partial(run_model_exchange, own)),
-    ]
-    driven = [
-        (f"{name}, by fmpy", partial(run_co_simulation, own, method=method))
-        for name, method in METHODS.items()
-    ]
-    driven.append(("cvode_adams, by rparm", partial(run_compiled, fmu)))
-    python_plant = ("Python plant of pythonfmu, by fmpy", partial(run_co_simulation, plant))
-    bindings = ("MuJoCo RK4, by its Python bindings", run_mujoco)
-    peers = []
-    for bound, work in FREE.items():
-        # scipy and fmpy do not come within 1e-14
-        peers += [tuned(Peer(name, run, work, 0.0), bound)
-                  for name, run in (tuned_ones if bound == 1e-8 else tuned_ones[:1])]  # fmt: skip
-        for name in ("erk", "taylor") if bound == 1e-8 else ("taylor",):
-            tolerance = find(first, work.name, name)["tolerance"]
-            run = partial(run_co_simulation, own, method=METHODS[name])
-            peers.append(Peer(f"{name}, by fmpy", run, work, tolerance))
-    peers.append(heyoka_like("erk", FREE[1e-8], first))
-    peers.append(heyoka_like("taylor", FREE[1e-8], first))
-    peers.append(Peer(*python_plant, FREE[1e-8], 1e-8))
-    for work in CHANGING:
-        for name, run in (*tuned_ones, *driven, python_plant, bindings):
-            peers.append(Peer(name, run, work, 1e-8))
-    for work in (*CHANGING, *OTHERS):
-        peers.append(heyoka_like("taylor", work, first))
-    return peers
+def make_peers(first: list[dict]) -> list[Peer]:
+    """Return heyoka for all works, at its tolerances; first: rows of bench, for their errors."""
+    free = [tuned(Peer("heyoka", work, 0.0), bound) for bound, work in FREE.items()]
+    free += [heyoka_like(run, FREE[1e-8], first) for run in ("erk", "taylor")]
+    changing = [Peer("heyoka", work, 1e-8) for work in CHANGING]
+    return free + changing + [heyoka_like("taylor", work, first) for work in (*CHANGING, *OTHERS)]
 
 
 def judged(row: dict, figure: str, limit: float | None) -> dict:
     """The row with the largest value that its figure may have, if there is one."""
-    target = {"judged": figure, "comparison": "<=", "limit": limit}
+    target = {"judged": figure, "limit": limit}
     return row | (target if limit is not None else {})
 
 
@@ -239,13 +180,12 @@ def judge(rows: list[dict]) -> list[dict]:
     """The rows, with whether they meet their targets."""
     for row in rows:
         if "judged" in row:
-            meets = operator.le if row["comparison"] == "<=" else operator.ge
-            row["met"] = bool(meets(row[row["judged"]], row["limit"]))
+            row["met"] = row[row["judged"]] <= row["limit"]
     return rows
 
 
 def take_rounds(program: list[str], peers: list[Peer], rounds: int, repeats: int) -> list[dict]:
-    """Rounds of bench's communication steps and all peers; rows with medians over the turns."""
+    """Run communication steps of bench and heyoka in rounds; return rows with medians of turns."""
     found = defaultdict(list)  # rows of all turns, by key
     free = [peer for peer in peers if peer.work in FREE.values()]
     others = [peer for peer in peers if peer not in free]
@@ -261,6 +201,67 @@ def take_rounds(program: list[str], peers: list[Peer], rounds: int, repeats: int
            for figure in ("us", "ratio") if figure in of_turns[-1]}
         for of_turns in found.values()
     ]  # fmt: skip
+
+
+# ---- Tables
+
+
+def result(row: dict) -> str:
+    """Say what a row must reach and whether it does."""
+    if "judged" not in row:
+        return ""
+    return f"≤ {row['limit']:g}: {'ok' if row['met'] else '**MISSED**'}"
+
+
+def number(value: float | None) -> str:
+    """Three digits, or nothing."""
+    if value is None:
+        return ""
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
+
+
+def lines(header: list[str], rows: list[list[str]]) -> list[str]:
+    """Make a table."""
+    rule = ["---"] + ["--:"] * (len(header) - 1)
+    return ["| " + " | ".join(cells) + " |" for cells in (header, rule, *rows)] + [""]
+
+
+def of_group(rows: list[dict], group: str) -> list[str]:
+    """Return the Markdown table of a group."""
+    title, figures = GROUPS[group]
+    mine = [row for row in rows if row["group"] == group]
+    cells = [
+        [f"{row['work']}: {row['run']}", *(number(row.get(name)) for name in figures), result(row)]
+        for row in mine
+    ]
+    return [f"**{title}**", "", *lines(["", *figures, "must be"], cells)]
+
+
+def markdown(report: dict) -> str:
+    """Return all tables, from the contents of benchmark.json."""
+    rows = report["rows"]
+    about = ", ".join(f"{name} {value}" for name, value in report["machine"].items())
+    missed = sum(not row["met"] for row in rows if "judged" in row)
+    head = [f"{about}. {missed} of the targets missed.", ""]
+    return "\n".join(head + [line for group in GROUPS for line in of_group(rows, group)])
+
+
+def miss(row: dict) -> str:
+    """Name a target that is missed, with what was measured."""
+    return f"- {row['work']}, {row['run']}: {number(row[row['judged']])} ({result(row)})"
+
+
+def summary(report: dict) -> str:
+    """Return the table of ratios to the plain loop, and a list of the targets that are missed."""
+    rows = [row for row in report["rows"] if row["group"] == "steps" and "us" in row]
+    ratios = {(row["run"], row["work"]): row["ratio"] for row in rows}
+    cells = [
+        [run, *(number(ratios.get((run, work))) for work in WORKS.values())]
+        for run in dict.fromkeys(run for run, _ in ratios)
+    ]
+    missed = [miss(row) for row in report["rows"] if "judged" in row and not row["met"]]
+    head = f"{len(missed)} targets are missed:"
+    return "\n".join([*lines(["", *WORKS], cells), head, "", *missed, ""])
 
 
 def with_figures(page: str, tables: str) -> str:
@@ -291,15 +292,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--build", type=Path, default=ROOT / "build", help="where it was built")
     parser.add_argument("--output", type=Path, help="default: report/benchmark there")
-    parser.add_argument("--rounds", type=int, default=5, help="of bench and the Python peers")
+    parser.add_argument("--rounds", type=int, default=5, help="of bench and heyoka")
     parser.add_argument("--repeats", type=int, default=11, help="within bench")
     parser.add_argument("--readme", action="store_true", help="put the ratios into the page")
     parser.add_argument("--quick", action="store_true", help="little of everything, to try it")
     options = parser.parse_args()
     needed = [options.build / "tests/bench/bench", *libraries(options.build)]
-    fmu = options.build / "RPManipulator.fmu"
     output = options.output or options.build / "report/benchmark"
-    for path in (*needed, fmu):
+    for path in needed:
         if not path.exists():
             sys.exit(f"{path}: no such file. Build it and run this with\n"
                      "    ./setup.sh --platforms && cmake --preset default && "
@@ -309,16 +309,11 @@ def main() -> None:
     program = [str(path) for path in needed]
     small = ["--quick"] if options.quick else []
 
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        own = LoadedFmu(fmu, folder / "own")
-        plant = LoadedFmu(build_python_plant(folder), folder / "plant")
-        first = run_bench(program, "--only", "steps,free-motion", "--repeats", "1")
-        peers = make_peers(fmu, own, plant, first["rows"])
-        rows = take_rounds(program, peers, options.rounds, min(3, options.repeats))
-    print("instances, threads, friction and stops", file=sys.stderr)
-    others = "instances,threads,life,plant"
-    rest = run_bench(program, *small, "--only", others, "--repeats", str(options.repeats))
+    first = run_bench(program, "--only", "steps,free-motion", "--repeats", "1")
+    peers = make_peers(first["rows"])
+    rows = take_rounds(program, peers, options.rounds, min(3, options.repeats))
+    print("an instance, friction and stops", file=sys.stderr)
+    rest = run_bench(program, *small, "--only", "life,plant", "--repeats", str(options.repeats))
     result = {
         "machine": about | first["machine"],
         "rounds": options.rounds,

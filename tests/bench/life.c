@@ -4,7 +4,7 @@
 
 void measure_life(struct bench *bench) {
     enum { LIVES = 100 };
-    struct problem *problem = problem_create(1e-3, 1, INPUTS_CHANGING, 0.0);
+    struct problem *problem = problem_create(1e-3, 1, INPUTS_CHANGING);
     double us[METHODS][MOST_REPEATS];
     for (int repeat = 0; repeat < bench->repeats; repeat++) {
         for (enum method method = FIRST_METHOD; method < METHODS; method++) {
@@ -24,11 +24,11 @@ void measure_life(struct bench *bench) {
         bench->fmu.FreeInstance(c);
         const double life = median(us[method], bench->repeats);
         report_row(&bench->report, "life", "instantiate to free", method_names[method]);
-        report_judged(&bench->report, "us", life, (struct target){AT_MOST, 30.0});
+        report_judged(&bench->report, "us", life, 30.0);
         report_row_end(&bench->report);
         report_row(&bench->report, "life", "memory of an instance after a step",
                    method_names[method]);
-        report_judged(&bench->report, "kib", kib, (struct target){AT_MOST, 32.0});
+        report_judged(&bench->report, "kib", kib, 32.0);
         report_row_end(&bench->report);
     }
     problem_destroy(problem);

@@ -5,25 +5,17 @@
 #include <stdlib.h>
 #include <time.h>
 
-static double read_clock(clockid_t clock) {
+double processor_time(void) {
     struct timespec t;
-    clock_gettime(clock, &t);
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-double now(void) {
-    return read_clock(CLOCK_MONOTONIC);
-}
-
-double processor_time(void) {
-    return read_clock(CLOCK_THREAD_CPUTIME_ID);
-}
-
-double clock_cost(double (*clock)(void)) {
+double clock_cost(void) {
     double cost[1001];
     for (int i = 0; i < 1001; i++) {
-        const double begin = clock();
-        cost[i] = clock() - begin;
+        const double begin = processor_time();
+        cost[i] = processor_time() - begin;
     }
     return median(cost, 1001);
 }

@@ -62,13 +62,13 @@ static void solve(struct problem *problem) {
     }
 }
 
-struct problem *problem_create(double step, int steps, enum problem_inputs kind, double shift) {
+struct problem *problem_create(double step, int steps, enum problem_inputs kind) {
     struct problem *problem = allocate(1, sizeof *problem);
     *problem = (struct problem){
         .step = step,
         .steps = steps,
         .kind = kind,
-        .start = {0.3 + shift, 0.2 + shift, 0.0, 0.0},
+        .start = {0.3, 0.2, 0.0, 0.0},
         .inputs = allocate((size_t)steps, sizeof problem->inputs[0]),
         .reference = allocate((size_t)steps, sizeof problem->reference[0]),
     };

@@ -14,15 +14,12 @@
 
 /* ---- measure.c: clock, order statistics, and the end of a program that cannot measure */
 
-/* s since some point in the past */
-double now(void);
-
-/* s that a processor has worked for this thread: what else runs on the machine disturbs it less
- * than it does the time of day. */
+/* Returns the s that a processor has worked for this thread: other programs disturb it less than
+ * the time of day. */
 double processor_time(void);
 
-/* What two readings of a clock in a row differ by, s. */
-double clock_cost(double (*clock)(void));
+/* Returns the s between two readings of this clock in a row. */
+double clock_cost(void);
 
 /* Of count > 0 values, which it sorts. */
 double median(double values[], int count);
@@ -63,8 +60,8 @@ struct problem {
 /* Those of the FMU's start values. */
 extern const struct rp_parameters problem_parameters;
 
-/* With the usual start, moved by shift (rad, m). Ends the program if memory runs out. */
-struct problem *problem_create(double step, int steps, enum problem_inputs kind, double shift);
+/* Ends the program if memory runs out. */
+struct problem *problem_create(double step, int steps, enum problem_inputs kind);
 
 void problem_destroy(struct problem *problem);
 

@@ -55,7 +55,7 @@ static void add_fmi3(struct race *race, const struct fmu3_functions *fmu3, doubl
 }
 
 static void measure_work(struct bench *bench, const struct work *work) {
-    struct problem *problem = problem_create(work->step, work->steps, work->inputs, 0.0);
+    struct problem *problem = problem_create(work->step, work->steps, work->inputs);
     struct race race = {0};
     race_add_usual(&race, &bench->fmu, work->tolerance);
     if (is_compared(work)) {
@@ -72,7 +72,7 @@ static void measure_work(struct bench *bench, const struct work *work) {
 /* Every solver at its own largest tolerance, MuJoCo at its largest step, with that error. */
 static void measure_with_error(struct bench *bench, struct race *race, const char *work,
                                double bound) {
-    struct problem *problem = problem_create(2.0, 1, INPUTS_ZERO, 0.0);
+    struct problem *problem = problem_create(2.0, 1, INPUTS_ZERO);
     for (int run = 0; run < race->count; run++) {
         race_tune(&race->runs[run], &bench->fmu, problem, bound);
     }

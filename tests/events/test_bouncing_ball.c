@@ -261,3 +261,13 @@ static void test_a_step_that_fails_at_once_leaves_the_time(void) {
     }
     tearDown();
 }
+
+static void test_a_ball_in_the_air_does_not_rest(void) {
+    start_moving(&ball_description);
+    struct ball_values *now = (void *)instance->memory.values;
+    struct ball_values *held = (void *)instance->memory.restart_values;
+    assert_forged(&now->is_resting, &held->is_resting, 2, "the modes are impossible");
+    assert_forged(&now->is_resting, &held->is_resting, -1, "the modes are impossible");
+    assert_forged(&now->is_resting, &held->is_resting, 1,
+                  "the modes since the restart are impossible");
+}

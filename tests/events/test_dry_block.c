@@ -152,3 +152,15 @@ EACH_METHOD static void test_rollback_over_events(void) {
     TEST_ASSERT_EQUAL_DOUBLE(straight[0], get(TOY_POSITION));
     TEST_ASSERT_EQUAL_DOUBLE(straight[1], get(TOY_LAST_EVENT));
 }
+
+static void test_a_block_slides_where_its_velocity_points(void) {
+    start_moving(&block_description);
+    struct block_values *now = (void *)instance->memory.values;
+    struct block_values *held = (void *)instance->memory.restart_values;
+    assert_forged(&now->direction, &held->direction, 2, "the modes are impossible");
+    assert_forged(&now->direction, &held->direction, -2, "the modes are impossible");
+    assert_forged(&now->direction, &held->direction, -1,
+                  "the modes since the restart are impossible");
+    assert_forged(&now->direction, &held->direction, 0,
+                  "the modes since the restart are impossible");
+}

@@ -3,7 +3,6 @@
 #include "continuous_states.h"
 #include "derivatives.h"
 #include "each_method.h"
-#include "serialization.h"
 #include "toy_run.h"
 
 #include <stdlib.h>
@@ -377,4 +376,14 @@ static void test_a_declaration_that_does_not_fit_the_model_is_refused(void) {
     wrong.has_time_events = true;
     TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, instance_create(&wrong, &last_text_sink, &none));
     TEST_ASSERT_NULL(none);
+}
+
+/* What update writes is 0 until it is called. */
+static void test_no_stroke_before_the_start(void) {
+    prepare(&hammer_description, 1, 1e-8);
+    struct hammer_values *now = (void *)instance->memory.values;
+    ASSERT_OK(pass_on());
+    now->start = 1.0;
+    ASSERT_REFUSED(pass_on());
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_text, "the modes are impossible"), last_text);
 }

@@ -25,31 +25,27 @@ bool fuzz_are_same_bytes(const struct fuzz_bytes *one, const struct fuzz_bytes *
 
 /* ---- Changed fields -------------------------------------------------------------------------- */
 
-size_t fuzz_fields_begin(void) {
-    return 20 + strlen(model_description.guid);
-}
+/* serialization.h: magic, version, length and length of the GUID in 20 bytes, the GUID, fields of 8
+ * bytes, FNV-1a of all that. */
+enum { FIELD = 8 };
 
-void fuzz_write_number(fmi2Byte *to, uint64_t number, size_t size) {
-    for (size_t k = 0; k < size; k++) {
-        to[k] = (fmi2Byte)(number >> 8 * k);
+static void write_field(fmi2Byte *to, uint64_t bits) {
+    for (size_t k = 0; k < FIELD; k++) {
+        to[k] = (fmi2Byte)(bits >> 8 * k);
     }
 }
 
-void fuzz_write_field(struct fuzz_bytes *bytes, size_t field, uint64_t bits) {
-    const size_t count = (bytes->size - fuzz_fields_begin() - FUZZ_FIELD) / FUZZ_FIELD;
-    fuzz_write_number(bytes->data + fuzz_fields_begin() + FUZZ_FIELD * (field % count), bits,
-                      FUZZ_FIELD);
-}
-
-void fuzz_repair_checksum(struct fuzz_bytes *bytes) {
+static void repair_checksum(struct fuzz_bytes *bytes) {
     uint64_t hash = 0xcbf29ce484222325u;
-    for (size_t i = 0; i + FUZZ_FIELD < bytes->size; i++) {
+    for (size_t i = 0; i + FIELD < bytes->size; i++) {
         hash = (hash ^ (uint8_t)bytes->data[i]) * 0x100000001b3u;
     }
-    fuzz_write_number(bytes->data + bytes->size - FUZZ_FIELD, hash, FUZZ_FIELD);
+    write_field(bytes->data + bytes->size - FIELD, hash);
 }
 
 void fuzz_forge(struct fuzz_input *input, struct fuzz_bytes *bytes) {
+    const size_t begin = 20 + strlen(model_description.guid);
+    const size_t count = (bytes->size - begin - FIELD) / FIELD;
     const unsigned changes = 1 + fuzz_below(input, 3);
     for (unsigned i = 0; i < changes; i++) {
         const size_t field = fuzz_byte(input) | (size_t)fuzz_byte(input) << 8;
@@ -58,7 +54,7 @@ void fuzz_forge(struct fuzz_input *input, struct fuzz_bytes *bytes) {
         if (fuzz_below(input, 2) == 0) {
             memcpy(&bits, &real, sizeof bits);
         }
-        fuzz_write_field(bytes, field, bits);
+        write_field(bytes->data + begin + FIELD * (field % count), bits);
     }
-    fuzz_repair_checksum(bytes);
+    repair_checksum(bytes);
 }

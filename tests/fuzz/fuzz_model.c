@@ -250,10 +250,12 @@ static void use_same(struct fuzz_input *input, struct fuzz_instance *instance,
     fuzz_forget(instance, &before);
 }
 
-/* Another instance of this variety takes the state of the instance from its bytes: a step has the
- * same bits. Or forged bytes do no harm: a step can be tried, and what it gives is finite. */
+/* Gives the state to another instance by its bytes: a step of this variety has the same bits. Or
+ * forges the bytes: they do no harm, a step can be tried, and its values are finite. A state that
+ * is accepted serializes to the bytes that it came from. */
 static void move_state(struct fuzz_input *input, struct fuzz_instance *instance) {
     static struct fuzz_bytes bytes;
+    static struct fuzz_bytes again;
     const bool is_forged = fuzz_below(input, 2) == 0;
     struct fuzz_instance *other = fuzz_instance_create_variety(
         instance->kind, is_forged ? 0 : instance->variety, true, false);
@@ -268,6 +270,10 @@ static void move_state(struct fuzz_input *input, struct fuzz_instance *instance)
         fuzz_fail("a serialized state is refused: %s", other->text);
     }
     if (status == fmi2OK) {
+        fuzz_serialize_state(other, state, &again);
+        if (!fuzz_are_same_bytes(&again, &bytes)) {
+            fuzz_fail("an accepted state is serialized to other bytes");
+        }
         fuzz_require(FUZZ_CHECKED(other, SetFMUstate, state), other, "fmi2SetFMUstate");
         is_forged ? use_forged(input, other) : use_same(input, instance, other);
     }

@@ -79,14 +79,13 @@ def times(plan: dict[str, Any]) -> list[float]:
     return [plan["start"] + i * plan["step"] for i in range(plan["steps"] + 1)]
 
 
-def co_simulation(loaded: LoadedFmu, plan: dict[str, Any], inputs: str) -> np.ndarray:
-    """Outputs (steps + 1, outputs), with the inputs of the steps' beginning or of their end."""
-    later = {"beginning": 0, "end": 1}[inputs]
+def co_simulation(loaded: LoadedFmu, plan: dict[str, Any], held: int = 0) -> np.ndarray:
+    """Return the outputs (steps + 1, outputs); a step holds the inputs of so many steps later."""
     with instance(loaded) as arm:
         arm.initialize(**plan["parameters"], **plan["initial"], **inputs_at(plan, 0))
         rows = [arm.get(*plan["outputs"])]
         for i, t in enumerate(times(plan)[:-1]):
-            arm.set(**inputs_at(plan, i + later))
+            arm.set(**inputs_at(plan, i + held))
             arm.step(t, plan["step"])
             rows.append(arm.get(*plan["outputs"]))
     return np.array(rows)

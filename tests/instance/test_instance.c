@@ -1,37 +1,13 @@
+/* What an instance checks when it is created, and its life: reset, nominal values, snapshots. */
 #include "continuous_states.h"
+#include "each_method.h"
 #include "one_instance.h"
 #include "oscillator_by_hand.h"
+#include "snapshot.h"
 
 void setUp(void) {
     create(&oscillator_description);
 }
-
-/* ---- Times ---------------------------------------------------------------------------------- */
-
-static void test_a_master_that_accumulates_its_time_reaches_the_stop_time(void) {
-    initialize_of(instance, 0.0, 600.0);
-    double t = 0.0;
-    for (int i = 0; i < 600000; i++) {
-        ASSERT_OK(instance_do_step(instance, t, 1e-3));
-        t += 1e-3;
-    }
-    double exact[2] = {1.0, 0.0};
-    oscillator_solution(2.0, 0.0, t, exact, exact);
-    TEST_ASSERT_EQUAL_DOUBLE(t, instance_time(instance));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-5, exact[0], get(OSCILLATOR_X));
-}
-
-static void test_a_small_mismatch_of_the_time_is_integrated(void) {
-    double exact[2] = {1.0, 0.0};
-    initialize_at(0.0);
-    ASSERT_OK(instance_do_step(instance, 0.0, 1.0));
-    ASSERT_OK(instance_do_step(instance, 1.0 + 1e-10, 0.5));
-    oscillator_solution(2.0, 0.0, 1.5 + 1e-10, exact, exact);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(OSCILLATOR_X));
-    TEST_ASSERT_EQUAL_DOUBLE(1.5 + 1e-10, instance_time(instance));
-}
-
-/* ---- Life ----------------------------------------------------------------------------------- */
 
 /* As if variables.toml named a calculated field for the input: it compiles and would do nothing. */
 static void test_a_field_of_another_kind_is_refused(void) {
@@ -104,38 +80,21 @@ static void test_calculated_values_follow_a_reset(void) {
     TEST_ASSERT_TRUE(get(OSCILLATOR_ENERGY) == fresh);
 }
 
-/* ---- Values --------------------------------------------------------------------------------- */
-
-static void test_the_parameter_wins_over_the_experiment_over_the_default(void) {
-    const struct instance_experiment experiment = {.tolerance_defined = true, .tolerance = 1e-6};
-    const double by_default = get(OSCILLATOR_EFFECTIVE_TOLERANCE);
-    TEST_ASSERT_TRUE(by_default > 0.0 && by_default <= 1e-8);
-
-    ASSERT_OK(instance_setup_experiment(instance, &experiment));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-20, 1e2 * by_default, get(OSCILLATOR_EFFECTIVE_TOLERANCE));
-    set(OSCILLATOR_RELATIVE_TOLERANCE, 1e-9);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-20, 1e-1 * by_default, get(OSCILLATOR_EFFECTIVE_TOLERANCE));
-
-    // what cannot be kept is not promised
-    set(OSCILLATOR_RELATIVE_TOLERANCE, 1e-300);
-    TEST_ASSERT_TRUE(get(OSCILLATOR_EFFECTIVE_TOLERANCE) >= 1e-15);
-    set(OSCILLATOR_RELATIVE_TOLERANCE, 1e300);
-    TEST_ASSERT_TRUE(get(OSCILLATOR_EFFECTIVE_TOLERANCE) < 1.0);
-}
-
-static void test_outputs_follow_what_was_set_last(void) {
+EACH_METHOD static void test_a_snapshot_can_be_forgotten_in_any_order(void) {
+    struct instance_snapshot *snapshots[5] = {NULL};
+    static const int order[] = {2, 4, 0, 3, 1};
+    set_int(OSCILLATOR_SOLVER_METHOD, method);
     initialize_at(0.0);
-    TEST_ASSERT_EQUAL_DOUBLE(2.0, get(OSCILLATOR_ENERGY));
-    set(OSCILLATOR_OMEGA, 4.0);
-    TEST_ASSERT_EQUAL_DOUBLE(8.0, get(OSCILLATOR_ENERGY));
-}
-
-static void test_settings_are_closed_after_initialization(void) {
-    const unsigned limit = OSCILLATOR_MAX_STEPS;
-    const int value = 5;
-    initialize_at(0.0);
-    ASSERT_REFUSED(instance_set_integer(instance, &limit, 1, &value));
-    ASSERT_REFUSED(try_set(OSCILLATOR_X, 2.0));
-    TEST_ASSERT_NOT_NULL(strstr(last_text, "only inputs and tunable parameters can"));
-    ASSERT_REFUSED(try_set(OSCILLATOR_GAIN, 2.0));
+    for (int i = 0; i < 5; i++) {
+        ASSERT_OK(instance_do_step(instance, instance_time(instance), 0.1));
+        ASSERT_OK(instance_save(instance, (unsigned)i, &snapshots[i]));
+    }
+    for (int i = 0; i < 5; i++) {
+        unsigned tag = 99;
+        enum phase phase = PHASE_COUNT;
+        ASSERT_OK(instance_snapshot_tag(instance, snapshots[order[i]], &tag, &phase));
+        TEST_ASSERT_EQUAL_UINT(order[i], tag);
+        ASSERT_OK(instance_forget(instance, &snapshots[order[i]]));
+        TEST_ASSERT_NULL(snapshots[order[i]]);
+    }
 }

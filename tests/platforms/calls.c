@@ -124,15 +124,13 @@ static void call_SerializedFMUstateSize(struct run *run) {
     run_write_hex(run, size, 8);
 }
 
-/* instance, state, bytes, and where it is wrong, a size */
+/* instance, state, bytes */
 static void call_SerializeFMUstate(struct run *run) {
     const fmi2Component c = run_read_instance(run);
     const fmi2FMUstate state = run->states[run_read_place(run)];
     struct bytes *to = run_read_bytes(run);
-    if (run_words_left(run) > 0) {
-        to->size = (size_t)run_read_integer(run) % sizeof to->data;
-    } else if (run->fmi->SerializedFMUstateSize(c, state, &to->size) != fmi2OK ||
-               to->size > sizeof to->data) {
+    if (run->fmi->SerializedFMUstateSize(c, state, &to->size) != fmi2OK ||
+        to->size > sizeof to->data) {
         run_mistake(run, "the state has no size, or too large a one");
         return;
     }
@@ -152,10 +150,6 @@ static void call_DeSerializeFMUstate(struct run *run) {
                      run->fmi->DeSerializeFMUstate(c, from->data, from->size, run_read_state(run)));
 }
 
-static void set_byte(struct run *run, struct bytes *bytes, size_t place, const char *digits) {
-    bytes->data[place] = (char)(unsigned char)run_read_hex(run, digits, 2);
-}
-
 static void call_bytes(struct run *run) {
     struct bytes *to = run_read_bytes(run);
     const char *digits = run_read_word(run);
@@ -165,25 +159,8 @@ static void call_bytes(struct run *run) {
         return;
     }
     for (size_t i = 0; i < to->size; i++) {
-        set_byte(run, to, i, digits + 2 * i);
+        to->data[i] = (char)(unsigned char)run_read_hex(run, digits + 2 * i, 2);
     }
-    run_write_status(run, fmi2OK);
-}
-
-static void call_poke(struct run *run) {
-    struct bytes *bytes = run_read_bytes(run);
-    const int place = run_read_integer(run);
-    if (place < 0 || (size_t)place >= bytes->size) {
-        run_mistake(run, "there is no such byte");
-        return;
-    }
-    set_byte(run, bytes, (size_t)place, run_read_word(run));
-    run_write_status(run, fmi2OK);
-}
-
-static void call_cut(struct run *run) {
-    struct bytes *bytes = run_read_bytes(run);
-    bytes->size = (size_t)run_read_integer(run) % sizeof bytes->data;
     run_write_status(run, fmi2OK);
 }
 
@@ -334,8 +311,6 @@ static const struct {
     FMI2_FUNCTION_LIST(COMMAND)
 #undef COMMAND
         {"bytes", call_bytes},
-    {"poke", call_poke},
-    {"cut", call_cut},
     {"Euler", call_Euler},
 };
 

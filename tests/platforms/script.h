@@ -9,8 +9,8 @@
  *     DoStep 0  0000000000000000 3f847ae147ae147b             time, step
  *     SerializeFMUstate 0 2 1                                 instance, state, bytes
  *
- * Further commands: "bytes 1 434f..." fills bytes, "poke 1 40 ff" changes one of them and "cut 1
- * 100" shortens them; "Euler 0 4 h" makes a step of Euler's method with 4 states.
+ * Further commands: "bytes 1 434f..." fills bytes; "Euler 0 4 h" makes a step of Euler's method
+ * with 4 states.
  *
  * A line of the transcript is the number of the line in the script, the name, the status, and the
  * values. Messages stand before the line of their call: number, "log", instance, status, category,

@@ -4,6 +4,7 @@ A script is made from modelDescription.xml, so that the calls of every FMU come 
 numbers are bits: every platform gets the same.
 """
 
+import math
 import struct
 import xml.etree.ElementTree as ET
 import zipfile
@@ -15,6 +16,7 @@ METHODS = (1, 2, 3, 4)  # cvode_adams, cvode_bdf, erk, taylor
 # the models that taylor, the last method, can integrate
 WITH_SERIES = ("RPManipulator", "RPPlant", "BouncingBall", "DcMotor")
 STEPS = 200
+VARIANTS = (1, 2, 3)  # of a run
 
 
 def bits(value: float) -> str:
@@ -181,16 +183,6 @@ CHANGED: dict[str, dict[str, float | list[int]]] = {
     },
 }  # fmt: skip
 
-# parameters that are allowed one by one, and inconsistent together
-INCONSISTENT: dict[str, dict[str, float]] = {
-    "RPManipulator": {"I1z": 0.0, "I2z": 0.0, "lc1": 0.0},
-    "RPController": {"I1z": 0.0, "I2z": 0.0, "lc1": 0.0},
-    "RPActuator": {"gear_ratio1": 0.0},
-    "RPTrajectory": {"turns": 1.0, "frequency": 3.0},
-    "RPSensor": {"resolution1": 1e300, "sample_time": 1e-6},
-    "RPPlant": {"coulomb_friction2": 2.0, "breakaway_friction2": 1.0},
-}
-
 
 def change(script: Script, model: Model, place: int, variant: int, shift: float = 0.0) -> None:
     """Set start values and parameters; shift is added to the first Real one."""
@@ -351,6 +343,72 @@ def model_exchange(model: Model) -> Script:
     script.call("Terminate", place)
     script.call("FreeInstance", place)
     return script
+
+
+# ---- Messages ------------------------------------------------------------------------------------
+
+# quiet and signalling NaN of both signs, as bits: Python would make all of them quiet
+NOT_FINITE = (
+    "7ff8000000000000", "fff8000000000000", "7ff0000000000001", "fff8dead0000beef",
+    bits(math.inf), bits(-math.inf),
+)  # fmt: skip
+EXTREME = (1e300, -1e300, 5e-324, 1e22, 100000.5, 1000000.5, 2.5, 0.1, 1 / 3, 123456789.0)
+CATEGORIES = (
+    "logEvents", "logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal",
+    "logAll",
+)  # fmt: skip
+
+
+def messages(model: Model) -> Script:
+    """Refused numbers, steps with too many internal steps, and the log by categories."""
+    script = Script()
+    place = 3
+    instantiate(script, model, place)
+    parameter = next(v for v in model.variables if (v.kind, v.causality) == ("Real", "parameter"))
+    for digits in NOT_FINITE:
+        script.call("SetReal", place, parameter.reference, digits, expect="Discard")
+        script.call("Reset", place)
+    times = [pair for x in NOT_FINITE for pair in ((bits(0.0), x), (x, bits(0.1)))]
+    times += [(bits(value), bits(-abs(value))) for value in EXTREME]
+    for time, length in times:
+        initialize(script, place)
+        script.call("DoStep", place, time, length, expect="Error")
+        script.call("Reset", place)
+    for method in model.methods if model.states else ():
+        script.call("SetInteger", place, model["max_internal_steps"].reference, 2)
+        script.call("SetInteger", place, model["solver_method"].reference, method)
+        initialize(script, place)
+        script.call("SetReal", place, *pairs(model.inputs, [0.3] * len(model.inputs)))
+        script.call("DoStep", place, bits(0.0), bits(10.0), expect="Discard")
+        script.call("GetRealStatus", place, 2)
+        get_all(script, model, place)
+        script.call("Reset", place)
+    script.call("FreeInstance", place)
+    for name in ("plain", "ünïcödé", "100%d#r1#"):
+        script.call("Instantiate", 0, CO_SIMULATION, model.guid, 1, name)
+        script.call("SetDebugLogging", 0, 1, "logN%sthing#r1#", expect="Error")
+        script.call("FreeInstance", 0)
+    script.call("Instantiate", 0, CO_SIMULATION, model.guid, 0, "logger")
+    for on, *categories in ((1,), (0,), *((1, c) for c in CATEGORIES), (0, "logAll")):
+        script.call("SetDebugLogging", 0, on, *categories)
+        script.call("SetupExperiment", 0, bits(1e-2), bits(0.1), "-")
+        script.call("EnterInitializationMode", 0)
+        script.call("ExitInitializationMode", 0)
+        script.call("DoStep", 0, bits(0.1), bits(0.1))
+        script.call("GetStatus", 0, 0, expect="Discard")
+        script.call("DoStep", 0, bits(0.1), bits(0.1), expect="Error")
+        script.call("Reset", 0)
+    script.call("FreeInstance", 0)
+    return script
+
+
+def everything(model: Model) -> Script:
+    """Return one script with all that a platform may do differently."""
+    return joined(
+        *(co_simulation(model, variant) for variant in VARIANTS),
+        model_exchange(model),
+        messages(model),
+    )
 
 
 # ---- States that go to another platform ----------------------------------------------------------

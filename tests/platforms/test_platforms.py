@@ -10,13 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from tests.platforms import refusals, scripts
+from tests.platforms import scripts
 from tests.platforms.platforms import PLATFORMS, Platform, Runner, runner
-from tests.platforms.scripts import Model, Script, joined
+from tests.platforms.scripts import VARIANTS, Script, joined
 from tests.platforms.transcript import first_difference, read
 from tests.support.paths import NAMES
 
-VARIANTS = (1, 2, 3)
 THREADS = 8
 STEPS = 40  # before a state is saved, and after
 
@@ -37,15 +36,6 @@ def runners(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Runners:
     return functools.cache(lambda row, name: runner(row, name, fmu, folder))
 
 
-def everything(model: Model) -> Script:
-    """All that a platform may do differently, in one script."""
-    others = (scripts.model_exchange, refusals.refusals, refusals.logging)
-    return joined(
-        *(scripts.co_simulation(model, variant) for variant in VARIANTS),
-        *(part(model) for part in others),
-    )
-
-
 @pytest.mark.parametrize("recompiled", [False, True])
 @each_platform
 @each_fmu
@@ -55,7 +45,7 @@ def test_all_values_states_and_messages_are_the_same(
     """Of the library in the release, and of one that a foreign compiler makes of its sources."""
     native = runners(None, name)
     other = runner(row, name, fmu, tmp_path, recompiled=True) if recompiled else runners(row, name)
-    script = everything(native.model)
+    script = scripts.everything(native.model)
     (expected,) = native.run(script)
     (actual,) = other.run(script)
     difference = first_difference(script, expected, actual)

@@ -5,8 +5,6 @@ from dataclasses import dataclass, field
 
 from tests.platforms.scripts import Script
 
-NOT_WRITTEN = "aa" * 8  # of a value that a call did not write
-
 
 @dataclass
 class Answer:
