@@ -13,6 +13,7 @@ from rparm.models.machine.references.monolithic import COLUMNS, monolithic
 from rparm.errors import UserError
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_made_again_it_is_the_same(variant: str) -> None:
     expected = continuous.reference(variant)
