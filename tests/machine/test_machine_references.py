@@ -9,7 +9,7 @@ from rparm.models.machine.references.machine import COMPONENTS, completed, decla
 from rparm.models.rp_plant.references.solver import Solver
 
 from rparm.errors import UserError
-from tests.machine.test_machine import VARIANTS, reference
+from tests.support.systems import MACHINE_SYSTEM as MACHINE
 
 STOP = 0.3  # s, of what is made again
 
@@ -20,9 +20,10 @@ def solver() -> Solver:
 
 
 def test_variants_are_those_of_the_system() -> None:
-    assert set(make_references.variants()) == set(VARIANTS)
+    assert set(make_references.variants()) == set(MACHINE.variants)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("variant", ["pick_and_place", "stick_slip", "noisy_sensor"])
 def test_made_again_it_begins_alike(solver: Solver, variant: str) -> None:
     parameters = make_references.variants()[variant]
@@ -30,14 +31,14 @@ def test_made_again_it_begins_alike(solver: Solver, variant: str) -> None:
     for file in make_references.FILES:
         times, columns = made[file]
         assert len(times) == round(STOP * STEPS_PER_SECOND) // make_references.KEPT + 1
-        kept = reference(variant, file)
+        kept = MACHINE.reference(variant, file)
         assert list(kept) == ["time", *columns]
         for name, column in columns.items():
             rows = kept[name][: len(times)]
             scale = max(np.abs(rows).max(), 1e-3)
             assert np.abs(column - rows).max() <= 1e-13 * scale, (file, name)
     times, columns = made["tightest.csv"]  # of these 0.3 s: not all samples are among the tightest
-    kept = reference(variant, "tightest.csv")
+    kept = MACHINE.reference(variant, "tightest.csv")
     listed = kept["time"] < STOP - 0.01
     rows = np.searchsorted(times.astype(float), kept["time"][listed])
     assert len(rows) > 10 or variant == "stick_slip"  # which has none so early
