@@ -2,8 +2,8 @@
 # Sets up, builds and runs the tests, all by ctest.
 #
 #   ./test.sh               optimized, C and Python, and C with gcc's sanitizers
-#   ./test.sh --all         then slow tests, clang, threads, fuzzing, analysers, mutants, other platforms, other importers, browsers
-#   ./test.sh --long        all, then the long campaigns, an hour and a half, with a table of their figures
+#   ./test.sh --all         then slow tests, clang's warnings, threads, analysers, other platforms, other importers, browsers
+#   ./test.sh --long        all, then C tests by clang, on Arm and in valgrind, fuzzing, mutants and long campaigns: two hours, with a table of figures
 #   ./test.sh ARGUMENTS     optimized only; of all tests those that ctest chooses by ARGUMENTS: ./test.sh -R instance
 #
 # Each installs what it needs. Tests for which something is missing nevertheless are skipped and named; in CI they fail.
@@ -32,27 +32,18 @@ short() {
 more() {
   ./setup.sh --platforms
 
-  step "clang, all warnings are errors; C tests"
+  step "clang, all warnings are errors"
   build clang
-  ctest --preset clang --progress -j 2
 
   step "ThreadSanitizer; the test with many threads"
   build tsan
   ctest --preset tsan --progress
 
-  step "libFuzzer, ten seconds a target"
-  build fuzz
-  ctest --preset fuzz --progress -j 2
-
-  step "64-bit Arm in qemu; C tests of src and models"
-  build qemu
-  ctest --preset qemu --progress -j 2
-
   step "other importers, each in its own environment"
   # without network the tests of those that are missing are skipped; CI must have them
   tests/importers/install.sh || [ -z "${CI-}" ]
 
-  step "releases, playground, analysers, mutants, importers, browsers"
+  step "releases, playground, analysers, importers, browsers"
   build default
   build default release
   build default playground
@@ -60,10 +51,16 @@ more() {
 }
 
 long() {
-  step "long campaigns"
   local failed=0
+  step "C tests: clang; 64-bit Arm in qemu, those of src and models"
+  ctest --preset clang --progress -j 2 || failed=1
+  build qemu
+  ctest --preset qemu --progress -j 2 || failed=1
+
+  step "long campaigns, fuzzing, mutants"
+  build fuzz
   ctest --preset tsan -C Long || failed=1
-  ctest --preset fuzz -C Long -L long -j 2 || failed=1
+  ctest --preset fuzz -C Long -j 2 || failed=1
   ctest --preset default -C Long -R '^(long_|test_faults_)' || failed=1
   python3 tests/robustness/figures.py build/{tsan/,fuzz/,}Testing/Temporary/LastTest.log
   return "$failed"

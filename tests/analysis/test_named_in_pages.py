@@ -22,7 +22,7 @@ WRITTEN = {"value_references.h", "benchmark.md"}  # by the generator and the ben
 PLACEHOLDERS = {"my_scenario", "my_model", "MyModel", "Name", "name", "pendulum_values"}
 # names in programs of others
 ELSEWHERE = {"step_until", "SystemGeometry", "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES"}
-ELSEWHERE |= {"OMSimulator", "system_sc", "system_wc", "importFMU", "load_fmu"}
+ELSEWHERE |= {"OMSimulator", "system_sc", "system_wc", "importFMU", "load_fmu", "final_time"}
 HISTORY = ROOT / "CHANGELOG.md"  # names what is gone, too
 
 SPAN = re.compile(r"`([^`\n]+)`")

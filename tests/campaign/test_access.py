@@ -1,4 +1,4 @@
-"""Who reaches the processes of a campaign on this machine: nobody but its own processes."""
+"""Who reaches the processes of a campaign: its own ones, and those with certificates."""
 
 import json
 import os
@@ -9,14 +9,21 @@ import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
+import dask
 import psutil
 import pytest
 from distributed import Client
 
-from rparm.campaign import cluster
-from tests.campaign.cluster import processes
+from rparm.campaign import cluster, credentials
+from rparm.errors import UserError
+from tests.campaign.cluster import certificates, processes
 from tests.campaign.cluster.processes import ENVIRONMENT
 from tests.campaign.files import write
+from tests.support.hosts import LOOPBACK
+from tests.support.rparm_project import Console
+
+# ---- On this machine -----------------------------------------------------------------------------
+
 
 CHANGES = [("runs = 40", "runs = 240"), ("block = 8", "block = 6")]
 
@@ -105,3 +112,102 @@ def test_only_this_machine_reaches_a_campaign(
     assert pages == printed
     assert len(pages) == (0 if options else 1)
     assert len(found - {("127.0.0.1", port) for port in pages}) == 5  # scheduler, workers, nannies
+
+
+# ---- A scheduler elsewhere -----------------------------------------------------------------------
+
+
+Files = tuple[Path, Path, Path]
+FEW = [("runs = 40", "runs = 8"), ("[3, 17]", "[3]")]
+TLS, TCP = "tls://127.0.0.1:1", "tcp://127.0.0.1:1"
+
+
+@pytest.fixture(scope="module")
+def own(tmp_path_factory: pytest.TempPathFactory) -> Files:
+    return certificates.make(tmp_path_factory.mktemp("own") / "certificates")
+
+
+@pytest.fixture(scope="module")
+def other(tmp_path_factory: pytest.TempPathFactory) -> Files:
+    """Of another authority."""
+    return certificates.make(tmp_path_factory.mktemp("other") / "certificates")
+
+
+def options(ca: Path, cert: Path, key: Path) -> list[str]:
+    return ["--tls-ca", str(ca), "--tls-cert", str(cert), "--tls-key", str(key)]
+
+
+def test_a_cluster_with_certificates(own: Files, other: Files, tmp_path: Path) -> None:
+    file = write(tmp_path, changes=FEW)
+    expected = processes.completed(file, tmp_path / "here", "--workers", 1)
+    with processes.cluster(LOOPBACK, [LOOPBACK], own) as (address, *_):
+        given = ("--scheduler", address, *options(*own))
+        assert processes.completed(file, tmp_path / "elsewhere", *given) == expected
+        plain = address.replace("tls", "tcp")
+        for place, files in (
+            (address, other),
+            (address, (own[0], *other[1:])),
+            (address, (other[0], *own[1:])),
+            (plain, (None, None, None)),
+        ):
+            security = credentials.of(place, *files)
+            words = re.escape(f"{place}: the scheduler cannot be reached: ") + "[^\n]+$"
+            with (
+                pytest.raises(UserError, match=words),
+                cluster.opened(place, None, tmp_path, security),
+            ):
+                pass
+
+
+def test_wrong_certificates_are_refused(
+    own: Files, other: Files, tmp_path: Path, console: Console
+) -> None:
+    """Before anything runs, in one line."""
+    ca, cert, key = own
+    garbage, none = tmp_path / "garbage.pem", tmp_path / "none.pem"
+    garbage.write_text("-----BEGIN CERTIFICATE-----\nx\n-----END CERTIFICATE-----\n")
+    locked = certificates.make(tmp_path / "locked", b"secret")
+    cases = [
+        ([TLS], f"{TLS}: needs certificates: --tls-ca, --tls-cert, --tls-key, or those of Dask's"),
+        ([TLS, "--tls-ca", str(ca)], "--tls-cert, --tls-key: missing, tls://127.0.0.1:1 needs"),
+        ([TLS, *options(*own)[:4]], "--tls-key: missing"),
+        ([TCP, *options(*own)], f"--tls-ca: {TCP} takes no certificates, expected an address as"),
+        (["127.0.0.1:1", *options(*own)], "--tls-ca: 127.0.0.1:1 takes no certificates"),
+        ([TLS, *options(none, cert, key)], f"{none}: no such file"),
+        ([TLS, *options(ca, none, key)], f"{none}: no such file"),
+        ([TLS, *options(ca, cert, none)], f"{none}: no such file"),
+        ([TLS, *options(Path("/dev/zero"), cert, key)], "/dev/zero: cannot be read: is a device"),
+        ([TLS, *options(tmp_path, cert, key)], f"{tmp_path}: is not the certificate of an auth"),
+        ([TLS, *options(garbage, cert, key)], f"{garbage}: is not the certificate of an authority"),
+        ([TLS, *options(ca, garbage, key)], f"{garbage}, {key}: are not a certificate and its"),
+        ([TLS, *options(ca, cert, garbage)], f"{cert}, {garbage}: are not a certificate and its"),
+        ([TLS, *options(ca, cert, other[2])], f"{cert}, {other[2]}: are not a certificate and its"),
+        ([TLS, *options(*locked)], "private key without a password"),
+        ([TCP, "--no-dashboard"], "--no-dashboard: that of a --scheduler"),
+        (["nonsense://x"], "nonsense://x: the scheduler cannot be reached"),
+    ]
+    command = ("campaign", write(tmp_path, changes=FEW), "--output", tmp_path / "out")
+    for arguments, words in cases:
+        assert words in console.failed(*command, "--scheduler", *arguments)
+    assert "are for a --scheduler" in console.failed(*command, *options(*own))
+
+
+def test_dasks_configuration_has_certificates(own: Files, other: Files) -> None:
+    def configured(ca: Path, cert: Path, key: Path) -> dask.config.set:
+        names = ("ca-file", "client.cert", "client.key")
+        values = map(str, (ca, cert, key))
+        return dask.config.set(
+            {f"distributed.comm.tls.{n}": v for n, v in zip(names, values, strict=True)}
+        )
+
+    with configured(*own):
+        made = credentials.of(TLS, None, None, None)
+        assert made.get_tls_config_for_role("client")["key"] == str(own[2])
+        assert made.require_encryption
+        given = credentials.of(TLS, *other)  # those of the command line go before
+        assert given.get_tls_config_for_role("client")["ca_file"] == str(other[0])
+    with (
+        configured(*own[:2], other[2]),
+        pytest.raises(UserError, match="are not a certificate and its private key"),
+    ):
+        credentials.of(TLS, None, None, None)

@@ -24,8 +24,8 @@ from rparm.models.closed_loop.coupling.step_errors import StepErrors
 
 from rparm.__main__ import main
 from rparm.errors import UserError
-from tests.closed_loop.variants import VARIANTS
 from tests.support.paths import ROOT
+from tests.support.systems import CLOSED_LOOP
 
 STEP = 1e-3  # s, of the sampled references
 BOUND = 1e-7  # relative, at the relative tolerance of the variants, 1e-11
@@ -62,7 +62,7 @@ def flat(parameters: dict) -> dict:
 # ---- Against the references ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("variant", CLOSED_LOOP.variants)
 def test_jacobi_steps_meet_the_sampled_reference(loop: ClosedLoop, variant: str) -> None:
     expected = closed_loop.read_reference(REFERENCES / variant / "sampled.csv")
     columns, calls = loop.run(METHODS[0], STEP, variant)

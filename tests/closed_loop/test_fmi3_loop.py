@@ -9,7 +9,7 @@ from rparm.models.closed_loop.coupling import loop as closed_loop
 from rparm.models.closed_loop.coupling.loop import METHODS, REFERENCE_AHEAD, ClosedLoop, Method
 
 from rparm.errors import UserError
-from rparm.system import comparison, ecos, ssp
+from rparm.system import ssp
 from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, edited, edited_fmu, replace
 
@@ -56,18 +56,6 @@ def test_straight_lines_give_the_same_numbers(
 
 
 # ---- Ecos ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("variant", ["nominal", "heavy_payload_integral", "limited_effort"])
-def test_ecos_gives_the_same_bits(variant: str) -> None:
-    results = []
-    for path in (SSP, SSP3):
-        with ssp.unpacked(path) as opened:
-            results.append(ecos.run(opened, variant, comparison.recorded(opened)))
-    first, second = results
-    assert first.names == second.names
-    assert len(first.values) == 6001 and np.ptp(first.values) > 1.0
-    assert first.values.tobytes() == second.values.tobytes()
 
 
 def test_the_command_takes_the_fmus_of_fmi_3(tmp_path: Path, console: Console) -> None:

@@ -1,6 +1,5 @@
 """The closed loop in Ecos is what the references say; failures leave nothing."""
 
-import functools
 import html
 import os
 import signal
@@ -14,16 +13,13 @@ from rparm.models.closed_loop.study import EXPERIMENT
 
 from rparm.errors import UserError
 from rparm.report import overview
-from rparm.system import comparison, ecos, ssp
-from tests.closed_loop.variants import VARIANTS
+from rparm.system import comparison, ssp
 from tests.support.paths import ROOT
 from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, not_a_number, read_csv, replace
+from tests.support.systems import CLOSED_LOOP
 
 SSP3 = SSP.parent / "fmi3" / SSP.name
-BOUND = 1e-7  # of the largest value of a variable, or of SCALE where that is larger
-SCALE = 1e-3
-ROUNDING = 1e-9  # two engines with the same order
 STATES = ("q1", "q2", "dq1", "dq2")
 STRUCTURE = "SystemStructure.ssd"
 REPORT = ("{0}.html", "{0}.csv")
@@ -35,53 +31,7 @@ def is_built() -> None:
         pytest.fail(f"{SSP}: no such file, ./run.sh builds it")
 
 
-def reference(variant: str, name: str) -> dict[str, np.ndarray]:
-    return read_csv(ROOT / "models" / "closed_loop" / "references" / variant / name)
-
-
-def difference(values: np.ndarray, expected: np.ndarray) -> float:
-    assert values.shape == expected.shape
-    assert np.isfinite(values).all()
-    return float(np.abs(values - expected).max() / max(np.abs(expected).max(), SCALE))
-
-
-@functools.cache
-def run(variant: str) -> dict[str, np.ndarray]:
-    """The variant in Ecos: all recorded values by name."""
-    with ssp.unpacked(SSP) as opened:
-        result = ecos.run(opened, variant, comparison.recorded(opened))
-    return {"time": result.times} | dict(zip(result.names, result.values.T, strict=True))
-
-
-def rows_of(expected: dict[str, np.ndarray]) -> np.ndarray:
-    """Communication points that a reference has rows for."""
-    rows = np.rint(expected["time"] * 1000).astype(int)
-    assert np.allclose(expected["time"], rows / 1000, rtol=0, atol=1e-12)
-    assert (rows[0], rows[-1]) == (0, 6000)
-    assert len(rows) > 100
-    return rows
-
-
 # ---- Ecos ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("variant", VARIANTS)
-def test_ecos_is_at_the_reference_of_its_order(variant: str) -> None:
-    expected = reference(variant, "ecos.csv")
-    result, rows = run(variant), rows_of(expected)
-    assert set(expected) == set(result)
-    worst = {name: difference(result[name][rows], expected[name]) for name in expected}
-    assert max(worst.values()) <= BOUND, max(worst, key=worst.__getitem__)
-
-
-def test_the_bound_tells_one_order_from_another() -> None:
-    """A delay of one step more or less, or none at all, is far beyond it."""
-    other = reference("nominal", "monolithic.csv")
-    result, rows = run("nominal"), rows_of(other)
-    assert difference(result["arm.q1"][rows], other["arm.q1"]) > 100 * BOUND
-    sampled = reference("nominal", "sampled.csv")
-    effort = "controller.tau1"
-    assert difference(result[effort][rows], sampled[effort]) > 100 * BOUND
 
 
 def test_recorded_are_all_outputs_and_states() -> None:
@@ -96,19 +46,17 @@ def test_recorded_are_all_outputs_and_states() -> None:
 
 
 def test_variants_differ_as_they_should() -> None:
+    runs = {variant: CLOSED_LOOP.run(variant) for variant in CLOSED_LOOP.variants}
     distance = {
-        variant: np.hypot(
-            run(variant)["arm.ee_x"] - run(variant)["trajectory.ee_x_ref"],
-            run(variant)["arm.ee_y"] - run(variant)["trajectory.ee_y_ref"],
-        )
-        for variant in VARIANTS
+        variant: np.hypot(*(run[f"arm.ee_{x}"] - run[f"trajectory.ee_{x}_ref"] for x in "xy"))
+        for variant, run in runs.items()
     }
     assert distance["nominal"].max() < 1e-3  # m
     assert distance["heavy_payload"].max() > 10 * distance["nominal"].max()
     # the constant part of the payload's error, at rest at the end
     assert distance["heavy_payload"][-1] > 1e-3
     assert distance["heavy_payload_integral"][-1] < 1e-5
-    torque = run("limited_effort")["controller.tau1"]
+    torque = runs["limited_effort"]["controller.tau1"]
     assert torque.max() == 11.0
     assert 0.1 < np.mean(torque == 11.0) < 0.9
     assert distance["limited_effort"][-1] < 1e-4
@@ -127,9 +75,8 @@ def test_the_command_checks_and_reports(tmp_path: Path, console: Console) -> Non
         for file in REPORT:
             assert (tmp_path / "system" / file.format(name)).stat().st_size > 10_000
         assert f'href="system/{name}.html"' in page
-    written, result = read_csv(tmp_path / "system/nominal.csv"), run("nominal")
-    with ssp.unpacked(SSP) as opened:
-        assert list(written) == [*result, *comparison.discrete(opened)]
+    written, result = read_csv(tmp_path / "system/nominal.csv"), CLOSED_LOOP.run("nominal")
+    assert list(written) == list(result)
     rows = np.rint(written["time"] / result["time"][1]).astype(int)  # those that the page draws
     for name in result:
         np.testing.assert_allclose(written[name], result[name][rows], rtol=1e-11)

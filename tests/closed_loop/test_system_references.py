@@ -247,6 +247,7 @@ def test_gauss_seidel_gives_the_newest_outputs(order: str, newest: int) -> None:
 # -- files --
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_made_again_is_the_same(variant: str) -> None:
     made = make_references.make(VARIANTS[variant])

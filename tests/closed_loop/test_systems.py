@@ -8,12 +8,12 @@ import pytest
 from rparm import project
 from rparm.errors import UserError
 from rparm.system import study
-from tests.closed_loop.variants import VARIANTS
 from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, Edit, edited, replace
+from tests.support.systems import CLOSED_LOOP
 
 STRUCTURE = "SystemStructure.ssd"
-SECOND = tuple(f"{name}_2" for name in VARIANTS)
+SECOND = tuple(f"{name}_2" for name in CLOSED_LOOP.variants)
 Add = Callable[[str, str, str], Path]
 
 
@@ -30,7 +30,7 @@ def add(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Add:
             STRUCTURE: replace('System name="closed_loop"', f'System name="{name}"')
         }
         for component in ("trajectory", "controller", "arm"):
-            for variant in VARIANTS:
+            for variant in CLOSED_LOOP.variants:
                 file = f"resources/{component}_{variant}.ssv"
                 edits[file] = replace(f'name="{variant}"', f'name="{variant}{suffix}"')
         return edited(SSP, tmp_path / "build" / archive, edits)
@@ -54,7 +54,7 @@ def listed(console: Console, *arguments: object) -> dict[str, list[str]]:
 def test_names_are_those_of_variants_and_systems(add: Add, console: Console) -> None:
     add("loop", "Loop.ssp", "")
     second = add("loop_two", "LoopTwo.ssp", "_2")
-    both = {"loop": list(VARIANTS), "loop_two": list(SECOND)}
+    both = {"loop": list(CLOSED_LOOP.variants), "loop_two": list(SECOND)}
     assert listed(console) == both
     assert listed(console, "loop_two") == {"loop_two": list(SECOND)}
     assert listed(console, "loop_two", "loop") == both
@@ -91,7 +91,7 @@ def test_a_system_that_is_not_built_is_named(add: Add, console: Console) -> None
     add("loop", "Loop.ssp", "")
     add("loop_two", "LoopTwo.ssp", "_2").unlink()
     assert "has no SSP of loop_two: ./run.sh builds it" in console.refused("system", "--list")
-    assert listed(console, "loop") == {"loop": list(VARIANTS)}
+    assert listed(console, "loop") == {"loop": list(CLOSED_LOOP.variants)}
 
 
 def test_a_system_without_a_folder_is_refused(add: Add, tmp_path: Path, console: Console) -> None:

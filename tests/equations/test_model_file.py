@@ -272,3 +272,22 @@ def read_mutations(folder: Path, seed: int, count: int) -> int:
 
 def test_mutated_examples_are_read_or_refused(tmp_path: Path) -> None:
     assert 60 < read_mutations(tmp_path, 0, 600) < 550
+
+
+@pytest.mark.long
+def test_a_million_mutated_examples(tmp_path: Path) -> None:
+    assert 100_000 < read_mutations(tmp_path, 1_000_000, 1_000_000) < 900_000
+
+
+@pytest.mark.long
+def test_what_is_accepted_compiles(tmp_path: Path) -> None:
+    chance, texts = random.Random(2), [path.read_text() for path in EXAMPLES]
+    compiled = 0
+    while compiled < 100:
+        folder = tmp_path / str(compiled)
+        folder.mkdir(exist_ok=True)
+        try:
+            Model(folder, mutated(chance, chance.choice(texts)))
+        except ModelFileError:
+            continue
+        compiled += 1

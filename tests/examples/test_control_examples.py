@@ -1,6 +1,9 @@
 """Examples of control: optimal control, LQR with a Kalman filter, an environment for learning."""
 
+import os
 import re
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 
@@ -12,6 +15,7 @@ from gymnasium.utils.env_checker import check_env
 import rparm
 from examples import gymnasium_environment, lqr_and_kalman, optimal_control
 from tests.examples.scripts import printed
+from tests.support.paths import ROOT
 
 
 @pytest.mark.parametrize("example", ["optimal_control.py", "lqr_and_kalman.py"])
@@ -179,3 +183,21 @@ def test_episodes_by_hand_end_at_the_goal(tmp_path: Path) -> None:
         _, q1, q2, reward = (float(x) for x in re.findall(r"-?\d[\d.e-]*", line))
         assert [q1, q2] == pytest.approx(gymnasium_environment.GOAL, abs=0.03)
         assert -0.1 < reward < 0.0
+
+
+# ---- Models --------------------------------------------------------------------------------------
+
+
+EXAMPLES = ROOT / "examples"
+
+
+def test_a_run_of_each_model_is_drawn(tmp_path: Path) -> None:
+    picture = tmp_path / "models.png"
+    ran = subprocess.run(
+        [sys.executable, EXAMPLES / "models" / "draw.py", picture],
+        cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, text=True, capture_output=True,
+    )  # fmt: skip
+    assert ran.returncode == 0, ran.stderr
+    files = {file.name.partition(".")[0] for file in (EXAMPLES / "models").glob("*.toml")}
+    assert {line.partition(":")[0] for line in ran.stdout.splitlines()} == files
+    assert picture.read_bytes().startswith(b"\x89PNG") and [*tmp_path.iterdir()] == [picture]

@@ -2,6 +2,7 @@
 
 import io
 import os
+import re
 import subprocess
 import sys
 import zipfile
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 import rparm
+from tests.examples.scripts import printed, python
 from tests.support.paths import FMI_HEADERS, ROOT
 
 EXAMPLES = ROOT / "examples"
@@ -87,3 +89,35 @@ def test_friction_takes_energy_and_nothing_else_does(tmp_path: Path) -> None:
     assert sorted(lost) == [0.0, 0.5, 1.0]
     assert lost[0.0] == 0.0 and min(lost[0.5], lost[1.0]) > 1.0
     assert picture.read_bytes().startswith(PNG)
+
+
+# ---- HELICS --------------------------------------------------------------------------------------
+
+
+FAILING = """
+import sys
+from examples import helics_federate
+
+def fail(*arguments):
+    raise ValueError("this one fails")
+
+if sys.argv[1] == "arm":
+    helics_federate.Arm.step = fail
+else:
+    helics_federate.control = fail
+helics_federate.in_federation()
+"""
+
+
+def test_the_federate_has_the_bits_of_a_plain_loop(tmp_path: Path) -> None:
+    end, difference = printed("helics_federate.py", tmp_path)
+    reached = [float(number) for number in re.findall(r"= (\S+)", end)]
+    assert reached == pytest.approx([0.5, 0.1], abs=1e-3)  # the controller's goal
+    assert difference == "largest difference from a plain loop: 0"
+
+
+@pytest.mark.parametrize("who", ["arm", "controller"])
+def test_no_federate_waits_for_one_that_failed(who: str, tmp_path: Path) -> None:
+    ran = python(tmp_path, "-c", FAILING, who)
+    assert ran.returncode == 1
+    assert ran.stderr.splitlines()[-1] == "ValueError: this one fails"

@@ -1,18 +1,23 @@
-"""Other programs of the machine, of any user, that speak HELICS to the port of a federation."""
+"""Who reaches a federation: other programs of the machine, of any user, and other hosts."""
 
 import os
 import subprocess
 import sys
 from contextlib import suppress
+from pathlib import Path
 
 import psutil
 import pytest
 
 from rparm.federation import addresses
 from rparm.federation.network import KEY
-from tests.federation.processes import Start, federation, wait_for_steps
+from tests.federation.processes import Process, Start, federation, wait_for_steps
+from tests.support.hosts import DEVICE, Network
 from tests.support.paths import ROOT
-from tests.support.ssp_files import SSP
+from tests.support.ssp_files import SSP, edited, replace
+
+# ---- On this machine -----------------------------------------------------------------------------
+
 
 LIMIT = 120.0  # s
 
@@ -84,3 +89,49 @@ def test_a_component_elsewhere_needs_the_key(start: Start, monkeypatch: pytest.M
     text, _ = there.communicate(timeout=LIMIT)
     assert there.returncode == 2
     assert text == f"error: {KEY}: not in the environment, copy the whole line of the federation\n"
+
+
+# ---- Two hosts -----------------------------------------------------------------------------------
+
+
+def apart_from_the_arm(
+    start: Start, apart: Network, system: Path, *arguments: str
+) -> tuple[Process, Process]:
+    address = f"tcp://{apart.here.address}:23404"
+    given = ("--listen", address, *arguments, "--elsewhere", "arm")
+    here = federation(start, *given, system=system, host=apart.here)
+    there = start(
+        "federate", str(system), "nominal", "arm", "--broker", address, *arguments, host=apart.there
+    )
+    return here, there
+
+
+def test_two_hosts_give_the_values_of_one(start: Start, apart: Network) -> None:
+    """The command compares them with those of the master."""
+    for process in apart_from_the_arm(start, apart, SSP):
+        text, _ = process.communicate(timeout=LIMIT)
+        assert process.returncode == 0, text
+
+
+def test_a_lost_link_ends_both(start: Start, apart: Network, tmp_path: Path) -> None:
+    long = edited(
+        SSP,
+        tmp_path / "Long.ssp",
+        {"SystemStructure.ssd": replace('stopTime="6"', 'stopTime="600"')},
+    )
+    here, there = apart_from_the_arm(start, apart, long, "--silence", "10")
+    wait_for_steps(here)
+    apart.cut()
+    for process, words in ((here, "arm has been silent"), (there, "23404 has been silent")):
+        text, _ = process.communicate(timeout=LIMIT)
+        assert process.returncode == 2, text
+        assert f"{words} for 10 s" in text.splitlines()[-1]
+
+
+def test_what_a_host_without_a_network_lacks_is_said(start: Start, apart: Network) -> None:
+    command = ("ip", "address", "flush", "dev", DEVICE)
+    subprocess.run([*apart.here.enter, *command], check=True)
+    offline = federation(start, system=SSP, host=apart.here)
+    text, _ = offline.communicate(timeout=LIMIT)
+    assert offline.returncode == 2
+    assert "needs an IPv4 address besides 127.0.0.1" in text.splitlines()[-1]

@@ -88,12 +88,6 @@ static void test_unknown_categories_are_named(void) {
     }
 }
 
-static void test_missing_categories_are_an_error(void) {
-    const fmi2Component c = fmu_instantiate(&messages, false);
-    ASSERT_ERROR(fmu.SetDebugLogging(c, fmi2True, 3, NULL));
-    fmu_assert_logged(&messages, "fmi2SetDebugLogging");
-}
-
 /* ---- On and off ----------------------------------------------------------------------------- */
 
 static void test_logging_off_still_tells_what_failed(void) {

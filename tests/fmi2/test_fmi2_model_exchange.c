@@ -277,16 +277,3 @@ static void test_there_are_no_events(void) {
         }
     }
 }
-
-static void test_results_without_a_place_are_errors(void) {
-    fmi2Boolean flag;
-    fmi2Component c = in_event_mode();
-    ASSERT_ERROR(fmu.NewDiscreteStates(c, NULL));
-    fmu_assert_in_error(c);
-    c = fmu_me_initialized(&messages, 0.0);
-    ASSERT_ERROR(fmu.CompletedIntegratorStep(c, fmi2True, NULL, &flag));
-    fmu_assert_in_error(c);
-    c = fmu_me_initialized(&messages, 0.0);
-    ASSERT_ERROR(fmu.CompletedIntegratorStep(c, fmi2True, &flag, NULL));
-    fmu_assert_in_error(c);
-}

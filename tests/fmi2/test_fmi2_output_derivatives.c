@@ -141,32 +141,3 @@ static void test_output_derivatives_that_are_refused(void) {
         fmu_free(c);
     }
 }
-
-/* ---- Both kinds of derivatives -------------------------------------------------------------- */
-
-static fmi2Status derive(bool input, fmi2Component c, const fmi2ValueReference references[],
-                         size_t count, const fmi2Integer orders[], double values[]) {
-    return input ? fmu.SetRealInputDerivatives(c, references, count, orders, values)
-                 : fmu.GetRealOutputDerivatives(c, references, count, orders, values);
-}
-
-static void test_missing_arrays(void) {
-    const fmi2Integer order = 1;
-    double value = 1.0;
-    for (int i = 0; i < 6; i++) {
-        const bool input = i % 2 == 0;
-        if (input && fmu_version == 3) { // which has none
-            continue;
-        }
-        const int missing = i / 2;
-        const fmi2ValueReference reference = input ? RP_MANIPULATOR_f2 : RP_MANIPULATOR_q1;
-        const fmi2Component c = fmu_initialized(&messages, 0.0);
-        ASSERT_OK(derive(input, c, NULL, 0, NULL, NULL));
-        fmu_log_clear(&messages);
-        ASSERT_ERROR(derive(input, c, missing == 0 ? NULL : &reference, 1,
-                            missing == 1 ? NULL : &order, missing == 2 ? NULL : &value));
-        fmu_assert_logged(&messages, "NULL");
-        fmu_assert_in_error(c);
-        fmu_free(c);
-    }
-}

@@ -284,54 +284,6 @@ static void test_what_is_no_handle_is_refused(void) {
     }
 }
 
-/* ---- Arguments ------------------------------------------------------------------------------ */
-
-static fmi2Status call_with_null(int which, fmi2Component c, fmi2FMUstate state) {
-    fmi2Byte buffer[16384];
-    size_t size = sizeof buffer;
-    fmi2FMUstate made = NULL;
-    switch (which) {
-    case 0:
-        return fmu.GetFMUstate(c, NULL);
-    case 1:
-        return fmu.SetFMUstate(c, NULL);
-    case 2:
-        return fmu.SerializedFMUstateSize(c, NULL, &size);
-    case 3:
-        return fmu.SerializedFMUstateSize(c, state, NULL);
-    case 4:
-        return fmu.SerializeFMUstate(c, NULL, buffer, size);
-    case 5:
-        return fmu.SerializeFMUstate(c, state, NULL, size);
-    case 6:
-        return fmu.DeSerializeFMUstate(c, NULL, size, &made);
-    case 7:
-        return fmu.DeSerializeFMUstate(c, NULL, 0, &made);
-    default: {
-        struct fmu_bytes bytes = {.data = buffer, .size = size};
-        (void)fmu.SerializedFMUstateSize(c, state, &bytes.size);
-        (void)fmu.SerializeFMUstate(c, state, bytes.data, bytes.size);
-        return fmu.DeSerializeFMUstate(c, bytes.data, bytes.size, NULL);
-    }
-    }
-}
-
-static void test_null_arguments_are_errors(void) {
-    for (int which = 0; which < 9; which++) {
-        char text[32];
-        snprintf(text, sizeof text, "case %d", which);
-        const fmi2Component c = fmu_initialized(&messages, 0.0);
-        fmi2FMUstate saved = fmu_save(c);
-        fmu_log_clear(&messages);
-        TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Error, call_with_null(which, c, saved), text);
-        TEST_ASSERT_EQUAL_UINT_MESSAGE(1, messages.count[fmi2Error], text);
-        fmu_assert_in_error(c);
-        fmu_restore(c, saved);
-        step(c, 0.0);
-        fmu_free(c);
-    }
-}
-
 /* ---- Memory --------------------------------------------------------------------------------- */
 
 /* Masters save at every step and never free; FreeInstance does, as the leak check sees. */

@@ -336,30 +336,3 @@ static void test_status_tells_what_can_be_known(void) {
     }
     ASSERT_OK(fmu.DoStep(c, 2.5, 0.5, fmi2True)); // a Discard here is no failure
 }
-
-static fmi2Status status_into_nothing(int function, fmi2Component c) {
-    switch (function) {
-    case FMU_GetStatus:
-        return fmu.GetStatus(c, fmi2DoStepStatus, NULL);
-    case FMU_GetRealStatus:
-        return fmu.GetRealStatus(c, fmi2LastSuccessfulTime, NULL);
-    case FMU_GetIntegerStatus:
-        return fmu.GetIntegerStatus(c, fmi2DoStepStatus, NULL);
-    case FMU_GetBooleanStatus:
-        return fmu.GetBooleanStatus(c, fmi2Terminated, NULL);
-    default:
-        return fmu.GetStringStatus(c, fmi2PendingStatus, NULL);
-    }
-}
-
-static void test_status_into_nothing_is_an_error(void) {
-    fmu_only_in(2, "FMI 3.0 has no status of a step");
-    for (int function = FMU_GetStatus; function <= FMU_GetStringStatus; function++) {
-        const fmi2Component c = fmu_initialized(&messages, 0.0);
-        fmu_log_clear(&messages);
-        ASSERT_ERROR(status_into_nothing(function, c));
-        fmu_assert_logged(&messages, fmu_name_of((enum fmu_function)function));
-        fmu_assert_in_error(c);
-        fmu_free(c);
-    }
-}

@@ -114,25 +114,6 @@ static void test_missing_arrays(void) {
     }
 }
 
-static void test_missing_arrays_of_a_directional_derivative(void) {
-    const fmi2ValueReference unknown = RP_MANIPULATOR_ddq1;
-    const fmi2ValueReference known = RP_MANIPULATOR_tau1;
-    const double seed = 1.0;
-    const fmi2Component c = fmu_initialized(&messages, 0.0);
-    for (int missing = 0; missing < 4; missing++) {
-        double result = -1.0;
-        ASSERT_OK(fmu.Reset(c));
-        fmu_initialize(c, 0.0, 0.0);
-        fmu_log_clear(&messages);
-        ASSERT_ERROR(fmu.GetDirectionalDerivative(
-            c, missing == 0 ? NULL : &unknown, 1, missing == 1 ? NULL : &known, 1,
-            missing == 2 ? NULL : &seed, missing == 3 ? NULL : &result));
-        fmu_assert_logged(&messages, "NULL");
-        fmu_assert_in_error(c);
-        TEST_ASSERT_TRUE(result == -1.0);
-    }
-}
-
 static void test_a_vector_is_set_as_a_whole_or_not_at_all(void) {
     static const struct {
         fmi2ValueReference reference;

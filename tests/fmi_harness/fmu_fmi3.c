@@ -445,6 +445,8 @@ const char *fmu_name_of(enum fmu_function function) {
         [FMU_SerializeFMUstate] = "fmi3SerializeFMUState",
         [FMU_DeSerializeFMUstate] = "fmi3DeserializeFMUState",
         [FMU_GetDerivatives] = "fmi3GetContinuousStateDerivatives",
+        [FMU_GetRealOutputDerivatives] = "fmi3GetOutputDerivatives",
+        [FMU_NewDiscreteStates] = "fmi3UpdateDiscreteStates",
     };
     return other_names[function] != NULL ? other_names[function]
                                          : fmu_function_names[function] + sizeof "fmi2" - 1;

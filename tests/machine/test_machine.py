@@ -1,42 +1,17 @@
-"""The machine in Ecos is what the references say, and does what its page says."""
+"""The machine in Ecos does what its page says."""
 
-import functools
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rparm.models.machine.experiment import STEPS_PER_SECOND, STOP
 
-from rparm.system import comparison, ecos, ssp
-from tests.support.paths import ROOT
 from tests.support.rparm_project import Console
-from tests.support.ssp_files import MACHINE as SSP
 from tests.support.ssp_files import read_csv
+from tests.support.systems import MACHINE_SYSTEM as MACHINE
+from tests.support.systems import Columns
 
-VARIANTS = (
-    *("pick_and_place", "pick_and_place_untold", "stick_slip", "wall_contact", "noisy_sensor"),
-)
-BOUND = 1e-7  # of the largest value of a variable, or of SCALE where that is larger
-SCALE = 1e-3
-STEPS = round(STOP * STEPS_PER_SECOND)
-DISCRETE = ("plant.mode1", "plant.mode2", "sensor.counts1", "sensor.counts2")
-DISCRETE = (*DISCRETE, "trajectory.payload_attached")
-
-Columns = dict[str, np.ndarray]
-
-
-def reference(variant: str, name: str = "ecos.csv") -> Columns:
-    return read_csv(ROOT / "models" / "machine" / "references" / variant / name)
-
-
-@functools.cache
-def run(variant: str, folder: str = "") -> Columns:
-    """The variant in Ecos: all recorded values by name."""
-    with ssp.unpacked(SSP.parent / folder / SSP.name) as opened:
-        names = [*comparison.recorded(opened), *comparison.discrete(opened)]
-        result = ecos.run(opened, variant, names)
-    assert len(result.times) == STEPS + 1
-    return {"time": result.times} | dict(zip(result.names, result.values.T, strict=True))
+run = MACHINE.run
 
 
 def distance(columns: Columns) -> np.ndarray:
@@ -49,26 +24,8 @@ def changes(mode: np.ndarray) -> np.ndarray:
     return np.flatnonzero(np.diff(mode))
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
-def test_ecos_is_at_the_reference_of_its_order(variant: str) -> None:
-    """All Real outputs, and to the last bit counts, modes and whether the payload is attached."""
-    expected, result = reference(variant), run(variant)
-    rows = np.rint(expected["time"] * STEPS_PER_SECOND).astype(int)
-    assert np.allclose(expected["time"], rows / STEPS_PER_SECOND, rtol=0, atol=1e-12)
-    assert (rows[0], rows[-1]) == (0, STEPS) and len(rows) > 100
-    assert {"plant.mode1", "sensor.counts1", "environment.wall_force"} <= set(expected)
-    assert set(expected) <= set(result)
-    for name in DISCRETE:
-        np.testing.assert_array_equal(result[name][rows], expected[name])
-    worst = {
-        name: np.abs(result[name][rows] - x).max() / max(np.abs(x).max(), SCALE)
-        for name, x in expected.items()
-    }
-    assert max(worst.values()) <= BOUND, max(worst, key=worst.__getitem__)
-
-
 def test_a_controller_that_is_told_tracks_ten_times_better() -> None:
-    told, untold = (run(name) for name in VARIANTS[:2])
+    told, untold = (run(name) for name in MACHINE.variants[:2])
     assert distance(told).max() < 0.1 * distance(untold).max()
     attached = untold["trajectory.payload_attached"] == 1
     np.testing.assert_array_equal(attached, told["trajectory.payload_attached"] == 1)
@@ -165,14 +122,6 @@ def test_noise_and_latency_are_those_of_the_sensor() -> None:
     assert distance(columns).max() < 0.1 * distance(run("pick_and_place_untold")).max()
 
 
-@pytest.mark.parametrize("variant", ["pick_and_place", "stick_slip", "noisy_sensor"])
-def test_fmus_of_fmi_3_give_the_same_bits(variant: str) -> None:
-    first, second = run(variant), run(variant, "fmi3")
-    assert list(first) == list(second)
-    for name, values in first.items():
-        assert values.tobytes() == second[name].tobytes(), name
-
-
 def test_the_command_runs_it(tmp_path: Path, console: Console) -> None:
     pictures = tmp_path / "pictures"
     arguments = ("--report", tmp_path, "--pictures", pictures)
@@ -193,4 +142,6 @@ def test_systems_are_listed_with_their_variants(console: Console) -> None:
     lines = console("system", "--list")[1].splitlines()
     at = lines.index("machine")
     assert lines[0] == "closed_loop"
-    assert lines[at + 1 : at + 1 + len(VARIANTS)] == [f"  {name}" for name in VARIANTS]
+    assert lines[at + 1 : at + 1 + len(MACHINE.variants)] == [
+        f"  {name}" for name in MACHINE.variants
+    ]

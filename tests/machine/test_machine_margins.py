@@ -11,7 +11,7 @@ import pytest
 from rparm.models.machine.experiment import STEPS_PER_SECOND, STOP
 from rparm.models.machine.references import make_references
 
-from tests.machine.test_machine import STEPS, VARIANTS, reference, run
+from tests.support.systems import MACHINE_SYSTEM as MACHINE
 
 LEAST = 4.0  # times the error that a margin is, at the worst sample
 CLEAR = 100.0  # times the largest error that the margins of all samples are that are not listed
@@ -20,10 +20,10 @@ RESOLUTION = {1: 2 * np.pi / 2**20, 2: 1.25e-6}  # rad, m
 
 
 @pytest.mark.parametrize("joint", [1, 2])
-@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("variant", MACHINE.variants)
 def test_no_count_is_near_enough_to_flip(variant: str, joint: int) -> None:
     """The samples with the least margins one by one, all others against the largest error."""
-    tightest, result = reference(variant, "tightest.csv"), run(variant)
+    tightest, result = MACHINE.reference(variant, "tightest.csv"), MACHINE.run(variant)
     margins = tightest[f"margin{joint}"]
     assert 0 < margins.min() < 1e-3 * RESOLUTION[joint]  # of 4000 samples one is that near
     rows = np.rint(tightest["time"] * STEPS_PER_SECOND).astype(int)
@@ -31,17 +31,17 @@ def test_no_count_is_near_enough_to_flip(variant: str, joint: int) -> None:
     assert np.all(margins > LEAST * errors)
     # those that are left out have larger margins than any of the 200 that are in
     others = np.sort(margins)[make_references.TIGHTEST - 1]
-    every = reference(variant)
+    every = MACHINE.reference(variant)
     rows = np.rint(every["time"] * STEPS_PER_SECOND).astype(int)
     largest = np.abs(result[f"plant.q{joint}"][rows] - every[f"plant.q{joint}"]).max()
     assert others > CLEAR * max(largest, errors.max())
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("variant", MACHINE.variants)
 def test_ticks_and_changes_of_efforts_are_between_the_points(variant: str) -> None:
     """Exactly, against what rounding does to the times of an engine that sums up steps."""
-    summed = np.cumsum(np.full(STEPS, 1 / STEPS_PER_SECOND))
-    rounding = np.abs(summed - np.arange(1, STEPS + 1) / STEPS_PER_SECOND).max()
+    summed = np.cumsum(np.full(MACHINE.steps, 1 / STEPS_PER_SECOND))
+    rounding = np.abs(summed - np.arange(1, MACHINE.steps + 1) / STEPS_PER_SECOND).max()
     parameters = PARAMETERS[variant]
     step, stop = Fraction(1, STEPS_PER_SECOND), Fraction(STOP)
     clocks = [("sensor", Fraction(0))]

@@ -1,15 +1,19 @@
-"""The machine's references: made again, and their components against closed forms."""
+"""The machine's references, sampled and continuous: made again, closed forms, refusals."""
 
 import numpy as np
 import pytest
+from rparm.models.machine import continuous
+from rparm.models.machine.continuous import VARIANTS
 from rparm.models.machine.experiment import STEPS_PER_SECOND
 from rparm.models.machine.references import make_references
 from rparm.models.machine.references.components import Actuator, Environment, Sensor, Ticks, real
 from rparm.models.machine.references.machine import COMPONENTS, completed, declared
+from rparm.models.machine.references.make_references import variants
+from rparm.models.machine.references.monolithic import COLUMNS, monolithic
 from rparm.models.rp_plant.references.solver import Solver
 
 from rparm.errors import UserError
-from tests.machine.test_machine import VARIANTS, reference
+from tests.support.systems import MACHINE_SYSTEM as MACHINE
 
 STOP = 0.3  # s, of what is made again
 
@@ -20,9 +24,10 @@ def solver() -> Solver:
 
 
 def test_variants_are_those_of_the_system() -> None:
-    assert set(make_references.variants()) == set(VARIANTS)
+    assert set(make_references.variants()) == set(MACHINE.variants)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("variant", ["pick_and_place", "stick_slip", "noisy_sensor"])
 def test_made_again_it_begins_alike(solver: Solver, variant: str) -> None:
     parameters = make_references.variants()[variant]
@@ -30,14 +35,14 @@ def test_made_again_it_begins_alike(solver: Solver, variant: str) -> None:
     for file in make_references.FILES:
         times, columns = made[file]
         assert len(times) == round(STOP * STEPS_PER_SECOND) // make_references.KEPT + 1
-        kept = reference(variant, file)
+        kept = MACHINE.reference(variant, file)
         assert list(kept) == ["time", *columns]
         for name, column in columns.items():
             rows = kept[name][: len(times)]
             scale = max(np.abs(rows).max(), 1e-3)
             assert np.abs(column - rows).max() <= 1e-13 * scale, (file, name)
     times, columns = made["tightest.csv"]  # of these 0.3 s: not all samples are among the tightest
-    kept = reference(variant, "tightest.csv")
+    kept = MACHINE.reference(variant, "tightest.csv")
     listed = kept["time"] < STOP - 0.01
     rows = np.searchsorted(times.astype(float), kept["time"][listed])
     assert len(rows) > 10 or variant == "stick_slip"  # which has none so early
@@ -115,3 +120,40 @@ def test_the_wall_answers_by_its_law() -> None:
     assert found["ee_mz"] == pytest.approx(-0.2 * force, rel=1e-12)
     away = wall.outputs(motion | {"ee_vy": 50.0})
     assert away["wall_force"] == 0 and away["ee_fy"] == 0
+
+
+# ---- In continuous time --------------------------------------------------------------------------
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_made_again_it_is_the_same(variant: str) -> None:
+    expected = continuous.reference(variant)
+    assert set(expected) == {"time", *COLUMNS}
+    times = expected["time"][:60]
+    assert times[-1] > 1.0
+    for name, column in monolithic(variants()[variant], times).items():
+        scale = max(np.abs(expected[name]).max(), 1e-3)
+        assert np.abs(column - expected[name][:60]).max() <= 1e-13 * scale, name
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"plant.coulomb_friction1": 0.1}, r"plant\.coulomb_friction1 has to be 0"),
+        ({"controller.Ki2": 1.0}, r"controller\.Ki2 has to be 0"),
+        ({"controller.mode": 1}, r"controller\.mode keeps its default"),
+        ({"environment.position": 0.6}, r"the wall is touched"),
+        ({"controller.tau1_max": 5.0}, r"controller\.tau1 reaches its limit 5\.0"),
+        ({"actuator.voltage_max1": 0.1}, r"actuator\.voltage1 reaches its limit 0\.1"),
+    ],
+)
+def test_what_the_equations_do_not_have_is_refused(changes: dict[str, float], message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        monolithic(variants()["pick_and_place"] | changes, [0.0, 0.1, 0.3])
+
+
+def test_times_must_ascend_from_0() -> None:
+    for times in ([], [0.1, 0.2], [0.0, 0.2, 0.2]):
+        with pytest.raises(UserError, match="times must ascend from 0"):
+            monolithic(variants()["pick_and_place"], times)

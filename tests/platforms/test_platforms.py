@@ -20,7 +20,9 @@ THREADS = 8
 STEPS = 40  # before a state is saved, and after
 
 # of the examples the one with events: each takes about a minute
-each_fmu = pytest.mark.parametrize("name", (*NAMES, "BouncingBall"))
+each_fmu = pytest.mark.parametrize(
+    "name", (*NAMES, pytest.param("BouncingBall", marks=pytest.mark.long))
+)
 each_platform = pytest.mark.parametrize("row", PLATFORMS, ids=lambda row: row.name)
 # and this one, whose library comes from the FMU in build/
 everywhere = pytest.mark.parametrize(
@@ -36,7 +38,7 @@ def runners(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Runners:
     return functools.cache(lambda row, name: runner(row, name, fmu, folder))
 
 
-@pytest.mark.parametrize("recompiled", [False, True])
+@pytest.mark.parametrize("recompiled", [False, pytest.param(True, marks=pytest.mark.long)])
 @each_platform
 @each_fmu
 def test_all_values_states_and_messages_are_the_same(

@@ -263,7 +263,7 @@ def main() -> int:
         if isinstance(fault, sites.Mutant) and how != UNCOMPILABLE:
             drawn.append(fault.as_dict())
     if options.random:
-        SAMPLE.write_text(json.dumps(drawn, indent=1) + "\n")
+        SAMPLE.write_text("[\n" + ",\n".join(map(json.dumps, drawn)) + "\n]\n")
     return int(alive > 0)
 
 

@@ -1,4 +1,4 @@
-"""The program that encloses motions gives the same bits from every compiler and processor."""
+"""The program that encloses motions: the same bits from every compiler, and faults in it."""
 
 import shutil
 import subprocess
@@ -6,8 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.prove import faults
 from tests.prove.problems import SMALL, SOURCES, run
 from tests.support.missing import missing
+
+# ---- Compilers -----------------------------------------------------------------------------------
+
 
 FLAGS = ["-std=c17", "-ffp-contract=off"]  # those of the build; later ones of a compiler prevail
 
@@ -43,3 +47,18 @@ def test_fast_mathematics_is_refused(tmp_path: Path) -> None:
     command = ["gcc", *FLAGS, "-ffast-math", SOURCES / "prove.c", "-o", tmp_path / "prove", "-lm"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode != 0 and "-ffast-math" in done.stderr
+
+
+# ---- Faults --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("fault", faults.PLANTED, ids=lambda fault: fault.name)
+def test_planted_faults_are_noticed(fault: faults.Fault) -> None:
+    how = faults.verdict(fault.file, faults.source_of(fault))
+    assert how not in (None, faults.UNCOMPILABLE)
+
+
+@pytest.mark.parametrize("mutant", faults.sample(), ids=lambda mutant: mutant.description()[:80])
+def test_random_faults_are_noticed_or_change_no_bound(mutant: faults.sites.Mutant) -> None:
+    noticed = faults.verdict(mutant.file, faults.source_of(mutant)) is not None
+    assert noticed or mutant.statement in faults.MASKED
