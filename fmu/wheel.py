@@ -1,7 +1,7 @@
 """Hook of hatchling: what the wheel carries besides the Python package, below rparm/share.
 
 models/                    scenarios, references, campaigns, systems and their modules; tables as
-                           .csv.xz, which `rparm.trajectory_csv` reads like .csv
+                           .csv.xz, which `rparm.files` reads like .csv
 fmu/, src/                 what makes FMUs of own equations: Python, and what it reads
 pieces, files.json         all FMUs and systems of the release, as `rparm.shipped` reads them
 built.tar.xz               what else is built for each platform: built.py

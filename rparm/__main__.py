@@ -12,12 +12,11 @@ from io import TextIOWrapper
 from typing import NoReturn, TextIO
 
 from rparm import command_line, project
-from rparm.command_line import Answered
-from rparm.commands import Ended
+from rparm.command_line import Answered, Ended
 from rparm.errors import UserError, reason
+from rparm.files import write_text, written
 from rparm.interruption import handle_endings
 from rparm.output import streams
-from rparm.output_files import write_text, written
 
 LONGEST_MESSAGE = 2000  # characters; some quote what a file says
 

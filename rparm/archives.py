@@ -15,7 +15,7 @@ from pathlib import Path
 from lxml import etree
 
 from rparm.errors import one_line, reason
-from rparm.input_files import UnreadableError, check_regular, is_file, show
+from rparm.files import UnreadableError, check_regular, is_file, show
 
 LARGEST_CONTENT = 2**30  # bytes of all files in an archive
 LARGEST_SYSTEM = 2**32  # bytes of all files in the FMUs of an SSP

@@ -37,7 +37,7 @@ import platformdirs
 
 from rparm import fmu_tools, shipped
 from rparm.errors import UserError, did_you_mean, reason
-from rparm.input_files import is_file
+from rparm.files import is_file
 
 PACKAGE = Path(__file__).resolve().parent
 INSTALLED = shipped.SHARE.is_dir()  # else the package is that of a checkout

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from rparm.models.machine.experiment import STOP
 from rparm.models.machine.systems import SENSOR, SEQUENCE, direct, run_in_ecos
 
-from rparm import project, trajectory_csv
+from rparm import files, project
 from rparm.coupling.master import Master
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value
@@ -80,7 +80,7 @@ def parameters(opened: Ssp, variant: str) -> dict[str, dict[str, Value]]:
 def reference(variant: str) -> Columns:
     """Columns of the solution in continuous time, by name."""
     path = project.references(FOLDER) / variant / "monolithic.csv"
-    names, table = trajectory_csv.read(path, trajectory_csv.failure(path))
+    names, table = files.read_trajectory(path, files.csv_failure(path))
     return dict(zip(names, table.T, strict=True))
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from rparm.models.machine.systems import VARIANT, write_system
 
-from rparm import project, trajectory_csv
+from rparm import files, project
 from rparm.coupling import in_process
 from rparm.fmi.model import Value
 from rparm.identification.demo import Demo
@@ -94,4 +94,4 @@ def _write(machine: Path, log: Path, circle: dict[str, float]) -> None:
             run = in_process.run(opened, VARIANT, list(COLUMNS.values()))
     finally:
         changed.unlink()
-    trajectory_csv.write(log, np.asarray(run.times), list(COLUMNS), run.values, None, True)
+    files.write_trajectory(log, np.asarray(run.times), list(COLUMNS), run.values, None, True)

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from rparm import project, trajectory_csv
+from rparm import files, project
 from rparm.coupling import in_process
 from rparm.errors import UserError, hint
 from rparm.federation import addresses, federation
+from rparm.files import written
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Model, Value
-from rparm.output_files import written
 from rparm.proof import proven, prover
 from rparm.runs import given, reference, simulation
 from rparm.runs.given import Input
@@ -61,7 +61,7 @@ class Table(Mapping[str, np.ndarray]):
     def to_csv(self, path: str | Path) -> None:
         """Write all columns to a file, with 17 significant digits."""
         with written(path):
-            trajectory_csv.write(Path(path), self._times, self._names, self._values)
+            files.write_trajectory(Path(path), self._times, self._names, self._values)
 
     def to_pandas(self) -> Any:
         """The columns as a pandas.DataFrame; pandas must be installed."""

@@ -23,7 +23,7 @@ from pydantic import (
 
 from rparm.errors import UserError, WrongValueError, hint
 from rparm.expressions.evaluation import Expression, parsed
-from rparm.input_files import read_toml, show
+from rparm.files import read_toml, show
 from rparm.units import SECONDS, quantity
 
 MAX_RUNS = 10**9

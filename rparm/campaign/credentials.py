@@ -7,7 +7,7 @@ from pathlib import Path
 from distributed import Security
 
 from rparm.errors import UserError, placed, reason
-from rparm.input_files import check_regular
+from rparm.files import check_regular
 
 TLS = "tls://"
 OPTIONS = ("--tls-ca", "--tls-cert", "--tls-key")

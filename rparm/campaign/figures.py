@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from rparm.campaign.analysis import Index
 from rparm.report.style import ERRORS, MUTED, RUN, STYLE
-from rparm.texts import minus
+from rparm.units import minus
 
 BINS = 50
 COLUMNS = 3

@@ -21,7 +21,7 @@ from rparm.campaign.measures import (
 from rparm.errors import UserError, WrongValueError, did_you_mean, hint, one_line, placed
 from rparm.expressions.evaluation import Expression
 from rparm.fmi.model import INPUTS, TOLERANCE, Value, Variable
-from rparm.texts import unit
+from rparm.units import unit
 
 RUN, FAILURE = "run", "failure"  # columns of every table
 MAX_RECORDED = 100_000_000  # numbers that a run records

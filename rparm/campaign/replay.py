@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rparm import trajectory_csv
+from rparm import files
 from rparm.campaign.bases import Base
 from rparm.campaign.campaign_file import Campaign
 from rparm.campaign.job import Job
@@ -24,7 +24,7 @@ from rparm.report.motion import Recorded
 from rparm.report.overview import RAN
 from rparm.report.pages import INDEX, RunPage, Table
 from rparm.report.run_data import Plot, RunData, result_curve, thinned
-from rparm.texts import unit
+from rparm.units import unit
 
 FOLDER = "replays"
 DIED = "the run takes its process down"
@@ -71,7 +71,7 @@ def replay(
     record = rows.trajectories[run]
     table = folder / FOLDER / f"run_{run}.csv"
     table.parent.mkdir(parents=True, exist_ok=True)
-    trajectory_csv.write(table, job.times, job.watched, record)
+    files.write_trajectory(table, job.times, job.watched, record)
     assets.write(folder)
     page = RunPage(
         title=f"{campaign.title}: run {run}",

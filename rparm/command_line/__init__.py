@@ -1,8 +1,10 @@
 """The commands, and which one arguments ask for; the options of each are in its module."""
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib import import_module
+from pathlib import Path
 from typing import NoReturn
 
 from rparm import project
@@ -52,6 +54,17 @@ EXIT_CODES = (
 EPILOG = f"""With --json, standard output has one JSON document and nothing else. "exit_code" is in
 it, and "error" with the message if there is one. A command that is interrupted prints none.
 {EXIT_CODES}."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a command has ended."""
+
+    code: int  # to exit with
+    verdict: str  # the last line
+    document: Mapping[str, object] = field(default_factory=dict)  # for programs
+    error: UserError | None = None
+    page: Path | None = None  # that --open shows
 
 
 class Answered(Exception):

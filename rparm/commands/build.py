@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 
 from rparm import building, project
+from rparm.command_line import Ended
 from rparm.command_line.options import add_output
-from rparm.commands import Ended
 
 DESCRIPTION = (
     "Makes FMUs of the equations in FILE.toml, for FMI 2.0 and 3.0: NAME.fmu and fmi3/NAME.fmu. "

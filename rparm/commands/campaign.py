@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rparm import project
+from rparm.command_line import Ended
 from rparm.command_line.options import add_output, count, number, retyped
-from rparm.commands import Ended
 from rparm.errors import UserError, one_line
+from rparm.files import from_here, written
 from rparm.interruption import arrived
 from rparm.output import console
 from rparm.output.progress import Progress
-from rparm.output_files import from_here, written
 from rparm.scenarios.scenario import title
 
 if TYPE_CHECKING:

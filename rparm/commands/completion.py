@@ -8,9 +8,9 @@ from typing import Any
 import shtab
 
 from rparm import command_line, project
+from rparm.command_line import Ended
 from rparm.command_line.options import add_output
-from rparm.commands import Ended
-from rparm.output_files import write_text, written
+from rparm.files import write_text, written
 from rparm.system import comparison
 
 SCRIPT = Path(project.PROGRAM).name

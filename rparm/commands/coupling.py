@@ -3,11 +3,11 @@
 import argparse
 
 from rparm import project
+from rparm.command_line import Ended
 from rparm.command_line.options import add_report, add_system
-from rparm.commands import Ended
+from rparm.files import check_writable
 from rparm.linearization import stable_steps
 from rparm.output import console
-from rparm.output_files import check_writable
 from rparm.system import study
 
 DESCRIPTION = (

@@ -4,8 +4,8 @@ import argparse
 import os
 from pathlib import Path
 
+from rparm.command_line import Ended
 from rparm.command_line.options import add_document, add_silence
-from rparm.commands import Ended
 from rparm.errors import UserError, hint
 from rparm.federation import SILENCE, addresses, component, screen, watching
 from rparm.federation.network import KEY, key

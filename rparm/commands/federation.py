@@ -7,22 +7,22 @@ from pathlib import Path
 
 import numpy as np
 
-from rparm import project, trajectory_csv
+from rparm import files, project
+from rparm.command_line import Ended
 from rparm.command_line.options import add_output, add_silence, add_system
-from rparm.commands import Ended
 from rparm.coupling.master import Master
 from rparm.errors import UserError, hint
 from rparm.federation import SILENCE, addresses, federation, screen
 from rparm.federation.federation import Record
 from rparm.federation.network import KEY, key
 from rparm.federation.parts import real_connections
+from rparm.files import check_writable, written
 from rparm.output import console
 from rparm.output.progress import Progress
 from rparm.output.result_tables import FederationTable
-from rparm.output_files import check_writable, written
 from rparm.system import comparison, ecos, ssp, study
 from rparm.system.ssp import Ssp
-from rparm.texts import counted
+from rparm.units import counted
 
 DESCRIPTION = (
     "Runs variants of the closed loop with each FMU in its own process, coupled by HELICS, and "
@@ -106,7 +106,7 @@ def run(options: argparse.Namespace) -> Ended:
 def _write(path: Path, record: Record) -> None:
     with written(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        trajectory_csv.write(path, record.times, record.names, record.values)
+        files.write_trajectory(path, record.times, record.names, record.values)
 
 
 def _command(path: Path, variant: str, component: str, address: str) -> str:

@@ -4,9 +4,9 @@ import argparse
 from pathlib import Path
 
 from rparm import project
+from rparm.command_line import Ended
 from rparm.command_line.options import add_fmi, add_output
-from rparm.commands import Ended
-from rparm.output_files import copied
+from rparm.files import copied
 from rparm.project import VERSIONS
 
 DESCRIPTION = "Copies the FMU of a model, for another tool."

@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rparm import project
+from rparm.command_line import Ended
 from rparm.command_line.options import add_report, file_or_name, names, pairs, retyped
-from rparm.commands import Ended
 from rparm.errors import UserError, placed
-from rparm.input_files import number_in
+from rparm.files import check_writable, from_here, number_in, written
 from rparm.output import console
-from rparm.output_files import check_writable, from_here, written
 from rparm.units import SECONDS, typed_quantity
 
 if TYPE_CHECKING:

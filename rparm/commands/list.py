@@ -3,8 +3,8 @@
 import argparse
 
 from rparm import project
+from rparm.command_line import Ended
 from rparm.command_line.options import add_document
-from rparm.commands import Ended
 from rparm.output import console
 from rparm.scenarios import scenario
 

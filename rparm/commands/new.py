@@ -5,11 +5,11 @@ import shlex
 from pathlib import Path
 
 from rparm import project
+from rparm.command_line import Ended
 from rparm.command_line.options import add_output
-from rparm.commands import Ended
 from rparm.errors import UserError
+from rparm.files import check_for_windows, create, from_folder, written
 from rparm.fmi.fmu_file import read_model
-from rparm.output_files import check_for_windows, create, from_folder, written
 from rparm.scenarios import template
 
 DESCRIPTION = (

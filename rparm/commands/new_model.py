@@ -6,10 +6,10 @@ import shlex
 from pathlib import Path
 
 from rparm import project
+from rparm.command_line import Ended
 from rparm.command_line.options import add_output
-from rparm.commands import Ended
 from rparm.errors import UserError
-from rparm.output_files import check_for_windows, create, written
+from rparm.files import check_for_windows, create, written
 
 DESCRIPTION = (
     f"Writes NAME.toml, a model of one's own with comments: {project.PROGRAM} build NAME.toml "

@@ -3,9 +3,9 @@
 import argparse
 
 from rparm import project
+from rparm.command_line import Ended
 from rparm.command_line.options import add_output
-from rparm.commands import Ended
-from rparm.output_files import copied, from_here
+from rparm.files import copied, from_here
 
 DESCRIPTION = "Says where the page with the plant is; --open shows it."
 

@@ -8,21 +8,20 @@ from pathlib import Path
 import numpy as np
 
 from rparm import project
+from rparm.command_line import Ended
 from rparm.command_line.options import add_report, add_tolerance, retyped
-from rparm.commands import Ended
 from rparm.errors import UserError, WrongValueError, placed
+from rparm.files import check_writable, from_here, written
 from rparm.fmi.fmu_file import Fmu
 from rparm.output import console
 from rparm.output.progress import Progress
-from rparm.output_files import check_writable, from_here, written
 from rparm.proof import proven, prover
 from rparm.proof.proven import ASSUMED, ProvenReference
 from rparm.proof.prover import Enclosure, Prover
 from rparm.report import proof_page
 from rparm.scenarios import scenario as scenarios
 from rparm.scenarios.scenario import Scenario
-from rparm.texts import counted, rounded_up, verdict
-from rparm.units import typed_quantity
+from rparm.units import counted, rounded_up, typed_quantity, verdict
 
 DESCRIPTION = (
     "Encloses the exact motion of a scenario in intervals, by validated integration, and prints "

@@ -7,19 +7,17 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from rparm import project
-from rparm.command_line import COMMANDS, PROGRAM
+from rparm.command_line import COMMANDS, PROGRAM, Ended
 from rparm.command_line.options import add_fmi, add_report, add_tolerance
-from rparm.commands import Ended
 from rparm.commands import list as scenario_list
 from rparm.errors import UserError, did_you_mean, placed, together
+from rparm.files import check_writable, from_here, missing, written
 from rparm.fmi.fmu_file import Fmu
-from rparm.input_files import missing
 from rparm.output import console, results
 from rparm.output.progress import Progress
 from rparm.output.result_tables import RunTable, SweepTable, measured
 from rparm.output.result_tables import convergence as convergence_table
 from rparm.output.results import Done
-from rparm.output_files import check_writable, from_here, written
 from rparm.project import VERSIONS
 from rparm.report import pages
 from rparm.report.writer import ReportWriter
@@ -29,7 +27,7 @@ from rparm.runs.convergence import Convergence
 from rparm.runs.tolerance_sweep import TIGHTEST, TOLERANCES, Sweep, sweep
 from rparm.scenarios import scenario as scenarios
 from rparm.scenarios.scenario import Scenario
-from rparm.texts import counted, short
+from rparm.units import counted, short
 
 DESCRIPTION = (
     "Simulates each scenario at its own tolerance and at 1e-11, and over the tolerances 1e-4 to "

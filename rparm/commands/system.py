@@ -6,20 +6,19 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from rparm import project
-from rparm.command_line import PROGRAM
+from rparm.command_line import PROGRAM, Ended
 from rparm.command_line.options import add_report, add_system
-from rparm.commands import Ended
 from rparm.coupling import in_process
 from rparm.errors import UserError, did_you_mean, hint, together
+from rparm.files import check_writable, from_here, written
 from rparm.output import console
 from rparm.output.result_tables import VariantTable
-from rparm.output_files import check_writable, from_here, written
 from rparm.report import overview, system_page
 from rparm.report.overview import Entry
 from rparm.report.system_page import Section
 from rparm.system import comparison, ecos, ssp
 from rparm.system.comparison import Outcome, Reference
-from rparm.texts import counted
+from rparm.units import counted
 
 DESCRIPTION = (
     "Runs the variants of the systems in Ecos and compares every variable with the reference."

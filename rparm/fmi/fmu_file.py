@@ -13,12 +13,12 @@ from lxml import etree
 
 from rparm.archives import check_library, read_xml, unpack
 from rparm.errors import UserError, one_line, placed, reason
+from rparm.files import UnreadableError, show
 from rparm.fmi.fmi2_instance import Fmi2Instance
 from rparm.fmi.fmi3_instance import Fmi3Instance
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.model import Model, described
 from rparm.fmi.model_exchange import Fmi2ModelExchange, Fmi3ModelExchange
-from rparm.input_files import UnreadableError, show
 from rparm.interruption import temporary_folder
 from rparm.project import VERSIONS
 

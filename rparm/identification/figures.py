@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from rparm.identification.whiteness import Whiteness
 from rparm.report.style import ERRORS, MUTED, RUN, STYLE
-from rparm.texts import minus
+from rparm.units import minus
 
 TEXTS = STYLE | {"text.parse_math": False}
 DARK = 0.6  # cells of a larger correlation

@@ -14,7 +14,7 @@ from rparm.report.overview import FAILED, RAN
 from rparm.report.pages import INDEX, RunPage, Table, write_page
 from rparm.report.run_data import Curve, Plot, RunData, thinned
 from rparm.report.style import save
-from rparm.texts import number, unit
+from rparm.units import number, unit
 
 PICTURE = "correlations.png"
 

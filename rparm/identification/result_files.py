@@ -7,11 +7,10 @@ from xml.sax.saxutils import quoteattr
 
 from rparm import project
 from rparm.errors import UserError
+from rparm.files import difference, from_folder, whole
 from rparm.fmi.model import Model, Value
 from rparm.identification.identify import Identification
 from rparm.identification.parameters import DELAY
-from rparm.input_files import difference
-from rparm.output_files import from_folder, whole
 from rparm.scenarios.template import quoted
 
 SCENARIO, PARAMETERS, PARAMETER_SET = "scenario.toml", "parameters.toml", "parameters.ssv"

@@ -8,7 +8,7 @@ from rparm.linearization.largest_step import LargestStep
 from rparm.linearization.margins import Margins
 from rparm.linearization.study import Study
 from rparm.report.pages import Table
-from rparm.texts import milliseconds
+from rparm.units import milliseconds
 
 NONE = "–"
 LISTED = 12  # names in a sentence

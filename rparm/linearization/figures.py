@@ -13,7 +13,7 @@ from rparm.linearization.margins import Margins, closed, searched
 from rparm.linearization.matrices import eigenvalues, zeros
 from rparm.linearization.responses import frequencies, frequency_response, sampled_response
 from rparm.report.style import DASHED, ERRORS, INK, MUTED, RUN, STYLE
-from rparm.texts import milliseconds
+from rparm.units import milliseconds
 
 TEXTS = STYLE | {"text.parse_math": False}
 MOST = 2  # inputs and outputs that are drawn: with more, curves would share a colour

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from rparm.errors import UserError, reason
+from rparm.files import whole
 from rparm.linearization.linear import Linear
 from rparm.linearization.study import Study
-from rparm.output_files import whole
 
 Document = dict[str, Any]
 

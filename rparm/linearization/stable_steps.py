@@ -16,7 +16,7 @@ from rparm.linearization.largest_step import LargestStep, largest_steps
 from rparm.linearization.system import SystemSubject
 from rparm.system import ssp
 from rparm.system.study import Rest
-from rparm.texts import verdict
+from rparm.units import verdict
 
 STEPS = 500
 EARLY = 100  # first steps, before the motion is that of the slowest eigenvalues

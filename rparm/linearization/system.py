@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from rparm.coupling.master import INPUTS, ORDERS, Master
 from rparm.errors import UserError, hint
+from rparm.files import UnreadableError
 from rparm.fmi.fmu_file import MODEL_EXCHANGE, Fmu
 from rparm.fmi.model import Value, Variable
-from rparm.input_files import UnreadableError
 from rparm.linearization.connections import connected
 from rparm.linearization.derivatives import (
     SAMPLED,

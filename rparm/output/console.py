@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence, Sized
 
 from rparm.output import streams
-from rparm.texts import counted, shortened
+from rparm.units import counted, shortened
 
 WIDTH = 80  # columns that a terminal has, if it has no fewer
 LEAST = 20  # columns: in fewer, lines are left to the terminal to wrap

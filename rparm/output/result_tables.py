@@ -10,7 +10,7 @@ from rparm.runs.measured import comparisons
 from rparm.runs.tolerance_sweep import TIGHTEST, Sweep
 from rparm.system.comparison import BOUND, Outcome
 from rparm.system.study import Measure
-from rparm.texts import milliseconds, seconds, short, unit, verdict
+from rparm.units import milliseconds, seconds, short, unit, verdict
 
 NONE = "-"
 

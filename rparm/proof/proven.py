@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from rparm.errors import UserError, hint
+from rparm.files import from_here
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import METHOD, SMALLEST_TOLERANCES
-from rparm.output_files import from_here
 from rparm.proof import prover
 from rparm.proof.prover import Enclosure, distances
 from rparm.runs import reference, simulation
 from rparm.runs.simulation import Result
 from rparm.scenarios.scenario import Scenario
-from rparm.texts import rounded_up
+from rparm.units import rounded_up
 
 # of a scenario that is proven where nobody asks for it: communication steps, time that it takes
 MOST_STEPS = 20_000

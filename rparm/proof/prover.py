@@ -20,7 +20,7 @@ import numpy as np
 
 from rparm import project
 from rparm.errors import UserError
-from rparm.input_files import is_file, read_toml
+from rparm.files import is_file, read_toml
 from rparm.scenarios import scenario as scenarios
 from rparm.scenarios.scenario import Scenario
 

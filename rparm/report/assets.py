@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from rparm import project
-from rparm.output_files import whole
+from rparm.files import whole
 
 FOLDER = "assets"  # in the report
 SOURCES = Path(__file__).parent / "assets"

@@ -7,7 +7,7 @@ from rparm.fmi.model import Model
 from rparm.report.pages import Table
 from rparm.report.run_data import Plot, result_curve
 from rparm.runs.measured import Comparison
-from rparm.texts import unit
+from rparm.units import unit
 
 
 def with_measured(

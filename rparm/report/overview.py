@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from rparm.output_files import write_text
+from rparm.files import write_text
 from rparm.report import assets, pages
 from rparm.report.pages import RunPage
 from rparm.report.sparkline import HEIGHT, WIDTH, scale_of

@@ -9,8 +9,8 @@ from urllib.parse import quote
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from rparm import texts
-from rparm.output_files import write_text
+from rparm import units
+from rparm.files import write_text
 from rparm.report.run_data import RunData
 
 INDEX = "index.html"
@@ -25,9 +25,9 @@ _templates = Environment(
 )
 _templates.filters |= {
     "address": lambda path: quote(os.fsencode(path)),
-    "minus": texts.minus,
-    "number": texts.number,
-    "short": texts.short,
+    "minus": units.minus,
+    "number": units.number,
+    "short": units.short,
 }
 _templates.tests |= {
     "numeric": lambda cell: NUMERIC.fullmatch(str(cell)) is not None,

@@ -15,7 +15,7 @@ from rparm.report.overview import FAILED, PASSED
 from rparm.report.pages import INDEX, RunPage, Table, write_run
 from rparm.report.run_data import Curve, Plot, RunData, thinned
 from rparm.scenarios.scenario import Scenario
-from rparm.texts import SMALLEST, counted, number, rounded_up, unit
+from rparm.units import SMALLEST, counted, number, rounded_up, unit
 
 FOLDER = "proofs"  # of the report
 ASSUMES = f"The proof assumes {proven.ASSUMED}."

@@ -23,8 +23,8 @@ import numpy as np
 
 from rparm import project
 from rparm.errors import UserError, did_you_mean, one_line
+from rparm.files import whole, written
 from rparm.fmi.fmu_file import Fmu
-from rparm.output_files import whole, written
 from rparm.report import motion
 from rparm.runs.comparison import Runs
 from rparm.scenarios import scenario as scenarios

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from rparm import trajectory_csv
+from rparm import files
 from rparm.fmi.model import Model, Value, Variable
 from rparm.proof import proven
 from rparm.proof.proven import ProvenError
@@ -20,7 +20,7 @@ from rparm.runs.comparison import Failure, Run, estimated_from
 from rparm.runs.measured import comparisons
 from rparm.runs.simulation import Result
 from rparm.scenarios.scenario import Scenario
-from rparm.texts import bits, milliseconds, number, ordinal, rounded_up, sentence, short, unit
+from rparm.units import bits, milliseconds, number, ordinal, rounded_up, sentence, short, unit
 
 DIGITS = 12  # of values; the references of the project have more, users' files have none
 
@@ -110,7 +110,7 @@ def _write_values(
 ) -> str:
     """Write the file of values; its name."""
     values = np.column_stack([column.astype(float) for column in columns.values()])
-    trajectory_csv.write(file, result.times, list(columns), values, digits, True)
+    files.write_trajectory(file, result.times, list(columns), values, digits, True)
     return file.name
 
 

@@ -1,7 +1,7 @@
 """Inputs of a scenario as text."""
 
 from rparm.scenarios.signals import Constant, Logged, Signal, Sines, Switches
-from rparm.texts import number
+from rparm.units import number
 
 MOST_POINTS = 8  # of a table, to be listed
 

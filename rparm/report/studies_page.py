@@ -14,7 +14,7 @@ from rparm.report.sparkline import path as sparkline
 from rparm.runs import reference
 from rparm.runs.convergence import Convergence
 from rparm.runs.tolerance_sweep import Sweep
-from rparm.texts import milliseconds, short, verdict
+from rparm.units import milliseconds, short, verdict
 
 ACCURACY = "accuracy"  # name of the page over the tolerance
 UPDATE = "intermediate update"

@@ -5,7 +5,7 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from rparm.output_files import whole
+from rparm.files import whole
 
 INK, MUTED, GRID = "#22303c", "#6b7885", "#e3e8ec"
 REFERENCE, RUN = "#a9c5de", "#1d4e79"

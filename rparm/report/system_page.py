@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from rparm import project, trajectory_csv
+from rparm import files, project
 from rparm.errors import StoppedError, UserError
+from rparm.files import whole
 from rparm.fmi.model import KINDS
-from rparm.output_files import whole
 from rparm.report import assets, motion, overview
 from rparm.report.overview import FAILED, PASSED, SYSTEM, Entry
 from rparm.report.pages import RunPage, Table
@@ -23,7 +23,7 @@ from rparm.system.comparison import BOUND, Outcome
 from rparm.system.ssp import Ssp
 from rparm.system.structure import System
 from rparm.system.study import Diagram, Study, load
-from rparm.texts import milliseconds, short, unit
+from rparm.units import milliseconds, short, unit
 
 MOST_ROWS = 350  # of a file of values, which has many columns
 DIGITS = 12  # there; errors have a bound of 1e-7
@@ -161,7 +161,7 @@ def _data(section: Section, outcome: Outcome) -> tuple[np.ndarray, RunData]:
 def _values(folder: Path, outcome: Outcome, rows: np.ndarray) -> dict[str, str]:
     """Write the file of values; what the page says of it."""
     run, csv = outcome.run, f"{outcome.variant}.csv"
-    trajectory_csv.write(folder / csv, run.times[rows], run.names, run.values[rows], DIGITS, True)
+    files.write_trajectory(folder / csv, run.times[rows], run.names, run.values[rows], DIGITS, True)
     every = milliseconds(np.diff(run.times[rows]).max(initial=0.0))
     note = f"It has a row every {every}, the extremes of the plots in between, and {DIGITS} digits."
     return {"csv": csv, "csv_note": note}

@@ -6,7 +6,7 @@ from itertools import chain, count
 from pathlib import Path
 
 from rparm import project
-from rparm.output_files import from_here
+from rparm.files import from_here
 from rparm.report import assets, overview, scenario_page, studies_page
 from rparm.report.overview import FILES, SCENARIOS, STUDIES
 from rparm.runs.comparison import Failure, Run

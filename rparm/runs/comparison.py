@@ -10,7 +10,7 @@ from rparm.runs import reference, simulation
 from rparm.runs.reference import Compared, Reference
 from rparm.runs.simulation import Result
 from rparm.scenarios.scenario import Scenario
-from rparm.texts import short
+from rparm.units import short
 
 ESTIMATE_TOLERANCE = 1e-11  # of the run that errors are estimated from, or a tighter one
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from rparm.errors import UserError, placed
+from rparm.files import difference
 from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, Model, Value
-from rparm.input_files import difference
 from rparm.scenarios.scenario import MAX_STEPS
 
 Input = float | bool | np.ndarray | Sequence[float] | tuple[Any, Any] | Callable[[float], float]

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rparm import project, trajectory_csv
+from rparm import files, project
 from rparm.errors import UserError
+from rparm.files import is_file, read_toml
 from rparm.fmi.model import Model
-from rparm.input_files import is_file, read_toml
 from rparm.runs.simulation import Result
 from rparm.scenarios.scenario import Scenario
 
@@ -72,15 +72,15 @@ def load(scenario: Scenario, model: Model) -> Reference:
     path = project.reference_file(scenario.path, model.name)
     folder = project.model_folder(scenario.path)
     wrong = failure(path, folder, scenario.name)
-    (_, *names), table = trajectory_csv.read(path, wrong)
+    (_, *names), table = files.read_trajectory(path, wrong)
     _check_names(names, model, wrong)
     _check_times(table[:, 0], scenario, wrong)
     return Reference(path, table[:, 0], tuple(names), table[:, 1:], read_summed(folder))
 
 
-def failure(path: Path, folder: Path, name: str) -> trajectory_csv.Failure:
+def failure(path: Path, folder: Path, name: str) -> files.Failure:
     """Makes errors of the reference `name` of a model or system, with how to make it again."""
-    return trajectory_csv.failure(path, f"; {project.making_references(folder, name)}")
+    return files.csv_failure(path, f"; {project.making_references(folder, name)}")
 
 
 def read_summed(folder: Path) -> Summed:
@@ -126,7 +126,7 @@ def bound(tolerance: float) -> float:
     return min([ERROR_PER_TOLERANCE * tolerance, *applying])
 
 
-def _check_names(names: Sequence[str], model: Model, wrong: trajectory_csv.Failure) -> None:
+def _check_names(names: Sequence[str], model: Model, wrong: files.Failure) -> None:
     """Check that every Real output is there, and nothing else: all columns are compared."""
     for name in names:
         if name not in model.variables or model.variables[name].type != "Real":
@@ -141,7 +141,7 @@ def _check_names(names: Sequence[str], model: Model, wrong: trajectory_csv.Failu
             raise wrong(f"{name!r} is not an output of the model", 1)
 
 
-def _check_times(times: np.ndarray, scenario: Scenario, wrong: trajectory_csv.Failure) -> None:
+def _check_times(times: np.ndarray, scenario: Scenario, wrong: files.Failure) -> None:
     """Check that the times are those communication points that the scenario asks for."""
     expected = scenario.times[scenario.reference_rows]
     shared = min(len(times), len(expected))

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from rparm.errors import UserError, hint
+from rparm.files import show
 from rparm.fmi.model import INPUTS, Model, Variable
-from rparm.input_files import show
 from rparm.scenarios import logs
 from rparm.scenarios.logs import Columns, Log
 from rparm.scenarios.reader import Reader

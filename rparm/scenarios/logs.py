@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from rparm.errors import UserError, did_you_mean, placed
-from rparm.input_files import decoded, number_in, read_bytes, show
+from rparm.files import decoded, number_in, read_bytes, show
 
 LARGEST = 50_000_000  # bytes
 DELIMITERS = ",;\t"

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from rparm.errors import UserError, hint, placed
-from rparm.input_files import show
+from rparm.files import show
 from rparm.units import Units, finite_number, quantity
 
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from rparm import project
 from rparm.errors import UserError, did_you_mean
+from rparm.files import difference, is_file, missing, read_toml, show
 from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, TOLERANCE, Model, Value
-from rparm.input_files import difference, is_file, missing, read_toml, show
 from rparm.scenarios.inputs import MEASURED, InputReader
 from rparm.scenarios.reader import Reader
 from rparm.scenarios.signals import Logged, Signal

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rparm import project, trajectory_csv
+from rparm import files, project
 from rparm.errors import UserError
 from rparm.runs import reference
 from rparm.runs.reference import Compared, Summed
@@ -99,7 +99,7 @@ def load_reference(
     _check_experiment(ssp, experiment)
     path = project.variant_reference_file(system, variant)
     wrong = reference.failure(path, system, variant)
-    (_, *names), table = trajectory_csv.read(path, wrong)
+    (_, *names), table = files.read_trajectory(path, wrong)
     known = recorded(ssp)
     possible = {*known, *discrete(ssp)}
     for name in names:
@@ -113,7 +113,7 @@ def load_reference(
     return Reference(path, steps, values, reference.read_summed(system))
 
 
-def _steps(ssp: Ssp, times: np.ndarray, wrong: trajectory_csv.Failure) -> np.ndarray:
+def _steps(ssp: Ssp, times: np.ndarray, wrong: files.Failure) -> np.ndarray:
     """Numbers of the communication points at `times`, (rows,)."""
     system = ssp.system
     steps = np.rint((times - system.start) / system.step).astype(int)

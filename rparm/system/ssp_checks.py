@@ -6,9 +6,9 @@ from typing import NoReturn
 
 from rparm.archives import LARGEST_SYSTEM
 from rparm.errors import UserError, did_you_mean, placed
+from rparm.files import is_file
 from rparm.fmi.fmu_file import describe
 from rparm.fmi.model import TOLERANCE, Model, Variable
-from rparm.input_files import is_file
 from rparm.system.structure import Component, Connector, Parameter, System
 
 # type of a variable -> types of a parameter's value that engines can give it

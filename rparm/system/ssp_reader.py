@@ -18,13 +18,13 @@ from lxml import etree
 
 from rparm.archives import read_xml, wrong_name
 from rparm.errors import UserError, placed
+from rparm.files import UnreadableError, difference, is_file
 from rparm.fmi.fmu_file import describe
 from rparm.fmi.model import Value
-from rparm.input_files import UnreadableError, difference, is_file
 from rparm.project import STRUCTURE
 from rparm.scenarios.scenario import MAX_STEPS
 from rparm.system.structure import ALONE, Component, Connection, Connector, Parameter, System
-from rparm.texts import number
+from rparm.units import number
 
 NAMESPACES = {
     "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from rparm import project
 from rparm.errors import UserError
-from rparm.input_files import is_file
+from rparm.files import is_file
 from rparm.system.comparison import Outcome
 from rparm.system.ssp import Ssp
 

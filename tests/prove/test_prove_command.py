@@ -23,7 +23,7 @@ from rparm.fmi.fmu_file import Fmu
 from rparm.proof import proven, prover
 from rparm.runs import reference
 from rparm.scenarios import scenario as scenarios
-from rparm.texts import rounded_up
+from rparm.units import rounded_up
 
 PROVER = prover.provers()["rp_manipulator"]
 STATES = {"q1", "q2", "dq1", "dq2"}

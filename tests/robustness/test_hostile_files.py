@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from rparm.models.closed_loop.coupling.loop import opened as opened_loop
 
-from rparm import input_files
+from rparm import files
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.runs import reference
@@ -103,7 +103,7 @@ def test_files_of_other_editors_are_read(model: Path) -> None:
 
 
 def test_files_that_are_too_large(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(input_files, "LARGEST_TOML", 10_000_000)
+    monkeypatch.setattr(files, "LARGEST_TOML", 10_000_000)
     with scenario_file(model).open("r+b") as file:
         file.truncate(10_000_001)
     refused(lambda: read(model), f"{SCENARIO}.toml: is larger than 10 MB")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rparm import command_line, project, trajectory_csv
+from rparm import command_line, files, project
 from rparm.command_line import COMMANDS
 from rparm.commands.completion import SCRIPT, SHELLS
 from rparm.system import study
@@ -116,7 +116,9 @@ def test_a_federation_writes_what_it_recorded(
     code, out, err = console("federation", *arguments)
     assert code == 0 and err == "--open: federation has written no page\n" and shown == []
     (row,) = json.loads(out)["variants"]
-    names, values = trajectory_csv.read(tmp_path / "nominal.csv", lambda text, _: ValueError(text))
+    names, values = files.read_trajectory(
+        tmp_path / "nominal.csv", lambda text, _: ValueError(text)
+    )
     assert names[0] == "time" and "arm.q1" in names and len(values) == row["steps"] + 1
 
 

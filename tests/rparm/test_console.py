@@ -23,7 +23,7 @@ from rparm.output.console import stage, verdict_line
 from rparm.output.result_tables import RunTable, SweepTable
 from rparm.runs.comparison import Run, Runs
 from rparm.runs.tolerance_sweep import TOLERANCES, Sweep
-from rparm.texts import seconds, short, shortened
+from rparm.units import seconds, short, shortened
 from tests.support.paths import ROOT
 from tests.support.rparm_project import FMUS, LONG, SHORT, Console, load
 from tests.support.ssp_files import SSP

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from rparm.models.closed_loop.experiment import STOP
 
-from rparm import project, trajectory_csv
+from rparm import files, project
 from rparm.coupling.master import Master
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
@@ -169,8 +169,8 @@ def grid(stop: float, step: float) -> np.ndarray:
 
 def read_reference(path: Path) -> Columns:
     """Columns of a reference by name, with "time"."""
-    wrong = trajectory_csv.failure(path)
-    names, table = trajectory_csv.read(path, wrong)
+    wrong = files.csv_failure(path)
+    names, table = files.read_trajectory(path, wrong)
     if not set(STATES) <= set(names):
         raise wrong("not a reference of the closed loop", 1)
     return dict(zip(names, table.T, strict=True))

@@ -12,8 +12,8 @@ from rparm.models.closed_loop.coupling.step_doubling import study_doubling
 from rparm.models.closed_loop.coupling.step_errors import StepErrors, study_step_errors
 from rparm.models.closed_loop.study import REST
 
+from rparm.files import from_here, written
 from rparm.linearization import stable_steps
-from rparm.output_files import from_here, written
 from rparm.report.style import save
 
 

@@ -16,8 +16,8 @@ from make_references import INPUTS, MODEL_FOLDER, PARAMETERS, STATES, derive
 
 from rparm import project
 from rparm.errors import UserError
+from rparm.files import write_text
 from rparm.fmi.fmu_file import read_model
-from rparm.output_files import write_text
 from rparm.runs import convergence
 from rparm.scenarios import scenario as scenarios
 from rparm.scenarios.scenario import Scenario
