@@ -1,9 +1,9 @@
-"""Values with units, read as users write them, and written as messages, tables and pages show them.
+"""Values with units as users write them, and as messages, tables and pages show them.
 
-Users may write "90 deg", "300 mm" or "2kN". Known for a variable are its own unit, the display units
-that its FMU declares for it, and both with one factor exchanged: m, s and N take the prefixes m, c
-and k, rad takes m, and each factor its own display units. Conversions are exact and rounded once;
-degrees are those of `math.radians`.
+Users may write "90 deg", "300 mm" or "2kN". Known for a variable are its own unit, the display
+units that its FMU declares for it, and both with one factor exchanged: m, s and N take the prefixes
+m, c and k, rad takes m, and each factor its own display units. Conversions are exact and rounded
+once; degrees are converted as by `math.radians`.
 """
 
 import math
@@ -16,7 +16,7 @@ from fractions import Fraction
 from typing import Any
 
 from rparm.errors import WrongValueError, did_you_mean
-from rparm.expressions import numbers
+from rparm.expressions import expression
 from rparm.files import show
 
 PREFIXES = {"m": Fraction(1000), "c": Fraction(100), "k": Fraction(1, 1000)}
@@ -115,7 +115,7 @@ RADIANS = units_of(ANGLE, {ANGLE: {"deg": Unit(DEGREE)}})
 def finite_number(given: Any) -> float:
     """Return `given` as a float; WrongValueError if it is not a finite number."""
     try:
-        return numbers.finite_number(given)
+        return expression.finite_number(given)
     except ValueError as error:
         raise WrongValueError(f"{error}, got {show(given)}") from None
 

@@ -14,7 +14,7 @@ from equations.c_code import indented, number
 from equations.c_placement import Path, costs_inside, guarded, paths, stripped
 from equations.c_values import RELATION, Conditions
 from equations.graph import CONDITIONS, DERIVATIVES, LEAVES, Value
-from rparm.expressions.tree import in_order
+from rparm.expressions.expression import in_order
 
 WIDTH = 100
 MOST_CHOSEN = 2  # cost of both branches of ?:

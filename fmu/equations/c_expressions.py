@@ -25,7 +25,7 @@ from equations.c_types import (
 )
 from equations.c_values import RELATION, Known
 from equations.graph import DERIVATIVES, Graph, Value
-from rparm.expressions.tree import RELATIONS, in_order
+from rparm.expressions.expression import RELATIONS, in_order
 
 BUILT_IN = ("fabs", "abs", "value_of", "moving_as")
 ROUNDING = ("ceil", "floor", "trunc", "round")  # of what has no derivatives

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from equations.c_values import Conditions, Known
 from equations.graph import CONDITIONS, Value
-from rparm.expressions.tree import in_order
+from rparm.expressions.expression import in_order
 
 COSTS = {"+": 1, "-": 1, "*": 1, "negative": 0, "/": 5, "value_of": 0, "moving_as": 0, "if": 0}
 OF_FUNCTION = 20

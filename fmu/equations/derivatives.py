@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from equations.graph import STILL, Graph, Value, is_number
-from rparm.expressions.tree import in_order
+from rparm.expressions.expression import in_order
 
 Rates = Callable[[Value], tuple[Value, Value] | None]  # of a leaf; None: it rests
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from equations.graph import Graph, Value, is_unknown
-from rparm.expressions.tree import in_order
+from rparm.expressions.expression import in_order
 
 Guards = dict[Value, Value | None]  # conditions; None: always
 

@@ -20,8 +20,7 @@ from equations_file.tables import (
     read_tables,
     tables_of,
 )
-from rparm.expressions.kinds import check_kinds
-from rparm.expressions.tree import CONSTANTS, ExpressionError, in_order, names
+from rparm.expressions.expression import CONSTANTS, ExpressionError, check_kinds, in_order, names
 from rparm.expressions.units import BASE, Unit, times, unit_of, unit_of_exponents
 from rparm.expressions.units import shown as unit_shown
 

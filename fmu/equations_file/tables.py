@@ -13,10 +13,16 @@ from typing import Any
 
 from declaration.files import shown
 
-from rparm.expressions.kinds import CONDITION, NUMBER
-from rparm.expressions.numbers import finite_number
-from rparm.expressions.parser import parse
-from rparm.expressions.tree import FUNCTIONS, NO_NAMES, RELATIONS, Node
+from rparm.expressions.expression import (
+    CONDITION,
+    FUNCTIONS,
+    NO_NAMES,
+    NUMBER,
+    RELATIONS,
+    Node,
+    finite_number,
+    parse,
+)
 from rparm.expressions.units import ANGLE, BASE, exponents
 
 LARGEST = 10**6  # bytes

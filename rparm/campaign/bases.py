@@ -17,7 +17,7 @@ from rparm.campaign.campaign_file import Campaign
 from rparm.campaign.job import Component, HeldInputs
 from rparm.coupling.connected_instance import start_value
 from rparm.errors import UserError, WrongValueError, did_you_mean, hint
-from rparm.fmi.compiled.loop import Part
+from rparm.fmi.compiled_loop import Part
 from rparm.fmi.fmu_file import describe, read_model
 from rparm.fmi.model import INPUTS, Model, Value, Variable
 from rparm.scenarios import scenario

@@ -22,7 +22,7 @@ from pydantic import (
 )
 
 from rparm.errors import UserError, WrongValueError, hint
-from rparm.expressions.evaluation import Expression, parsed
+from rparm.expressions.expression import Expression, parsed
 from rparm.files import read_toml, show
 from rparm.units import SECONDS, quantity
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rparm.campaign.measures import Measure
-from rparm.fmi.compiled.loop import Part
+from rparm.fmi.compiled_loop import Part
 from rparm.fmi.model import Value
 
 

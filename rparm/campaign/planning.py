@@ -19,7 +19,7 @@ from rparm.campaign.measures import (
     plain,
 )
 from rparm.errors import UserError, WrongValueError, did_you_mean, hint, one_line, placed
-from rparm.expressions.evaluation import Expression
+from rparm.expressions.expression import Expression
 from rparm.fmi.model import INPUTS, TOLERANCE, Value, Variable
 from rparm.units import unit
 

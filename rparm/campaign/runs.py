@@ -12,8 +12,7 @@ import numpy as np
 from rparm.campaign.job import Job, Target
 from rparm.campaign.measures import Recorded
 from rparm.errors import UserError, one_line
-from rparm.fmi.compiled.loop import Tangent
-from rparm.fmi.compiled.stepper import Stepper
+from rparm.fmi.compiled_loop import Stepper, Tangent
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 

@@ -1,1 +1,1 @@
-"""The commands: modules with `add_NAME_options` and `do_NAME` for each, which returns how it ended."""
+"""The commands. Each has `add_NAME_options` and `do_NAME`, which returns how it has ended."""

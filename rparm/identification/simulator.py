@@ -10,8 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from rparm.errors import UserError
-from rparm.fmi.compiled.loop import Part
-from rparm.fmi.compiled.stepper import Stepper
+from rparm.fmi.compiled_loop import Part, Stepper
 from rparm.fmi.fmi_instance import Instance, Reals
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value

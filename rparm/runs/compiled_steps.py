@@ -6,8 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from rparm.errors import UserError
-from rparm.fmi.compiled.loop import Part
-from rparm.fmi.compiled.stepper import Stepper
+from rparm.fmi.compiled_loop import Part, Stepper
 from rparm.fmi.fmi_instance import Instance
 from rparm.scenarios.scenario import Scenario
 

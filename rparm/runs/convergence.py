@@ -19,10 +19,10 @@ from fmpy.fmi1 import FMICallException
 
 from rparm import project
 from rparm.errors import UserError
-from rparm.fmi.fmi3_instance import Fmi3Instance
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Model
+from rparm.fmi.versions import Fmi3Instance
 from rparm.runs import simulation
 from rparm.scenarios import scenario as scenarios
 from rparm.scenarios.scenario import Scenario

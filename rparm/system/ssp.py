@@ -5,9 +5,8 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from rparm.archives import unpack
 from rparm.errors import placed
-from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.fmu_file import Fmu, unpack
 from rparm.fmi.model import INPUTS, Model, Variable
 from rparm.interruption import temporary_folder
 from rparm.system import ssp_checks

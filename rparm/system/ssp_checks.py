@@ -4,10 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NoReturn
 
-from rparm.archives import LARGEST_SYSTEM
 from rparm.errors import UserError, did_you_mean, placed
 from rparm.files import is_file
-from rparm.fmi.fmu_file import describe
+from rparm.fmi.fmu_file import LARGEST_SYSTEM, describe
 from rparm.fmi.model import TOLERANCE, Model, Variable
 from rparm.system.structure import Component, Connector, Parameter, System
 

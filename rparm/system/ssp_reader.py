@@ -16,10 +16,9 @@ from typing import NoReturn
 import fmpy
 from lxml import etree
 
-from rparm.archives import read_xml, wrong_name
 from rparm.errors import UserError, placed
 from rparm.files import UnreadableError, difference, is_file
-from rparm.fmi.fmu_file import describe
+from rparm.fmi.fmu_file import describe, read_xml, wrong_name
 from rparm.fmi.model import Value
 from rparm.project import STRUCTURE
 from rparm.scenarios.scenario import MAX_STEPS

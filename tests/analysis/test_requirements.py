@@ -34,7 +34,7 @@ COMMANDS = {
         "fmu/source_code.py", "fmu/equations_to_fmu.py",
     ),
     "campaign": (
-        "rparm/commands/campaign.py", "rparm/campaign/*.py", "rparm/fmi/compiled/*.py",
+        "rparm/commands/campaign.py", "rparm/campaign/*.py", "rparm/fmi/compiled_*.py",
         "rparm/runs/compiled_steps.py",
     ),
     "control": (

@@ -24,8 +24,7 @@ from scipy.integrate import DOP853
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from rparm.fmi.compiled.loop import Part
-from rparm.fmi.compiled.stepper import Stepper
+from rparm.fmi.compiled_loop import Part, Stepper
 from rparm.fmi.fmu_file import Fmu
 
 FOLDER = Path(__file__).resolve().parent

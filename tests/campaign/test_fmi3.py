@@ -11,8 +11,7 @@ import pytest
 
 from rparm.campaign.measures import LYAPUNOV
 from rparm.campaign.runs import Rows
-from rparm.fmi.compiled.calls import DO_STEP
-from rparm.fmi.compiled.loop import COLUMNS
+from rparm.fmi.compiled_loop import COLUMNS, DO_STEP
 from tests.campaign.cluster.processes import completed
 from tests.campaign.files import ARM, HEAD, campaign, commands, write
 from tests.campaign.runners import rows, runner

@@ -6,8 +6,8 @@ Those of values and steps: test_fmi3.py, where a derivative has as many unknowns
 from ctypes import CFUNCTYPE, POINTER, c_double, c_int, c_size_t, c_uint32, c_void_p, cast
 from typing import Any
 
-from rparm.fmi.compiled.calls import DERIVATIVE
-from rparm.fmi.compiled.fmi3_adapters import ADDRESSES
+from rparm.fmi.compiled_fmi3 import ADDRESSES
+from rparm.fmi.compiled_loop import DERIVATIVE
 
 INSTANCE = 0x1234
 COUNT = 3

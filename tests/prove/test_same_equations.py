@@ -22,7 +22,7 @@ import flint
 import pytest
 from flint import arb, arb_series
 
-from rparm.expressions.tree import in_order
+from rparm.expressions.expression import in_order
 from tests.prove.faults import COMPILE, Fault
 from tests.prove.problems import SOURCES
 from tests.support.paths import ROOT

@@ -19,8 +19,8 @@ import pytest
 
 from rparm.errors import UserError
 from rparm.fmi import fmu_file
-from rparm.fmi.fmi2_instance import Fmi2Instance
 from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.versions import Fmi2Instance
 from rparm.runs import reference, simulation
 from rparm.scenarios import scenario as scenarios
 from tests.support.paths import ROOT, SYSTEMS

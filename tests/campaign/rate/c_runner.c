@@ -1,4 +1,4 @@
-/* The stepping loop of rparm/fmi/compiled/loop.py in C, over the same arrays: what a compiled
+/* The stepping loop of rparm/fmi/compiled_loop.py in C, over the same arrays: what a compiled
  * runner would gain. loop.py loads it as a shared library.
  */
 #include <stdint.h>

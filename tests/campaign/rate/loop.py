@@ -20,7 +20,7 @@ import numpy as np
 
 from rparm.campaign import campaign_file
 from rparm.campaign.runs import Runner
-from rparm.fmi.compiled.loop import Wires
+from rparm.fmi.compiled_loop import Wires
 from tests.campaign.rate.works import WORKS
 from tests.campaign.runners import runner
 from tests.support.paths import FMI_HEADERS, ROOT

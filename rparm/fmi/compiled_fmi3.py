@@ -1,7 +1,7 @@
 """Functions with the prototypes of FMI 2.0 that call an FMU of FMI 3.0: the loop knows only these.
 
 In place of the component, each adapter takes a row of pointers: to the FMU's instance, then to its
-functions, in the order of `rparm.fmi.compiled.calls`. Importing this module compiles them.
+functions, in the order of `compiled_loop.FUNCTIONS`. Importing this module compiles them.
 """
 
 import numpy as np
@@ -10,14 +10,14 @@ from numba import carray, cfunc, njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from rparm.fmi.compiled.calls import DISCARD, TERMINATED
+from rparm.fmi.compiled_loop import DISCARD, TERMINATED
 
 INSTANCE, SET_FLOAT64, GET_FLOAT64, SET_BOOLEAN, GET_BOOLEAN, DO_STEP, DERIVATIVE = range(7)
 GET_INT32 = 7
-
 POINTER, SIZE, REAL, STATUS = types.voidptr, types.uintp, types.float64, types.int32
 ROW = types.CPointer(POINTER)
 BOOLEAN_2, BOOLEAN_3 = types.int32, types.uint8
+_move = cfunc(STATUS(ROW, POINTER, SIZE, POINTER), cache=True)
 
 
 @intrinsic
@@ -50,8 +50,6 @@ def _place(_context):
 
 
 # ---- Values --------------------------------------------------------------------------------------
-
-
 @njit(cache=True, nogil=True)
 def _move_booleans(row, function, references, count, values):
     """A Boolean is an int in FMI 2.0 and a byte in FMI 3.0."""
@@ -63,9 +61,6 @@ def _move_booleans(row, function, references, count, values):
     for i in range(count):
         ints[i] = truths[i]
     return status
-
-
-_move = cfunc(STATUS(ROW, POINTER, SIZE, POINTER), cache=True)
 
 
 @_move
@@ -94,8 +89,6 @@ def _get_boolean(row, references, count, values):
 
 
 # ---- Steps ---------------------------------------------------------------------------------------
-
-
 @cfunc(STATUS(ROW, REAL, REAL, BOOLEAN_2), cache=True)
 def _do_step(row, time, length, final):
     """Of an instance without event mode and early return."""
@@ -118,4 +111,6 @@ def _derivative(row, unknowns, unknown_count, knowns, known_count, direction, re
 ADAPTERS = (
     _set_real, _get_real, _set_boolean, _get_boolean, _do_step, _derivative, _get_integer,
 )  # fmt: skip
+
+
 ADDRESSES = tuple(adapter.address for adapter in ADAPTERS)
