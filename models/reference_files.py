@@ -16,8 +16,8 @@ from rparm import files, project
 from rparm.errors import UserError
 from rparm.files import write_text
 from rparm.fmi.fmu_file import read_model
-from rparm.scenarios import scenario as scenarios
-from rparm.scenarios.scenario import Scenario
+from rparm.runs import scenario as scenarios
+from rparm.runs.scenario import Scenario
 
 # Writes the reference of a scenario to a folder.
 Writer = Callable[[Scenario, Path], None]

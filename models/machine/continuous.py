@@ -124,7 +124,7 @@ def limit(runs: Sequence[Columns], per_second: Sequence[int], power: int) -> tup
 def largest_error(columns: Columns, expected: Columns) -> tuple[float, str]:
     """Largest difference of all variables, relative to the largest value of each, and whose it is.
 
-    As the errors of `rparm.runs.reference`, but never relative to a sum. `columns` have the first
+    As the errors of `rparm.runs.comparison`, but never relative to a sum. `columns` have the first
     rows of `expected`, or all.
     """
     errors = {

@@ -16,9 +16,10 @@ from rparm.files import written
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Model, Value
 from rparm.proof import proven, prover
-from rparm.runs import given, reference, simulation
-from rparm.runs.given import Input
-from rparm.scenarios import scenario as scenarios
+from rparm.runs import scenario as scenarios
+from rparm.runs import simulation
+from rparm.runs.comparison import load_reference
+from rparm.runs.simulation import Input
 from rparm.system import comparison, ecos, ssp, study
 
 
@@ -121,8 +122,8 @@ def simulate(
         Row i is what is read right after the step to time i; row 0 at the start.
     """
     path = Path(fmu)
-    times = given.times(start_time, stop_time, step)
-    if not (given.is_finite_number(tolerance) and 0 < tolerance < 1):
+    times = simulation.communication_points(start_time, stop_time, step)
+    if not (simulation.is_finite_number(tolerance) and 0 < tolerance < 1):
         raise UserError(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")
     with Fmu(path) as opened:
         model = opened.model
@@ -132,9 +133,10 @@ def simulate(
                 raise UserError(
                     f"{path}: has no Real output {name!r}{hint(name, model.real_outputs)}"
                 )
-        values = given.start_values(model, start_values or {})
+        values = simulation.start_values(model, start_values or {})
         signals = {
-            name: given.input_values(model, name, x, times) for name, x in (inputs or {}).items()
+            name: simulation.input_values(model, name, x, times)
+            for name, x in (inputs or {}).items()
         }
         run = scenarios.Scenario(
             name=path.stem, model=model.name, path=path, title=path.stem, description="",
@@ -179,7 +181,7 @@ class Scenario:
     def errors(self, table: Table) -> dict[str, float]:
         """Largest error of each output of a run against the reference, relative to its scale."""
         with self._opened(2) as (opened, loaded):
-            expected = reference.load(loaded, opened.model)
+            expected = load_reference(loaded, opened.model)
         if len(table["time"]) != len(expected.times):
             raise UserError(f"{self.path}: the reference has {len(expected.times)} rows")
         return {

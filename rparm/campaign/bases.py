@@ -20,8 +20,8 @@ from rparm.errors import UserError, WrongValueError, did_you_mean, hint
 from rparm.fmi.compiled_loop import Part
 from rparm.fmi.fmu_file import describe, read_model
 from rparm.fmi.model import INPUTS, Model, Value, Variable
-from rparm.scenarios import scenario
-from rparm.scenarios.scenario import MAX_STEPS, Scenario
+from rparm.runs import scenario
+from rparm.runs.scenario import MAX_STEPS, Scenario
 from rparm.system import ssp
 from rparm.system.ssp import Ssp
 

@@ -15,7 +15,7 @@ from rparm.files import from_here, written
 from rparm.interruption import arrived
 from rparm.output import console
 from rparm.output.progress import Progress
-from rparm.scenarios.scenario import title
+from rparm.runs.scenario import title
 
 if TYPE_CHECKING:
     from distributed import Security

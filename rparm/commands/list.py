@@ -6,7 +6,7 @@ from rparm import project
 from rparm.command_line import Ended
 from rparm.command_line.options import add_document
 from rparm.output import console
-from rparm.scenarios import scenario
+from rparm.runs import scenario
 
 DESCRIPTION = "Prints the name and the title of every scenario."
 

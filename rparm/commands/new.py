@@ -10,7 +10,7 @@ from rparm.command_line.options import add_output
 from rparm.errors import UserError
 from rparm.files import check_for_windows, create, from_folder, written
 from rparm.fmi.fmu_file import read_model
-from rparm.scenarios import template
+from rparm.runs import scenario
 
 DESCRIPTION = (
     f"Writes NAME.toml, a scenario with comments that runs as it is: {project.PROGRAM} NAME.toml."
@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> Ended:
         subject = project.model(options.model) if options.model else _usual_model()
         key, name = "model", subject.name
     model = read_model(project.fmu_of(subject))
-    text = template.text(path.stem, key, name, model)
+    text = scenario.template(path.stem, key, name, model)
     if options.output:
         with written(path):
             options.output.mkdir(parents=True, exist_ok=True)

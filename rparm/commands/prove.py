@@ -19,8 +19,8 @@ from rparm.proof import proven, prover
 from rparm.proof.proven import ASSUMED, ProvenReference
 from rparm.proof.prover import Enclosure, Prover
 from rparm.report import proof_page
-from rparm.scenarios import scenario as scenarios
-from rparm.scenarios.scenario import Scenario
+from rparm.runs import scenario as scenarios
+from rparm.runs.scenario import Scenario
 from rparm.units import counted, rounded_up, typed_quantity, verdict
 
 DESCRIPTION = (

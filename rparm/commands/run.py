@@ -22,11 +22,10 @@ from rparm.project import VERSIONS
 from rparm.report import pages
 from rparm.report.writer import ReportWriter
 from rparm.runs import convergence
-from rparm.runs.comparison import Failure, Run, Runs
+from rparm.runs import scenario as scenarios
+from rparm.runs.comparison import TIGHTEST, TOLERANCES, Failure, Run, Runs, Sweep, sweep
 from rparm.runs.convergence import Convergence
-from rparm.runs.tolerance_sweep import TIGHTEST, TOLERANCES, Sweep, sweep
-from rparm.scenarios import scenario as scenarios
-from rparm.scenarios.scenario import Scenario
+from rparm.runs.scenario import Scenario
 from rparm.units import counted, short
 
 DESCRIPTION = (

@@ -11,7 +11,7 @@ from rparm.files import difference, from_folder, whole
 from rparm.fmi.model import Model, Value
 from rparm.identification.identify import Identification
 from rparm.identification.parameters import DELAY
-from rparm.scenarios.template import quoted
+from rparm.runs.scenario import toml_text
 
 SCENARIO, PARAMETERS, PARAMETER_SET = "scenario.toml", "parameters.toml", "parameters.ssv"
 TYPES = ("Real", "Integer", "Boolean")  # of an SSV that all engines read
@@ -37,7 +37,7 @@ def _parameters(values: dict[str, Value], model: Model) -> str:
 
 
 def _toml(value: Value) -> str:
-    return quoted(value) if isinstance(value, str) else json.dumps(value)  # with all digits
+    return toml_text(value) if isinstance(value, str) else json.dumps(value)  # with all digits
 
 
 def _set(values: dict[str, Value], model: Model) -> str:

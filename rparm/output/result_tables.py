@@ -4,10 +4,8 @@ from collections.abc import Iterable, Sequence
 
 from rparm.output import console
 from rparm.output.console import Table
-from rparm.runs.comparison import Run
+from rparm.runs.comparison import TIGHTEST, Run, Sweep, comparisons
 from rparm.runs.convergence import Convergence
-from rparm.runs.measured import comparisons
-from rparm.runs.tolerance_sweep import TIGHTEST, Sweep
 from rparm.system.comparison import BOUND, Outcome
 from rparm.system.study import Measure
 from rparm.units import milliseconds, seconds, short, unit, verdict

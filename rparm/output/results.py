@@ -3,11 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from rparm.runs.comparison import Failure, Run
+from rparm.runs.comparison import Failure, Run, Sweep, comparisons
 from rparm.runs.convergence import Convergence
-from rparm.runs.measured import comparisons
-from rparm.runs.tolerance_sweep import Sweep
-from rparm.scenarios.scenario import Scenario
+from rparm.runs.scenario import Scenario
 
 
 @dataclass

@@ -12,9 +12,9 @@ from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import METHOD, SMALLEST_TOLERANCES
 from rparm.proof import prover
 from rparm.proof.prover import Enclosure, distances
-from rparm.runs import reference, simulation
+from rparm.runs import comparison, simulation
+from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import Result
-from rparm.scenarios.scenario import Scenario
 from rparm.units import rounded_up
 
 # of a scenario that is proven where nobody asks for it: communication steps, time that it takes
@@ -144,7 +144,7 @@ def largest(
 
 def of_reference(fmu: Fmu, scenario: Scenario, enclosure: Enclosure) -> ProvenReference:
     """How good the reference of a scenario is, in all columns; UserError if it has none."""
-    expected = reference.load(scenario, fmu.model)
+    expected = comparison.load_reference(scenario, fmu.model)
     rows = scenario.reference_rows
     around = enclosure.of(expected.names)
     nearest = prover.is_nearest(expected.values, around, rows)

@@ -21,8 +21,8 @@ import numpy as np
 from rparm import project
 from rparm.errors import UserError
 from rparm.files import is_file, read_toml
-from rparm.scenarios import scenario as scenarios
-from rparm.scenarios.scenario import Scenario
+from rparm.runs import scenario as scenarios
+from rparm.runs.scenario import Scenario
 
 STOPPED = 1  # exit code: the proof could not go on
 UNDERFLOW = 2.0**-800  # in SI units: above all that intervals around 0 allow for underflow

@@ -6,7 +6,7 @@ from dataclasses import replace
 from rparm.fmi.model import Model
 from rparm.report.pages import Table
 from rparm.report.run_data import Plot, result_curve
-from rparm.runs.measured import Comparison
+from rparm.runs.comparison import Comparison
 from rparm.units import unit
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from rparm import project
 from rparm.fmi.model import Value
 from rparm.runs.comparison import Run
+from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import Result
-from rparm.scenarios.scenario import Scenario
 from rparm.system.comparison import Outcome
 from rparm.system.ssp import Ssp
 

@@ -14,7 +14,7 @@ from rparm.report import assets
 from rparm.report.overview import FAILED, PASSED
 from rparm.report.pages import INDEX, RunPage, Table, write_run
 from rparm.report.run_data import Curve, Plot, RunData, thinned
-from rparm.scenarios.scenario import Scenario
+from rparm.runs.scenario import Scenario
 from rparm.units import SMALLEST, counted, number, rounded_up, unit
 
 FOLDER = "proofs"  # of the report

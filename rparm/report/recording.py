@@ -26,8 +26,8 @@ from rparm.errors import UserError, did_you_mean, one_line
 from rparm.files import whole, written
 from rparm.fmi.fmu_file import Fmu
 from rparm.report import motion
+from rparm.runs import scenario as scenarios
 from rparm.runs.comparison import Runs
-from rparm.scenarios import scenario as scenarios
 from rparm.system import comparison, ssp, study
 
 if TYPE_CHECKING:

@@ -16,10 +16,9 @@ from rparm.report.overview import FAILED, PASSED, RAN, Entry
 from rparm.report.pages import RunPage, Table
 from rparm.report.run_data import Curve, Plot, RunData, result_curve, thinned
 from rparm.report.signal_texts import describe
-from rparm.runs.comparison import Failure, Run, estimated_from
-from rparm.runs.measured import comparisons
+from rparm.runs.comparison import Failure, Run, comparisons, estimated_from
+from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import Result
-from rparm.scenarios.scenario import Scenario
 from rparm.units import bits, milliseconds, number, ordinal, rounded_up, sentence, short, unit
 
 DIGITS = 12  # of values; the references of the project have more, users' files have none

@@ -1,6 +1,6 @@
 """Inputs of a scenario as text."""
 
-from rparm.scenarios.signals import Constant, Logged, Signal, Sines, Switches
+from rparm.runs.inputs import Constant, Logged, Signal, Sines, Switches
 from rparm.units import number
 
 MOST_POINTS = 8  # of a table, to be listed

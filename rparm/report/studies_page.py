@@ -11,9 +11,9 @@ from rparm.report.overview import FAILED, PASSED, Entry
 from rparm.report.pages import RunPage, Table
 from rparm.report.run_data import Axis, Curve, Plot, RunData
 from rparm.report.sparkline import path as sparkline
-from rparm.runs import reference
+from rparm.runs import comparison
+from rparm.runs.comparison import Sweep
 from rparm.runs.convergence import Convergence
-from rparm.runs.tolerance_sweep import Sweep
 from rparm.units import milliseconds, short, verdict
 
 ACCURACY = "accuracy"  # name of the page over the tolerance
@@ -32,8 +32,8 @@ def write_sweeps(folder: Path, sweeps: Sequence[Sweep]) -> Entry:
     for sweep in sweeps:
         models.setdefault(sweep.scenario.model, []).append(sweep)
     limit = Curve(
-        f"{reference.ERROR_PER_TOLERANCE:g} × tolerance",
-        reference.ERROR_PER_TOLERANCE * x,
+        f"{comparison.ERROR_PER_TOLERANCE:g} × tolerance",
+        comparison.ERROR_PER_TOLERANCE * x,
         limit=True,
     )
     plots = [

@@ -9,9 +9,8 @@ from rparm import project
 from rparm.files import from_here
 from rparm.report import assets, overview, scenario_page, studies_page
 from rparm.report.overview import FILES, SCENARIOS, STUDIES
-from rparm.runs.comparison import Failure, Run
+from rparm.runs.comparison import Failure, Run, Sweep
 from rparm.runs.convergence import Convergence
-from rparm.runs.tolerance_sweep import Sweep
 
 
 class ReportWriter:

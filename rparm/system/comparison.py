@@ -8,8 +8,8 @@ import numpy as np
 
 from rparm import files, project
 from rparm.errors import UserError
-from rparm.runs import reference
-from rparm.runs.reference import Compared, Summed
+from rparm.runs import comparison
+from rparm.runs.comparison import Compared, Summed
 from rparm.system import ecos
 from rparm.system.ssp import Ssp
 
@@ -27,7 +27,7 @@ class Reference:
 
     def scale(self, name: str) -> float:
         """What an error of the variable is divided by, in its unit."""
-        return reference.scale(self.columns, name, self.summed)
+        return comparison.error_scale(self.columns, name, self.summed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ def load_reference(
     """
     _check_experiment(ssp, experiment)
     path = project.variant_reference_file(system, variant)
-    wrong = reference.failure(path, system, variant)
+    wrong = comparison.reference_failure(path, system, variant)
     (_, *names), table = files.read_trajectory(path, wrong)
     known = recorded(ssp)
     possible = {*known, *discrete(ssp)}
@@ -110,7 +110,7 @@ def load_reference(
             raise wrong(f"has no column {name!r}", 1)
     steps = _steps(ssp, table[:, 0], wrong)
     values = dict(zip(names, table[:, 1:].T, strict=True))
-    return Reference(path, steps, values, reference.read_summed(system))
+    return Reference(path, steps, values, comparison.read_summed(system))
 
 
 def _steps(ssp: Ssp, times: np.ndarray, wrong: files.Failure) -> np.ndarray:

@@ -21,7 +21,7 @@ from rparm.files import UnreadableError, difference, is_file
 from rparm.fmi.fmu_file import describe, read_xml, wrong_name
 from rparm.fmi.model import Value
 from rparm.project import STRUCTURE
-from rparm.scenarios.scenario import MAX_STEPS
+from rparm.runs.scenario import MAX_STEPS
 from rparm.system.structure import ALONE, Component, Connection, Connector, Parameter, System
 from rparm.units import number
 

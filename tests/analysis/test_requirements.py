@@ -35,7 +35,6 @@ COMMANDS = {
     ),
     "campaign": (
         "rparm/commands/campaign.py", "rparm/campaign/*.py", "rparm/fmi/compiled_*.py",
-        "rparm/runs/compiled_steps.py",
     ),
     "control": (
         "rparm/commands/linearize.py", "rparm/linearization/*.py", "rparm/commands/identify.py",
@@ -48,7 +47,7 @@ COMMANDS = {
 # what others use only where its packages are installed
 OPTIONAL = (
     "rparm/campaign/*.py", "rparm/federation/*.py", "rparm/identification/*.py",
-    "rparm/linearization/*.py", "rparm/runs/compiled_steps.py",
+    "rparm/linearization/*.py", "rparm/fmi/compiled_*.py",
 )  # fmt: skip
 # each of these runs in the environment of its importer
 ELSEWHERE = [*(ROOT / "tests" / "importers").glob("run_*.py")]

@@ -21,8 +21,8 @@ from rparm.commands import prove
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.proof import proven, prover
-from rparm.runs import reference
-from rparm.scenarios import scenario as scenarios
+from rparm.runs import comparison
+from rparm.runs import scenario as scenarios
 from rparm.units import rounded_up
 
 PROVER = prover.provers()["rp_manipulator"]
@@ -166,7 +166,7 @@ def test_every_wrong_value_of_a_reference_is_found(name: str, copies: Path) -> N
     with Fmu(rparm.fmu("rp_manipulator")) as fmu:
         scenario = scenarios.load(project.scenario_file(name), fmu.model)
         enclosure = PROVER.enclose(scenario)
-        right = reference.load(scenario, fmu.model)
+        right = comparison.load_reference(scenario, fmu.model)
         assert list(right.names) == COLUMNS
         for i, column in enumerate(COLUMNS):
             for row in (0, draw.randrange(1, len(right.values) - 1), len(right.values) - 1):
@@ -175,7 +175,7 @@ def test_every_wrong_value_of_a_reference_is_found(name: str, copies: Path) -> N
                     values[row, i] = fault(float(values[row, i]))
                     planted = replace(right, values=values)
                     with pytest.MonkeyPatch.context() as patch:
-                        patch.setattr(reference, "load", lambda *_, x=planted: x)
+                        patch.setattr(comparison, "load_reference", lambda *_, x=planted: x)
                         good = proven.of_reference(fmu, scenario, enclosure)
                     (wrong,) = good.wrong
                     assert not good.passed and good.values - good.nearest == 1, kind

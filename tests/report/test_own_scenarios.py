@@ -9,8 +9,8 @@ import pytest
 
 from rparm.report.overview import Entry, forget, read, record
 from rparm.report.signal_texts import describe
-from rparm.scenarios import scenario
-from rparm.scenarios.signals import Table
+from rparm.runs import scenario
+from rparm.runs.inputs import Table
 from tests.report.conftest import CONTENT, STRANGE, show
 from tests.support.browser import Browser
 from tests.support.rparm_project import FMUS, Console, declared

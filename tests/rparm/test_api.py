@@ -13,7 +13,7 @@ from docs import python_api
 from rparm import files, project
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
-from rparm.scenarios import scenario as scenarios
+from rparm.runs import scenario as scenarios
 from tests.support.paths import ROOT
 
 RUN = {"stop_time": 1.0, "step": 0.01}

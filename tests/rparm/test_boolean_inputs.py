@@ -8,8 +8,7 @@ import pytest
 from rparm.coupling.master import Master
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import CO_SIMULATION, INSTANCES, Fmu
-from rparm.runs import simulation
-from rparm.scenarios import scenario
+from rparm.runs import scenario, simulation
 from rparm.system.structure import Connection
 from tests.support.rparm_project import BUILD, fmi3_fmu
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, timed, toy

@@ -21,8 +21,7 @@ from rparm.fmi.fmu_file import Fmu
 from rparm.output import result_tables, streams
 from rparm.output.console import stage, verdict_line
 from rparm.output.result_tables import RunTable, SweepTable
-from rparm.runs.comparison import Run, Runs
-from rparm.runs.tolerance_sweep import TOLERANCES, Sweep
+from rparm.runs.comparison import TOLERANCES, Run, Runs, Sweep
 from rparm.units import seconds, short, shortened
 from tests.support.paths import ROOT
 from tests.support.rparm_project import FMUS, LONG, SHORT, Console, load

@@ -30,7 +30,7 @@ from rparm.runs.convergence import (
     Convergence,
     Problem,
 )
-from rparm.scenarios.signals import Sines
+from rparm.runs.inputs import Sines
 from tests.support.paths import ROOT
 from tests.support.rparm_project import Console, declared, load, repacked
 

@@ -21,8 +21,8 @@ from rparm.errors import UserError
 from rparm.fmi import fmu_file
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.versions import Fmi2Instance
-from rparm.runs import reference, simulation
-from rparm.scenarios import scenario as scenarios
+from rparm.runs import comparison, simulation
+from rparm.runs import scenario as scenarios
 from tests.support.paths import ROOT, SYSTEMS
 from tests.support.rparm_project import (
     BUILD,
@@ -191,12 +191,12 @@ def test_run_without_what_windows_lacks(fmu: Path, tmp_path: Path) -> None:
 
 def test_files_with_the_line_ends_of_windows_are_read(project: Path, fmu: Path) -> None:
     expected = load(SHORT, project)
-    before = reference.load(expected, declared("rp_manipulator"))
+    before = comparison.load_reference(expected, declared("rp_manipulator"))
     for path in (expected.path, reference_file(project, SHORT)):
         path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
     scenario = scenarios.load(expected.path, declared("rp_manipulator"))
     assert scenario.description == expected.description
-    after = reference.load(scenario, declared("rp_manipulator"))
+    after = comparison.load_reference(scenario, declared("rp_manipulator"))
     assert after.names == before.names and np.array_equal(after.values, before.values)
 
 

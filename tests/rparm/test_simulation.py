@@ -12,8 +12,8 @@ from rparm import files
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.output import progress as progress_module
+from rparm.runs import scenario as scenarios
 from rparm.runs import simulation
-from rparm.scenarios import scenario as scenarios
 from tests.support.rparm_project import LONG, SHORT, edit, fmi3_fmu, load, repacked
 from tests.support.ssp_files import edited
 

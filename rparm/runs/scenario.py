@@ -1,11 +1,13 @@
 """Scenarios: what to simulate, read from models/<model>/scenarios/<name>.toml.
 
 The README.md next to the scenarios documents the format. What a scenario says of its model is
-checked against the description of the model's FMU.
+checked against the description of the model's FMU. `template` writes a scenario to start from.
 """
 
+import json
 import math
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,16 +17,46 @@ import numpy as np
 from rparm import project
 from rparm.errors import UserError, did_you_mean
 from rparm.files import difference, is_file, missing, read_toml, show
-from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, TOLERANCE, Model, Value
-from rparm.scenarios.inputs import MEASURED, InputReader
-from rparm.scenarios.reader import Reader
-from rparm.scenarios.signals import Logged, Signal
+from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, TOLERANCE, Model, Value, Variable
+from rparm.project import PROGRAM
+from rparm.runs.inputs import MEASURED, InputReader, Logged, Reader, Signal
 from rparm.units import SECONDS
 
 MODEL, FMU = "model", "fmu"  # keys of a file that is in no model's folder: one of them
 MAX_STEPS = 10_000_000
 MAX_PATTERN = 1000  # step lengths in a pattern
 SLIVER = 1e-9  # a last step shorter than this fraction of its full length joins the one before
+TEMPLATE_WIDTH = 100
+USUAL_STOP, USUAL_TOLERANCE = 2.0, 1e-8  # s; relative
+USUAL_STEPS = 200  # to the stop time, where the FMU proposes none
+TEMPLATE = """\
+# A scenario. Run it by {program} FILE.toml. Numbers are in SI units; in quotation marks a value may
+# have another one: "90 deg", "300 mm", "2kN".
+# "# name = value" is a start value as it is: remove the "# " to change it.
+{key} = {model}
+title = {title}
+description = "What happens, in a sentence or two."
+tolerance = {tolerance}  # of the integrator, relative: between 0 and 1
+
+# Results have every k-th communication point:
+# reference_every = 5
+{panels}
+[time]
+start = {start}  # s
+stop = {stop}  # s
+step = {step}  # s; or a pattern that is repeated until stop: [{step}, {shorter}]
+"""
+INPUT_HELP = """\
+# An input is one of
+#   constant = 1.5
+#   table = [[0.0, 0.0], [1.0, 1.5]]  # [time in s from start, value], linear in between
+#   sines = [{ amplitude = 1.5, frequency = 0.5, phase = 0.0 }]  # Hz, rad; `offset = 1.0` beside it
+#   file = "log.csv"  # of measurements, beside this file; `column = "tau"`, `time = "t"`,
+#                     # `scale = "1 kN"`, `begin = 1.5`, `hold = true` beside it
+# What was measured of an output is compared with it: [measured.NAME], with the keys of a file.
+# A Boolean one is `constant = true`, or a table that holds from each time on. An input that is not
+# here has its start value.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,3 +330,109 @@ class _Reader(Reader):
         times.setflags(write=False)
         elapsed.setflags(write=False)
         return times, elapsed
+
+
+def template(name: str, key: str, subject: str, model: Model) -> str:
+    """Content of the file, which runs as it is.
+
+    The `key` is `model`, with its folder below models/, or `fmu`, with the path of an FMU from the
+    file.
+    """
+    outputs = model.real_outputs[:2]
+    panels = "# Further plots, each of variables of one unit:\n"
+    panels += f"# panels = {json.dumps([[output] for output in outputs])}\n"
+    given = {"key": key, "model": toml_text(subject), "title": toml_text(name), "panels": panels}
+    given |= {name: _toml_number(number) for name, number in _template_times(model).items()}
+    parts = [TEMPLATE.format(program=PROGRAM, **given)]
+    parts += _template_section(PARAMETERS, "Parameters.", model)
+    parts += _template_section(INITIAL, "State at the start.", model)
+    inputs = [variable for variable in model.variables.values() if variable.is_a(INPUTS)]
+    if inputs:
+        parts.append(INPUT_HELP + "\n".join(_template_input(variable) for variable in inputs))
+    return "\n".join(parts)
+
+
+def _template_times(model: Model) -> dict[str, float]:
+    """The default experiment of the FMU, as far as a scenario can have it."""
+    given = model.experiment
+    start = 0.0 if given.start is None else given.start
+    stop = given.stop
+    if stop is None or not start < stop or not math.isfinite(stop - start):
+        stop = start + USUAL_STOP
+    step = given.step
+    if step is None or not (stop - start) / MAX_STEPS <= step <= stop - start:
+        step = float(f"{(stop - start) / USUAL_STEPS:.0e}")
+    if start + step == start or stop - step == stop:  # lost in rounding
+        start, stop, step = 0.0, USUAL_STOP, USUAL_STOP / USUAL_STEPS
+    tolerance = given.tolerance
+    if tolerance is None or not 0 < tolerance < 1:
+        tolerance = USUAL_TOLERANCE
+    return {
+        "start": start,
+        "stop": stop,
+        "step": step,
+        "shorter": float(f"{step / 5:.6g}"),
+        "tolerance": max(tolerance, model.smallest_tolerance({})),
+    }
+
+
+def _toml_number(number: float) -> str:
+    """A number as TOML has it, with all its digits."""
+    return repr(number).replace("e-0", "e-")
+
+
+def toml_text(content: str) -> str:
+    """A text as TOML writes it; UserError for the name of a file that is not UTF-8."""
+    try:
+        content.encode()
+    except UnicodeEncodeError:
+        raise UserError(f"{content}: TOML has no such name, which is not UTF-8") from None
+    return json.dumps(content, ensure_ascii=False)
+
+
+def _template_section(section: str, title: str, model: Model) -> Iterator[str]:
+    """A section with the start value of each variable in a comment."""
+    known = [
+        variable
+        for variable in model.variables.values()
+        if variable.is_a(section) and variable.start is not None and variable.type != "String"
+    ]
+    if known:
+        lines = [
+            f"{_template_comment(variable)}\n# {_template_line(variable)}" for variable in known
+        ]
+        yield f"# {title}\n[{section}]\n" + "\n".join(lines) + "\n"
+
+
+def _template_line(variable: Variable) -> str:
+    assert variable.start is not None
+    line = f"{variable.name} = {_toml_value(variable.written(variable.start))}"
+    return f"{line}  # {variable.unit}" if variable.unit not in (None, "", "1") else line
+
+
+def _template_comment(variable: Variable) -> str:
+    """Meaning and limits of a variable, above its line, set off from what may be uncommented."""
+    limits = []
+    if math.isfinite(variable.least) and variable.type == "Real":
+        limits.append(f"at least {variable.least:g}")
+    if math.isfinite(variable.greatest) and variable.type == "Real":
+        limits.append(f"at most {variable.greatest:g}")
+    if variable.items:
+        limits.append("one of " + ", ".join(map(toml_text, variable.items)))
+    meaning = "; ".join([" ".join(variable.description.split()) or variable.name, *limits])
+    return textwrap.fill(meaning, TEMPLATE_WIDTH, initial_indent="#   ", subsequent_indent="#   ")
+
+
+def _toml_value(value: Value) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return toml_text(value) if isinstance(value, str) else repr(value)
+
+
+def _template_input(variable: Variable) -> str:
+    start = variable.start if variable.start is not None else 0.0
+    unit = f"  # {variable.unit}" if variable.unit else ""
+    header = f"[{INPUTS}.{variable.name}]\nconstant = {_toml_value(start)}{unit}\n"
+    if variable.type not in ("Real", "Boolean"):
+        return ""
+    return f"{_template_comment(variable)}\n{header}"
