@@ -9,8 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from rparm.report.style import DASHED, ERRORS, MUTED, REFERENCE, RUN
-from rparm.system.comparison import Outcome
-from rparm.system.study import Measure
+from rparm.systems.comparison import Measure, Outcome
 
 JOINTS = (("q1", "rad"), ("q2", "m"))
 REACHED = 0.999  # share of a limit

@@ -21,12 +21,12 @@ from rparm.models.machine.experiment import STOP
 from rparm.models.machine.systems import SENSOR, SEQUENCE, direct, run_in_ecos
 
 from rparm import files, project
-from rparm.coupling.master import Master
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value
 from rparm.report.style import ERRORS, RUN, STYLE, save
-from rparm.system import ssp
-from rparm.system.ssp import Ssp
+from rparm.systems import ssp
+from rparm.systems.master import Master
+from rparm.systems.ssp import Ssp
 
 FOLDER = Path(__file__).resolve().parent
 VARIANTS = ("pick_and_place", "pick_and_place_untold")

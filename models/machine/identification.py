@@ -12,12 +12,11 @@ import numpy as np
 from rparm.models.machine.systems import VARIANT, write_system
 
 from rparm import files, project
-from rparm.coupling import in_process
 from rparm.fmi.model import Value
 from rparm.identification.demo import Demo
 from rparm.identification.parameters import DELAY
 from rparm.identification.request import Request
-from rparm.system import ssp
+from rparm.systems import master, ssp
 
 BASE = "noisy_sensor"  # the variant that all else is taken from
 STOP, STEP = 8.0, 1e-3  # s
@@ -91,7 +90,7 @@ def _write(machine: Path, log: Path, circle: dict[str, float]) -> None:
         write_system(opened, changed, values, STOP, STEP)
     try:
         with ssp.unpacked(changed) as opened:
-            run = in_process.run(opened, VARIANT, list(COLUMNS.values()))
+            run = master.run_in_master(opened, VARIANT, list(COLUMNS.values()))
     finally:
         changed.unlink()
     files.write_trajectory(log, np.asarray(run.times), list(COLUMNS), run.values, None, True)

@@ -10,8 +10,8 @@ from rparm.models.system_figure import draw, draw_limit
 
 from rparm.models import system_figure
 from rparm.report.style import ERRORS, MUTED, RUN, STYLE
-from rparm.system.comparison import Outcome
-from rparm.system.ssp import Ssp
+from rparm.systems.comparison import Outcome
+from rparm.systems.ssp import Ssp
 
 EFFORTS = (("tau1", "N·m"), ("f2", "N"))
 MOTORS = (("current", "A"), ("voltage", "V"))

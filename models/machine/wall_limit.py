@@ -21,11 +21,11 @@ from rparm.models.machine.stability import Contact, exact_least_damping, least_d
 from rparm.models.machine.systems import SEQUENCE, direct, run_in_ecos, write_system
 
 from rparm import project
-from rparm.coupling.master import Master
 from rparm.fmi.fmu_file import Fmu
 from rparm.report.style import ERRORS, RUN, STYLE, save
-from rparm.system import ssp
-from rparm.system.ssp import Ssp
+from rparm.systems import ssp
+from rparm.systems.master import Master
+from rparm.systems.ssp import Ssp
 
 FOLDER = Path(__file__).resolve().parent
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from rparm import files, project
-from rparm.coupling import in_process
 from rparm.errors import UserError, hint
 from rparm.federation import addresses, federation
 from rparm.files import written
@@ -20,7 +19,7 @@ from rparm.runs import scenario as scenarios
 from rparm.runs import simulation
 from rparm.runs.comparison import load_reference
 from rparm.runs.simulation import Input
-from rparm.system import comparison, ecos, ssp, study
+from rparm.systems import comparison, ecos, master, ssp
 
 
 class Table(Mapping[str, np.ndarray]):
@@ -271,7 +270,7 @@ class System:
                 f"{self.path}: has no variant {variant!r}{hint(variant, self.variants)}"
             )
         engines = {
-            "master": in_process.run,
+            "master": master.run_in_master,
             "ecos": ecos.run,
             "helics": lambda ssp, variant, _: federation.run(ssp, variant, addresses.free()),
         }
@@ -295,7 +294,7 @@ class System:
         dict of str to dict
             Numbers of each part of the study; "passed" says whether they are as expected.
         """
-        folder, known = study.of_coupling()
+        folder, known = comparison.coupling_study()
         if not project.is_built_from(self.path.stem, folder):
             raise UserError(f"{self.path}: has no study of its coupling, {folder.name} has one")
         return known.study_coupling(self.path, Path(output))

@@ -15,15 +15,15 @@ import numpy as np
 from rparm import project
 from rparm.campaign.campaign_file import Campaign
 from rparm.campaign.job import Component, HeldInputs
-from rparm.coupling.connected_instance import start_value
 from rparm.errors import UserError, WrongValueError, did_you_mean, hint
 from rparm.fmi.compiled_loop import Part
 from rparm.fmi.fmu_file import describe, read_model
 from rparm.fmi.model import INPUTS, Model, Value, Variable
 from rparm.runs import scenario
 from rparm.runs.scenario import MAX_STEPS, Scenario
-from rparm.system import ssp
-from rparm.system.ssp import Ssp
+from rparm.systems import ssp
+from rparm.systems.master import start_value
+from rparm.systems.ssp import Ssp
 
 
 class Base(ABC):

@@ -11,7 +11,7 @@ from rparm import command_line, project
 from rparm.command_line import Ended
 from rparm.command_line.options import add_output
 from rparm.files import write_text, written
-from rparm.system import comparison
+from rparm.systems import comparison
 
 SCRIPT = Path(project.PROGRAM).name
 DESCRIPTION = (

@@ -8,7 +8,7 @@ from rparm.command_line.options import add_report, add_system
 from rparm.files import check_writable
 from rparm.linearization import stable_steps
 from rparm.output import console
-from rparm.system import study
+from rparm.systems import comparison
 
 DESCRIPTION = (
     "Steps the system in several orders, with inputs held and extrapolated and with step-size "
@@ -23,12 +23,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> Ended:
-    folder, known = study.of_coupling()
+    folder, known = comparison.coupling_study()
     path = options.ssp or project.built(folder, ".ssp", "--ssp", options.fmi)
     check_writable(options.report)
     console.stage(f"studying the coupling of {folder.name}")
     parts = known.study_coupling(path, options.report)
-    for other, rest in study.rests().items():
+    for other, rest in comparison.rests().items():
         if other != folder and not options.ssp:
             ssp = project.built(other, ".ssp", version=options.fmi)
             parts[f"largest steps of {other.name}"] = stable_steps.study(ssp, rest)

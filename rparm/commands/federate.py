@@ -10,7 +10,7 @@ from rparm.errors import UserError, hint
 from rparm.federation import SILENCE, addresses, component, screen, watching
 from rparm.federation.network import KEY, key
 from rparm.federation.parts import parts
-from rparm.system import ssp
+from rparm.systems import ssp
 
 DESCRIPTION = "Steps one component of a system until the federation has come to the end."
 

@@ -10,7 +10,6 @@ import numpy as np
 from rparm import files, project
 from rparm.command_line import Ended
 from rparm.command_line.options import add_output, add_silence, add_system
-from rparm.coupling.master import Master
 from rparm.errors import UserError, hint
 from rparm.federation import SILENCE, addresses, federation, screen
 from rparm.federation.federation import Record
@@ -20,8 +19,9 @@ from rparm.files import check_writable, written
 from rparm.output import console
 from rparm.output.progress import Progress
 from rparm.output.result_tables import FederationTable
-from rparm.system import comparison, ecos, ssp, study
-from rparm.system.ssp import Ssp
+from rparm.systems import comparison, ecos, ssp
+from rparm.systems.master import Master
+from rparm.systems.ssp import Ssp
 from rparm.units import counted
 
 DESCRIPTION = (
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> Ended:
     screen.apart()
     path = options.ssp
     if path is None:
-        folder, _ = study.of_coupling()
+        folder, _ = comparison.coupling_study()
         path = project.built(folder, ".ssp", "--ssp", options.fmi)
     address = addresses.free() if options.listen is None else options.listen
     addresses.check_free(address)

@@ -8,7 +8,6 @@ from pathlib import Path
 from rparm import project
 from rparm.command_line import PROGRAM, Ended
 from rparm.command_line.options import add_report, add_system
-from rparm.coupling import in_process
 from rparm.errors import UserError, did_you_mean, hint, together
 from rparm.files import check_writable, from_here, written
 from rparm.output import console
@@ -16,8 +15,8 @@ from rparm.output.result_tables import VariantTable
 from rparm.report import overview, system_page
 from rparm.report.overview import Entry
 from rparm.report.system_page import Section
-from rparm.system import comparison, ecos, ssp
-from rparm.system.comparison import Outcome, Reference
+from rparm.systems import comparison, ecos, master, ssp
+from rparm.systems.comparison import Outcome, Reference
 from rparm.units import counted
 
 DESCRIPTION = (
@@ -128,7 +127,7 @@ def _run(
     entries: list[Entry] = []
     rows: list[dict[str, object]] = []
     absent = ecos.absent()
-    engine, where = (in_process.run, "this process") if absent else (ecos.run, "Ecos")
+    engine, where = (master.run_in_master, "this process") if absent else (ecos.run, "Ecos")
     if absent:
         print(f"{absent}: the master of rparm steps the systems, in the same order as Ecos")
     for section, references in plans:

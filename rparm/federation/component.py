@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rparm.coupling.connected_instance import begin, check_finite
 from rparm.errors import UserError
 from rparm.federation import watching
 from rparm.federation.network import Federate
@@ -12,6 +11,7 @@ from rparm.federation.parts import Part
 from rparm.federation.watching import Silence
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
+from rparm.systems.master import begin_instance, check_finite
 
 
 def run(
@@ -79,7 +79,7 @@ class _Stepper:
 
     def _initialize(self) -> None:
         part, instance = self._part, self._instance
-        begin(instance, part.times[0], part.times[-1], part.parameters)
+        begin_instance(instance, part.times[0], part.times[-1], part.parameters)
         self._federate.enter_initialization()
         self._give_early()
         for _ in range(part.rounds):

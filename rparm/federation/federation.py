@@ -18,7 +18,7 @@ from rparm.federation.network import ABSENT, ANSWER, ENDED, Broker, Federate
 from rparm.federation.parts import Part, parts
 from rparm.federation.watching import LEAVE, POLL, Silence
 from rparm.interruption import temporary_folder, uninterrupted
-from rparm.system.ssp import Ssp
+from rparm.systems.ssp import Ssp
 
 RECORDER = "recorder"
 

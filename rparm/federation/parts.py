@@ -8,8 +8,7 @@ import numpy as np
 
 from rparm.errors import UserError, hint
 from rparm.fmi.model import Value
-from rparm.system.ssp import Ssp
-from rparm.system.structure import Connection
+from rparm.systems.ssp import Connection, Ssp
 
 
 @dataclass(frozen=True)

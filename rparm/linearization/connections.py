@@ -8,7 +8,7 @@ import numpy as np
 from rparm.errors import UserError
 from rparm.linearization.linear import Linear
 from rparm.linearization.matrices import cleared, closure
-from rparm.system.structure import Connection
+from rparm.systems.ssp import Connection
 
 NEGLIGIBLE = 1e-14  # of the largest entries of row and column: rounding
 

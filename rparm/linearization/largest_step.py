@@ -2,7 +2,7 @@
 
 A master's step is linear, too: it takes states, outputs and slopes of outputs at one communication
 point to those at the next. The system is stable at a step if all eigenvalues of this map are
-inside the unit circle. What `rparm.coupling.master` does is done here with matrices.
+inside the unit circle. What `rparm.systems.master` does is done here with matrices.
 """
 
 import math
@@ -12,10 +12,10 @@ from functools import cache, partial
 
 import numpy as np
 
-from rparm.coupling.master import INPUTS, ORDERS
 from rparm.linearization.connections import connected, looped
 from rparm.linearization.linear import Linear, hold
-from rparm.system.structure import Connection
+from rparm.systems.master import INPUT_MODES, ORDERS
+from rparm.systems.ssp import Connection
 
 FASTEST, SLOWEST = 1e-3, 1e2  # of the time scales of fastest and slowest pole: steps to try
 RATIO = 1.04  # of a step to the next one that is tried
@@ -32,7 +32,7 @@ class LargestStep:
     Attributes
     ----------
     order, inputs : str
-        As in `rparm.coupling.master`.
+        As in `rparm.systems.master`.
     step : float
         s; 0: unstable at every step; inf: stable at all that were tried.
     frequency : float
@@ -48,7 +48,7 @@ class LargestStep:
 def largest_steps(
     parts: Mapping[str, Linear],
     connections: Sequence[Connection],
-    ways: Sequence[tuple[str, str]] = tuple((o, i) for o in ORDERS for i in INPUTS),
+    ways: Sequence[tuple[str, str]] = tuple((o, i) for o in ORDERS for i in INPUT_MODES),
 ) -> list[LargestStep]:
     """The limit of each way to step; empty if no signal comes back through connections.
 

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rparm.coupling.master import Master
 from rparm.linearization.largest_step import LargestStep, largest_steps
 from rparm.linearization.system import SystemSubject
-from rparm.system import ssp
-from rparm.system.study import Rest
+from rparm.systems import ssp
+from rparm.systems.comparison import Rest
+from rparm.systems.master import Master
 from rparm.units import verdict
 
 STEPS = 500
@@ -29,7 +29,7 @@ MOVED = 1e-6  # in the unit of what is moved
 class Limit:
     """The largest stable step of a way to step."""
 
-    way: tuple[str, str]  # order and inputs, as in `rparm.coupling.master`
+    way: tuple[str, str]  # order and inputs, as in `rparm.systems.master`
     predicted: float  # s
     growths: tuple[float, float]  # in a step, measured WITHIN below and above it
 

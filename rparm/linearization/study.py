@@ -18,7 +18,7 @@ from rparm.linearization.margins import Margins, margins, open_loop
 from rparm.linearization.system import SystemSubject
 from rparm.linearization.trim import Trimmed, trim
 from rparm.project import VERSIONS
-from rparm.system import ssp
+from rparm.systems import ssp
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 
-from rparm.coupling.master import INPUTS, ORDERS, Master
 from rparm.errors import UserError, hint
 from rparm.files import UnreadableError
 from rparm.fmi.fmu_file import MODEL_EXCHANGE, Fmu
@@ -19,8 +18,8 @@ from rparm.linearization.derivatives import (
 )
 from rparm.linearization.linear import Linear
 from rparm.linearization.modes import held_states, is_sampled
-from rparm.system.ssp import Ssp
-from rparm.system.structure import Connection
+from rparm.systems.master import INPUT_MODES, ORDERS, Master
+from rparm.systems.ssp import Connection, Ssp
 
 
 class SystemSubject(ExitStack):
@@ -126,7 +125,11 @@ class SystemSubject(ExitStack):
             for c in self.connections
             if self._is_real(c.start_component, c.start_connector)
         )
-        return [(order, inputs) for inputs in (INPUTS if can else INPUTS[:1]) for order in ORDERS]
+        return [
+            (order, inputs)
+            for inputs in (INPUT_MODES if can else INPUT_MODES[:1])
+            for order in ORDERS
+        ]
 
     def held(self, parts: Mapping[str, Linear]) -> dict[str, list[str]]:
         """Held states by component."""

@@ -6,8 +6,7 @@ from rparm.output import console
 from rparm.output.console import Table
 from rparm.runs.comparison import TIGHTEST, Run, Sweep, comparisons
 from rparm.runs.convergence import Convergence
-from rparm.system.comparison import BOUND, Outcome
-from rparm.system.study import Measure
+from rparm.systems.comparison import BOUND, Measure, Outcome
 from rparm.units import milliseconds, seconds, short, unit, verdict
 
 NONE = "-"

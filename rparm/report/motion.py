@@ -17,8 +17,8 @@ from rparm.fmi.model import Value
 from rparm.runs.comparison import Run
 from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import Result
-from rparm.system.comparison import Outcome
-from rparm.system.ssp import Ssp
+from rparm.systems.comparison import Outcome
+from rparm.systems.ssp import Ssp
 
 Rows = Sequence[int] | np.ndarray | slice  # of a run, that are shown
 EVERY = slice(None)

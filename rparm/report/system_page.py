@@ -18,11 +18,9 @@ from rparm.report.overview import FAILED, PASSED, SYSTEM, Entry
 from rparm.report.pages import RunPage, Table
 from rparm.report.run_data import Plot, RunData, result_curve, thinned
 from rparm.report.scenario_page import cells, meanings
-from rparm.system import ecos
-from rparm.system.comparison import BOUND, Outcome
-from rparm.system.ssp import Ssp
-from rparm.system.structure import System
-from rparm.system.study import Diagram, Study, load
+from rparm.systems import ecos
+from rparm.systems.comparison import BOUND, Diagram, Outcome, Study, load_study
+from rparm.systems.ssp import Ssp, System
 from rparm.units import milliseconds, short, unit
 
 MOST_ROWS = 350  # of a file of values, which has many columns
@@ -39,7 +37,7 @@ class Section:
     @cached_property
     def study(self) -> Study:
         """What its folder says of it."""
-        return load(self.folder)
+        return load_study(self.folder)
 
     @property
     def variants(self) -> list[str]:

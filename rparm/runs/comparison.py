@@ -30,6 +30,9 @@ SMALLEST_GAIN = 1000.0  # by which the tightest tolerance beats the loosest
 SMALL_ENOUGH = 1e-10  # an error below it needs no gain
 
 
+# ---- References ----------------------------------------------------------------------------------
+
+
 class Compared:
     """A run that has been compared: which of its variables is farthest from the reference."""
 
@@ -160,6 +163,9 @@ def _check_times(times: np.ndarray, scenario: Scenario, wrong: files.Failure) ->
         raise wrong(f"{other} time {float(expected[row])!r} s, {found}", row + 2)
     if len(times) != len(expected):
         raise wrong(f"{other} {len(expected)} rows, found {len(times)}", shared + 1)
+
+
+# ---- Runs ----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -306,6 +312,9 @@ def differing(one: Result, other: Result) -> tuple[str, ...]:
     return tuple(name for name in names if columns.get(name) != others.get(name))
 
 
+# ---- Logs ----------------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """An output that was measured, at the times of a run's rows."""
@@ -340,6 +349,9 @@ def comparisons(scenario: Scenario, result: Result) -> Iterator[Comparison]:
         measured = np.where(log.covers(elapsed), log.values(elapsed), np.nan)
         simulated = result.values[:, result.names.index(name)]
         yield Comparison(name, log.source, measured, simulated)
+
+
+# ---- Tolerances ----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)

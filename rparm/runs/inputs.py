@@ -36,6 +36,9 @@ CONSTANT, SINES, TABLE, FILE = "constant", "sines", "table", "file"  # shapes of
 BESIDE = {"offset": SINES} | dict.fromkeys(("column", "time", "begin", "scale", "hold"), FILE)
 
 
+# ---- Checked values of a file --------------------------------------------------------------------
+
+
 class Reader:
     """Takes checked values from one file; errors name the file and the key."""
 
@@ -84,6 +87,9 @@ class Reader:
         for key in required:
             if key not in table:
                 self.fail(f"{begin}missing key {key!r}")
+
+
+# ---- Functions of time ---------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -170,6 +176,9 @@ class Logged:
 
 
 Signal = Constant | Sines | Table | Switches | Logged
+
+
+# ---- Logs ----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -329,6 +338,9 @@ def _header(path: Path, text: str, delimiter: str) -> list[str]:
 
 def _csv_reader(text: str, delimiter: str) -> "csv._reader":
     return csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
+
+
+# ---- Sections of a scenario ----------------------------------------------------------------------
 
 
 class InputReader:

@@ -332,6 +332,9 @@ class _Reader(Reader):
         return times, elapsed
 
 
+# ---- A scenario to start from --------------------------------------------------------------------
+
+
 def template(name: str, key: str, subject: str, model: Model) -> str:
     """Content of the file, which runs as it is.
 

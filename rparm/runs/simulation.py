@@ -187,6 +187,9 @@ def _switching(switches: dict[str, np.ndarray]) -> dict[int, list[str]]:
     return found
 
 
+# ---- Compiled steps ------------------------------------------------------------------------------
+
+
 def _step_compiled(
     instance: Instance, scenario: Scenario, progress: Callable[[int], object] | None
 ) -> tuple[np.ndarray, np.ndarray, float, UserError | None]:
@@ -273,6 +276,9 @@ class _CompiledSteps:
     def rows(self) -> np.ndarray:
         """Outputs at the recorded points that were reached, (rows, outputs)."""
         return self._values[: self._recorded]
+
+
+# ---- Values of programs --------------------------------------------------------------------------
 
 
 def is_finite_number(given: object) -> bool:

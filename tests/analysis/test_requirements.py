@@ -29,7 +29,7 @@ COMMANDS = {
     "run": (
         "rparm/__main__.py", "rparm/commands/[!cfil]*.py", "rparm/commands/coupling.py",
         "rparm/commands/completion.py", "rparm/commands/fmu.py", "rparm/commands/list.py",
-        "rparm/system/ecos.py", "models/*/animation.py", "models/*/study.py",
+        "rparm/systems/ecos.py", "models/*/animation.py", "models/*/study.py",
         "fmu/generate.py", "fmu/document.py", "fmu/references.py", "fmu/package.py",
         "fmu/source_code.py", "fmu/equations_to_fmu.py",
     ),

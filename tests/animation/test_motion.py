@@ -11,8 +11,8 @@ from rparm import files, project
 from rparm.fmi.fmu_file import Fmu
 from rparm.report import motion
 from rparm.runs.comparison import Run, Runs
-from rparm.system import comparison, ecos, ssp
-from rparm.system.comparison import Outcome
+from rparm.systems import comparison, ecos, ssp
+from rparm.systems.comparison import Outcome
 from tests.animation.player_page import show
 from tests.support.browser import Browser
 from tests.support.paths import ROOT

@@ -14,7 +14,7 @@ from rparm.models.closed_loop.study import EXPERIMENT
 
 from rparm.errors import UserError
 from rparm.report import overview
-from rparm.system import comparison, ecos, ssp
+from rparm.systems import comparison, ecos, ssp
 from tests.closed_loop.variants import VARIANTS
 from tests.support.paths import ROOT
 from tests.support.rparm_project import Console

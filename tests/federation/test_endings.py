@@ -18,7 +18,7 @@ from rparm.federation import addresses, component, watching
 from rparm.federation.federation import run
 from rparm.federation.network import KEY, Broker, Federate
 from rparm.federation.parts import parts
-from rparm.system import ssp
+from rparm.systems import ssp
 from tests.federation.processes import Process, Start, federation
 from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP, edited, replace

@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rparm.coupling.master import Master
 from rparm.errors import UserError
 from rparm.federation import addresses, federation
 from rparm.federation.parts import parts, real_connections
 from rparm.fmi.fmu_file import Fmu
-from rparm.system import ssp
-from rparm.system.ssp import Ssp
+from rparm.systems import ssp
+from rparm.systems.master import Master
+from rparm.systems.ssp import Ssp
 from tests.federation.processes import Start
 from tests.support.paths import ROOT
 from tests.support.rparm_project import Console

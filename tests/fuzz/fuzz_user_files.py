@@ -37,7 +37,7 @@ from rparm.fmi.fmu_file import read_model  # noqa: E402
 from rparm.fmi.model import Model  # noqa: E402
 from rparm.runs import scenario as scenarios  # noqa: E402
 from rparm.runs.comparison import load_reference  # noqa: E402
-from rparm.system import comparison, ssp  # noqa: E402
+from rparm.systems import comparison, ssp  # noqa: E402
 
 SLOWEST = 5.0  # s of processor time, for one file
 MODEL = "rp_manipulator"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rparm.models.machine.experiment import STEPS_PER_SECOND, STOP
 
-from rparm.system import comparison, ecos, ssp
+from rparm.systems import comparison, ecos, ssp
 from tests.support.paths import ROOT
 from tests.support.rparm_project import Console
 from tests.support.ssp_files import MACHINE as SSP

@@ -7,7 +7,7 @@ from rparm.models.machine.continuous import BOUND, METHODS, SMALLEST, VARIANTS, 
 
 from rparm.fmi.fmu_file import Fmu
 from rparm.runs.convergence import slope
-from rparm.system.ssp import Ssp
+from rparm.systems.ssp import Ssp
 
 STOP = 0.4  # s: the start and the grasp
 # steps per second of the runs here, by method

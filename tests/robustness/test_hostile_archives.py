@@ -16,7 +16,7 @@ from rparm import __main__ as cli
 from rparm.errors import UserError
 from rparm.fmi import fmu_file
 from rparm.fmi.fmu_file import Fmu
-from rparm.system import ssp
+from rparm.systems import ssp
 from tests.support.paths import ROOT
 from tests.support.rparm_project import assert_one_line, repacked
 from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, replace
@@ -235,7 +235,7 @@ def test_archives_that_grow(refuse: Callable[..., None], monkeypatch: pytest.Mon
 
 def test_a_system_whose_fmus_grow(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each within its limit: some commands unpack all of them."""
-    monkeypatch.setattr("rparm.system.ssp_checks.LARGEST_SYSTEM", SSP.stat().st_size // 2)
+    monkeypatch.setattr("rparm.systems.ssp.LARGEST_SYSTEM", SSP.stat().st_size // 2)
     with pytest.raises(UserError, match="the FMUs up to component '.*' have more than"):
         ssp_opened(SSP)
 

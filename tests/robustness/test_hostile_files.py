@@ -15,7 +15,7 @@ from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.runs import comparison
 from rparm.runs import scenario as scenarios
-from rparm.system import ssp
+from rparm.systems import ssp
 from tests.support.paths import ROOT
 from tests.support.rparm_project import declared
 from tests.support.ssp_files import SSP, Edit, edited, replace

@@ -9,7 +9,7 @@ import pytest
 from rparm import command_line, files, project
 from rparm.command_line import COMMANDS
 from rparm.commands.completion import SCRIPT, SHELLS
-from rparm.system import study
+from rparm.systems import comparison
 from tests.support.paths import ROOT
 from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, edited, replace
@@ -73,7 +73,7 @@ def test_the_playground_is_copied_and_shown(
 def test_the_picture_of_the_coupling_is_shown(
     tmp_path: Path, shown: list[str], monkeypatch: pytest.MonkeyPatch, console: Console
 ) -> None:
-    _, module = study.of_coupling()
+    _, module = comparison.coupling_study()
 
     def draw(_: Path, report: Path) -> dict[str, dict[str, object]]:
         (report / module.COUPLING_PICTURE).touch()

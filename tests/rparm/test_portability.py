@@ -325,8 +325,8 @@ def test_the_child_is_killed_where_there_are_no_process_groups() -> None:
 
 
 def test_components_are_found_by_paths_of_windows() -> None:
-    from rparm.system import ecos
-    from rparm.system import ssp as ssp_archives
+    from rparm.systems import ecos
+    from rparm.systems import ssp as ssp_archives
 
     with ssp_archives.unpacked(BUILD / "ClosedLoop.ssp") as opened:
         component = opened.system.components[0]

@@ -1,4 +1,4 @@
-"""The closed loop, stepped by the master of rparm.coupling in several ways.
+"""The closed loop, stepped by the master of rparm in several ways.
 
 The same components, connections and parameters as in Ecos (ClosedLoop.ssp). Errors are relative to
 the closed loop in continuous time (../references). The page ../coupling.md says which results are
@@ -14,12 +14,12 @@ import numpy as np
 from rparm.models.closed_loop.experiment import STOP
 
 from rparm import files, project
-from rparm.coupling.master import Master
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value
-from rparm.system import ssp
-from rparm.system.structure import Connection
+from rparm.systems import ssp
+from rparm.systems.master import Master
+from rparm.systems.ssp import Connection
 
 FOLDER = Path(__file__).resolve().parents[1]
 REFERENCES = FOLDER / "references"

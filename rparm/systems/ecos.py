@@ -2,7 +2,7 @@
 
 Ecos continues when a component fails, says so in its log only at level debug, and leaves its
 temporary files behind. So the run is a child process whose log is read and whose temporary folder
-is removed: `python -m rparm.system.ecos FOLDER` is that child.
+is removed: `python -m rparm.systems.ecos FOLDER` is that child.
 """
 
 import ctypes
@@ -29,8 +29,8 @@ from rparm import project
 from rparm.errors import StoppedError, UserError, one_line
 from rparm.interruption import run_group, temporary_folder
 
-if TYPE_CHECKING:  # the child does not need these modules
-    from rparm.system.ssp import Ssp
+if TYPE_CHECKING:
+    from rparm.systems.ssp import Ssp
 
 PLAN, ROWS, DONE, LOG = "plan.json", "rows.npy", "done.json", "ecos.log"
 # of an instance: [path of its FMU] fmi2Status text, [its name] Status text in FMI 3.0
@@ -180,7 +180,7 @@ def _start(folder: Path) -> int:
         environment["PATH"] = f"{_unzip(folder)}:{environment.get('PATH', os.defpath)}"
     with (folder / LOG).open("wb") as log:
         return run_group(
-            [sys.executable, "-P", "-m", "rparm.system.ecos", str(folder)],
+            [sys.executable, "-P", "-m", "rparm.systems.ecos", str(folder)],
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=subprocess.STDOUT,
@@ -241,8 +241,6 @@ def _check_values(
 
 
 # ---- the child
-
-
 def _child(folder: Path) -> None:
     """Run the plan of the folder, until a value is not finite or a component has complained."""
     _load_tbb()

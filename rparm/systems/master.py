@@ -17,22 +17,111 @@ A Boolean that has changed in a step is passed on at the end of the step, in bot
 values jump to what follows from it at this time, as at the start.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import time
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
-from ctypes import c_double
+from ctypes import Array, c_double, sizeof
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
-from rparm.coupling.connected_instance import ConnectedInstance, check_finite
-from rparm.errors import UserError
-from rparm.fmi.fmi_instance import Instance
+from rparm.errors import UserError, placed
+from rparm.fmi.fmi_instance import Instance, Reals, UnpackedFmu
 from rparm.fmi.fmu_file import Fmu
-from rparm.fmi.model import Value
-from rparm.system.structure import Connection
+from rparm.fmi.model import INPUTS, Value
+from rparm.systems.ecos import Run, said_at_end
+from rparm.systems.ssp import Connection, Ssp
 
 ORDERS = ("jacobi", "gauss_seidel")
-INPUTS = ("held", "extrapolated")
+INPUT_MODES = ("held", "extrapolated")
+
+
+class ConnectedInstance:
+    """An instance, its place among the system's values, and the sources of its inputs.
+
+    Of `values` and their derivatives with respect to time, `slopes`, those from `first` on belong
+    to its outputs, of which some are `feeding` inputs. Each input has a source, an index among
+    them, which steps `ahead` of this component or not.
+    """
+
+    def __init__(
+        self,
+        instance: Instance,
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        first: int,
+        feeding: Collection[str],
+        sources: Sequence[int],
+        ahead: Sequence[bool],
+        values: Array,
+        slopes: np.ndarray,
+    ) -> None:
+        self.instance = instance
+        self.sources = np.array(sources, dtype=int)
+        self.ahead = np.array(ahead, dtype=bool)
+        memory = (c_double * len(outputs)).from_buffer(values, first * sizeof(c_double))
+        self.outputs = instance.reals(outputs, memory)
+        self.inputs = instance.reals(inputs)
+        self._lines = instance.input_polynomials(inputs, 1)
+        connected = [i for i, name in enumerate(outputs) if name in feeding]
+        self._output_slopes = instance.output_derivatives([outputs[i] for i in connected], 1)
+        self._slopes = slopes
+        self._slope_indices = first + np.array(connected, dtype=int)
+
+    @property
+    def name(self) -> str:
+        return self.instance.name
+
+    def begin(self, start: float, stop: float | None, parameters: Mapping[str, Value]) -> None:
+        for name in self.inputs.names:
+            if name in parameters:
+                raise UserError(f"{self.name}.{name}: is fed by a connection, which says its value")
+        begin_instance(self.instance, start, stop, parameters)
+
+    def set_inputs(self, values: np.ndarray) -> None:
+        """Set the inputs, (inputs,), in their units."""
+        self.inputs.view[:] = values
+        self.inputs.set()
+
+    def set_lines(self, values: np.ndarray, slopes: np.ndarray) -> None:
+        """Set the inputs and their derivatives with respect to time, (inputs,) each."""
+        self._lines.view[:] = values, slopes
+        self._lines.set()
+
+    def read(self) -> None:
+        self.outputs.get()
+
+    def read_slopes(self) -> None:
+        self._output_slopes.get()
+        self._slopes[self._slope_indices] = self._output_slopes.view
+
+
+def begin_instance(
+    instance: Instance, start: float, stop: float | None, parameters: Mapping[str, Value]
+) -> None:
+    instance.set_up(start, stop)
+    for name, value in parameters.items():
+        instance.set(name, start_value(instance.fmu, instance.name, name, value))
+    instance.enter_initialization()
+
+
+def check_finite(component: str, outputs: Reals, when: str) -> None:
+    bad = np.flatnonzero(~np.isfinite(outputs.view))
+    if len(bad):
+        name, value = f"{component}.{outputs.names[bad[0]]}", outputs.view[bad[0]]
+        raise UserError(f"{name} is {value} {when}: a finite value is expected")
+
+
+def start_value(fmu: UnpackedFmu, component: str, name: str, value: Value) -> Value:
+    """Value to set before initialization, an item as its number; UserError if it cannot be set."""
+    variable = fmu.model.variables.get(name)
+    if variable is None or not (variable.can_start or variable.is_a(INPUTS)):
+        raise UserError(f"{component}: {fmu.path} has no parameter {name!r}")
+    is_item = variable.type == "Enumeration" and isinstance(value, str)
+    if not is_item and variable.type != "Boolean":
+        return value
+    with placed(f"{component}.{name}"):
+        return variable.checked(value)
 
 
 class Snapshot(AbstractContextManager["Snapshot"]):
@@ -103,8 +192,8 @@ class Master(AbstractContextManager["Master"]):
         inputs: str = "held",
         also: Sequence[tuple[str, str]] = (),
     ) -> None:
-        if order not in ORDERS or inputs not in INPUTS:
-            raise UserError(f"expected an order of {ORDERS} and inputs of {INPUTS}")
+        if order not in ORDERS or inputs not in INPUT_MODES:
+            raise UserError(f"expected an order of {ORDERS} and inputs of {INPUT_MODES}")
         self.extrapolates = inputs == "extrapolated"
         self.jacobi = order == "jacobi"
         self.time, self.do_steps = 0.0, 0
@@ -338,3 +427,70 @@ def _split(
 def _is_switch(fmus: Mapping[str, Fmu], component: str, name: str, causality: str) -> bool:
     variable = fmus[component].model.variables.get(name) if component in fmus else None
     return variable is not None and (variable.type, variable.causality) == ("Boolean", causality)
+
+
+def run_in_master(ssp: Ssp, variant: str, names: Sequence[str]) -> Run:
+    """Run a system in Jacobi order with one of its parameter sets; read what Ecos would read.
+
+    That is the values of the Real, Integer or Boolean variables ``component.variable`` at a
+    communication point after the inputs of the next step have been set. UserError if a component
+    fails, or gives a value that is not finite.
+    """
+    system = ssp.system
+    times = system.times
+    rows = np.empty((len(times), len(names)))
+    with ssp.unpacked_fmus() as fmus, Master(fmus, system.connections) as master:
+        master.initialize(times[0], times[-1], system.parameter_sets[variant])
+        readers = [_RowReader(ssp, c, names) for c in master.components.values()]
+        begin = time.perf_counter()
+        for row, end in enumerate(times.tolist()):
+            if row:
+                master.advance(end)
+            for reader in readers:
+                with reader.component.instance.explained(f"at t = {end!r} s"):
+                    reader.component.set_inputs(master.values[reader.component.sources])
+                    reader.read(rows[row])
+        wall_time = time.perf_counter() - begin
+        messages = [
+            f"{component.name!r}: {text}"
+            for component in master.components.values()
+            for text in component.instance.messages
+        ]
+        said = {name: _value_at_end(master, ssp, name) for name in said_at_end(ssp)}
+    return Run(tuple(names), times, rows, wall_time, tuple(dict.fromkeys(messages)), said)
+
+
+def _value_at_end(master: Master, ssp: Ssp, name: str) -> float:
+    component, _, variable = name.partition(".")
+    row = np.empty(1)
+    _RowReader(ssp, master.components[component], [name]).read(row)
+    return float(row[0])
+
+
+class _RowReader:
+    """Reads the wanted variables of one component into a row of the system's."""
+
+    def __init__(self, ssp: Ssp, component: ConnectedInstance, names: Sequence[str]) -> None:
+        self.component = component
+        instance = component.instance
+        own: dict[str, int] = {}
+        for column, name in enumerate(names):
+            owner, _, variable = name.partition(".")
+            if owner == component.name:
+                own[variable] = column
+        variables = ssp.models[component.name].variables
+        real = [name for name in own if variables[name].type == "Real"]
+        self._reals = instance.reals(real)
+        self._real_columns = [own[name] for name in real]
+        self._others: list[tuple[int, Callable[[str], int | None], str]] = []
+        for name in own.keys() - set(real):
+            boolean = variables[name].type == "Boolean"
+            self._others.append(
+                (own[name], instance.boolean if boolean else instance.integer, name)
+            )
+
+    def read(self, row: np.ndarray) -> None:
+        self._reals.get()
+        row[self._real_columns] = self._reals.view
+        for column, read, name in self._others:
+            row[column] = read(name)

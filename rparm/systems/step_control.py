@@ -1,4 +1,4 @@
-"""Step-size control by step doubling, for any master of rparm.coupling.master.
+"""Step-size control by step doubling, for any master of rparm.systems.master.
 
 A step H is made whole and, after a rollback by FMU states, again as two steps H/2. A coupling of
 order p makes an error of C H^(p+1) in a step. Then the two results are C H^(p+1) (1 - 2^-p) apart,
@@ -23,8 +23,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rparm.coupling.master import Master, Snapshot
 from rparm.errors import UserError
+from rparm.systems.master import Master, Snapshot
 
 SAFETY = 0.9  # of the step that would just reach the tolerance
 SMALLEST_FACTOR, LARGEST_FACTOR = 0.2, 2.5  # from one step to the next
