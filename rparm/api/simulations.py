@@ -10,7 +10,7 @@ import numpy as np
 
 from rparm import files, project
 from rparm.errors import UserError, hint
-from rparm.federation import addresses, federation
+from rparm.federation import federation, network
 from rparm.files import written
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Model, Value
@@ -272,7 +272,7 @@ class System:
         engines = {
             "master": master.run_in_master,
             "ecos": ecos.run,
-            "helics": lambda ssp, variant, _: federation.run(ssp, variant, addresses.free()),
+            "helics": lambda ssp, variant, _: federation.run(ssp, variant, network.free_address()),
         }
         if engine not in engines:
             raise UserError(f"engine: expected one of {', '.join(engines)}, got {engine!r}")

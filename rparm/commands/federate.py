@@ -7,9 +7,9 @@ from pathlib import Path
 from rparm.command_line import Ended
 from rparm.command_line.options import add_document, add_silence
 from rparm.errors import UserError, hint
-from rparm.federation import SILENCE, addresses, component, screen, watching
+from rparm.federation import SILENCE, component, network
+from rparm.federation.component import parts
 from rparm.federation.network import KEY, key
-from rparm.federation.parts import parts
 from rparm.systems import ssp
 
 DESCRIPTION = "Steps one component of a system until the federation has come to the end."
@@ -30,9 +30,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> Ended:
-    screen.apart()
-    addresses.check_form(options.broker)
-    addresses.check_host()
+    network.separate_messages()
+    network.check_address(options.broker)
+    network.check_host_has_address()
     if KEY not in os.environ:
         raise UserError(f"{KEY}: not in the environment, copy the whole line of the federation")
     key()
@@ -43,11 +43,13 @@ def run(options: argparse.Namespace) -> Ended:
             raise UserError(f"{options.ssp}: has no component {options.component!r}{known}")
         with system.unpacked_fmu(options.component) as fmu:
             if not options.owned:
-                addresses.wait_for(
+                network.wait_for_listener(
                     options.broker,
                     options.silence,
                     lambda: print(f"waiting for a federation at {options.broker}", flush=True),
                 )
-            is_gone = watching.end_of_input().is_set if options.owned else lambda: False
-            component.run(made[options.component], fmu, options.broker, options.silence, is_gone)
+            is_gone = component.end_of_input().is_set if options.owned else lambda: False
+            component.run_component(
+                made[options.component], fmu, options.broker, options.silence, is_gone
+            )
     return Ended(0, "", {"component": options.component})

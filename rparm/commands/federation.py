@@ -11,10 +11,10 @@ from rparm import files, project
 from rparm.command_line import Ended
 from rparm.command_line.options import add_output, add_silence, add_system
 from rparm.errors import UserError, hint
-from rparm.federation import SILENCE, addresses, federation, screen
+from rparm.federation import SILENCE, federation, network
+from rparm.federation.component import real_connections
 from rparm.federation.federation import Record
 from rparm.federation.network import KEY, key
-from rparm.federation.parts import real_connections
 from rparm.files import check_writable, written
 from rparm.output import console
 from rparm.output.progress import Progress
@@ -58,13 +58,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Ended:
     """Run the variants; compare each with the master that steps all in one process."""
-    screen.apart()
+    network.separate_messages()
     path = options.ssp
     if path is None:
         folder, _ = comparison.coupling_study()
         path = project.built(folder, ".ssp", "--ssp", options.fmi)
-    address = addresses.free() if options.listen is None else options.listen
-    addresses.check_free(address)
+    address = network.free_address() if options.listen is None else options.listen
+    network.check_address_is_free(address)
     if options.output:
         check_writable(options.output)
     key()  # what is wrong with it is said before anything runs

@@ -36,6 +36,9 @@ ORDERS = ("jacobi", "gauss_seidel")
 INPUT_MODES = ("held", "extrapolated")
 
 
+# ---- Components ----------------------------------------------------------------------------------
+
+
 class ConnectedInstance:
     """An instance, its place among the system's values, and the sources of its inputs.
 
@@ -122,6 +125,9 @@ def start_value(fmu: UnpackedFmu, component: str, name: str, value: Value) -> Va
         return value
     with placed(f"{component}.{name}"):
         return variable.checked(value)
+
+
+# ---- The master ----------------------------------------------------------------------------------
 
 
 class Snapshot(AbstractContextManager["Snapshot"]):
@@ -427,6 +433,9 @@ def _split(
 def _is_switch(fmus: Mapping[str, Fmu], component: str, name: str, causality: str) -> bool:
     variable = fmus[component].model.variables.get(name) if component in fmus else None
     return variable is not None and (variable.type, variable.causality) == ("Boolean", causality)
+
+
+# ---- A variant -----------------------------------------------------------------------------------
 
 
 def run_in_master(ssp: Ssp, variant: str, names: Sequence[str]) -> Run:
