@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from rparm import files, project
+from rparm import files, project, proof
 from rparm.errors import UserError, hint
 from rparm.federation import federation, network
 from rparm.files import written
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Model, Value
-from rparm.proof import proven, prover
 from rparm.runs import scenario as scenarios
 from rparm.runs import simulation
 from rparm.runs.comparison import load_reference
@@ -207,14 +206,16 @@ class Scenario:
         dict of str to float
             Largest distance at communication points, by the name of the state, in its unit.
         """
-        program = prover.of_scenario(self.path)
+        program = proof.prover_of(self.path)
         with self._opened(2) as (opened, loaded):
             enclosure = program.enclose(loaded).of(program.states)
             if enclosure.stopped is not None:
                 raise UserError(f"{self.path}: the proof holds up to {enclosure.stopped!r} s only")
             used = method or opened.model.method(loaded.parameters)
-            (used,) = proven.methods(opened, used)
-            found = proven.bounds(opened, loaded, enclosure, used, tolerance or loaded.tolerance)
+            (used,) = proof.methods_of(opened, used)
+            found = proof.error_bounds(
+                opened, loaded, enclosure, used, tolerance or loaded.tolerance
+            )
         return dict(zip(enclosure.names, found.max(axis=0).tolist(), strict=True))
 
     @contextmanager

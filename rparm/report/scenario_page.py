@@ -8,8 +8,7 @@ import numpy as np
 
 from rparm import files
 from rparm.fmi.model import Model, Value, Variable
-from rparm.proof import proven
-from rparm.proof.proven import ProvenError
+from rparm.proof import ASSUMED, ProvenError, errors_of_run
 from rparm.report import motion, overview
 from rparm.report.measured_data import measured_tables, with_measured
 from rparm.report.overview import FAILED, PASSED, RAN, Entry
@@ -39,7 +38,7 @@ def write(
     csv = _write_values(folder / f"{name}.csv", first.result, columns, digits)
     rows, plots = _thinned(_plots(runs, columns))
     moving, times = motion.of_run(first, rows), first.result.times[rows]
-    proof = proven.of_run(scenario, first.result) or {}
+    proof = errors_of_run(scenario, first.result) or {}
     page = RunPage(
         title=scenario.title,
         description=scenario.description,
@@ -47,7 +46,7 @@ def write(
         facts=[*_facts(first), *_proven(proof, first.fmu.model)],
         data=RunData(scenario.name, scenario.title, times, plots, motion=moving),
         tables=_tables(runs),
-        notes=[*_notes(runs), *([f"The proven error assumes {proven.ASSUMED}."] if proof else [])],
+        notes=[*_notes(runs), *([f"The proven error assumes {ASSUMED}."] if proof else [])],
         failures=[
             *(sentence(run.violation) for run in runs if run.violation),
             *map(_described, failures),
