@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from rparm.report.style import DASHED, ERRORS, MUTED, REFERENCE, RUN
+from rparm.report.pages import DASHED, ERROR_COLORS, MUTED, REFERENCE, RUN
 from rparm.systems.comparison import Measure, Outcome
 
 JOINTS = (("q1", "rad"), ("q2", "m"))
@@ -41,9 +41,9 @@ def draw_motion(axes: dict[str, Axes], outcome: Outcome, arm: str) -> None:
         axes[joint].plot(times, wanted, color=REFERENCE, linewidth=5, solid_capstyle="round")
         draw(axes[joint], times, actual, f"{joint} ({unit})")
         label = f"tracking error of {joint} ({unit})"
-        draw(axes[f"{joint}_error"], times, wanted - actual, label, ERRORS[0])
+        draw(axes[f"{joint}_error"], times, wanted - actual, label, ERROR_COLORS[0])
     away = 1e3 * distance(outcome, arm)
-    draw(axes["distance"], times, away, "distance from the reference (mm)", ERRORS[0])
+    draw(axes["distance"], times, away, "distance from the reference (mm)", ERROR_COLORS[0])
     axes["distance"].set_ylim(bottom=0.0)
     _draw_path(axes["path"], outcome, arm)
     for name, panel in axes.items():
@@ -95,7 +95,7 @@ def finish(
     handles = [
         Line2D([], [], color=REFERENCE, linewidth=5, label="reference motion"),
         Line2D([], [], color=RUN, linewidth=1.3, label=f"{arm}, in Ecos"),
-        Line2D([], [], color=ERRORS[0], linewidth=1.3, label="difference of the two"),
+        Line2D([], [], color=ERROR_COLORS[0], linewidth=1.3, label="difference of the two"),
         *more,
     ]
     picture.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9.5)

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 from rparm.models.system_figure import draw, draw_limit
 
 from rparm.models import system_figure
-from rparm.report.style import STYLE
+from rparm.report.pages import STYLE
 from rparm.systems.comparison import Outcome
 from rparm.systems.ssp import Ssp
 

@@ -9,7 +9,7 @@ from matplotlib.patches import Patch
 from rparm.models.system_figure import draw, draw_limit
 
 from rparm.models import system_figure
-from rparm.report.style import ERRORS, MUTED, RUN, STYLE
+from rparm.report.pages import ERROR_COLORS, MUTED, RUN, STYLE
 from rparm.systems.comparison import Outcome
 from rparm.systems.ssp import Ssp
 
@@ -46,7 +46,7 @@ def figure(ssp: Ssp, outcome: Outcome) -> Figure:
             is_limited |= _draw_motor(axes, ssp, outcome, joint)
             _draw_mode(axes[f"mode{joint}"], times, outcome.column(f"plant.mode{joint}"), joint)
         force = outcome.column("environment.wall_force")
-        draw(axes["wall"], times, force, "force of the wall (N)", ERRORS[1])
+        draw(axes["wall"], times, force, "force of the wall (N)", ERROR_COLORS[1])
         axes["wall"].set_ylim(bottom=0.0)
         system_figure.draw_motion(axes, outcome, ARM)
         if force.any():
@@ -58,7 +58,9 @@ def figure(ssp: Ssp, outcome: Outcome) -> Figure:
                 panel.axvspan(carried[0], carried[-1], color=CARRIED, zorder=0)
         for name in ("mode1", "mode2", "wall"):
             axes[name].set_xlabel("time (s)")
-        more: list[Line2D | Patch] = [Line2D([], [], color=ERRORS[1], linewidth=1.3, label="wall")]
+        more: list[Line2D | Patch] = [
+            Line2D([], [], color=ERROR_COLORS[1], linewidth=1.3, label="wall")
+        ]
         if is_limited:
             more.append(system_figure.limit_entry("limit of the motor"))
         if attached.any():

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from rparm.campaign.analysis import Index
-from rparm.report.style import ERRORS, MUTED, RUN, STYLE
+from rparm.report.pages import ERROR_COLORS, MUTED, RUN, STYLE
 from rparm.units import minus
 
 BINS = 50
@@ -92,7 +92,7 @@ def indices(found: Mapping[str, Sequence[Index]]) -> Figure:
                     values,
                     0.34,
                     yerr=half,
-                    color=(RUN, ERRORS[0])[i],
+                    color=(RUN, ERROR_COLORS[0])[i],
                     ecolor=MUTED,
                     capsize=4,
                     label=kind,

@@ -13,9 +13,8 @@ from rparm.campaign.job import Job
 from rparm.campaign.measures import LYAPUNOV
 from rparm.campaign.planning import FAILURE, RUN
 from rparm.campaign.results import MANIFEST, Results
-from rparm.report import assets
-from rparm.report.pages import INDEX, Command, Table, write_page
-from rparm.report.style import save
+from rparm.report import pages
+from rparm.report.pages import INDEX, Command, Table, save_figure, write_page
 
 MOST = 10**7  # runs, whose table is held in memory
 DRAWN = 24  # columns in a picture at most
@@ -50,7 +49,7 @@ class Page:
         """Write the page, on a table with this digest; its path."""
         manifest = json.loads((self.folder / MANIFEST).read_text(encoding="utf-8"))
         found = self.indices()
-        assets.write(self.folder)
+        pages.write_assets(self.folder)
         return write_page(
             self.folder / INDEX,
             "campaign.html",
@@ -92,7 +91,7 @@ class Page:
             return None
         drawn, note = self.drawn(there)
         picture = figures.distributions({self.labels[name]: self.kept[name] for name in drawn})
-        save(picture, self.folder / "distributions.png")
+        save_figure(picture, self.folder / "distributions.png")
         head = ["kept", "smallest", "5 %", "median", "95 %", "largest", "runs without a value"]
         rows = [
             [self.labels[name], *map(_rounded, analysis.quantiles(values)), _lacking(values)]
@@ -124,7 +123,7 @@ class Page:
             return None
         drawn, note = self.drawn(found)
         picture = figures.indices({self.labels[name]: found[name] for name in drawn})
-        save(picture, self.folder / "indices.png")
+        save_figure(picture, self.folder / "indices.png")
         head = ["kept", "parameter", "first order", "±", "total", "±", "groups of runs"]
         rows = [
             [
@@ -195,7 +194,7 @@ class Page:
         there = int(np.isfinite(columns).all(axis=0).sum())
         if there:
             labels = [self.labels[name] for name in (drawn.x, drawn.y, drawn.colour)]
-            save(figures.heat_map(labels, *columns), self.folder / f"map_{number}.png")
+            save_figure(figures.heat_map(labels, *columns), self.folder / f"map_{number}.png")
         return drawn, [self.labels[name] for name in names], there
 
 

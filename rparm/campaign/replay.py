@@ -19,7 +19,7 @@ from rparm.campaign.points import Points
 from rparm.campaign.runs import Rows, Runner, open_fmus
 from rparm.errors import UserError
 from rparm.interruption import temporary_folder
-from rparm.report import assets, motion, pages
+from rparm.report import motion, pages
 from rparm.report.motion import Recorded
 from rparm.report.overview import RAN
 from rparm.report.pages import INDEX, RunPage, Table
@@ -72,7 +72,7 @@ def replay(
     table = folder / FOLDER / f"run_{run}.csv"
     table.parent.mkdir(parents=True, exist_ok=True)
     files.write_trajectory(table, job.times, job.watched, record)
-    assets.write(folder)
+    pages.write_assets(folder)
     page = RunPage(
         title=f"{campaign.title}: run {run}",
         description="One run of a campaign, made again.",

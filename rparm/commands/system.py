@@ -149,11 +149,11 @@ def _run(
             with written(options.report):
                 entries.append(system_page.write_variant(options.report, section, outcome))
             if options.pictures:
-                from rparm.report.style import save  # matplotlib takes long to import
+                from rparm.report.pages import save_figure  # matplotlib takes long to import
 
                 with written(options.pictures):
                     options.pictures.mkdir(parents=True, exist_ok=True)
-                    save(
+                    save_figure(
                         section.study.figure(section.ssp, outcome), options.pictures / f"{name}.png"
                     )
             outcomes.append(outcome)

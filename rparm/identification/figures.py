@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rparm.identification.whiteness import Whiteness
-from rparm.report.style import ERRORS, MUTED, RUN, STYLE
+from rparm.report.pages import ERROR_COLORS, MUTED, RUN, STYLE
 from rparm.units import minus
 
 TEXTS = STYLE | {"text.parse_math": False}
@@ -36,7 +36,7 @@ def _autocorrelations(axes: Axes, tests: Mapping[str, Whiteness]) -> None:
     width = 0.8 / max(len(tests), 1)
     for i, (name, test) in enumerate(tests.items()):
         lags = np.arange(1, len(test.correlations) + 1)
-        colour = (RUN, *ERRORS)[i % (1 + len(ERRORS))]
+        colour = (RUN, *ERROR_COLORS)[i % (1 + len(ERROR_COLORS))]
         places = lags + (i - (len(tests) - 1) / 2) * width
         axes.bar(places, test.correlations, width, color=colour, label=name)
     bound = max((test.bound for test in tests.values()), default=0.0)

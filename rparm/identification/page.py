@@ -9,11 +9,10 @@ from rparm.fmi.model import Model
 from rparm.identification import figures, results
 from rparm.identification.identify import Identification
 from rparm.identification.parameters import DELAY
-from rparm.report import assets
+from rparm.report import pages
 from rparm.report.overview import FAILED, RAN
-from rparm.report.pages import INDEX, RunPage, Table, write_page
+from rparm.report.pages import INDEX, RunPage, Table, save_figure, write_page
 from rparm.report.run_data import Curve, Plot, RunData, thinned
-from rparm.report.style import save
 from rparm.units import number, unit
 
 PICTURE = "correlations.png"
@@ -24,8 +23,8 @@ def write(
 ) -> Path:
     """Write the page and its picture into a folder; its path. `again` is what makes it again."""
     picture = figures.figure(found.whiteness, found.known, found.covariances.scatter)
-    save(picture, folder / PICTURE)
-    assets.write(folder)
+    save_figure(picture, folder / PICTURE)
+    pages.write_assets(folder)
     logs = ", ".join(recording.path.name for recording in found.recordings)
     page = RunPage(
         title=f"{found.model}: identified parameters",

@@ -12,7 +12,7 @@ from rparm.linearization.linear import Linear, hold
 from rparm.linearization.margins import Margins, closed, searched
 from rparm.linearization.matrices import eigenvalues, zeros
 from rparm.linearization.responses import frequencies, frequency_response, sampled_response
-from rparm.report.style import DASHED, ERRORS, INK, MUTED, RUN, STYLE
+from rparm.report.pages import DASHED, ERROR_COLORS, INK, MUTED, RUN, STYLE
 from rparm.units import milliseconds
 
 TEXTS = STYLE | {"text.parse_math": False}
@@ -92,7 +92,7 @@ def nyquist(loop: Linear, step: float | None) -> Figure:
             _nyquist(axes, sampled_response(loop, step)(below), DASHED, name)
         circle = np.exp(1j * np.linspace(0, 2 * math.pi, 200))
         axes.plot(circle.real, circle.imag, color=MUTED, linewidth=0.8, linestyle=":")
-        axes.plot(-1, 0, "+", color=ERRORS[0], markersize=14, markeredgewidth=2)
+        axes.plot(-1, 0, "+", color=ERROR_COLORS[0], markersize=14, markeredgewidth=2)
         axes.set_xlim(-FARTHEST, FARTHEST)
         axes.set_ylim(-FARTHEST, FARTHEST)
         axes.set_aspect("equal")
@@ -150,7 +150,7 @@ def poles(model: Linear, step: float | None, loop: Linear | None = None) -> Figu
         plain.set_ylim(min(low, -height), max(high, height))
         if loop is not None:
             found = closed(loop).poles
-            style = {"color": ERRORS[0], "label": "when it is closed", "markersize": 11}
+            style = {"color": ERROR_COLORS[0], "label": "when it is closed", "markersize": 11}
             plain.plot(found.real, found.imag, "+", **style)
         plain.set_xlabel("real part (1/s): left of 0 dies out")
         plain.set_ylabel("imaginary part (rad/s)")
@@ -186,7 +186,7 @@ def _channels(model: Linear) -> Iterator[tuple[str, Linear]]:
 
 def _colors() -> Iterator[str]:
     while True:
-        yield from (RUN, *ERRORS)
+        yield from (RUN, *ERROR_COLORS)
 
 
 def _grid(model: Linear, found: Margins | None = None) -> np.ndarray:

@@ -5,9 +5,8 @@ from pathlib import Path
 from rparm.linearization import explained, figures
 from rparm.linearization.margins import closed
 from rparm.linearization.study import Study
-from rparm.report import assets
-from rparm.report.pages import INDEX, Table, write_page
-from rparm.report.style import save
+from rparm.report import pages
+from rparm.report.pages import INDEX, Table, save_figure, write_page
 
 Picture = tuple[str, str]  # file without its suffix, and what it shows
 Part = tuple[Table, str, list[Picture]]
@@ -15,7 +14,7 @@ Part = tuple[Table, str, list[Picture]]
 
 def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
     """Write page and pictures into a folder; return the page. `again` makes them again."""
-    assets.write(folder)
+    pages.write_assets(folder)
     linear = found.linear
     parts: list[Part] = []
     if found.trimmed:
@@ -25,7 +24,7 @@ def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
     if found.largest:
         parts.append((explained.largest(list(found.largest)), explained.STEPS, []))
     if len(linear.states):
-        save(figures.poles(linear, step, found.loop), folder / "poles.png")
+        save_figure(figures.poles(linear, step, found.loop), folder / "poles.png")
         parts.append((explained.poles(found), explained.POLES, [("poles", "Poles")]))
     pictures = _pictures(folder, found, step)
     if pictures:
@@ -48,9 +47,9 @@ def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
 def _pictures(folder: Path, found: Study, step: float | None) -> list[Picture]:
     """Bode, Nyquist and steps: of the loop where it is broken, else of inputs and outputs."""
     if found.loop is not None:
-        save(figures.bode(found.loop, step, found.margins), folder / "bode.png")
-        save(figures.nyquist(found.loop, step), folder / "nyquist.png")
-        save(figures.steps(closed(found.loop), None), folder / "steps.png")
+        save_figure(figures.bode(found.loop, step, found.margins), folder / "bode.png")
+        save_figure(figures.nyquist(found.loop, step), folder / "nyquist.png")
+        save_figure(figures.steps(closed(found.loop), None), folder / "steps.png")
         return [
             ("bode", "Bode diagram of the loop"),
             ("nyquist", "Nyquist diagram of the loop"),
@@ -59,8 +58,8 @@ def _pictures(folder: Path, found: Study, step: float | None) -> list[Picture]:
     shown = figures.drawn(found.linear)
     if not shown.inputs or not shown.outputs:
         return []
-    save(figures.bode(shown, step), folder / "bode.png")
-    save(figures.steps(shown, step), folder / "steps.png")
+    save_figure(figures.bode(shown, step), folder / "bode.png")
+    save_figure(figures.steps(shown, step), folder / "steps.png")
     return [("bode", "Bode diagram"), ("steps", "Answers to steps")]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from rparm import proof
 from rparm.fmi.model import Model
 from rparm.proof import Enclosure, ProvenReference
-from rparm.report import assets
+from rparm.report import pages
 from rparm.report.overview import FAILED, PASSED
 from rparm.report.pages import INDEX, RunPage, Table, write_run
 from rparm.report.run_data import Curve, Plot, RunData, thinned
@@ -99,7 +99,7 @@ def _status(references: Iterable[ProvenReference]) -> str:
 
 
 def _write(report: Path, name: str, page: RunPage) -> Path:
-    assets.write(report)
+    pages.write_assets(report)
     (report / FOLDER).mkdir(parents=True, exist_ok=True)
     with_overview = (report / INDEX).exists()
     return write_run(report / FOLDER / f"{name}.html", replace(page, overview=with_overview))

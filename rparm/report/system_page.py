@@ -13,7 +13,7 @@ from rparm import files, project
 from rparm.errors import StoppedError, UserError
 from rparm.files import whole
 from rparm.fmi.model import KINDS
-from rparm.report import assets, motion, overview
+from rparm.report import motion, overview, pages
 from rparm.report.overview import FAILED, PASSED, SYSTEM, Entry
 from rparm.report.pages import RunPage, Table
 from rparm.report.run_data import Plot, RunData, result_curve, thinned
@@ -127,7 +127,7 @@ def write_failed(report: Path, section: Section, variant: str, error: UserError)
 
 def _folder(report: Path, section: Section) -> Path:
     """Folder of the pages, with what they share."""
-    assets.write(report)
+    pages.write_assets(report)
     folder = report / SYSTEM
     folder.mkdir(parents=True, exist_ok=True)
     with whole(folder / f"{section.name}.svg") as path:

@@ -14,7 +14,7 @@ from rparm.models.closed_loop.study import REST
 
 from rparm.files import from_here, written
 from rparm.linearization import stable_steps
-from rparm.report.style import save
+from rparm.report.pages import save_figure
 
 
 def run(path: Path, ssp: Path) -> dict[str, dict[str, object]]:
@@ -32,7 +32,7 @@ def run(path: Path, ssp: Path) -> dict[str, dict[str, object]]:
         _print(tables.doubling_lines(doubling))
         limits = stable_steps.study(ssp, REST)
     with written(path):
-        save(figure(step_errors, tracking, doubling), path)
+        save_figure(figure(step_errors, tracking, doubling), path)
     print(f"\npicture: {from_here(path)}")
     return {
         "step errors": {
