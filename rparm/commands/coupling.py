@@ -6,7 +6,7 @@ from rparm import project
 from rparm.command_line import Ended
 from rparm.command_line.options import add_report, add_system
 from rparm.files import check_writable
-from rparm.linearization import stable_steps
+from rparm.linearization import largest_step
 from rparm.output import console
 from rparm.systems import comparison
 
@@ -31,7 +31,7 @@ def run(options: argparse.Namespace) -> Ended:
     for other, rest in comparison.rests().items():
         if other != folder and not options.ssp:
             ssp = project.built(other, ".ssp", version=options.fmi)
-            parts[f"largest steps of {other.name}"] = stable_steps.study(ssp, rest)
+            parts[f"largest steps of {other.name}"] = largest_step.study_steps(ssp, rest)
     failed = [name for name, part in parts.items() if not part["passed"]]
     picture = (options.report / known.COUPLING_PICTURE).absolute()
     verdict = console.verdict_line(failed, parts, "part")

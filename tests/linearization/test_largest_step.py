@@ -13,9 +13,14 @@ from rparm.models.machine.stability import Contact, growth
 from rparm.models.machine.study import REST as MACHINE
 from scipy.linalg import expm
 
-from rparm.linearization.largest_step import LargestStep, largest_steps, transition
+from rparm.linearization.largest_step import (
+    LargestStep,
+    Resting,
+    largest_steps,
+    resting,
+    transition,
+)
 from rparm.linearization.linear import Linear
-from rparm.linearization.stable_steps import Resting, resting
 from rparm.systems.master import INPUT_MODES, ORDERS
 from rparm.systems.ssp import Connection
 from tests.support.paths import ROOT
