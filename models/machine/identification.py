@@ -1,9 +1,9 @@
-"""What rparm asks of this folder: logs of the machine, to identify the plant's parameters from.
+"""Logs of the machine, to identify the plant's parameters from.
 
-rparm/identification/demo.py says what `demo` gives. The machine lies flat, so that the efforts of a
-log lead an arm through the same motion again: under gravity it would run away. Its end effector
-moves on circles. A log has the efforts of the motors, and what the encoders show: counts with
-noise, two ticks late.
+rparm/identification/request.py says what `demo` gives. The machine lies flat, so that the efforts
+of a log lead an arm through the same motion again: under gravity it would run away. Its end
+effector moves on circles. A log has the efforts of the motors, and what the encoders show: counts
+with noise, two ticks late.
 """
 
 from pathlib import Path
@@ -13,9 +13,7 @@ from rparm.models.machine.systems import VARIANT, write_system
 
 from rparm import files, project
 from rparm.fmi.model import Value
-from rparm.identification.demo import Demo
-from rparm.identification.parameters import DELAY
-from rparm.identification.request import Request
+from rparm.identification.request import DELAY, Demo, Request
 from rparm.systems import master, ssp
 
 BASE = "noisy_sensor"  # the variant that all else is taken from

@@ -64,7 +64,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> Ended:
     """Identify, print a table, write page and files."""
     from rparm.fmi.fmu_file import Fmu
-    from rparm.identification import identify, page, result_files, results
+    from rparm.identification import identify, page, results
 
     check_writable(options.report)
     path, request, true = _asked(options)
@@ -74,7 +74,7 @@ def run(options: argparse.Namespace) -> Ended:
     _print(found, true)
     with written(options.report):
         options.report.mkdir(parents=True, exist_ok=True)
-        files = result_files.write(found, options.report, model)
+        files = results.write_files(found, options.report, model)
         files.append(page.write(found, options.report, model, true, _again(options)))
     verdict = f"identified: {len(found.estimates)} parameters, page {from_here(files[-1])}"
     if not found.has_converged:
@@ -87,8 +87,7 @@ def run(options: argparse.Namespace) -> Ended:
 
 def _asked(options: argparse.Namespace) -> tuple[Path, "Request", dict[str, float]]:
     """FMU and request of the options; the parameters' true values, as far as they are known."""
-    from rparm.identification import demo
-    from rparm.identification.request import Request
+    from rparm.identification.request import Request, make_demo
 
     if options.demo:
         _refuse_others(options)
@@ -96,7 +95,7 @@ def _asked(options: argparse.Namespace) -> tuple[Path, "Request", dict[str, floa
         folder = options.report
         with written(folder):
             folder.mkdir(parents=True, exist_ok=True)
-        made = demo.make(folder)
+        made = make_demo(folder)
         print(f"log: {from_here(made.request.logs[0])}")
         return made.fmu, made.request, dict(made.true)
     if not options.fmu or not options.logs:
