@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from rparm.report.pages import DASHED, ERROR_COLORS, MUTED, REFERENCE, RUN
+from rparm.report.pages import DASHED, ERROR_COLORS, MUTED, REFERENCE_COLOR, RUN_COLOR
 from rparm.systems.comparison import Measure, Outcome
 
 JOINTS = (("q1", "rad"), ("q2", "m"))
@@ -38,7 +38,7 @@ def draw_motion(axes: dict[str, Axes], outcome: Outcome, arm: str) -> None:
     for joint, unit in JOINTS:
         wanted = outcome.column(f"trajectory.{joint}_ref")
         actual = outcome.column(f"{arm}.{joint}")
-        axes[joint].plot(times, wanted, color=REFERENCE, linewidth=5, solid_capstyle="round")
+        axes[joint].plot(times, wanted, color=REFERENCE_COLOR, linewidth=5, solid_capstyle="round")
         draw(axes[joint], times, actual, f"{joint} ({unit})")
         label = f"tracking error of {joint} ({unit})"
         draw(axes[f"{joint}_error"], times, wanted - actual, label, ERROR_COLORS[0])
@@ -51,7 +51,9 @@ def draw_motion(axes: dict[str, Axes], outcome: Outcome, arm: str) -> None:
             panel.margins(x=0.02)
 
 
-def draw(axes: Axes, times: np.ndarray, values: np.ndarray, label: str, color: str = RUN) -> None:
+def draw(
+    axes: Axes, times: np.ndarray, values: np.ndarray, label: str, color: str = RUN_COLOR
+) -> None:
     """One signal, (rows,)."""
     axes.plot(times, values, color=color, linewidth=1.3)
     axes.set_ylabel(label)
@@ -68,10 +70,10 @@ def draw_limit(axes: Axes, values: np.ndarray, limit: float, share: float = REAC
 def _draw_path(axes: Axes, outcome: Outcome, arm: str) -> None:
     wanted = [outcome.column(f"trajectory.ee_{x}_ref") for x in "xy"]
     actual = [outcome.column(f"{arm}.ee_{x}") for x in "xy"]
-    axes.plot(*wanted, color=REFERENCE, linewidth=5, solid_capstyle="round")
-    axes.plot(*actual, color=RUN, linewidth=1.3)
+    axes.plot(*wanted, color=REFERENCE_COLOR, linewidth=5, solid_capstyle="round")
+    axes.plot(*actual, color=RUN_COLOR, linewidth=1.3)
     start = wanted[0][0], wanted[1][0]
-    axes.plot(*start, marker="o", markersize=8, color=RUN)
+    axes.plot(*start, marker="o", markersize=8, color=RUN_COLOR)
     axes.annotate("start", start, (-12, 0), ha="right", va="center", textcoords="offset points")
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.15)
@@ -93,8 +95,8 @@ def finish(
         weight="bold",
     )
     handles = [
-        Line2D([], [], color=REFERENCE, linewidth=5, label="reference motion"),
-        Line2D([], [], color=RUN, linewidth=1.3, label=f"{arm}, in Ecos"),
+        Line2D([], [], color=REFERENCE_COLOR, linewidth=5, label="reference motion"),
+        Line2D([], [], color=RUN_COLOR, linewidth=1.3, label=f"{arm}, in Ecos"),
         Line2D([], [], color=ERROR_COLORS[0], linewidth=1.3, label="difference of the two"),
         *more,
     ]

@@ -23,7 +23,7 @@ from rparm.models.machine.systems import SENSOR, SEQUENCE, direct, run_in_ecos
 from rparm import files, project
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value
-from rparm.report.pages import ERROR_COLORS, RUN, STYLE, save_figure
+from rparm.report.pages import ERROR_COLORS, RUN_COLOR, STYLE, save_figure
 from rparm.systems import ssp
 from rparm.systems.master import Master
 from rparm.systems.ssp import Ssp
@@ -153,7 +153,7 @@ def draw(measured: Mapping[tuple[str, str], tuple[list[float], float]]) -> Figur
     with mpl.rc_context(STYLE):
         picture = Figure(figsize=(13, 6), layout="constrained")
         for variant, axes in zip(VARIANTS, picture.subplots(1, 2, sharey=True), strict=True):
-            for color, method in zip((RUN, *ERROR_COLORS[:3]), METHODS, strict=True):
+            for color, method in zip((RUN_COLOR, *ERROR_COLORS[:3]), METHODS, strict=True):
                 errors, left = measured[variant, method.name]
                 steps = 1e3 / np.array(method.per_second)
                 axes.loglog(steps, errors, "o-", color=color, label=method.name)

@@ -9,7 +9,7 @@ from matplotlib.patches import Patch
 from rparm.models.system_figure import draw, draw_limit
 
 from rparm.models import system_figure
-from rparm.report.pages import ERROR_COLORS, MUTED, RUN, STYLE
+from rparm.report.pages import ERROR_COLORS, MUTED, RUN_COLOR, STYLE
 from rparm.systems.comparison import Outcome
 from rparm.systems.ssp import Ssp
 
@@ -85,7 +85,7 @@ def _draw_motor(axes: dict[str, Axes], ssp: Ssp, outcome: Outcome, joint: int) -
 
 
 def _draw_mode(axes: Axes, times: np.ndarray, mode: np.ndarray, joint: int) -> None:
-    axes.step(times, mode, where="post", color=RUN, linewidth=1.0)
+    axes.step(times, mode, where="post", color=RUN_COLOR, linewidth=1.0)
     axes.set_ylim(-1.4, 2.4)
     axes.set_yticks(list(MODES), list(MODES.values()))
     axes.set_title(f"friction of joint {joint}", loc="left", fontsize=11)

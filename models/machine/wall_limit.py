@@ -22,7 +22,7 @@ from rparm.models.machine.systems import SEQUENCE, direct, run_in_ecos, write_sy
 
 from rparm import project
 from rparm.fmi.fmu_file import Fmu
-from rparm.report.pages import ERROR_COLORS, RUN, STYLE, save_figure
+from rparm.report.pages import ERROR_COLORS, RUN_COLOR, STYLE, save_figure
 from rparm.systems import ssp
 from rparm.systems.master import Master
 from rparm.systems.ssp import Ssp
@@ -121,7 +121,7 @@ def draw(measured: Mapping[str, list[float]], in_engine: list[float]) -> Figure:
         picture = Figure(figsize=(9, 6), layout="constrained")
         axes = picture.subplots()
         line = np.geomspace(0.8 * STIFFNESSES[0], 1.25 * STIFFNESSES[-1], 60)
-        for color, (order, inputs) in zip((RUN, *ERROR_COLORS[:3]), CASES, strict=True):
+        for color, (order, inputs) in zip((RUN_COLOR, *ERROR_COLORS[:3]), CASES, strict=True):
             name = f"{order.replace('_', '-').title()}, inputs {inputs}"
             contacts = [Contact(MASS, k) for k in line]
             theory = [least_damping(c, STEP, order, inputs) for c in contacts]
@@ -131,7 +131,7 @@ def draw(measured: Mapping[str, list[float]], in_engine: list[float]) -> Figure:
             points = measured[f"{order}, {inputs}"]
             axes.loglog(STIFFNESSES, points, "o", color=color, markersize=7)
         axes.loglog(
-            STIFFNESSES, in_engine, "s", color="none", markeredgecolor=RUN, markersize=13,
+            STIFFNESSES, in_engine, "s", color="none", markeredgecolor=RUN_COLOR, markersize=13,
             label="measured in Ecos",
         )  # fmt: skip
         axes.loglog([], [], "o", color="#6b7885", label="measured under rparm's master")

@@ -154,14 +154,14 @@ def run_campaign(
         run failed, else empty.
     """
     with _needing("campaign"):
-        from rparm.campaign import cluster, work
+        from rparm.campaign import engine, work
     with work.opened(
         project.campaign_file(file), fmu and Path(fmu), output and Path(output)
     ) as made:
         if blocks := made.begin():
             with (
                 made.results.workers_folder() as files,
-                cluster.opened(None, workers, files) as client,
+                engine.opened_cluster(None, workers, files) as client,
             ):
                 made.run(client, blocks)
         return made.table()

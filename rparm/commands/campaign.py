@@ -85,7 +85,7 @@ def run(options: argparse.Namespace) -> Ended:
     file = project.campaign_file(options.file)
     project.check_installed(NEEDED, "campaign")
     # imported here: what a campaign needs may not be installed
-    from rparm.campaign import page, planning, replay, work
+    from rparm.campaign import page, planning, work
 
     security = _security(options)
 
@@ -97,7 +97,7 @@ def run(options: argparse.Namespace) -> Ended:
         if options.replay is not None:
             results.check()
             again = f"{_command(options)} --replay {options.replay}"
-            one = replay.replay(campaign, made.base, made.points, options.replay, folder, again)
+            one = work.replay(campaign, made.base, made.points, options.replay, folder, again)
             print(*one.lines, sep="\n")
             verdict = f"failed: {one.failure}" if one.failure else f"ran: run {options.replay}"
             return Ended(1 if one.failure else 0, verdict, one.document, page=one.page)
@@ -137,9 +137,9 @@ def _security(options: argparse.Namespace) -> "Security | None":
         return None
     if options.no_dashboard:
         raise UserError("--no-dashboard: that of a --scheduler is switched off where it starts")
-    from rparm.campaign import credentials  # takes long
+    from rparm.campaign import engine  # takes long
 
-    return credentials.of(options.scheduler, *certificates)
+    return engine.security_for(options.scheduler, *certificates)
 
 
 def _command(options: argparse.Namespace) -> str:
@@ -152,7 +152,7 @@ def _run_missing(options: argparse.Namespace, security: "Security | None", made:
     blocks = made.begin()
     if not blocks:
         return
-    from rparm.campaign import cluster, engine  # takes long
+    from rparm.campaign import engine  # takes long
 
     campaign, count = made.campaign, made.campaign.count
     ahead = sum(len(campaign.block_range(block)) for block in blocks)
@@ -162,7 +162,7 @@ def _run_missing(options: argparse.Namespace, security: "Security | None", made:
     try:
         with (
             made.results.workers_folder() as files,
-            cluster.opened(
+            engine.opened_cluster(
                 options.scheduler, options.workers, files, security, not options.no_dashboard
             ) as client,
         ):

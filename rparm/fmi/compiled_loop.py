@@ -22,7 +22,7 @@ from numba import njit, types
 from numba.extending import intrinsic
 
 from rparm.errors import UserError
-from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.fmi_instance import DISCARD, TERMINATED, Instance
 
 FUNCTIONS = {
     "2.0": (
@@ -45,8 +45,6 @@ FUNCTIONS = {
     ),
 }
 SET_REAL, GET_REAL, SET_BOOLEAN, GET_BOOLEAN, DO_STEP, DERIVATIVE, GET_INTEGER = range(7)
-DISCARD = 2  # the first status of FMI that stops a run
-TERMINATED = 100  # no status of FMI: the FMU asks to end the simulation
 _POINTER = ir.IntType(8).as_pointer()
 _SIZE = ir.IntType(64)
 _STATUS = ir.IntType(32)

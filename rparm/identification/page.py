@@ -19,7 +19,7 @@ from rparm.report.pages import (
     ERROR_COLORS,
     INDEX,
     MUTED,
-    RUN,
+    RUN_COLOR,
     STYLE,
     RunPage,
     Table,
@@ -207,7 +207,7 @@ def _autocorrelations(axes: Axes, tests: Mapping[str, Whiteness]) -> None:
     width = 0.8 / max(len(tests), 1)
     for i, (name, test) in enumerate(tests.items()):
         lags = np.arange(1, len(test.correlations) + 1)
-        colour = (RUN, *ERROR_COLORS)[i % (1 + len(ERROR_COLORS))]
+        colour = (RUN_COLOR, *ERROR_COLORS)[i % (1 + len(ERROR_COLORS))]
         places = lags + (i - (len(tests) - 1) / 2) * width
         axes.bar(places, test.correlations, width, color=colour, label=name)
     bound = max((test.bound for test in tests.values()), default=0.0)

@@ -21,7 +21,7 @@ from rparm.report.pages import (
     INDEX,
     INK,
     MUTED,
-    RUN,
+    RUN_COLOR,
     STYLE,
     Table,
     save_figure,
@@ -352,8 +352,8 @@ def nyquist_figure(loop: Linear, step: float | None) -> Figure:
 
 def _nyquist(axes: Axes, values: np.ndarray, line: object, label: str) -> None:
     values = np.where(np.abs(values) < POLE_GAIN, values, np.nan)
-    axes.plot(values.real, values.imag, color=RUN, linestyle=line, label=label)
-    axes.plot(values.real, -values.imag, color=RUN, linestyle=line, alpha=0.35)
+    axes.plot(values.real, values.imag, color=RUN_COLOR, linestyle=line, label=label)
+    axes.plot(values.real, -values.imag, color=RUN_COLOR, linestyle=line, alpha=0.35)
 
 
 def steps_figure(model: Linear, step: float | None) -> Figure:
@@ -392,7 +392,9 @@ def poles_figure(model: Linear, step: float | None, loop: Linear | None = None) 
         figure = Figure(figsize=(9, 4.2), layout="constrained")
         plain, sampled = figure.subplots(1, 2)
         plain.axvline(0, color=INK, linewidth=0.8)
-        plain.plot(model.poles.real, model.poles.imag, "x", color=RUN, label="poles", markersize=9)
+        plain.plot(
+            model.poles.real, model.poles.imag, "x", color=RUN_COLOR, label="poles", markersize=9
+        )
         height = FLATTEST * np.abs(model.poles).max(initial=1.0)
         low, high = plain.get_ylim()
         plain.set_ylim(min(low, -height), max(high, height))
@@ -409,7 +411,7 @@ def poles_figure(model: Linear, step: float | None, loop: Linear | None = None) 
             circle = np.exp(1j * np.linspace(0, 2 * math.pi, 200))
             sampled.plot(circle.real, circle.imag, color=INK, linewidth=0.8)
             found = np.linalg.eigvals(hold(model.A, model.B, step)[0])
-            sampled.plot(found.real, found.imag, "x", color=RUN, markersize=9)
+            sampled.plot(found.real, found.imag, "x", color=RUN_COLOR, markersize=9)
             sampled.set_aspect("equal")
             sampled.set_xlabel(f"held for {milliseconds(step)}: within the circle dies out")
     return figure
@@ -434,7 +436,7 @@ def _channels(model: Linear) -> Iterator[tuple[str, Linear]]:
 
 def _colors() -> Iterator[str]:
     while True:
-        yield from (RUN, *ERROR_COLORS)
+        yield from (RUN_COLOR, *ERROR_COLORS)
 
 
 def _grid(model: Linear, found: Margins | None = None) -> np.ndarray:

@@ -13,7 +13,7 @@ import psutil
 import pytest
 from distributed import Client
 
-from rparm.campaign import cluster
+from rparm.campaign import engine
 from tests.campaign.cluster import processes
 from tests.campaign.cluster.processes import ENVIRONMENT
 from tests.campaign.files import write
@@ -23,7 +23,7 @@ CHANGES = [("runs = 40", "runs = 240"), ("block = 8", "block = 6")]
 
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
-    with cluster.opened(None, 1, tmp_path_factory.mktemp("workers")) as client:
+    with engine.opened_cluster(None, 1, tmp_path_factory.mktemp("workers")) as client:
         yield client
 
 

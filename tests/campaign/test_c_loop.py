@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rparm.campaign import bases, planning
-from rparm.campaign.points import Points
+from rparm.campaign.planning import Points
 from rparm.campaign.runs import Runner, open_fmus
 from tests.campaign.files import campaign
 from tests.campaign.rate.c_loop import CLoop

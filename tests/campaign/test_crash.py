@@ -7,7 +7,7 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 
-from rparm.campaign import cluster, engine
+from rparm.campaign import engine
 from tests.campaign.files import ARM, campaign, write
 from tests.campaign.runners import engine_of, rows, runner
 from tests.support.paths import FMI_HEADERS, ROOT
@@ -46,11 +46,11 @@ def crashing(tmp_path: Path) -> Path:
 def test_a_run_that_takes_its_worker_down(
     crashing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(cluster.SETTINGS, "distributed.scheduler.allowed-failures", 1)
+    monkeypatch.setitem(engine.SETTINGS, "distributed.scheduler.allowed-failures", 1)
     with runner(campaign(tmp_path, ARM, CHANGES), tmp_path) as (runs, job, points):
         expected = rows(runs, job, points, range(8)).measures[:, 0]
     with (
-        cluster.opened(None, 1, tmp_path / "workers") as client,
+        engine.opened_cluster(None, 1, tmp_path / "workers") as client,
         engine_of(client, tmp_path / "test.toml", tmp_path / "output", crashing) as (made, results),
     ):
         made.run(range(3), lambda _: None)

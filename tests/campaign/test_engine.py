@@ -14,8 +14,8 @@ from types import SimpleNamespace
 import pytest
 from distributed import Client
 
-from rparm.campaign import cluster, engine
-from rparm.campaign.worker import Plugin
+from rparm.campaign import engine
+from rparm.campaign.runs import Plugin
 from rparm.errors import UserError
 from tests.campaign.cluster import processes
 from tests.campaign.cluster.processes import (
@@ -87,7 +87,7 @@ def test_a_campaign_whose_workers_are_gone_ends(
     monkeypatch.setattr(engine, "COUNT_EVERY", 100)
     with (
         processes.cluster(LOOPBACK, [LOOPBACK]) as (address, _, arms),
-        cluster.opened(address, None, tmp_path) as client,
+        engine.opened_cluster(address, None, tmp_path) as client,
     ):
         registered(arms[0])
         with (
@@ -109,7 +109,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 def local(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Client, Path]]:
     """A cluster of one worker, and the folder of its files."""
     folder = tmp_path_factory.mktemp("workers")
-    with cluster.opened(None, 1, folder) as client:
+    with engine.opened_cluster(None, 1, folder) as client:
         yield client, folder
 
 
@@ -200,9 +200,9 @@ def test_a_cluster_that_cannot_start_is_one_line(
     def refuse(**_: object) -> None:
         raise RuntimeError("Cluster failed to start:\nno loopback")  # as distributed says it
 
-    monkeypatch.setattr(cluster, "SpecCluster", refuse)
+    monkeypatch.setattr(engine, "SpecCluster", refuse)
     expected = "cannot connect at 127.0.0.1: Cluster failed to start: no loopback$"
-    with pytest.raises(UserError, match=expected), cluster.opened(None, 1, tmp_path):
+    with pytest.raises(UserError, match=expected), engine.opened_cluster(None, 1, tmp_path):
         pass
 
 
@@ -243,7 +243,7 @@ def test_fmus_stay_until_runs_under_way_have_ended(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shop = Shop()
-    monkeypatch.setattr("rparm.campaign.worker.Workshop", lambda *_: shop)
+    monkeypatch.setattr("rparm.campaign.runs.Workshop", lambda *_: shop)
     plugin = Plugin("name", None, {})
     plugin.setup(SimpleNamespace(local_directory=tmp_path))
     assert plugin.rows(plugin, None)

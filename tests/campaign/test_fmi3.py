@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from rparm.campaign.measures import LYAPUNOV
+from rparm.campaign.job import LYAPUNOV
 from rparm.campaign.runs import Rows
 from rparm.fmi.compiled_loop import COLUMNS, DO_STEP
 from tests.campaign.cluster.processes import completed

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rparm.campaign.measures import LYAPUNOV, Measure, Recorded, plain
+from rparm.campaign.job import LYAPUNOV, Measure, Recorded, plain
 
 TIMES = np.linspace(3.0, 5.0, 20001)
 ELAPSED = TIMES - 3.0

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rparm.campaign import bases
-from rparm.campaign.measures import LYAPUNOV
+from rparm.campaign.job import LYAPUNOV
 from rparm.fmi.fmu_file import Fmu
 from rparm.runs.simulation import simulate
 from rparm.systems import ssp

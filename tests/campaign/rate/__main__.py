@@ -23,8 +23,8 @@ from tempfile import TemporaryDirectory
 
 import psutil
 
-from rparm.campaign import bases, campaign_file, cluster, engine, planning
-from rparm.campaign.points import Points
+from rparm.campaign import bases, campaign_file, engine, planning
+from rparm.campaign.planning import Points
 from rparm.campaign.runs import open_fmus
 from tests.campaign.rate.c_loop import CLoop
 from tests.campaign.rate.plain_processes import plain_processes
@@ -77,7 +77,7 @@ def _process() -> int:
 @contextmanager
 def campaigns(workers: int, work: str, folder: Path) -> Iterator[Campaigns]:
     """A cluster with workers that have compiled their loop."""
-    with cluster.opened(None, workers, folder / f"workers_{workers}") as client:
+    with engine.opened_cluster(None, workers, folder / f"workers_{workers}") as client:
         made = Campaigns(client, work, folder / f"campaigns_{workers}")
         made.run(100 * workers)
         yield made
