@@ -11,12 +11,11 @@ from importlib import import_module
 from io import TextIOWrapper
 from typing import NoReturn, TextIO
 
-from rparm import command_line, project
+from rparm import command_line, console, project
 from rparm.command_line import Answered, Ended
 from rparm.errors import UserError, reason
 from rparm.files import write_text, written
 from rparm.interruption import handle_endings
-from rparm.output import streams
 
 LONGEST_MESSAGE = 2000  # characters; some quote what a file says
 
@@ -34,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not given:
             print(command_line.overview(), file=sys.stderr)
             return 2
-        with streams.of_results(as_json, "--quiet" in options) as results:
+        with console.results_stream(as_json, "--quiet" in options) as results:
             return _say(_ended(given), as_json, results)
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
@@ -75,7 +74,7 @@ def _keep_document(options: Namespace, ended: Ended) -> None:
     if folder is not None:
         path = folder / f"{options.command}.json"
         with written(path):
-            write_text(path, f"{streams.document(_document(ended))}\n")
+            write_text(path, f"{console.json_line(_document(ended))}\n")
 
 
 def _show_page(options: Namespace, ended: Ended) -> None:
@@ -107,7 +106,7 @@ def _say(ended: Ended, as_json: bool, results: TextIO | None) -> int:
     if ended.verdict:
         print(ended.verdict, file=sys.stdout if as_json else results)
     if as_json:
-        print(streams.document(_document(ended)), file=results)
+        print(console.json_line(_document(ended)), file=results)
     for stream in (sys.stdout, results):
         if stream is not None:
             stream.flush()

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rparm import project
+from rparm import console, project
 from rparm.command_line import Ended
 from rparm.command_line.options import add_output, count, number, retyped
+from rparm.console import Progress
 from rparm.errors import UserError, one_line
 from rparm.files import from_here, written
 from rparm.interruption import arrived
-from rparm.output import console
-from rparm.output.progress import Progress
 from rparm.runs.scenario import title
 
 if TYPE_CHECKING:

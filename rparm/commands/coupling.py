@@ -2,12 +2,11 @@
 
 import argparse
 
-from rparm import project
+from rparm import console, project
 from rparm.command_line import Ended
 from rparm.command_line.options import add_report, add_system
 from rparm.files import check_writable
 from rparm.linearization import largest_step
-from rparm.output import console
 from rparm.systems import comparison
 
 DESCRIPTION = (

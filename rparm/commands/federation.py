@@ -7,18 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
-from rparm import files, project
+from rparm import console, files, project
 from rparm.command_line import Ended
 from rparm.command_line.options import add_output, add_silence, add_system
+from rparm.console import Progress
 from rparm.errors import UserError, hint
 from rparm.federation import SILENCE, federation, network
 from rparm.federation.component import real_connections
 from rparm.federation.federation import Record
 from rparm.federation.network import KEY, key
 from rparm.files import check_writable, written
-from rparm.output import console
-from rparm.output.progress import Progress
-from rparm.output.result_tables import FederationTable
+from rparm.result_tables import FederationTable
 from rparm.systems import comparison, ecos, ssp
 from rparm.systems.master import Master
 from rparm.systems.ssp import Ssp

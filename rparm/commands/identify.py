@@ -5,12 +5,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rparm import project
+from rparm import console, project
 from rparm.command_line import Ended
 from rparm.command_line.options import add_report, file_or_name, names, pairs, retyped
 from rparm.errors import UserError, placed
 from rparm.files import check_writable, from_here, number_in, written
-from rparm.output import console
 from rparm.units import SECONDS, typed_quantity
 
 if TYPE_CHECKING:

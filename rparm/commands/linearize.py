@@ -3,12 +3,11 @@
 import argparse
 from pathlib import Path
 
-from rparm import project
+from rparm import console, project
 from rparm.command_line import Ended
 from rparm.command_line.options import add_fmi, add_report, file_or_name, names, pairs, retyped
 from rparm.errors import WrongValueError
 from rparm.files import check_writable, from_here, written
-from rparm.output import console
 from rparm.units import SECONDS, typed_quantity
 
 MOST_COLUMNS, MOST_ROWS = 6, 12  # of matrices in the terminal

@@ -2,10 +2,9 @@
 
 import argparse
 
-from rparm import project
+from rparm import console, project
 from rparm.command_line import Ended
 from rparm.command_line.options import add_document
-from rparm.output import console
 from rparm.runs import scenario
 
 DESCRIPTION = "Prints the name and the title of every scenario."

@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from rparm import project, proof
+from rparm import console, project, proof
 from rparm.command_line import Ended
 from rparm.command_line.options import add_report, add_tolerance, retyped
+from rparm.console import Progress
 from rparm.errors import UserError, WrongValueError, placed
 from rparm.files import check_writable, from_here, written
 from rparm.fmi.fmu_file import Fmu
-from rparm.output import console
-from rparm.output.progress import Progress
 from rparm.proof import ASSUMED, Enclosure, ProvenReference, Prover
 from rparm.report import proof_page
 from rparm.runs import scenario as scenarios

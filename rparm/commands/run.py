@@ -6,21 +6,18 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
-from rparm import project
+from rparm import console, project, result_tables
 from rparm.command_line import COMMANDS, PROGRAM, Ended
 from rparm.command_line.options import add_fmi, add_report, add_tolerance
 from rparm.commands import list as scenario_list
+from rparm.console import Progress
 from rparm.errors import UserError, did_you_mean, placed, together
 from rparm.files import check_writable, from_here, missing, written
 from rparm.fmi.fmu_file import Fmu
-from rparm.output import console, results
-from rparm.output.progress import Progress
-from rparm.output.result_tables import RunTable, SweepTable, measured
-from rparm.output.result_tables import convergence as convergence_table
-from rparm.output.results import Done
 from rparm.project import VERSIONS
 from rparm.report import pages
 from rparm.report.writer import ReportWriter
+from rparm.result_tables import Done, RunTable, SweepTable, print_convergence, print_measured
 from rparm.runs import convergence
 from rparm.runs import scenario as scenarios
 from rparm.runs.comparison import TIGHTEST, TOLERANCES, Failure, Run, Runs, Sweep, sweep
@@ -91,7 +88,7 @@ def run(options: argparse.Namespace) -> Ended:
         console.stage("writing the report")
         groups = writer.grouped(done.runs)
         for group in groups.values():
-            measured(group[0])
+            print_measured(group[0])
         with written(options.report), Progress("report", len(groups), "pages") as progress:
             page = writer.write(groups, done.sweeps, done.studies, progress, done.failures)
     print()
@@ -111,7 +108,7 @@ def _ended(done: Done, report: Path, page: Path) -> Ended:
     if not wrong and done.own:
         verdict = f"ran: {counted(everything, 'scenario')}, errors estimated"
         verdict = f"{verdict} of {len(done.own)}" if done.chosen else verdict
-    document = {"passed": not wrong, **results.document(done), "report": report}
+    document = {"passed": not wrong, **result_tables.document(done), "report": report}
     if done.failures:
         error = together([UserError(failure.text) for failure in done.failures])
         return Ended(2, verdict, document, error, page)
@@ -361,6 +358,6 @@ def _convergence(fmus: Mapping[str, Fmu], twins: Mapping[str, Fmu]) -> list[Conv
         ahead = convergence.steps_ahead(problem, updated is not None)
         with Progress(f"{name}, all steps", ahead) as progress:
             study = convergence.study(fmu, problem, progress, updated)
-        convergence_table(study)
+        print_convergence(study)
         studies.append(study)
     return studies

@@ -5,16 +5,15 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from rparm import project
+from rparm import console, project
 from rparm.command_line import PROGRAM, Ended
 from rparm.command_line.options import add_report, add_system
 from rparm.errors import UserError, did_you_mean, hint, together
 from rparm.files import check_writable, from_here, written
-from rparm.output import console
-from rparm.output.result_tables import VariantTable
 from rparm.report import overview, system_page
 from rparm.report.overview import Entry
 from rparm.report.system_page import Section
+from rparm.result_tables import VariantTable
 from rparm.systems import comparison, ecos, master, ssp
 from rparm.systems.comparison import Outcome, Reference
 from rparm.units import counted

@@ -14,13 +14,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rparm import command_line
+from rparm import command_line, result_tables
 from rparm import project as project_folders
 from rparm.command_line import COMMANDS
+from rparm.console import json_line, results_stream, stage, verdict_line
 from rparm.fmi.fmu_file import Fmu
-from rparm.output import result_tables, streams
-from rparm.output.console import stage, verdict_line
-from rparm.output.result_tables import RunTable, SweepTable
+from rparm.result_tables import RunTable, SweepTable
 from rparm.runs.comparison import TOLERANCES, Run, Runs, Sweep
 from rparm.units import seconds, short, shortened
 from tests.support.paths import ROOT
@@ -158,7 +157,7 @@ def test_every_command_prints_a_document(console: Console, arguments: list[str],
 
 def test_numbers_that_json_does_not_know_are_null() -> None:
     content = {"a": [math.nan, np.float64(1.5), np.inf], "b": {"c": (Path("x"), np.int64(3), True)}}
-    assert streams.document(content) == '{"a": [null, 1.5, null], "b": {"c": ["x", 3, true]}}'
+    assert json_line(content) == '{"a": [null, 1.5, null], "b": {"c": ["x", 3, true]}}'
 
 
 NOISE = """
@@ -297,7 +296,7 @@ def test_stages_are_for_terminals(
         monkeypatch.setattr(sys.stderr, "isatty", lambda known=is_terminal: known, raising=False)
         stage("building")
         assert capsys.readouterr().err == ("building ...\n" if is_terminal else "")
-        with streams.of_results(as_json=False, quiet=True):
+        with results_stream(as_json=False, quiet=True):
             stage("building")
         assert capsys.readouterr().err == ""
 

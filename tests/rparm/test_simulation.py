@@ -9,9 +9,9 @@ import pytest
 from fmpy import fmi2
 
 from rparm import files
+from rparm.console import Progress
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
-from rparm.output import progress as progress_module
 from rparm.runs import scenario as scenarios
 from rparm.runs import simulation
 from tests.support.rparm_project import LONG, SHORT, edit, fmi3_fmu, load, repacked
@@ -44,7 +44,7 @@ def test_progress_counts_all_steps(opened: Fmu, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_progress_is_silent_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    with progress_module.Progress("work", 200) as progress:
+    with Progress("work", 200) as progress:
         progress(50)
     assert capsys.readouterr() == ("", "")
 

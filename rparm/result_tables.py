@@ -1,15 +1,20 @@
-"""Results as tables on the console."""
+"""Results of scenarios and systems, as tables on the console and as a document for programs."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 
-from rparm.output import console
-from rparm.output.console import Table
-from rparm.runs.comparison import TIGHTEST, Run, Sweep, comparisons
+from rparm import console
+from rparm.console import Table
+from rparm.runs.comparison import TIGHTEST, Failure, Run, Sweep, comparisons
 from rparm.runs.convergence import Convergence
+from rparm.runs.scenario import Scenario
 from rparm.systems.comparison import BOUND, Measure, Outcome
 from rparm.units import milliseconds, seconds, short, unit, verdict
 
 NONE = "-"
+
+
+# ---- Tables --------------------------------------------------------------------------------------
 
 
 class RunTable:
@@ -96,7 +101,7 @@ class VariantTable:
         self._table = Table("variant", names, {**columns, "time": 7})
 
     def row(self, outcome: Outcome) -> None:
-        measured = (f"{_short(m.value(outcome))} {m.unit}" for m in self._measures)
+        measured = (f"{_seven_digits(m.value(outcome))} {m.unit}" for m in self._measures)
         cells = [short(outcome.error, 1), *measured, seconds(outcome.run.wall_time)]
         self._table.row(outcome.variant, cells, verdict(outcome.passed))
         if not outcome.passed:
@@ -109,12 +114,12 @@ class VariantTable:
         console.remark("did not run to its end")
 
 
-def _short(value: float) -> str:
+def _seven_digits(value: float) -> str:
     """A number of at most seven characters, unless it is very large or small."""
     return f"{value:.0f}" if 1000 <= abs(value) < 1e6 else f"{value:.3g}"
 
 
-def convergence(study: Convergence) -> None:
+def print_convergence(study: Convergence) -> None:
     """Print a table of errors over the communication step, and what is wrong with them."""
     print()
     steps = [milliseconds(step) for step in study.problem.steps]
@@ -128,7 +133,7 @@ def convergence(study: Convergence) -> None:
         console.remark(f"{study.scenario.name}: {text}")
 
 
-def measured(run: Run) -> None:
+def print_measured(run: Run) -> None:
     """Print how far a run is from what was measured."""
     for compared in comparisons(run.scenario, run.result):
         known = unit(run.fmu.model.variables[compared.name].unit)
@@ -136,3 +141,83 @@ def measured(run: Run) -> None:
             f"{run.scenario.name}: {compared.name} is {compared.rms:.3g} {known} RMS "
             f"from {compared.source}"
         )
+
+
+# ---- The document --------------------------------------------------------------------------------
+
+
+@dataclass
+class Done:
+    chosen: Sequence[Scenario]  # of the project
+    own: Sequence[Scenario]  # of users, which are not compared with anything
+    runs: list[Run] = field(default_factory=list)
+    failures: list[Failure] = field(default_factory=list)
+    sweeps: list[Sweep] = field(default_factory=list)
+    studies: list[Convergence] = field(default_factory=list)
+
+
+def document(done: Done) -> dict[str, object]:
+    """Each scenario with its runs and its sweep, and the studies."""
+    return {
+        "scenarios": [_scenario(done, scenario) for scenario in (*done.chosen, *done.own)],
+        "convergence": [_study(study) for study in done.studies],
+    }
+
+
+def _scenario(done: Done, scenario: Scenario) -> dict[str, object]:
+    runs = [run for run in done.runs if run.scenario is scenario]
+    failures = [failure for failure in done.failures if failure.scenario is scenario]
+    sweeps = [sweep for sweep in done.sweeps if sweep.scenario is scenario]
+    return {
+        "name": scenario.name,
+        "model": scenario.model,
+        "file": scenario.path,
+        "passed": not failures and all(x.passed for x in (*runs, *sweeps)),
+        "compared": scenario in done.chosen,
+        "warnings": scenario.questions,
+        "runs": [_run(run) for run in runs],
+        "failures": [{"tolerance": f.tolerance, "error": f.text} for f in failures],
+        "sweep": _sweep(sweeps[0]) if sweeps else None,
+    }
+
+
+def _run(run: Run) -> dict[str, object]:
+    found = {
+        "fmi_version": run.fmu.model.fmi_version,
+        "tolerance": run.result.tolerance,
+        "steps": run.result.steps,
+        "error": run.error,
+        "worst": run.worst,
+        "bound": run.bound if run.compared else None,
+        "seconds": run.result.wall_time,
+        "passed": run.passed,
+        "messages": run.result.messages,
+    }
+    found["measured"] = {
+        compared.name: {"source": compared.source, "rms": compared.rms}
+        for compared in comparisons(run.scenario, run.result)
+    }
+    if run.twin is not None:
+        found["twin"] = {"fmi_version": run.twin.fmi_version, "differing": run.twin.differing}
+    return found
+
+
+def _sweep(sweep: Sweep) -> dict[str, object]:
+    return {
+        "tolerances": sweep.tolerances,
+        "errors": sweep.errors,
+        "violations": sweep.violations,
+        "passed": sweep.passed,
+    }
+
+
+def _study(study: Convergence) -> dict[str, object]:
+    return {
+        "name": study.scenario.name,
+        "steps": study.problem.steps.tolist(),
+        "cases": [
+            {"name": row.name, "errors": row.errors, "slope": row.slope, "passed": row.holds}
+            for row in study.rows
+        ],
+        "passed": study.passed,
+    }

@@ -1,18 +1,95 @@
-"""What commands print: stages, tables of at most 80 columns, the last line."""
+"""Where and how commands print: streams, stages, tables of at most 80 columns, progress."""
 
+import json
+import math
+import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence, Sized
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Sized
+from contextlib import AbstractContextManager, ExitStack, contextmanager, redirect_stdout, suppress
+from pathlib import Path
+from typing import Any, TextIO
 
-from rparm.output import streams
 from rparm.units import counted, shortened
 
+_quiet = False
 WIDTH = 80  # columns that a terminal has, if it has no fewer
 LEAST = 20  # columns: in fewer, lines are left to the terminal to wrap
 NARROWEST = 8  # a column of names
 INDENT = "  "
 NAMED = 5  # failed things in the last line
+DELAY = 1.0  # s, shorter activities show nothing
+
+
+# ---- Streams -------------------------------------------------------------------------------------
+
+
+def is_quiet() -> bool:
+    """Whether the user wants to see the end only."""
+    return _quiet
+
+
+@contextmanager
+def results_stream(as_json: bool, quiet: bool) -> Iterator[TextIO | None]:
+    """The stream for a command's result; all else goes to standard error, or nowhere if `quiet`."""
+    global _quiet
+    real, before, _quiet = sys.stdout, _quiet, quiet
+    try:
+        with ExitStack() as stack:
+            if real is not None and (as_json or quiet):
+                null = stack.enter_context(
+                    Path(os.devnull).open(
+                        "w", encoding="utf-8", errors="backslashreplace", newline="\n"
+                    )
+                )
+                elsewhere = null if quiet or sys.stderr is None else sys.stderr
+                real = stack.enter_context(_apart(real, elsewhere))
+                stack.enter_context(redirect_stdout(elsewhere))
+            yield real
+    finally:
+        _quiet = before
+
+
+@contextmanager
+def _apart(real: TextIO, elsewhere: TextIO) -> Iterator[TextIO]:
+    """Lead standard output elsewhere, of compiled code and child processes too; a stream to it."""
+    try:
+        number, other = real.fileno(), elsewhere.fileno()
+    except (OSError, ValueError):  # none of the system
+        yield real
+        return
+    real.flush()
+    kept = os.dup(number)
+    out = os.fdopen(os.dup(kept), "w", encoding=real.encoding, errors=real.errors)
+    os.dup2(other, number)
+    try:
+        yield out
+    finally:
+        with suppress(OSError):  # full, or nobody reads it: already reported
+            out.close()
+        os.dup2(kept, number)
+        os.close(kept)
+
+
+def json_line(content: Mapping[str, object]) -> str:
+    """JSON in one line; numbers that are not finite become null."""
+    return json.dumps(_plain(content), ensure_ascii=False)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if hasattr(value, "item"):  # of numpy
+        value = value.item()
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return str(value) if isinstance(value, Path) else value
+
+
+# ---- Lines and tables ----------------------------------------------------------------------------
 
 
 def width() -> int:
@@ -22,7 +99,7 @@ def width() -> int:
 
 def stage(text: str) -> None:
     """Name the stage that begins, on a terminal."""
-    if sys.stderr is not None and sys.stderr.isatty() and not streams.is_quiet():
+    if sys.stderr is not None and sys.stderr.isatty() and not is_quiet():
         print(f"{text} ...", file=sys.stderr, flush=True)
 
 
@@ -111,3 +188,35 @@ def remark(text: str) -> None:
         text, width(), initial_indent=INDENT, subsequent_indent=2 * INDENT, break_on_hyphens=False
     )
     print(*wrapped, sep="\n", flush=True)
+
+
+# ---- Progress ------------------------------------------------------------------------------------
+
+
+class Progress(AbstractContextManager["Progress"]):
+    """A live bar on stderr, once an activity has taken about a second; nothing if not a terminal.
+
+    Call it with the number of steps (or of what `counted` names) done since the last call.
+    """
+
+    def __init__(self, label: str, total: int, counted: str = "steps") -> None:
+        self._bar = None
+        if sys.stderr.isatty() and not is_quiet():
+            from tqdm import tqdm  # takes time
+
+            self._bar = tqdm(
+                total=total,
+                desc=label,
+                unit=f" {counted}",
+                unit_scale=total >= 10_000,
+                delay=DELAY,
+                leave=False,
+            )
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+    def __call__(self, done: int) -> None:
+        if self._bar is not None:
+            self._bar.update(done)
