@@ -1,4 +1,4 @@
-"""Runs a command, a module of rparm.commands each, and ends as it ends."""
+"""Runs a command of rparm.commands, and ends as it ends."""
 
 import os
 import signal
@@ -7,7 +7,6 @@ import webbrowser
 from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import suppress
-from importlib import import_module
 from io import TextIOWrapper
 from typing import NoReturn, TextIO
 
@@ -16,12 +15,13 @@ from rparm.command_line import Answered, Ended
 from rparm.errors import UserError, reason
 from rparm.files import write_text, written
 from rparm.interruption import handle_endings
+from rparm.needs import COMMANDS, NO_READER
 
 LONGEST_MESSAGE = 2000  # characters; some quote what a file says
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; the exit code, as `command_line.EXIT_CODES` says."""
+    """Run the command line; the exit code, as `needs.EXIT_CODES` says."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # names that it cannot encode are no reason to stop
             stream.reconfigure(errors="backslashreplace")
@@ -40,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 130
     except BrokenPipeError:  # whoever read the output has left: as if SIGPIPE had ended it
         _drop_output()
-        return command_line.NO_READER
+        return NO_READER
     except OSError as error:
         _drop_output()
         return _refuse(f"{error.filename or 'output or temporary files'}: {reason(error)}")
@@ -53,7 +53,7 @@ def _ended(arguments: Sequence[str]) -> Ended:
         project.check_current_folder()
         options = command_line.parsed(arguments)
         # imported here because it takes long: so Ctrl-C during the import leaves no traceback
-        ended = import_module(f"rparm.commands.{options.command.replace('-', '_')}").run(options)
+        ended = command_line.function(options.command, "do_{}")(options)
         _keep_document(options, ended)
         _show_page(options, ended)
         return ended
@@ -64,7 +64,7 @@ def _ended(arguments: Sequence[str]) -> Ended:
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("rparm"):
             raise
-        extra = command_line.NEEDS.get(options.command, "all")
+        extra = COMMANDS[options.command].extra or "all"
         return Ended(2, "", error=project.not_installed(str(error.name), extra))
 
 

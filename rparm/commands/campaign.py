@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rparm import console, project
-from rparm.command_line import Ended
-from rparm.command_line.options import add_output, count, number, retyped
+from rparm.command_line import Ended, add_output, count, number, retyped
 from rparm.console import Progress
 from rparm.errors import UserError, one_line
 from rparm.files import from_here, written
@@ -21,14 +20,15 @@ if TYPE_CHECKING:
 
     from rparm.campaign.work import Work
 
-DESCRIPTION = (
-    "Runs what is missing of a campaign, on a cluster of Dask, and writes tables and a page. A "
-    "campaign that was stopped resumes. Runs that fail are results; only that of --replay is bad."
-)
 NEEDED = ("SALib", "cryptography", "distributed", "numba", "pyarrow", "scipy")
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
+def add_campaign_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Runs what is missing of a campaign, on a cluster of Dask, and writes tables and a "
+        "page. A campaign that was stopped resumes. Runs that fail are results; only that of "
+        "--replay is bad."
+    )
     parser.add_argument(
         "file", nargs="?", metavar="FILE.toml", help="the campaign, or the name of one of --list"
     )
@@ -72,7 +72,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(options: argparse.Namespace) -> Ended:
+def do_campaign(options: argparse.Namespace) -> Ended:
     """Run what is missing of the campaign; 0 when all runs are there, failed ones among them."""
     if options.list:
         found = [

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rparm import console, project
-from rparm.command_line import Ended
-from rparm.command_line.options import add_report, file_or_name, names, pairs, retyped
+from rparm.command_line import Ended, add_report, file_or_name, names, pairs, retyped
 from rparm.errors import UserError, placed
 from rparm.files import check_writable, from_here, number_in, written
 from rparm.units import SECONDS, typed_quantity
@@ -16,17 +15,17 @@ if TYPE_CHECKING:
     from rparm.identification.identify import Identification
     from rparm.identification.request import Request
 
-DESCRIPTION = (
-    "Fits parameters of an FMU to logs of a machine, and says how well they are known: a table, a "
-    "page, and the result as a scenario and as parameter files."
-)
 PART = "identify"
 SEGMENT = "0.4"  # s
 SEVERAL = "parameters", "inputs", "measured", "set", "start", "columns", "units"
 GIVEN = *SEVERAL, "delay", "validate"
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
+def add_identify_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Fits parameters of an FMU to logs of a machine, and says how well they are known: a "
+        "table, a page, and the result as a scenario and as parameter files."
+    )
     parser.add_argument("fmu", nargs="?", metavar="FMU", help="a file, or a model of the project")
     parser.add_argument(
         "logs", nargs="*", type=Path, metavar="LOG.csv", help="with a column of times in s"
@@ -60,7 +59,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_report(parser, PART)
 
 
-def run(options: argparse.Namespace) -> Ended:
+def do_identify(options: argparse.Namespace) -> Ended:
     """Identify, print a table, write page and files."""
     from rparm.fmi.fmu_file import Fmu
     from rparm.identification import identify, page, results

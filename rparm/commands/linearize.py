@@ -4,8 +4,7 @@ import argparse
 from pathlib import Path
 
 from rparm import console, project
-from rparm.command_line import Ended
-from rparm.command_line.options import add_fmi, add_report, file_or_name, names, pairs, retyped
+from rparm.command_line import Ended, add_fmi, add_report, file_or_name, names, pairs, retyped
 from rparm.errors import WrongValueError
 from rparm.files import check_writable, from_here, written
 from rparm.units import SECONDS, typed_quantity
@@ -13,13 +12,13 @@ from rparm.units import SECONDS, typed_quantity
 MOST_COLUMNS, MOST_ROWS = 6, 12  # of matrices in the terminal
 SUFFIXES = (".fmu", ".ssp")
 SHORTEST = 1e-9  # s, of samples: pictures of much shorter ones overflow
-DESCRIPTION = (
-    "Finds an equilibrium, and A, B, C and D about it; of a system also the margins of a loop that "
-    "is broken, and the largest stable communication step."
-)
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
+def add_linearize_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Finds an equilibrium, and A, B, C and D about it; of a system also the margins of a "
+        "loop that is broken, and the largest stable communication step."
+    )
     parser.add_argument("what", metavar="FMU|SSP", help="a file, or a name of the project")
     add_fmi(parser, project.VERSIONS[0], "version of FMI where a name is given (default: 2)")
     parser.add_argument("--variant", default="", metavar="NAME", help="parameter set of a system")
@@ -49,7 +48,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_report(parser, "linearize")
 
 
-def run(options: argparse.Namespace) -> Ended:
+def do_linearize(options: argparse.Namespace) -> Ended:
     """Linearize, print the tables, write page and files."""
     from rparm.linearization import page, study
 

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rparm import console, project, proof
-from rparm.command_line import Ended
-from rparm.command_line.options import add_report, add_tolerance, retyped
+from rparm.command_line import Ended, add_report, add_tolerance, retyped
 from rparm.console import Progress
 from rparm.errors import UserError, WrongValueError, placed
 from rparm.files import check_writable, from_here, written
@@ -20,16 +19,16 @@ from rparm.runs import scenario as scenarios
 from rparm.runs.scenario import Scenario
 from rparm.units import counted, rounded_up, typed_quantity, verdict
 
-DESCRIPTION = (
-    "Encloses the exact motion of a scenario in intervals, by validated integration, and prints "
-    "how far the states in a run of the FMU are from it at most, for each method of integration. "
-    "Every value of the scenario's reference must be the double nearest to the exact one. Without "
-    f"a scenario, checks all references. Assumed are {ASSUMED}."
-)
 COLUMNS = {"values": 8, "nearest doubles": 8, "interval": 9}
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
+def add_prove_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Encloses the exact motion of a scenario in intervals, by validated integration, and "
+        "prints how far the states in a run of the FMU are from it at most, for each method of "
+        "integration. Every value of the scenario's reference must be the double nearest to "
+        f"the exact one. Without a scenario, checks all references. Assumed are {ASSUMED}."
+    )
     parser.add_argument(
         "name", nargs="?", metavar="SCENARIO", help="a scenario, or a file FILE.toml of your own"
     )
@@ -49,7 +48,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_report(parser)
 
 
-def run(options: argparse.Namespace) -> Ended:
+def do_prove(options: argparse.Namespace) -> Ended:
     """Prove the errors of a scenario's runs, or of all references."""
     if options.name is None:
         for option in ("method", "tolerance", "within"):

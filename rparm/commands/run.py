@@ -7,14 +7,14 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from rparm import console, project, result_tables
-from rparm.command_line import COMMANDS, PROGRAM, Ended
-from rparm.command_line.options import add_fmi, add_report, add_tolerance
-from rparm.commands import list as scenario_list
+from rparm.command_line import Ended, add_fmi, add_report, add_tolerance
+from rparm.commands.files import do_list
 from rparm.console import Progress
 from rparm.errors import UserError, did_you_mean, placed, together
 from rparm.files import check_writable, from_here, missing, written
 from rparm.fmi.fmu_file import Fmu
-from rparm.project import VERSIONS
+from rparm.needs import COMMANDS
+from rparm.project import PROGRAM, VERSIONS
 from rparm.report import pages
 from rparm.report.writer import ReportWriter
 from rparm.result_tables import Done, RunTable, SweepTable, print_convergence, print_measured
@@ -25,18 +25,18 @@ from rparm.runs.convergence import Convergence
 from rparm.runs.scenario import Scenario
 from rparm.units import counted, short
 
-DESCRIPTION = (
-    "Simulates each scenario at its own tolerance and at 1e-11, and over the tolerances 1e-4 to "
-    "1e-11; compares all outputs with the reference, and prints the largest errors. Without names, "
-    "measures the order of convergence in the communication step too. The FMUs are of FMI 2.0; "
-    "those of FMI 3.0 must give the same bits."
-)
 SUFFIX = ".toml"
 FIRST, TWIN = VERSIONS  # of FMI: what runs, and what has to give the same bits
 QUICK = 20.0  # s, longest sweep that runs by default for a named scenario
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
+def add_run_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Simulates each scenario at its own tolerance and at 1e-11, and over the tolerances "
+        "1e-4 to 1e-11; compares all outputs with the reference, and prints the largest "
+        "errors. Without names, measures the order of convergence in the communication step "
+        "too. The FMUs are of FMI 2.0; those of FMI 3.0 must give the same bits."
+    )
     parser.add_argument(
         "names",
         nargs="*",
@@ -55,10 +55,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_tolerance(parser, "run at this relative tolerance only, without the sweep")
 
 
-def run(options: argparse.Namespace) -> Ended:
+def do_run(options: argparse.Namespace) -> Ended:
     """Run the scenarios and files that the options name, or all scenarios."""
     if options.list:
-        return scenario_list.run(options)
+        return do_list(options)
     with ExitStack() as stack:
         chosen, own, fmus, twins = _open(options, stack)
         _check(options, chosen, own, fmus)

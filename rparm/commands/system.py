@@ -1,4 +1,4 @@
-"""`system`: run variants of the systems in Ecos, compare them with references, write a report."""
+"""`system` and `coupling`: run systems, compare them, study what their coupling costs."""
 
 import argparse
 from collections.abc import Mapping, Sequence
@@ -6,10 +6,10 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from rparm import console, project
-from rparm.command_line import PROGRAM, Ended
-from rparm.command_line.options import add_report, add_system
+from rparm.command_line import Ended, add_report, add_system
 from rparm.errors import UserError, did_you_mean, hint, together
 from rparm.files import check_writable, from_here, written
+from rparm.project import PROGRAM
 from rparm.report import overview, system_page
 from rparm.report.overview import Entry
 from rparm.report.system_page import Section
@@ -18,12 +18,11 @@ from rparm.systems import comparison, ecos, master, ssp
 from rparm.systems.comparison import Outcome, Reference
 from rparm.units import counted
 
-DESCRIPTION = (
-    "Runs the variants of the systems in Ecos and compares every variable with the reference."
-)
 
-
-def add_options(parser: argparse.ArgumentParser) -> None:
+def add_system_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Runs the variants of the systems in Ecos and compares every variable with the reference."
+    )
     add_system(parser)
     parser.add_argument(
         "names",
@@ -41,7 +40,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--list", action="store_true", help="name the systems and their variants")
 
 
-def run(options: argparse.Namespace) -> Ended:
+def do_system(options: argparse.Namespace) -> Ended:
     """Run the variants that the options name, or all; or name them."""
     with ExitStack() as stack:
         try:
@@ -182,3 +181,32 @@ def _row(section: Section, outcome: Outcome) -> dict[str, object]:
         "seconds": outcome.run.wall_time,
         "passed": outcome.passed,
     }
+
+
+def add_coupling_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Steps the system in several orders, with inputs held and extrapolated and with step-size "
+        "control, and compares it with the solution in continuous time; predicts and measures the "
+        "largest stable steps of each system."
+    )
+    add_system(parser)
+    add_report(parser, "system")
+
+
+def do_coupling(options: argparse.Namespace) -> Ended:
+    from rparm.linearization.largest_step import study_steps
+
+    folder, known = comparison.coupling_study()
+    path = options.ssp or project.built(folder, ".ssp", "--ssp", options.fmi)
+    check_writable(options.report)
+    console.stage(f"studying the coupling of {folder.name}")
+    parts = known.study_coupling(path, options.report)
+    for other, rest in comparison.rests().items():
+        if other != folder and not options.ssp:
+            ssp = project.built(other, ".ssp", version=options.fmi)
+            parts[f"largest steps of {other.name}"] = study_steps(ssp, rest)
+    failed = [name for name, part in parts.items() if not part["passed"]]
+    picture = (options.report / known.COUPLING_PICTURE).absolute()
+    verdict = console.verdict_line(failed, parts, "part")
+    document = {"parts": parts, "picture": picture}
+    return Ended(1 if failed else 0, verdict, document, page=picture)

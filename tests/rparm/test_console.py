@@ -8,7 +8,6 @@ import random
 import subprocess
 import sys
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -205,7 +204,7 @@ def test_help_fits_and_names_every_command(console: Console) -> None:
     assert all(f"  {command} " in text for command in COMMANDS)
     assert max(map(len, text.splitlines())) <= 80
     modules = {path.stem for path in (ROOT / "rparm/commands").glob("[a-z]*.py")}
-    assert modules == {command.replace("-", "_") for command in COMMANDS}
+    assert modules == {command.module for command in COMMANDS.values()}
     for command in COMMANDS:
         for arguments in (["help", command], [command, "--help"]):
             code, text, _ = console(*arguments)
@@ -235,10 +234,10 @@ def test_the_playground_is_where_it_is_said_to_be(
 def test_the_folder_for_results_has_two_names(capsys: pytest.CaptureFixture[str]) -> None:
     """--report is what --output was called: it works, and no help shows it."""
     for name in ("run", "system"):
-        module = import_module(f"rparm.commands.{name}")
+        add_options = command_line.function(name, "add_{}_options")
         for option in ("--output", "--report"):
             parser = argparse.ArgumentParser()
-            module.add_options(parser)
+            add_options(parser)
             assert parser.parse_args([option, "here"]).report == Path("here")
         assert parser.parse_args([]).report == project_folders.report_folder()
         assert "--output DIR" in parser.format_help() and "--report" not in parser.format_help()

@@ -1,15 +1,117 @@
-"""Options that several commands have, and the values that they take."""
+"""The command line: which command arguments ask for, and options that commands share."""
 
 import argparse
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
+from typing import Any, NoReturn
 
-from rparm import project
-from rparm.errors import UserError, WrongValueError
-from rparm.project import VERSIONS
+from rparm import needs, project
+from rparm.errors import UserError, WrongValueError, did_you_mean
+from rparm.needs import COMMANDS, COMMON, DEFAULT, EXIT_CODES, HELP, VERSION
+from rparm.project import PROGRAM, VERSIONS
 from rparm.units import SECONDS, typed_quantity
+
+EPILOG = f"""With --json, standard output has one JSON document and nothing else. "exit_code" is in
+it, and "error" with the message if there is one. A command that is interrupted prints none.
+{EXIT_CODES}."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a command has ended."""
+
+    code: int  # to exit with
+    verdict: str  # the last line
+    document: Mapping[str, object] = field(default_factory=dict)  # for programs
+    error: UserError | None = None
+    page: Path | None = None  # that --open shows
+
+
+class Answered(Exception):
+    """Help or the version was asked for, and no command is to run; `text` has it."""
+
+    def __init__(self, name: str, text: str) -> None:
+        super().__init__(text)
+        self.name, self.text = name, text.rstrip("\n")
+
+
+def overview() -> str:
+    """Return the help on everything: the commands in a line each."""
+    return needs.overview(PROGRAM)
+
+
+def function(command: str, form: str) -> Any:
+    """Return the function of a command that is named in this form, as "do_{}"."""
+    module = import_module(f"rparm.commands.{COMMANDS[command].module}")
+    return getattr(module, form.format(command.replace("-", "_")))
+
+
+def parsed(arguments: Sequence[str]) -> argparse.Namespace:
+    """Options of the command that `arguments` ask for; `command` is its name.
+
+    Names and options without a command are those of `run`. Only the module of the command is
+    imported, because some take long.
+
+    UserError if something in them is wrong. Raises Answered if no command is to run.
+    """
+    first, *rest = arguments
+    while first in COMMON and rest:  # may stand in front of the command
+        first, *rest = [*rest, first]
+    if first == VERSION:
+        raise Answered("version", project.version())
+    if first in HELP:
+        raise Answered("help", _help([name for name in rest if name not in COMMON]))
+    if first == "--list":
+        first = "list"
+    if first not in COMMANDS:
+        first, rest = DEFAULT, [first, *rest]
+    options = parser(first).parse_args(rest)
+    options.command = first
+    return options
+
+
+def _help(names: Sequence[str]) -> str:
+    """Help on the first of `names`, or on everything if there are none."""
+    if not names:
+        return overview()
+    if names[0] not in COMMANDS:
+        guess = did_you_mean(names[0], COMMANDS)
+        raise UserError(f"no command {names[0]!r}{guess} ({PROGRAM} help names them)")
+    return parser(names[0]).format_help()
+
+
+def parser(command: str) -> argparse.ArgumentParser:
+    """Return the parser of a command's options."""
+    made = _Parser(
+        prog=f"{PROGRAM} {command}",
+        epilog=EPILOG,
+        allow_abbrev=False,  # --json is looked for before anything is parsed
+    )
+    function(command, "add_{}_options")(made)
+    add_common(made)
+    return made
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        """One line, like every other mistake of the user."""
+        raise UserError(f"{message} (--help explains)")
+
+    def print_help(self, file: object = None) -> NoReturn:
+        """Leave it to whoever prints."""
+        raise Answered("help", self.format_help())
+
+    def parse_args(self, *arguments, **keywords) -> argparse.Namespace:
+        """Propose the closest option for an unknown one."""
+        options, rest = self.parse_known_args(*arguments, **keywords)
+        if rest:
+            guess = did_you_mean(rest[0].partition("=")[0], self._option_string_actions)
+            self.error(f"unrecognized arguments: {' '.join(rest)}{guess}")
+        return options
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
