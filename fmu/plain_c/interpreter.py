@@ -11,13 +11,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+from equations.graph import Value
 from pycparser import c_ast
 
-from equations.c_expressions import Expressions
-from equations.c_memory import LeafOf, Scope, State
-from equations.c_text import CTextError, check_function, refused, walk
-from equations.c_types import UNSET, VOID, Array, Pointer, Structure
-from equations.graph import Value
+from plain_c.expressions import Expressions
+from plain_c.memory import UNSET, VOID, Array, LeafOf, Pointer, Scope, State, Structure
+from plain_c.text import CTextError, check_function, refused, walk
 
 MOST_ROUNDS = 100_000  # of loops, before a text is refused
 

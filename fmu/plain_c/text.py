@@ -20,7 +20,6 @@ PRELUDE = "typedef _Bool bool;\ntypedef unsigned long size_t;\n"
 DIRECTIVE = re.compile(r"\s*#\s*(\w*)\s*(.*?)\s*$")
 COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/|\"(?:\\.|[^\"\\\n])*\"", re.DOTALL)
 PLACE = re.compile(r"(?P<file>.*?):(?P<line>\d+)(?::\d+)?: (?P<text>.*)", re.DOTALL)
-
 # what to write instead of a statement or an expression that is no part of the equations' C
 INSTEAD = {
     c_ast.While: "a while loop has no fixed number of rounds: use for (int i = 0; i < N; i++)",
@@ -68,8 +67,6 @@ class Program:
 
 
 # ---- Preprocessor --------------------------------------------------------------------------------
-
-
 class Preprocessor:
     """The text of files with all that they include, with marks where each line is from."""
 
@@ -153,8 +150,6 @@ def _joined(found: re.Match[str]) -> str:
 
 
 # ---- Parser --------------------------------------------------------------------------------------
-
-
 def read(path: Path, folders: Iterable[Path] = (), ignored: Iterable[str] = ()) -> Program:
     """What a file declares, with all that it includes.
 

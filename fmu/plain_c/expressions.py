@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from equations.graph import DERIVATIVES, Graph, Value
 from pycparser import c_ast
 
-from equations.c_memory import Memory, Scope, State
-from equations.c_text import CTextError, Program, refused
-from equations.c_types import (
+from plain_c.memory import (
     BOOL,
     DOUBLE,
     INT,
@@ -18,13 +17,16 @@ from equations.c_types import (
     VOID,
     Address,
     Array,
+    Memory,
     Pointer,
+    Scope,
+    State,
     Structure,
     is_real,
     is_whole,
 )
-from equations.c_values import RELATION, Known
-from equations.graph import DERIVATIVES, Graph, Value
+from plain_c.text import CTextError, Program, refused
+from plain_c.values import RELATION, Known
 from rparm.expressions.expression import RELATIONS, in_order
 
 BUILT_IN = ("fabs", "abs", "value_of", "moving_as")
