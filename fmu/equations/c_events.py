@@ -5,7 +5,7 @@ mode, and 1 while no value that is needed reads it. An event of the file fires w
 comes to hold in its modes. What all models do with that is in src/model/relations.c.
 """
 
-from equations_file.tables import Event, ModelFile
+from equations_file import Event, ModelFile
 
 from equations.c_code import Code, Leaves, filled, indented, text
 from equations.errors import NONE, Errors

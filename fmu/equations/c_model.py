@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from itertools import chain
 
-from equations_file.tables import ModelFile
+from equations_file import ModelFile
 
 from equations.c_code import Code, filled, text
 from equations.c_events import FIELD, Events, arrays, leaves
