@@ -3,9 +3,7 @@
 models/                    scenarios, references, campaigns, systems and their modules; tables as
                            .csv.xz, which `rparm.files` reads like .csv
 fmu/, src/                 what makes FMUs of own equations: Python, and what it reads
-pieces, files.json         all FMUs and systems of the release, as `rparm.shipped` reads them:
-                           archives are cut where files in them begin, and each piece is there
-                           once, as FMUs share most of their sources, and systems contain FMUs
+pieces, files.json         all FMUs and systems of the release, as `rparm.shipped` reads them
 built.tar.xz               what else is built for each platform: built.py
 plotly/                    the library that draws on pages
 
@@ -15,20 +13,19 @@ RPARM_RELEASE names the folder of a release that is there; without it, one is bu
 from __future__ import annotations
 
 import gzip
-import hashlib
-import json
 import lzma
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
-import zipfile
 from importlib.util import find_spec
-from itertools import pairwise
 from pathlib import Path
-from typing import IO
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from pieces import write_pieces  # noqa: E402
 
 SHARE = "rparm/share"
 OF_MODELS = (".csv", ".json", ".py", ".ssd", ".svg", ".toml")
@@ -44,11 +41,11 @@ OF_RELEASES = (
     "bill_of_materials",
     "built",
     "derive",
+    "pieces",
     "references",
     "wheel",
 )  # not for a model
 OF_PLAIN_C = "plain_c"  # folder of fmu: reads the C of models, not files with equations
-VERSIONS = {"2.0": "", "3.0": "fmi3"}  # of FMI, with the folder of the release
 FOR_TESTS = ("_in", "sampled", "tightest")  # ends of names of tables that no command reads
 
 
@@ -77,7 +74,7 @@ class CustomBuildHook(BuildHookInterface):
             include[str(file)] = f"{SHARE}/{file.relative_to(root).as_posix()}"
         page = "examples/models/README.md"
         include[str(root / page)] = f"{SHARE}/{page}"
-        _write_pieces(release, staging)
+        write_pieces(release, staging)
         shutil.copy(release / "built.tar.xz", staging)
         _add_plotly(root, staging)
         for file in sorted(path for path in staging.rglob("*") if path.is_file()):
@@ -120,41 +117,3 @@ def _add_plotly(root: Path, staging: Path) -> None:
     (folder / "plotly.min.js.gz").write_bytes(gzip.compress(script, mtime=0))
     (license_file,) = sorted(package.parent.glob("plotly-*.dist-info/**/LICENSE.txt"))
     shutil.copy(license_file, folder)
-
-
-def _write_pieces(release: Path, folder: Path) -> None:
-    """Write `pieces` and `files.json`: the bytes of all FMUs and systems, each piece once."""
-    places: dict[bytes, tuple[int, int]] = {}
-    files: dict[str, dict[str, object]] = {}
-    with (folder / "pieces").open("wb") as stored:
-        for version, below in VERSIONS.items():
-            archives = (release / below).iterdir()
-            for path in sorted(path for path in archives if path.suffix in (".fmu", ".ssp")):
-                content = path.read_bytes()
-                pieces = []
-                cuts = sorted({0, *_beginnings(path, 0, content), len(content)})
-                for first, last in pairwise(cuts):
-                    piece = content[first:last]
-                    if piece not in places:
-                        places[piece] = (stored.tell(), len(piece))
-                        stored.write(piece)
-                    pieces.append(places[piece])
-                digest = hashlib.sha256(content).hexdigest()
-                files[f"{version}/{path.name}"] = {"sha256": digest, "pieces": pieces}
-    (folder / "files.json").write_text(json.dumps(files), encoding="utf-8")
-    if not files:
-        raise FileNotFoundError(f"{release}: has no FMU")
-
-
-def _beginnings(archive: Path | IO[bytes], offset: int, content: bytes) -> list[int]:
-    """Where files of an archive begin, and those of stored archives in it."""
-    cuts = []
-    with zipfile.ZipFile(archive) as opened:
-        for entry in opened.infolist():
-            cuts.append(offset + entry.header_offset)
-            if entry.compress_type == zipfile.ZIP_STORED and entry.filename.endswith(".fmu"):
-                first = content.index(b"PK\x03\x04", offset + entry.header_offset + 4)
-                with opened.open(entry) as inner:
-                    cuts += _beginnings(inner, first, content)
-        cuts.append(offset + opened.start_dir)
-    return cuts

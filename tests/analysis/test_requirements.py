@@ -27,9 +27,8 @@ OPTIONS = {"-r run.in", "-r run.txt", "--only-binary :all:"}
 # What each environment runs: patterns of files; what they import of the project belongs to it too.
 COMMANDS = {
     "run": (
-        "rparm/__main__.py", "rparm/commands/[!cfil]*.py", "rparm/commands/system.py",
-        "rparm/commands/files.py", "rparm/commands/files.py", "rparm/commands/files.py",
-        "rparm/systems/ecos.py", "models/*/animation.py", "models/*/study.py",
+        "rparm/__main__.py", "rparm/commands/[!cfil]*.py", "rparm/commands/completion.py",
+        "rparm/commands/files.py", "rparm/systems/ecos.py", "models/*/animation.py", "models/*/study.py",
         "fmu/generate.py", "fmu/document.py", "fmu/references.py", "fmu/package.py",
         "fmu/source_code.py", "fmu/equations_to_fmu.py",
     ),
