@@ -3,29 +3,26 @@
 # there is nothing to do.
 #
 #   ./setup.sh              for building and ./run.sh
-#   ./setup.sh --campaign   for ./run.sh campaign too
-#   ./setup.sh --federation for ./run.sh federation too
-#   ./setup.sh --control    for ./run.sh linearize, identify, prove --check too
-#   ./setup.sh --release    for ./release.sh too
+#   ./setup.sh --LIST       what requirements/LIST.txt names, too: ./run.sh asks for what a command needs
+#   ./setup.sh --control    so for ./run.sh prove --check
+#   ./setup.sh --release    so for ./release.sh
 #   ./setup.sh --dev        for ./test.sh too
 #   ./setup.sh --platforms  for ./test.sh --all too: clang, analysers, other platforms, browsers
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
-usage() { echo "usage: ./setup.sh [--campaign | --federation | --control | --release | --dev | --platforms]" >&2; exit 2; }
+usage() { echo "usage: ./setup.sh [--LIST | --platforms], LIST.txt is in requirements/" >&2; exit 2; }
 [ "$#" -le 1 ] || usage
-campaign=no federation=no control=no release=no dev=no platforms=no
+lists=(run)
 case "${1-}" in
   "") ;;
-  --campaign) campaign=yes ;;
-  --federation) federation=yes ;;
-  --control) control=yes ;;
-  --release) release=yes ;;
-  --dev) campaign=yes federation=yes control=yes dev=yes ;;
-  --platforms) campaign=yes federation=yes control=yes release=yes dev=yes platforms=yes ;;
+  --dev) lists+=(campaign federation control dev) ;;
+  --platforms) lists+=(campaign federation control release dev) ;;
   --help | -h) sed -n '2,/^set /{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"; exit ;;
+  --[a-z]*) lists+=("${1#--}"); [ -f "requirements/${1#--}.txt" ] || usage ;;
   *) usage ;;
 esac
+has() { [[ " ${lists[*]} " == *" $1 "* ]]; }
 
 fail() { echo "setup.sh: $*" >&2; exit 1; }
 
@@ -57,10 +54,10 @@ need python3-venv has_venv
 # Ecos links to the first and unpacks FMUs by the command of the second
 need libtbb12 has_libtbb
 need unzip command -v unzip
-if [ "$release" = yes ]; then
+if has release; then
   need llvm command -v llvm-ar
 fi
-if [ "$platforms" = yes ]; then
+if [ "${1-}" = --platforms ]; then
   need clang command -v clang
   need libclang-rt-dev has_clang_runtime
   need clang-tidy-14 command -v clang-tidy-14
@@ -120,16 +117,13 @@ install_requirements() {
     count_packages "$count" || return 1
   cp "$lock" "$stamp"
 }
-install_requirements run
+for list in "${lists[@]}"; do
+  install_requirements "$list"
+done
 # the wheel of Ecos has its programs without their run bits
 for program in build/venv/lib/python3*/site-packages/ecospy/binaries/{ecos,proxyfmu}; do
   [ -x "$program" ] || chmod +x "$program"
 done
-[ "$campaign" = no ] || install_requirements campaign
-[ "$federation" = no ] || install_requirements federation
-[ "$control" = no ] || install_requirements control
-[ "$release" = no ] || install_requirements release
-[ "$dev" = no ] || install_requirements dev
 
 # ---- sources, by an apt of this folder's own: nothing of them is installed
 
@@ -203,7 +197,7 @@ if [ ! -e build/deps/sundials/LICENSE ] || [ ! -e build/deps/musl/COPYRIGHT ]; t
   get_all_sources ||
     echo "setup.sh: no packages with them here, CMake will fetch them from upstream"
 fi
-if [ "$dev" = yes ] && [ ! -e build/deps/unity/src/unity.c ] &&
+if has dev && [ ! -e build/deps/unity/src/unity.c ] &&
    [ ! -e /usr/share/cmock/vendor/unity/src/unity.c ]; then
   echo "setup.sh: fetching the Unity test framework"
   { use_apt deb trixie && get_unity; } ||

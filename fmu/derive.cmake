@@ -16,7 +16,8 @@ function(derive target)
     list(APPEND modes --mode ${mode})
   endforeach()
   set(folders $<TARGET_PROPERTY:${target},INCLUDE_DIRECTORIES>)
-  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/equations/*.py ${PROJECT_SOURCE_DIR}/rparm/expressions/*.py)
+  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/plain_c/*.py ${FMU_SOURCE_DIR}/equations/*.py
+       ${PROJECT_SOURCE_DIR}/rparm/expressions/*.py)
   add_custom_command(
     OUTPUT ${output}
     COMMAND ${CMAKE_COMMAND} -E env PYTHONPATH=${PROJECT_SOURCE_DIR}

@@ -11,9 +11,9 @@ import argparse
 import sys
 from pathlib import Path
 
-from equations.c_derived import FORM, Derived, Wanted
-from equations.c_text import CTextError, read
 from generate import write_if_changed
+from plain_c.derived import FORM, Derived, Wanted
+from plain_c.text import CTextError, read
 from program import program
 from source_code import dependencies
 

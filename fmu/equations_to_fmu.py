@@ -12,8 +12,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from building.contents import PLACES, build
-from building.runtime import Runtime
+from building import PLACES, Runtime, build
 from equations import declaration, lock
 from equations.model_file import ModelFile, ModelFileError, read
 from package import pack

@@ -63,8 +63,7 @@ function(add_equations name file terminals folder)
   if(terminals)
     set(option --terminals ${terminals})
   endif()
-  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/equations/*.* ${FMU_SOURCE_DIR}/equations_file/*.py
-       ${FMU_SOURCE_DIR}/declaration/*
+  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/equations/*.* ${FMU_SOURCE_DIR}/equations_file.py ${FMU_SOURCE_DIR}/declaration/*
        ${PROJECT_SOURCE_DIR}/rparm/expressions/*.py ${PROJECT_SOURCE_DIR}/src/instance/*.toml)
   add_custom_command(
     OUTPUT ${folder}/equations.c ${folder}/equations.h ${folder}/variables.toml ${folder}/README.md
@@ -149,7 +148,7 @@ function(add_fmu name)
             --readme ${readme} ${derivation} --model-description ${out}/modelDescription.xml
             --output ${out}/documentation
     DEPENDS ${FMU_SOURCE_DIR}/document.py ${FMU_SOURCE_DIR}/document.css ${FMU_SOURCE_DIR}/document.html
-            ${FMU_SOURCE_DIR}/latex_to_mathml.py ${FMU_SOURCE_DIR}/program.py
+            ${FMU_SOURCE_DIR}/program.py
             ${readme} ${derivation} ${pictures} ${out}/modelDescription.xml
     COMMENT "Writing the documentation of ${name}"
     VERBATIM)

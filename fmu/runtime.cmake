@@ -1,5 +1,5 @@
 # What FMUs of own equations are linked with: all that is the same for every model, compiled once.
-# BUILD/runtime/runtime.json says where it is and how a model is compiled and linked to it: building/runtime.py.
+# BUILD/runtime/runtime.json says where it is and how a model is compiled and linked to it: building.py.
 
 if(WASM)
   return() # the playground has its own models

@@ -1,7 +1,7 @@
 """Hook of hatchling: what the wheel carries besides the Python package, below rparm/share.
 
 models/                    scenarios, references, campaigns, systems and their modules; tables as
-                           .csv.xz, which `rparm.trajectory_csv` reads like .csv
+                           .csv.xz, which `rparm.files` reads like .csv
 fmu/, src/                 what makes FMUs of own equations: Python, and what it reads
 pieces, files.json         all FMUs and systems of the release, as `rparm.shipped` reads them
 built.tar.xz               what else is built for each platform: built.py
@@ -45,18 +45,7 @@ OF_RELEASES = (
     "references",
     "wheel",
 )  # not for a model
-OF_PLAIN_C = (
-    "c_blocks",
-    "c_derived",
-    "c_expressions",
-    "c_interpreter",
-    "c_memory",
-    "c_placement",
-    "c_text",
-    "c_types",
-    "c_values",
-    "derivatives",
-)  # fmu/equations: read the C of models, not files with equations
+OF_PLAIN_C = "plain_c"  # folder of fmu: reads the C of models, not files with equations
 FOR_TESTS = ("_in", "sampled", "tightest")  # ends of names of tables that no command reads
 
 
@@ -80,7 +69,7 @@ class CustomBuildHook(BuildHookInterface):
             else:
                 include[str(file)] = f"{SHARE}/{file.relative_to(root).as_posix()}"
         for file in sorted(file for pattern in OF_FMU for file in root.glob(pattern)):
-            if file.stem in OF_RELEASES + OF_PLAIN_C:
+            if file.stem in OF_RELEASES or file.parent.name == OF_PLAIN_C:
                 continue
             include[str(file)] = f"{SHARE}/{file.relative_to(root).as_posix()}"
         page = "examples/models/README.md"

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from rparm import project, trajectory_csv
+from rparm import files, project
 from rparm.errors import UserError
+from rparm.files import write_text
 from rparm.fmi.fmu_file import read_model
-from rparm.output_files import write_text
-from rparm.scenarios import scenario as scenarios
-from rparm.scenarios.scenario import Scenario
+from rparm.runs import scenario as scenarios
+from rparm.runs.scenario import Scenario
 
 # Writes the reference of a scenario to a folder.
 Writer = Callable[[Scenario, Path], None]
@@ -48,7 +48,7 @@ def write(
     }
     for file, (times, names, table) in tables.items():
         rounded = table.astype(np.float64) + 0.0  # no negative zeros
-        trajectory_csv.write(folder / f"{model}_{file}.csv", times, names, rounded)
+        files.write_trajectory(folder / f"{model}_{file}.csv", times, names, rounded)
     options = {
         "StartTime": scenario.start,
         "StopTime": scenario.stop,

@@ -8,9 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from rparm.report.style import DASHED, ERRORS, MUTED, REFERENCE, RUN
-from rparm.system.comparison import Outcome
-from rparm.system.study import Measure
+from rparm.report.pages import DASHED, ERROR_COLORS, MUTED, REFERENCE_COLOR, RUN_COLOR
+from rparm.systems.comparison import Measure, Outcome
 
 JOINTS = (("q1", "rad"), ("q2", "m"))
 REACHED = 0.999  # share of a limit
@@ -39,12 +38,12 @@ def draw_motion(axes: dict[str, Axes], outcome: Outcome, arm: str) -> None:
     for joint, unit in JOINTS:
         wanted = outcome.column(f"trajectory.{joint}_ref")
         actual = outcome.column(f"{arm}.{joint}")
-        axes[joint].plot(times, wanted, color=REFERENCE, linewidth=5, solid_capstyle="round")
+        axes[joint].plot(times, wanted, color=REFERENCE_COLOR, linewidth=5, solid_capstyle="round")
         draw(axes[joint], times, actual, f"{joint} ({unit})")
         label = f"tracking error of {joint} ({unit})"
-        draw(axes[f"{joint}_error"], times, wanted - actual, label, ERRORS[0])
+        draw(axes[f"{joint}_error"], times, wanted - actual, label, ERROR_COLORS[0])
     away = 1e3 * distance(outcome, arm)
-    draw(axes["distance"], times, away, "distance from the reference (mm)", ERRORS[0])
+    draw(axes["distance"], times, away, "distance from the reference (mm)", ERROR_COLORS[0])
     axes["distance"].set_ylim(bottom=0.0)
     _draw_path(axes["path"], outcome, arm)
     for name, panel in axes.items():
@@ -52,7 +51,9 @@ def draw_motion(axes: dict[str, Axes], outcome: Outcome, arm: str) -> None:
             panel.margins(x=0.02)
 
 
-def draw(axes: Axes, times: np.ndarray, values: np.ndarray, label: str, color: str = RUN) -> None:
+def draw(
+    axes: Axes, times: np.ndarray, values: np.ndarray, label: str, color: str = RUN_COLOR
+) -> None:
     """One signal, (rows,)."""
     axes.plot(times, values, color=color, linewidth=1.3)
     axes.set_ylabel(label)
@@ -69,10 +70,10 @@ def draw_limit(axes: Axes, values: np.ndarray, limit: float, share: float = REAC
 def _draw_path(axes: Axes, outcome: Outcome, arm: str) -> None:
     wanted = [outcome.column(f"trajectory.ee_{x}_ref") for x in "xy"]
     actual = [outcome.column(f"{arm}.ee_{x}") for x in "xy"]
-    axes.plot(*wanted, color=REFERENCE, linewidth=5, solid_capstyle="round")
-    axes.plot(*actual, color=RUN, linewidth=1.3)
+    axes.plot(*wanted, color=REFERENCE_COLOR, linewidth=5, solid_capstyle="round")
+    axes.plot(*actual, color=RUN_COLOR, linewidth=1.3)
     start = wanted[0][0], wanted[1][0]
-    axes.plot(*start, marker="o", markersize=8, color=RUN)
+    axes.plot(*start, marker="o", markersize=8, color=RUN_COLOR)
     axes.annotate("start", start, (-12, 0), ha="right", va="center", textcoords="offset points")
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.15)
@@ -94,9 +95,9 @@ def finish(
         weight="bold",
     )
     handles = [
-        Line2D([], [], color=REFERENCE, linewidth=5, label="reference motion"),
-        Line2D([], [], color=RUN, linewidth=1.3, label=f"{arm}, in Ecos"),
-        Line2D([], [], color=ERRORS[0], linewidth=1.3, label="difference of the two"),
+        Line2D([], [], color=REFERENCE_COLOR, linewidth=5, label="reference motion"),
+        Line2D([], [], color=RUN_COLOR, linewidth=1.3, label=f"{arm}, in Ecos"),
+        Line2D([], [], color=ERROR_COLORS[0], linewidth=1.3, label="difference of the two"),
         *more,
     ]
     picture.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9.5)

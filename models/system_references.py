@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from rparm import trajectory_csv
+from rparm import files
 from rparm.errors import UserError
 from rparm.fmi.model import Value
 
@@ -60,7 +60,7 @@ def main(folder: Path, known: Iterable[str], make: Callable[[str], Files]) -> No
             for file, (times, columns) in make(name).items():
                 values = np.column_stack([*columns.values()])
                 rounded = values.astype(np.float64) + 0.0  # no negative zeros
-                trajectory_csv.write(target / file, times, list(columns), rounded)
+                files.write_trajectory(target / file, times, list(columns), rounded)
                 print(f"{name}/{file}: {len(times)} rows")
     except UserError as error:
         sys.exit(f"error: {error}")

@@ -1,4 +1,4 @@
-"""Runs a command, a module of rparm.commands each, and ends as it ends."""
+"""Runs a command of rparm.commands, and ends as it ends."""
 
 import os
 import signal
@@ -7,23 +7,21 @@ import webbrowser
 from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import suppress
-from importlib import import_module
 from io import TextIOWrapper
 from typing import NoReturn, TextIO
 
-from rparm import command_line, project
-from rparm.command_line import Answered
-from rparm.commands import Ended
+from rparm import command_line, console, project
+from rparm.command_line import Answered, Ended
 from rparm.errors import UserError, reason
+from rparm.files import write_text, written
 from rparm.interruption import handle_endings
-from rparm.output import streams
-from rparm.output_files import write_text, written
+from rparm.needs import COMMANDS, NO_READER
 
 LONGEST_MESSAGE = 2000  # characters; some quote what a file says
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; the exit code, as `command_line.EXIT_CODES` says."""
+    """Run the command line; the exit code, as `needs.EXIT_CODES` says."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # names that it cannot encode are no reason to stop
             stream.reconfigure(errors="backslashreplace")
@@ -35,14 +33,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not given:
             print(command_line.overview(), file=sys.stderr)
             return 2
-        with streams.of_results(as_json, "--quiet" in options) as results:
+        with console.results_stream(as_json, "--quiet" in options) as results:
             return _say(_ended(given), as_json, results)
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130
     except BrokenPipeError:  # whoever read the output has left: as if SIGPIPE had ended it
         _drop_output()
-        return command_line.NO_READER
+        return NO_READER
     except OSError as error:
         _drop_output()
         return _refuse(f"{error.filename or 'output or temporary files'}: {reason(error)}")
@@ -55,7 +53,7 @@ def _ended(arguments: Sequence[str]) -> Ended:
         project.check_current_folder()
         options = command_line.parsed(arguments)
         # imported here because it takes long: so Ctrl-C during the import leaves no traceback
-        ended = import_module(f"rparm.commands.{options.command.replace('-', '_')}").run(options)
+        ended = command_line.function(options.command, "do_{}")(options)
         _keep_document(options, ended)
         _show_page(options, ended)
         return ended
@@ -66,7 +64,7 @@ def _ended(arguments: Sequence[str]) -> Ended:
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("rparm"):
             raise
-        extra = command_line.NEEDS.get(options.command, "all")
+        extra = COMMANDS[options.command].extra or "all"
         return Ended(2, "", error=project.not_installed(str(error.name), extra))
 
 
@@ -76,7 +74,7 @@ def _keep_document(options: Namespace, ended: Ended) -> None:
     if folder is not None:
         path = folder / f"{options.command}.json"
         with written(path):
-            write_text(path, f"{streams.document(_document(ended))}\n")
+            write_text(path, f"{console.json_line(_document(ended))}\n")
 
 
 def _show_page(options: Namespace, ended: Ended) -> None:
@@ -108,7 +106,7 @@ def _say(ended: Ended, as_json: bool, results: TextIO | None) -> int:
     if ended.verdict:
         print(ended.verdict, file=sys.stdout if as_json else results)
     if as_json:
-        print(streams.document(_document(ended)), file=results)
+        print(console.json_line(_document(ended)), file=results)
     for stream in (sys.stdout, results):
         if stream is not None:
             stream.flush()

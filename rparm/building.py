@@ -10,8 +10,8 @@ from pathlib import Path
 
 from rparm import project
 from rparm.errors import UserError, one_line
+from rparm.files import whole, written
 from rparm.interruption import run_group, temporary_folder, uninterrupted
-from rparm.output_files import whole, written
 
 # what the program imports, beside this package
 NEEDED = ("latex2mathml", "markdown_it", "mdit_py_plugins", "pydantic")

@@ -37,7 +37,7 @@ import platformdirs
 
 from rparm import fmu_tools, shipped
 from rparm.errors import UserError, did_you_mean, reason
-from rparm.input_files import is_file
+from rparm.files import is_file
 
 PACKAGE = Path(__file__).resolve().parent
 INSTALLED = shipped.SHARE.is_dir()  # else the package is that of a checkout
@@ -46,8 +46,10 @@ PROGRAM = "rparm" if INSTALLED else "./run.sh"
 
 STRUCTURE = "SystemStructure.ssd"
 DIAGRAM = "system.svg"
-STUDY = "study"  # the module of a system's folder that rparm.system.study describes
-IDENTIFICATION = "identification"  # the module of a system's folder for rparm.identification.demo
+STUDY = "study"  # the module of a system's folder that rparm.systems.comparison describes
+IDENTIFICATION = (
+    "identification"  # the module of a system's folder for rparm.identification.request
+)
 ANIMATION = "animation"  # the module of a model's or system's folder for rparm.report.motion
 PROOF = "proof"  # folder of a model with the program that encloses its motions
 SCENARIO_FOLDERS = ("scenarios", "convergence")

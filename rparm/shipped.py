@@ -18,7 +18,7 @@ import tarfile
 from pathlib import Path, PurePosixPath
 
 from rparm.errors import UserError, reason
-from rparm.output_files import whole
+from rparm.files import whole
 
 SHARE = Path(__file__).resolve().parent / "share"
 PIECES = SHARE / "pieces"

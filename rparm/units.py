@@ -1,21 +1,23 @@
-"""Values that users give with a unit, as "90 deg", "300 mm" or "2kN": what they are in SI.
+"""Values with units as users write them, and as messages, tables and pages show them.
 
-What is known for a variable: its own unit, the display units that its FMU declares for it, and both
-with one factor exchanged: m, s and N take the prefixes m, c and k, rad takes m, and each factor its
-own display units. Conversions are exact and rounded once; degrees are those of `math.radians`.
+Users may write "90 deg", "300 mm" or "2kN". Known for a variable are its own unit, the display
+units that its FMU declares for it, and both with one factor exchanged: m, s and N take the prefixes
+m, c and k, rad takes m, and each factor its own display units. Conversions are exact and rounded
+once; degrees are converted as by `math.radians`.
 """
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence, Sized
 from contextlib import suppress
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, Context
 from fractions import Fraction
 from typing import Any
 
 from rparm.errors import WrongValueError, did_you_mean
-from rparm.expressions import numbers
-from rparm.input_files import show
+from rparm.expressions import expression
+from rparm.files import show
 
 PREFIXES = {"m": Fraction(1000), "c": Fraction(100), "k": Fraction(1, 1000)}
 PREFIXED = {"m": "mck", "s": "mck", "N": "mck", "rad": "m"}
@@ -30,17 +32,19 @@ QUANTITY = re.compile(rf"({NUMBER})[ \t]*([^\s\d.,+-].*|1/.*)?", re.ASCII)
 FACTOR = re.compile(r"([A-Za-z]+)(-?\d)?", re.ASCII)
 PRODUCT = re.compile(r"([^/()]+)(?:/(?:([^./()]+)|\(([^/()]+)\)))?")  # a.b, a/b or a/(b.c)
 TYPED = str.maketrans({"·": ".", "²": "2", "³": "3"})  # as pages write units
+SMALLEST = 1e-99  # smaller numbers are shown as ~0
+GAP = ".."  # in a text that is shortened
 
 
 @dataclass(frozen=True)
 class Unit:
-    """What a value is given in: number = factor * value + offset, as FMI defines display units."""
+    """A unit by number = factor * value + offset, as FMI defines display units."""
 
     factor: Fraction = Fraction(1)
     offset: Fraction = Fraction(0)
 
     def value(self, number: str, is_difference: bool = False) -> float:
-        """The value of a `number`, a finite literal; a difference of two has no offset."""
+        """Return the value of a `number`, a finite literal; a difference of two has no offset."""
         if not self.offset and abs(self.factor - DEGREE) <= SAME * DEGREE:
             return math.radians(float(number))
         # an exponent of any size is that of 0 here: others have been refused
@@ -50,11 +54,13 @@ class Unit:
 
 
 Units = Mapping[str, Unit]  # by name, the variable's own first
+
+
 Displays = Mapping[str, Units]  # display units, by the unit that they belong to
 
 
 def display_unit(factor: object, offset: object) -> Unit:
-    """Unit that an FMU declares; ValueError if its numbers are of no use."""
+    """Return the unit that an FMU declares; ValueError if its numbers are of no use."""
     numbers = [float(str(number)) for number in (factor, offset)]
     if not all(map(math.isfinite, numbers)) or not numbers[0]:
         raise ValueError(f"display unit with factor {factor} and offset {offset}")
@@ -62,7 +68,7 @@ def display_unit(factor: object, offset: object) -> Unit:
 
 
 def units_of(name: str | None, displays: Displays) -> Units:
-    """All units in which a value may be given whose own is `name`; empty if it has none."""
+    """Return all units in which users may give a value whose own unit is `name`; empty for none."""
     if name in NONE:
         return {}
     known = {name: Unit()} | dict(displays.get(name, {}))
@@ -72,7 +78,7 @@ def units_of(name: str | None, displays: Displays) -> Units:
 
 
 def _exchanged(name: str, displays: Displays) -> Iterator[tuple[str, Unit]]:
-    """Units that differ from `name` in one factor."""
+    """Yield the units that differ from `name` in one factor."""
     product = PRODUCT.fullmatch(name)
     if not product:
         return
@@ -89,29 +95,33 @@ def _exchanged(name: str, displays: Displays) -> Iterator[tuple[str, Unit]]:
 
 
 def _alternatives(symbol: str, displays: Displays) -> dict[str, Unit]:
-    """What may stand for a factor of a unit."""
+    """Return the units that may replace a factor of a unit."""
     found = {name: unit for name, unit in displays.get(symbol, {}).items() if not unit.offset}
     for prefix in PREFIXED.get(symbol, ""):
         found[f"{prefix}{symbol}"] = Unit(PREFIXES[prefix])
     return found
 
 
-# of what scenarios and campaigns have besides the variables of models
+# units of other values in scenarios and campaigns than variables of models
 SECONDS = units_of("s", {})
+
+
 HERTZ = units_of("Hz", {})
+
+
 RADIANS = units_of(ANGLE, {ANGLE: {"deg": Unit(DEGREE)}})
 
 
 def finite_number(given: Any) -> float:
-    """`given` as a float; WrongValueError if it is not a finite number."""
+    """Return `given` as a float; WrongValueError if it is not a finite number."""
     try:
-        return numbers.finite_number(given)
+        return expression.finite_number(given)
     except ValueError as error:
         raise WrongValueError(f"{error}, got {show(given)}") from None
 
 
 def quantity(given: Any, known: Units, is_difference: bool = False) -> float:
-    """Value of a number, or of one with a `known` unit; WrongValueError, with these, if neither."""
+    """Return the value of a number, or of a text with a `known` unit; else WrongValueError."""
     if not isinstance(given, str):
         return finite_number(given)
     number, unit = _parts(given, known)
@@ -124,7 +134,7 @@ def quantity(given: Any, known: Units, is_difference: bool = False) -> float:
 
 
 def typed_quantity(text: str, known: Units) -> float:
-    """Value of a text of the command line, with a unit or without one; errors as of `quantity`."""
+    """Return the value of a text of the command line, with or without a unit, as `quantity`."""
     number, unit = _parts(text, known)
     return _value(text, number, unit or next(iter(known), ""), known)
 
@@ -153,3 +163,81 @@ def _value(given: str, number: str, name: str, known: Units, is_difference: bool
 def _known(known: Units) -> str:
     names = [*list(known)[:MOST_SHOWN], *(["..."] if len(known) > MOST_SHOWN else [])]
     return f" (known: {', '.join(names)})" if names else ""
+
+
+def short(number: float, digits: int | None = None) -> str:
+    """Write 1e-8 for 1e-08: with `digits` behind the point, or up to three; 0, and ~0 if tiny."""
+    if not number or not math.isfinite(number):
+        return f"{number:g}"
+    if abs(number) < SMALLEST:
+        return "~0"
+    mantissa, exponent = f"{number:.{3 if digits is None else digits}e}".split("e")
+    if digits is None:
+        mantissa = mantissa.rstrip("0").rstrip(".")
+    return f"{mantissa}e{int(exponent)}"
+
+
+def rounded_up(value: float, digits: int) -> str:
+    """Write an upper bound, rounded up: 1.3e-08 for 1.21e-8 and one digit behind the point."""
+    upwards = Context(prec=digits + 1, rounding=ROUND_CEILING)
+    return f"{float(upwards.create_decimal_from_float(value)):.{digits}e}"
+
+
+def shortened(text: str, width: int) -> str:
+    """Return at most `width` characters: the begin and the end of a longer text."""
+    if len(text) <= width:
+        return text
+    begin = (width - len(GAP) + 1) // 2
+    return text[:begin] + GAP + text[len(text) - (width - len(GAP) - begin) :]
+
+
+def seconds(time: float) -> str:
+    """Write a time as 0.123 s, 12.3 s or 1234 s."""
+    return f"{time:.3f} s" if time < 10 else f"{time:.1f} s" if time < 100 else f"{time:.0f} s"
+
+
+def milliseconds(seconds: float) -> str:
+    """Write 2 ms for 0.002."""
+    return f"{1e3 * seconds:.6g} ms"
+
+
+def ordinal(number: int) -> str:
+    """Write 2nd, 3rd, 10th."""
+    teen = number // 10 % 10 == 1
+    return f"{number}{'th' if teen else {1: 'st', 2: 'nd', 3: 'rd'}.get(number % 10, 'th')}"
+
+
+def minus(text: object) -> str:
+    """Replace the hyphens before digits by minus signs, as plots have them."""
+    return re.sub(r"(?<![\w.-])-(?=\d)|(?<=\de)-(?=\d)", "\N{MINUS SIGN}", str(text))
+
+
+def unit(text: str | None) -> str:
+    """Write a unit of FMI as N·m for N.m, m/s² for m/s2; nothing for none."""
+    raised = re.sub(r"(?<=[a-z])[23]", lambda found: {"2": "²", "3": "³"}[found[0]], text or "")
+    return raised.replace(".", "·")
+
+
+def counted(things: Sized, name: str) -> str:
+    """Write 1 scenario, 2 scenarios."""
+    return f"{len(things)} {name}" + ("s" if len(things) != 1 else "")
+
+
+def bits(differing: Sequence[str]) -> str:
+    """Say how the outputs of two FMUs compare, given those that differ."""
+    return "other bits" if differing else "same bits"
+
+
+def sentence(text: str) -> str:
+    """Begin a text with a capital letter."""
+    return text[:1].upper() + text[1:]
+
+
+def verdict(passed: bool) -> str:
+    """Name the result of a check."""
+    return "passed" if passed else "FAILED"
+
+
+def number(value: float) -> str:
+    """Write a number with at most nine digits."""
+    return f"{value:.9g}"

@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 import rparm
 
 FOLDER = Path(__file__).resolve().parent
-# stop and step in s, start values, variables to draw: over time, or over the first one where they stand in brackets
+# stop and step in s, start values, variables to draw: over time, or over the one in brackets
 RUNS = {
     "dahlquist": (4.0, 0.02, {}, ["x"]),
     "van_der_pol": (40.0, 0.01, {"mu": 5.0}, ["x"]),

@@ -1,4 +1,4 @@
-"""Makes a model in C of one file with its equations, and derives C from plain C.
+"""Makes a model in C of one file with its equations.
 
 A module imports only from lines above its own:
 
@@ -11,19 +11,6 @@ A module imports only from lines above its own:
     c_model       equations.h and equations.c: a struct model (src/model/model.h)
     declaration   what the model declares, and its page
     lock          value references that stay
-
-Derives C from functions in plain C, the models' own (models/README.md), by the same graph:
-
-    c_text         syntax trees, and what is refused
-    c_types        types and addresses
-    c_values       whole numbers and conditions: what is known of them on a path
-    c_memory       what variables hold
-    c_expressions  expressions, calls of libm
-    c_interpreter  statements and functions
-    derivatives    first and second derivatives along a curve
-    c_placement    under which conditions a value is needed
-    c_blocks       values as statements in C that people read
-    c_derived      the functions that are asked for
 
 The C that all models of files share is in the files *.in.
 """

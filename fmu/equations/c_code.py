@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from equations.graph import CONDITIONS, LEAVES, Value
-from rparm.expressions.tree import RELATIONS, in_order
+from rparm.expressions.expression import RELATIONS, in_order
 
 # what a formula of C is made of; that of a function is its call
 FORMULAS = {op: f"{{}} {op} {{}}" for op in ("+", "-", "*", "/", *RELATIONS)}

@@ -7,12 +7,12 @@ comes to hold in its modes. What all models do with that is in src/model/relatio
 
 from collections.abc import Iterable
 
-from equations_file.tables import Event, ModelFile
+from equations_file import Event, ModelFile
 
 from equations.c_code import Code, Leaves, filled, indented, text
 from equations.errors import NONE, Errors
 from equations.graph import MOVING, Graph, Relation, Value, is_unknown
-from rparm.expressions.tree import in_order
+from rparm.expressions.expression import in_order
 
 Guards = dict[Value, Value | None]  # conditions; None: always
 

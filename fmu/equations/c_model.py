@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from itertools import chain
 
-from equations_file.tables import ModelFile
+from equations_file import ModelFile
 
 from equations.c_code import Code, filled, text
 from equations.c_events import FIELD, Events, arrays, leaves
 from equations.c_series import Series
 from equations.graph import FALLIBLE, Value
-from rparm.expressions.tree import in_order
+from rparm.expressions.expression import in_order
 
 RATE = "d_{}"  # fields have prefixes, so that any name of a variable will do
 STRUCTURE = "struct equations_values"

@@ -21,7 +21,7 @@ from equations.graph import (
     unsigned,
     with_partials,
 )
-from rparm.expressions.tree import in_order
+from rparm.expressions.expression import in_order
 
 
 class Series:

@@ -4,9 +4,9 @@ import re
 import string
 from typing import Any
 
-from declaration.files import read as read_declaration
 from declaration.load import UNITS
-from equations_file.tables import NUMBERS, ModelFile, Variable, placed
+from declaration.load import read as read_declaration
+from equations_file import NUMBERS, ModelFile, Variable, placed
 
 from equations import c_model
 from equations.c_events import FIELD, INDICATOR, MODE

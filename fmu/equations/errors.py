@@ -8,7 +8,7 @@ from itertools import product
 
 from equations.c_code import Code, Leaves, formula
 from equations.graph import CONDITIONS, Value
-from rparm.expressions.tree import in_order
+from rparm.expressions.expression import in_order
 
 NONE = "0.0"
 ROUNDING = "DBL_EPSILON"  # of an operation and of a function, over its result

@@ -14,8 +14,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 
-from rparm.expressions.parser import parse
-from rparm.expressions.tree import RELATIONS, Node, in_order
+from rparm.expressions.expression import RELATIONS, Node, in_order, parse
 
 # along a curve, "first" and "second" are the derivatives of the other leaves
 LEAVES = ("parameter", "input", "state", "time", "mode", "integer", "first", "second")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import tomllib
 from pathlib import Path
 
-from equations_file.tables import NAME, ModelFileError
+from equations_file import NAME, ModelFileError
 
 from equations.declaration import Key
 

@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterable
 from pathlib import Path
 
-from equations_file import checks
-from equations_file.tables import ModelFile, ModelFileError
+import equations_file
+from equations_file import ModelFile, ModelFileError
 
 from equations.graph import Graph
 
@@ -18,7 +18,7 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
 
     solver_names: of the variables that every model has. ModelFileError if something is wrong.
     """
-    file = checks.read(path, solver_names)
+    file = equations_file.read(path, solver_names)
     # without states nothing is integrated: outputs follow at once
     graph = file.graph = Graph(has_switches=bool(file.of("states") or file.events))
     for variable in file.of(*LEAVES):

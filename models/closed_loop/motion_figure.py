@@ -5,9 +5,9 @@ from matplotlib.figure import Figure
 from rparm.models.system_figure import draw, draw_limit
 
 from rparm.models import system_figure
-from rparm.report.style import STYLE
-from rparm.system.comparison import Outcome
-from rparm.system.ssp import Ssp
+from rparm.report.pages import STYLE
+from rparm.systems.comparison import Outcome
+from rparm.systems.ssp import Ssp
 
 EFFORTS = (("tau1", "N·m"), ("f2", "N"))
 ARM = "arm"  # the component

@@ -1,6 +1,6 @@
 """What rparm asks of this folder: measures and picture of a run, and the study of the coupling.
 
-rparm/system/study.py says what each name means.
+rparm/systems/comparison.py says what each name means.
 """
 
 from pathlib import Path
@@ -10,7 +10,7 @@ from rparm.models.closed_loop.motion_figure import ARM
 from rparm.models.closed_loop.motion_figure import figure as figure
 from rparm.models.system_figure import tracking_error
 
-from rparm.system.study import Diagram, Rest
+from rparm.systems.comparison import Diagram, Rest
 
 EXPERIMENT = (START, STOP, 1 / STEPS_PER_SECOND)
 COUPLING_PICTURE = "coupling.png"

@@ -20,13 +20,13 @@ from matplotlib.figure import Figure
 from rparm.models.machine.experiment import STOP
 from rparm.models.machine.systems import SENSOR, SEQUENCE, direct, run_in_ecos
 
-from rparm import project, trajectory_csv
-from rparm.coupling.master import Master
+from rparm import files, project
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value
-from rparm.report.style import ERRORS, RUN, STYLE, save
-from rparm.system import ssp
-from rparm.system.ssp import Ssp
+from rparm.report.pages import ERROR_COLORS, RUN_COLOR, STYLE, save_figure
+from rparm.systems import ssp
+from rparm.systems.master import Master
+from rparm.systems.ssp import Ssp
 
 FOLDER = Path(__file__).resolve().parent
 VARIANTS = ("pick_and_place", "pick_and_place_untold")
@@ -80,7 +80,7 @@ def parameters(opened: Ssp, variant: str) -> dict[str, dict[str, Value]]:
 def reference(variant: str) -> Columns:
     """Columns of the solution in continuous time, by name."""
     path = project.references(FOLDER) / variant / "monolithic.csv"
-    names, table = trajectory_csv.read(path, trajectory_csv.failure(path))
+    names, table = files.read_trajectory(path, files.csv_failure(path))
     return dict(zip(names, table.T, strict=True))
 
 
@@ -124,7 +124,7 @@ def limit(runs: Sequence[Columns], per_second: Sequence[int], power: int) -> tup
 def largest_error(columns: Columns, expected: Columns) -> tuple[float, str]:
     """Largest difference of all variables, relative to the largest value of each, and whose it is.
 
-    As the errors of `rparm.runs.reference`, but never relative to a sum. `columns` have the first
+    As the errors of `rparm.runs.comparison`, but never relative to a sum. `columns` have the first
     rows of `expected`, or all.
     """
     errors = {
@@ -153,7 +153,7 @@ def draw(measured: Mapping[tuple[str, str], tuple[list[float], float]]) -> Figur
     with mpl.rc_context(STYLE):
         picture = Figure(figsize=(13, 6), layout="constrained")
         for variant, axes in zip(VARIANTS, picture.subplots(1, 2, sharey=True), strict=True):
-            for color, method in zip((RUN, *ERRORS[:3]), METHODS, strict=True):
+            for color, method in zip((RUN_COLOR, *ERROR_COLORS[:3]), METHODS, strict=True):
                 errors, left = measured[variant, method.name]
                 steps = 1e3 / np.array(method.per_second)
                 axes.loglog(steps, errors, "o-", color=color, label=method.name)
@@ -194,7 +194,7 @@ def main() -> None:
                     f"{1e3 * tracking_error(at_zero):.8g} mm",
                     flush=True,
                 )
-    save(draw(measured), FOLDER / "continuous.png")
+    save_figure(draw(measured), FOLDER / "continuous.png")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
-"""What rparm asks of this folder: logs of the machine, to identify the plant's parameters from.
+"""Logs of the machine, to identify the plant's parameters from.
 
-rparm/identification/demo.py says what `demo` gives. The machine lies flat, so that the efforts of a
-log lead an arm through the same motion again: under gravity it would run away. Its end effector
-moves on circles. A log has the efforts of the motors, and what the encoders show: counts with
-noise, two ticks late.
+rparm/identification/request.py says what `demo` gives. The machine lies flat, so that the efforts
+of a log lead an arm through the same motion again: under gravity it would run away. Its end
+effector moves on circles. A log has the efforts of the motors, and what the encoders show: counts
+with noise, two ticks late.
 """
 
 from pathlib import Path
@@ -11,13 +11,10 @@ from pathlib import Path
 import numpy as np
 from rparm.models.machine.systems import VARIANT, write_system
 
-from rparm import project, trajectory_csv
-from rparm.coupling import in_process
+from rparm import files, project
 from rparm.fmi.model import Value
-from rparm.identification.demo import Demo
-from rparm.identification.parameters import DELAY
-from rparm.identification.request import Request
-from rparm.system import ssp
+from rparm.identification.request import DELAY, Demo, Request
+from rparm.systems import master, ssp
 
 BASE = "noisy_sensor"  # the variant that all else is taken from
 STOP, STEP = 8.0, 1e-3  # s
@@ -91,7 +88,7 @@ def _write(machine: Path, log: Path, circle: dict[str, float]) -> None:
         write_system(opened, changed, values, STOP, STEP)
     try:
         with ssp.unpacked(changed) as opened:
-            run = in_process.run(opened, VARIANT, list(COLUMNS.values()))
+            run = master.run_in_master(opened, VARIANT, list(COLUMNS.values()))
     finally:
         changed.unlink()
-    trajectory_csv.write(log, np.asarray(run.times), list(COLUMNS), run.values, None, True)
+    files.write_trajectory(log, np.asarray(run.times), list(COLUMNS), run.values, None, True)

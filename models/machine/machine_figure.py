@@ -9,9 +9,9 @@ from matplotlib.patches import Patch
 from rparm.models.system_figure import draw, draw_limit
 
 from rparm.models import system_figure
-from rparm.report.style import ERRORS, MUTED, RUN, STYLE
-from rparm.system.comparison import Outcome
-from rparm.system.ssp import Ssp
+from rparm.report.pages import ERROR_COLORS, MUTED, RUN_COLOR, STYLE
+from rparm.systems.comparison import Outcome
+from rparm.systems.ssp import Ssp
 
 EFFORTS = (("tau1", "N·m"), ("f2", "N"))
 MOTORS = (("current", "A"), ("voltage", "V"))
@@ -46,7 +46,7 @@ def figure(ssp: Ssp, outcome: Outcome) -> Figure:
             is_limited |= _draw_motor(axes, ssp, outcome, joint)
             _draw_mode(axes[f"mode{joint}"], times, outcome.column(f"plant.mode{joint}"), joint)
         force = outcome.column("environment.wall_force")
-        draw(axes["wall"], times, force, "force of the wall (N)", ERRORS[1])
+        draw(axes["wall"], times, force, "force of the wall (N)", ERROR_COLORS[1])
         axes["wall"].set_ylim(bottom=0.0)
         system_figure.draw_motion(axes, outcome, ARM)
         if force.any():
@@ -58,7 +58,9 @@ def figure(ssp: Ssp, outcome: Outcome) -> Figure:
                 panel.axvspan(carried[0], carried[-1], color=CARRIED, zorder=0)
         for name in ("mode1", "mode2", "wall"):
             axes[name].set_xlabel("time (s)")
-        more: list[Line2D | Patch] = [Line2D([], [], color=ERRORS[1], linewidth=1.3, label="wall")]
+        more: list[Line2D | Patch] = [
+            Line2D([], [], color=ERROR_COLORS[1], linewidth=1.3, label="wall")
+        ]
         if is_limited:
             more.append(system_figure.limit_entry("limit of the motor"))
         if attached.any():
@@ -83,7 +85,7 @@ def _draw_motor(axes: dict[str, Axes], ssp: Ssp, outcome: Outcome, joint: int) -
 
 
 def _draw_mode(axes: Axes, times: np.ndarray, mode: np.ndarray, joint: int) -> None:
-    axes.step(times, mode, where="post", color=RUN, linewidth=1.0)
+    axes.step(times, mode, where="post", color=RUN_COLOR, linewidth=1.0)
     axes.set_ylim(-1.4, 2.4)
     axes.set_yticks(list(MODES), list(MODES.values()))
     axes.set_title(f"friction of joint {joint}", loc="left", fontsize=11)

@@ -6,7 +6,7 @@ communication points ("held"), or is a straight line between them ("extrapolated
 which acts as a negative damping; from a damping of the wall on, the motion dies out.
 models/rp_environment/stability.md derives what is calculated here.
 
-`order` and `inputs` are those of rparm/coupling/master.py. In Gauss-Seidel order with extrapolated
+`order` and `inputs` are those of rparm/systems/master.py. In Gauss-Seidel order with extrapolated
 inputs the mass steps first; with held inputs either may.
 """
 

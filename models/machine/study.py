@@ -1,4 +1,4 @@
-"""What rparm asks of this folder, by the names of rparm/system/study.py: measures, picture."""
+"""Measures and pictures of this system: the names of `Study` in rparm/systems/comparison.py."""
 
 import numpy as np
 from rparm.models.machine.experiment import START, STEPS_PER_SECOND, STOP
@@ -6,8 +6,7 @@ from rparm.models.machine.machine_figure import ARM
 from rparm.models.machine.machine_figure import figure as figure
 from rparm.models.system_figure import tracking_error
 
-from rparm.system.comparison import Outcome
-from rparm.system.study import Diagram, Measure, Rest
+from rparm.systems.comparison import Diagram, Measure, Outcome, Rest
 
 EXPERIMENT = (START, STOP, 1 / STEPS_PER_SECOND)
 

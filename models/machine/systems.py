@@ -10,9 +10,8 @@ import numpy as np
 from lxml import etree
 
 from rparm.fmi.model import Model, Value
-from rparm.system import ecos, ssp
-from rparm.system.ssp import Ssp
-from rparm.system.structure import Connection
+from rparm.systems import ecos, ssp
+from rparm.systems.ssp import Connection, Ssp
 
 STRUCTURE = "SystemStructure.ssd"
 VARIANT = "changed"

@@ -21,11 +21,11 @@ from rparm.models.machine.stability import Contact, exact_least_damping, least_d
 from rparm.models.machine.systems import SEQUENCE, direct, run_in_ecos, write_system
 
 from rparm import project
-from rparm.coupling.master import Master
 from rparm.fmi.fmu_file import Fmu
-from rparm.report.style import ERRORS, RUN, STYLE, save
-from rparm.system import ssp
-from rparm.system.ssp import Ssp
+from rparm.report.pages import ERROR_COLORS, RUN_COLOR, STYLE, save_figure
+from rparm.systems import ssp
+from rparm.systems.master import Master
+from rparm.systems.ssp import Ssp
 
 FOLDER = Path(__file__).resolve().parent
 
@@ -121,7 +121,7 @@ def draw(measured: Mapping[str, list[float]], in_engine: list[float]) -> Figure:
         picture = Figure(figsize=(9, 6), layout="constrained")
         axes = picture.subplots()
         line = np.geomspace(0.8 * STIFFNESSES[0], 1.25 * STIFFNESSES[-1], 60)
-        for color, (order, inputs) in zip((RUN, *ERRORS[:3]), CASES, strict=True):
+        for color, (order, inputs) in zip((RUN_COLOR, *ERROR_COLORS[:3]), CASES, strict=True):
             name = f"{order.replace('_', '-').title()}, inputs {inputs}"
             contacts = [Contact(MASS, k) for k in line]
             theory = [least_damping(c, STEP, order, inputs) for c in contacts]
@@ -131,7 +131,7 @@ def draw(measured: Mapping[str, list[float]], in_engine: list[float]) -> Figure:
             points = measured[f"{order}, {inputs}"]
             axes.loglog(STIFFNESSES, points, "o", color=color, markersize=7)
         axes.loglog(
-            STIFFNESSES, in_engine, "s", color="none", markeredgecolor=RUN, markersize=13,
+            STIFFNESSES, in_engine, "s", color="none", markeredgecolor=RUN_COLOR, markersize=13,
             label="measured in Ecos",
         )  # fmt: skip
         axes.loglog([], [], "o", color="#6b7885", label="measured under rparm's master")
@@ -162,7 +162,7 @@ def main() -> None:
                 measured[f"{order}, {inputs}"].append(found)
                 print(f"{stiffness:g} N/m, {order}, {inputs}: {found:.5g}, theory {theory:.5g}")
             print(f"{stiffness:g} N/m, Ecos: {in_engine[-1]:.5g}")
-    save(draw(measured, in_engine), FOLDER / "wall_limit.png")
+    save_figure(draw(measured, in_engine), FOLDER / "wall_limit.png")
 
 
 if __name__ == "__main__":

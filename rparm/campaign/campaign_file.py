@@ -22,8 +22,8 @@ from pydantic import (
 )
 
 from rparm.errors import UserError, WrongValueError, hint
-from rparm.expressions.evaluation import Expression, parsed
-from rparm.input_files import read_toml, show
+from rparm.expressions.expression import Expression, parsed
+from rparm.files import read_toml, show
 from rparm.units import SECONDS, quantity
 
 MAX_RUNS = 10**9
@@ -37,7 +37,7 @@ LONGEST_NAME = 100
 Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME)]
 Title = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
 Text = Annotated[str, Field(min_length=1, max_length=2000)]
-Quantity = FiniteFloat | str  # a text has a unit: `rparm.campaign.quantities` makes numbers of all
+Quantity = FiniteFloat | str  # a text has a unit: `rparm.campaign.bases` makes numbers of all
 Pair = Annotated[list[Quantity], Field(min_length=2, max_length=2)]
 Number = FiniteFloat | bool | str
 

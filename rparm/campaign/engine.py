@@ -1,32 +1,54 @@
-"""Hands the blocks of a campaign to workers of Dask, and keeps what comes back.
+"""Hands the blocks of a campaign to workers of Dask, here or elsewhere, and keeps what comes back.
 
-A worker gets the FMUs and the job once, as a plugin, also if it starts later or again. A block is
-one task. Few are under way at a time, so that the scheduler's memory does not grow with the
-campaign. Only this process writes results: workers need no common disk.
+A block is one task. Few are under way at a time, so that the scheduler's memory does not grow with
+the campaign. Only this process writes results: workers need no common disk.
+
+Who can talk to Dask's processes runs code as their user. Those of this machine listen on loopback,
+where its other users are too, so they talk by TLS with a certificate that only they have. For a
+scheduler elsewhere, certificates are the user's.
 """
 
+import logging
+import multiprocessing.resource_tracker
+import os
+import signal
+import ssl
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
+from pathlib import Path
 from uuid import uuid4
 from weakref import WeakSet
 
+import dask
 import numpy as np
-from distributed import Client, Future, as_completed
+from dask.system import CPU_COUNT
+from distributed import (
+    Client,
+    Future,
+    Nanny,
+    Scheduler,
+    Security,
+    SpecCluster,
+    Worker,
+    as_completed,
+)
 from distributed.client import ClosedClientError, FutureCancelledError, WorkerStartTimeoutError
+from distributed.core import Status
 from distributed.scheduler import KilledWorker
 from tornado.ioloop import PeriodicCallback
 
 from rparm.campaign.campaign_file import Campaign
-from rparm.campaign.cluster import WAIT
 from rparm.campaign.job import Job
-from rparm.campaign.points import Points
+from rparm.campaign.planning import Points
 from rparm.campaign.results import RESUMES, Results
-from rparm.campaign.runs import Rows
-from rparm.campaign.worker import Plugin, run_block
-from rparm.errors import UserError, one_line
+from rparm.campaign.runs import Plugin, Rows, run_block
+from rparm.errors import UserError, one_line, placed, reason
+from rparm.files import check_regular
+from rparm.interruption import uninterrupted
 
 AHEAD = 3  # blocks under way for each thread of a worker
 COUNT_EVERY = 5000  # ms, between two looks at how many threads there are
@@ -36,6 +58,25 @@ FAREWELL = 5  # s, for workers to remove what they have got
 CONNECTION = (OSError, FutureCancelledError, ClosedClientError)
 GONE = "the scheduler is gone"
 DIED = "the worker died in this run"
+LOCAL = "127.0.0.1"
+KILLS = 5  # workers that may die in a task before it counts as failed
+RESTART_EVERY = 2000  # ms
+WAIT = 60  # s, for workers to start
+SETTINGS = {
+    "distributed.scheduler.allowed-failures": KILLS,
+    "distributed.comm.timeouts.connect": "20s",
+    # what watches workers many times a second takes three per cent of a core, for nothing here
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "500ms",
+    "distributed.worker.memory.monitor-interval": "1s",
+    "distributed.worker.memory.terminate": False,  # the system decides when memory is short
+}
+TLS = "tls://"
+OPTIONS = ("--tls-ca", "--tls-cert", "--tls-key")
+EXPECTED = "an address as tls://192.168.0.1:8786"
+
+
+# ---- Blocks --------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -189,3 +230,192 @@ def _joined(parts: Sequence[Rows]) -> Rows:
         [failure for part in parts for failure in part.failures],
         {run: record for part in parts for run, record in part.trajectories.items()},
     )
+
+
+# ---- The cluster ---------------------------------------------------------------------------------
+
+
+@contextmanager
+def opened_cluster(
+    scheduler: str | None,
+    workers: int | None,
+    folder: Path,
+    security: Security | None = None,
+    dashboard: bool = False,
+) -> Iterator[Client]:
+    """A cluster's client; UserError if the scheduler cannot be reached.
+
+    Without the address of a scheduler that runs elsewhere, and certificates for it, the cluster is
+    made on this machine: `workers` processes, by default one per core, with their files in
+    `folder`. There, Dask shows its pages (`dashboard`) to all users, who can change nothing.
+    """
+    logging.disable(logging.CRITICAL)  # what is wrong is said by the errors that are raised here
+    try:
+        with dask.config.set(SETTINGS):
+            start = (
+                _connected(scheduler, security)
+                if scheduler
+                else _local(workers or CPU_COUNT, folder, dashboard)
+            )
+            with start as client:
+                yield client
+    finally:
+        logging.disable(logging.NOTSET)
+
+
+@contextmanager
+def _connected(address: str, security: Security | None) -> Iterator[Client]:
+    try:
+        client = Client(address, timeout=20, security=security)
+    except (TimeoutError, OSError, ValueError, RuntimeError) as error:
+        raise UserError(f"{address}: the scheduler cannot be reached: {one_line(error)}") from None
+    with client:
+        yield client
+
+
+# ---- On this machine -----------------------------------------------------------------------------
+class _NoPages:
+    """A scheduler or worker without the HTTP server that Dask always starts."""
+
+    def start_http_server(self, *_: object, **__: object) -> None:
+        pass
+
+
+class _Scheduler(_NoPages, Scheduler):
+    pass
+
+
+class _Worker(_NoPages, Worker):
+    pass
+
+
+@contextmanager
+def _local(count: int, folder: Path, dashboard: bool) -> Iterator[Client]:
+    security = Security.temporary()
+    common = {"host": LOCAL, "protocol": "tls://", "security": security}
+    scheduler = {
+        "cls": Scheduler if dashboard else _Scheduler,
+        "options": {
+            **common,
+            "dashboard": dashboard,
+            "dashboard_address": f"{LOCAL}:0" if dashboard else None,
+        },
+    }
+    worker = {
+        "cls": Nanny,
+        "options": {
+            **common,
+            "worker_class": _Worker,
+            "nthreads": 1,
+            "memory_limit": 1 / count,  # share of the machine's memory
+            "local_directory": str(folder),
+            "silence_logs": logging.CRITICAL,
+        },
+    }
+    with ExitStack() as stack:
+        with uninterrupted():  # a cluster that is half made cannot be closed
+            # without workers at first: one that dies while it starts would end the cluster
+            try:
+                made = SpecCluster(
+                    scheduler=scheduler,
+                    worker=worker,
+                    security=security,
+                    silence_logs=logging.CRITICAL,
+                )
+            except RuntimeError as error:  # it waits for a connection until it gives up
+                raise UserError(
+                    f"the campaign's processes cannot connect at {LOCAL}: {one_line(error)}"
+                ) from error
+            client = stack.enter_context(Client(stack.enter_context(made)))
+        made.sync(_keep_signals_from_children)
+        keeper = PeriodicCallback(partial(_keep_workers, made, count), RESTART_EVERY)
+        stack.callback(made.loop.add_callback, keeper.stop)
+        made.loop.add_callback(keeper.start)
+        made.scale(count)
+        with suppress(TimeoutError):  # the campaign begins with those that are there
+            client.wait_for_workers(count, timeout=WAIT)
+        yield client
+
+
+async def _keep_signals_from_children() -> None:
+    """Block signals of the terminal in this thread, for all processes that it will start."""
+    if hasattr(signal, "pthread_sigmask"):
+        block = partial(signal.pthread_sigmask, signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
+        block()
+        multiprocessing.resource_tracker.ensure_running()  # unblocks SIGINT again
+        block()
+
+
+def _keep_workers(made: SpecCluster, count: int) -> None:
+    """Replace workers that died while starting; nannies restart the others."""
+    for name, nanny in list(made.workers.items()):
+        if nanny.status in (Status.failed, Status.closed):
+            del made.workers[name]
+    made.scale(count)
+
+
+# ---- Certificates --------------------------------------------------------------------------------
+
+
+def security_for(
+    address: str, ca: Path | None, cert: Path | None, key: Path | None
+) -> Security | None:
+    """What a client of the scheduler at `address` needs; None for one without certificates.
+
+    Files in PEM form: the certificate of the authority that signs all others, and the client's own
+    with its private key; without them, those of Dask's configuration. UserError if they do not fit
+    the address or cannot be used.
+    """
+    given = dict(zip(OPTIONS, (ca, cert, key), strict=True))
+    named = [option for option, path in given.items() if path is not None]
+    if not address.startswith(TLS):
+        if named:
+            raise UserError(f"{named[0]}: {address} takes no certificates, expected {EXPECTED}")
+        return None
+    if not named:
+        return _configured_security(address)
+    if len(named) < len(OPTIONS):
+        missing = ", ".join(option for option in OPTIONS if option not in named)
+        raise UserError(f"{missing}: missing, {address} needs {', '.join(OPTIONS)}")
+    _check_credentials(ca, cert, key)
+    return Security(
+        require_encryption=True,
+        tls_ca_file=str(ca),
+        tls_client_cert=str(cert),
+        tls_client_key=str(key),
+    )
+
+
+def _configured_security(address: str) -> Security:
+    made = Security(require_encryption=True)
+    ca, cert, key = made.tls_ca_file, made.tls_client_cert, made.tls_client_key
+    if not ca or not cert:
+        raise UserError(
+            f"{address}: needs certificates: {', '.join(OPTIONS)}, or those of Dask's configuration"
+        )
+    if not any("\n" in text for text in (ca, cert, key or "")):  # else not files, but their text
+        _check_credentials(Path(ca), Path(cert), Path(key or cert))
+    return made
+
+
+def _check_credentials(ca: Path, cert: Path, key: Path) -> None:
+    """Load the files as Dask does, but never ask for a password on the terminal."""
+    for path in (ca, cert, key):
+        try:
+            with placed(path):
+                check_regular(path)
+            os.close(os.open(path, os.O_RDONLY))
+        except OSError as error:
+            raise UserError(f"{path}: cannot be read: {reason(error)}") from None
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    try:
+        context.load_verify_locations(ca)
+    except OSError:
+        raise UserError(f"{ca}: is not the certificate of an authority in PEM form") from None
+    try:
+        context.load_cert_chain(cert, key, password=lambda: "")
+    except OSError:
+        raise UserError(
+            f"{cert}, {key}: are not a certificate and its private key without a password, in PEM "
+            "form"
+        ) from None

@@ -1,13 +1,144 @@
-"""What workers need for the runs of a campaign: one picklable object, made from FMUs and a file."""
+"""The job of a campaign: one picklable object with all that workers need, and what they measure.
 
-from collections.abc import Mapping
+Measures are numbers of what was recorded in a run. Sums are made in compiled code, in the order of
+time: numpy's order depends on the processor.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
-from rparm.campaign.measures import Measure
-from rparm.fmi.compiled.loop import Part
+from rparm.fmi.compiled_loop import Part
 from rparm.fmi.model import Value
+
+PLAIN = ("start", "final", "minimum", "maximum", "rms", "integral")  # of one variable
+LYAPUNOV = "lyapunov"
+FINAL_INTEGER = "final_integer"
+
+
+# ---- Measures ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What a run has recorded."""
+
+    times: np.ndarray  # (n + 1,) s
+    values: np.ndarray  # (n + 1, variables) in their units
+    growth: np.ndarray  # (n,): by how much each step lengthens a small deviation, if one is carried
+    integers: Sequence[int] = ()  # (integers,) at the end
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A number of a run, and the column of the table that it is in."""
+
+    column: str
+    variables: tuple[str, ...]  # that it needs; pairs of them one after the other for tracking
+    kind: str
+    options: tuple[float, ...] = ()
+
+    def value(self, recorded: Recorded, columns: Sequence[int]) -> float:
+        """The number; `columns` of the variables, in `values` or `integers`."""
+        times, rows = recorded.times, recorded.values
+        if self.kind == LYAPUNOV:
+            return _log_sum(recorded.growth) / (times[-1] - times[0])
+        if self.kind == FINAL_INTEGER:
+            return float(recorded.integers[columns[0]])
+        if self.kind in ("largest_distance", "rms_distance"):
+            pairs = np.array(columns).reshape(-1, 2)
+            distance = _distance(rows, pairs[:, 0], pairs[:, 1])
+            largest = self.kind == "largest_distance"
+            return float(np.max(distance)) if largest else _rms(times, distance)
+        values = rows[:, columns[0]]
+        match self.kind:
+            case "start" | "final":
+                return float(values[0 if self.kind == "start" else -1])
+            case "minimum" | "maximum":
+                return float((np.min if self.kind == "minimum" else np.max)(values))
+            case "rms":
+                return _rms(times, values)
+            case "integral":
+                return _integral(times, values)
+            case "settling":
+                return _settling(times, values, *self.options)
+            case "crossings":
+                return float(_crossings(values, *self.options))
+        raise AssertionError(self.kind)
+
+
+def plain(kind: str, variable: str) -> Measure:
+    """One of `PLAIN` of a variable."""
+    return Measure(f"{kind}({variable})", (variable,), kind)
+
+
+def final_integer(variable: str) -> Measure:
+    """Value of an Integer at the end."""
+    return Measure(f"final({variable})", (variable,), FINAL_INTEGER)
+
+
+@njit(cache=True, nogil=True)
+def _integral(times, values):
+    """Integral over time by the trapezoidal rule."""
+    total = 0.0
+    for i in range(len(times) - 1):
+        total += 0.5 * (times[i + 1] - times[i]) * (values[i] + values[i + 1])
+    return total
+
+
+@njit(cache=True, nogil=True)
+def _rms(times, values):
+    """Root of the mean square over time."""
+    return np.sqrt(_integral(times, values * values) / (times[-1] - times[0]))
+
+
+@njit(cache=True, nogil=True)
+def _distance(rows, first, second):
+    """Distance (n + 1,) of the points whose coordinates are the columns `first` and `second`."""
+    result = np.empty(len(rows))
+    for i in range(len(rows)):
+        total = 0.0
+        for k in range(len(first)):
+            difference = rows[i, first[k]] - rows[i, second[k]]
+            total += difference * difference
+        result[i] = np.sqrt(total)
+    return result
+
+
+@njit(cache=True, nogil=True)
+def _settling(times, values, target, band):
+    """Time since the start from which on values stay within the band; NaN: they end outside."""
+    for i in range(len(values) - 1, -1, -1):
+        if not abs(values[i] - target) <= band:
+            return times[i + 1] - times[0] if i + 1 < len(values) else np.nan
+    return 0.0
+
+
+@njit(cache=True, nogil=True)
+def _crossings(values, level):
+    """How often the level is crossed upwards."""
+    count = 0
+    for i in range(len(values) - 1):
+        if values[i] < level <= values[i + 1]:
+            count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _log_sum(growth):
+    """Sum of the logarithms; factors are multiplied as far as they go, which rounds less."""
+    total, product = 0.0, 1.0
+    for factor in growth:
+        product *= factor
+        if not 1e-100 < product < 1e100:
+            total += np.log(product)
+            product = 1.0
+    return total + np.log(product)
+
+
+# ---- The job -------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

@@ -1,22 +1,44 @@
 """The page of a campaign: distributions, worst cases, Sobol' indices, maps, failures."""
 
 import json
-from collections.abc import Iterable, Mapping
+import math
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from textwrap import fill
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from SALib.analyze import sobol
 
-from rparm.campaign import analysis, figures
-from rparm.campaign.analysis import Index
 from rparm.campaign.campaign_file import Campaign
-from rparm.campaign.job import Job
-from rparm.campaign.measures import LYAPUNOV
-from rparm.campaign.planning import FAILURE, RUN
+from rparm.campaign.job import LYAPUNOV, Job
+from rparm.campaign.planning import FAILURE, RUN, sampling_problem
 from rparm.campaign.results import MANIFEST, Results
-from rparm.report import assets
-from rparm.report.pages import INDEX, Command, Table, write_page
-from rparm.report.style import save
+from rparm.report import pages
+from rparm.report.pages import (
+    ERROR_COLORS,
+    INDEX,
+    MUTED,
+    RUN_COLOR,
+    STYLE,
+    Command,
+    Table,
+    save_figure,
+    write_page,
+)
+from rparm.units import minus
 
+QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
+WORST = 10  # runs that are listed
+RESAMPLES = 1000  # of the bootstrap
+CONFIDENCE = 0.95
+NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\.?\d[\d.]*(?:[eE][-+]?\d+)?|(?:inf|nan)\b)")
 MOST = 10**7  # runs, whose table is held in memory
 DRAWN = 24  # columns in a picture at most
 LISTED = 10  # reasons of failed runs at most
@@ -26,6 +48,91 @@ NO_VALUE = {
     "settling": "does not settle",
     LYAPUNOV: "has no value, as a discrete output changes (an impact, friction that holds),",
 }
+BINS = 50
+COLUMNS = 3
+LONGEST_LINE = 40  # characters of a label below a column
+FEWEST = 6  # of these, below many bars
+COLOURS = "viridis"  # in order of brightness, also for the colour-blind
+NARROW = (
+    1e-3  # of a value: what varies less is drawn as a difference, which short numbers can write
+)
+# names are those of a user's file: no mathematics
+TEXTS = STYLE | {"text.parse_math": False}
+
+
+# ---- Statistics of the table ---------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Runs that have failed for the same reason, whatever numbers it has."""
+
+    reason: str  # of the first one
+    count: int
+    run: int  # the first one
+
+
+@dataclass(frozen=True)
+class Index:
+    """Sobol' indices of a parameter, with half the width of their confidence intervals."""
+
+    parameter: str
+    first: float
+    first_confidence: float
+    total: float
+    total_confidence: float
+
+
+def quantiles(values: np.ndarray) -> list[float]:
+    """Quantiles of the numbers in `values`, (runs,); NaN if there are none."""
+    numbers = values[np.isfinite(values)]
+    return np.quantile(numbers, QUANTILES).tolist() if len(numbers) else [np.nan] * len(QUANTILES)
+
+
+def worst(values: np.ndarray) -> list[int]:
+    """Numbers of the runs with the largest of `values`, (runs,), the largest first."""
+    numbers = np.flatnonzero(np.isfinite(values))
+    order = np.argsort(-values[numbers], kind="stable")
+    return numbers[order[:WORST]].tolist()
+
+
+def failures(reasons: Iterable[str]) -> list[Failure]:
+    """Reasons of the runs that failed, the most frequent first."""
+    counts: Counter[str] = Counter()
+    firsts: dict[str, tuple[str, int]] = {}
+    for run, reason in enumerate(reasons):
+        if reason:
+            kind = NUMBER.sub("0", reason)
+            counts[kind] += 1
+            firsts.setdefault(kind, (reason, run))
+    ordered = ((firsts[kind], count) for kind, count in counts.most_common())
+    return [Failure(reason, count, run) for (reason, run), count in ordered]
+
+
+def saltelli_groups(campaign: Campaign, values: np.ndarray) -> np.ndarray:
+    """Rows of runs (groups, parameters + 2) that belong together, without incomplete ones."""
+    rows = values.reshape(-1, len(campaign.parameters) + 2)
+    return rows[np.isfinite(rows).all(axis=1)]
+
+
+def sobol_indices(campaign: Campaign, values: np.ndarray) -> list[Index]:
+    """First-order and total Sobol' indices of `values`, (runs,); none if too few runs have any."""
+    rows = saltelli_groups(campaign, values)
+    if len(rows) < 2 or np.ptp(rows) == 0:
+        return []
+    found: Mapping[str, np.ndarray] = sobol.analyze(
+        sampling_problem(campaign),
+        rows.ravel(),
+        calc_second_order=False,
+        num_resamples=RESAMPLES,
+        conf_level=CONFIDENCE,
+        seed=campaign.seed,
+    )
+    rows = np.column_stack([found[key] for key in ("S1", "S1_conf", "ST", "ST_conf")])
+    return [Index(name, *row) for name, row in zip(campaign.parameters, rows.tolist(), strict=True)]
+
+
+# ---- The page ------------------------------------------------------------------------------------
 
 
 class Page:
@@ -43,14 +150,14 @@ class Page:
         self.table = results.table([*results.columns, FAILURE])
         self.kept = {measure.column: self.table[measure.column] for measure in job.measures}
         self.labels = {name: f"{name} [{unit}]" if unit else name for name, unit in units.items()}
-        self.failures = analysis.failures(self.table[FAILURE].tolist())
+        self.failures = failures(self.table[FAILURE].tolist())
         self.failed = sum(failure.count for failure in self.failures)
 
     def write(self, digest: str) -> Path:
         """Write the page, on a table with this digest; its path."""
         manifest = json.loads((self.folder / MANIFEST).read_text(encoding="utf-8"))
         found = self.indices()
-        assets.write(self.folder)
+        pages.write_assets(self.folder)
         return write_page(
             self.folder / INDEX,
             "campaign.html",
@@ -91,11 +198,11 @@ class Page:
         if not there:
             return None
         drawn, note = self.drawn(there)
-        picture = figures.distributions({self.labels[name]: self.kept[name] for name in drawn})
-        save(picture, self.folder / "distributions.png")
+        picture = distributions_figure({self.labels[name]: self.kept[name] for name in drawn})
+        save_figure(picture, self.folder / "distributions.png")
         head = ["kept", "smallest", "5 %", "median", "95 %", "largest", "runs without a value"]
         rows = [
-            [self.labels[name], *map(_rounded, analysis.quantiles(values)), _lacking(values)]
+            [self.labels[name], *map(_rounded, quantiles(values)), _lacking(values)]
             for name, values in self.kept.items()
         ]
         return Table("Distributions", head, rows, note)
@@ -115,7 +222,7 @@ class Page:
     def indices(self) -> dict[str, list[Index]]:
         if self.campaign.sampling != "indices":
             return {}
-        found = {name: analysis.indices(self.campaign, x) for name, x in self.kept.items()}
+        found = {name: sobol_indices(self.campaign, x) for name, x in self.kept.items()}
         return {name: rows for name, rows in found.items() if rows}
 
     def indices_table(self, found: Mapping[str, list[Index]]) -> Table | None:
@@ -123,8 +230,8 @@ class Page:
         if not found:
             return None
         drawn, note = self.drawn(found)
-        picture = figures.indices({self.labels[name]: found[name] for name in drawn})
-        save(picture, self.folder / "indices.png")
+        picture = indices_figure({self.labels[name]: found[name] for name in drawn})
+        save_figure(picture, self.folder / "indices.png")
         head = ["kept", "parameter", "first order", "±", "total", "±", "groups of runs"]
         rows = [
             [
@@ -132,7 +239,7 @@ class Page:
                 row.parameter,
                 *(f"{x:.3f}" for x in (row.first, row.first_confidence)),
                 *(f"{x:.3f}" for x in (row.total, row.total_confidence)),
-                len(analysis.groups(self.campaign, self.kept[name])),
+                len(saltelli_groups(self.campaign, self.kept[name])),
             ]
             for name, rows in found.items()
             for row in rows
@@ -144,7 +251,7 @@ class Page:
         if self.campaign.sampling != "indices":
             return []
         texts = []
-        groups = {name: len(analysis.groups(self.campaign, self.kept[name])) for name in found}
+        groups = {name: len(saltelli_groups(self.campaign, self.kept[name])) for name in found}
         if any(count < self.campaign.runs for count in groups.values()):
             texts.append(
                 f"There are {self.campaign.runs} groups of runs. One is left out where a run of it "
@@ -173,7 +280,7 @@ class Page:
                 *(_rounded(self.table[name][run]) for name in (column, *names)),
                 self.command(run),
             ]
-            for run in analysis.worst(self.table[column])
+            for run in worst(self.table[column])
         ]
         return Table(f"Largest {column}", head, rows)
 
@@ -195,7 +302,7 @@ class Page:
         there = int(np.isfinite(columns).all(axis=0).sum())
         if there:
             labels = [self.labels[name] for name in (drawn.x, drawn.y, drawn.colour)]
-            save(figures.heat_map(labels, *columns), self.folder / f"map_{number}.png")
+            save_figure(heat_map_figure(labels, *columns), self.folder / f"map_{number}.png")
         return drawn, [self.labels[name] for name in names], there
 
 
@@ -205,3 +312,110 @@ def _rounded(value: float) -> float | str:
 
 def _lacking(values: np.ndarray) -> int:
     return int((~np.isfinite(values)).sum())
+
+
+# ---- Pictures ------------------------------------------------------------------------------------
+
+
+def distributions_figure(table: Mapping[str, np.ndarray]) -> Figure:
+    """Histograms of columns, (runs,) each, by their labels."""
+    rows = math.ceil(len(table) / COLUMNS)
+    with mpl.rc_context(TEXTS):
+        figure = Figure(figsize=(11, 2.6 * rows), layout="constrained")
+        axes = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
+        for one, (label, values) in zip(axes, table.items(), strict=False):
+            _histogram(one, values[np.isfinite(values)], label)
+        for one in axes[len(table) :]:
+            one.set_visible(False)
+        return figure
+
+
+def _histogram(axes: Axes, values: np.ndarray, label: str) -> None:
+    """A histogram of one number or more; a text if they do not vary, or too much to be drawn."""
+    smallest, largest = float(values.min()), float(values.max())
+    if 0 < largest - smallest < math.inf:
+        values, label = _centred(values, label)
+        axes.hist(values, bins=BINS, color=RUN_COLOR)
+        axes.xaxis.set_major_locator(MaxNLocator(4))
+        axes.xaxis.set_major_formatter(_tick)
+        axes.yaxis.set_major_locator(MaxNLocator(5, integer=True))
+    else:
+        ends = f"from {smallest:g} to {largest:g}" if smallest < largest else f"{smallest:g}"
+        axes.text(0.5, 0.5, f"all runs: {ends}", transform=axes.transAxes, ha="center")
+        axes.set_xticks([])
+        axes.set_yticks([])
+    axes.set_xlabel(fill(label, LONGEST_LINE))
+    axes.set_ylabel("runs")
+
+
+def _centred(values: np.ndarray, label: str) -> tuple[np.ndarray, str]:
+    """Values as differences from one of them, rounded, if they vary little; and their label."""
+    there = values[np.isfinite(values)]
+    middle = float(np.median(there))
+    spread = float(np.max(there) - np.min(there))
+    if not 0 < spread < NARROW * abs(middle):
+        return values, label
+    texts = (f"{middle:.{digits}g}" for digits in range(1, 18))
+    text = next(text for text in texts if abs(float(text) - middle) <= spread)
+    sign = "+" if text.startswith("-") else "\N{MINUS SIGN}"
+    return values - float(text), f"{label} {sign} {minus(text.lstrip('-'))}"
+
+
+def _tick(value: float, _: int) -> str:
+    """A number with its exponent, for which there is no room at the end of a short axis."""
+    return minus(f"{value:g}")
+
+
+def indices_figure(found: Mapping[str, Sequence[Index]]) -> Figure:
+    """Sobol' indices of columns as bars, with their confidence intervals, by their labels."""
+    with mpl.rc_context(TEXTS):
+        figure = Figure(figsize=(11, 2.8 * len(found)), layout="constrained")
+        axes = figure.subplots(len(found), 1, squeeze=False)[:, 0]
+        for one, (label, rows) in zip(axes, found.items(), strict=True):
+            middle = np.arange(len(rows))
+            kinds = (
+                ("first order", [x.first for x in rows], [x.first_confidence for x in rows]),
+                ("total", [x.total for x in rows], [x.total_confidence for x in rows]),
+            )
+            for i, (kind, values, half) in enumerate(kinds):
+                one.bar(
+                    middle + 0.36 * (i - 0.5),
+                    values,
+                    0.34,
+                    yerr=half,
+                    color=(RUN_COLOR, ERROR_COLORS[0])[i],
+                    ecolor=MUTED,
+                    capsize=4,
+                    label=kind,
+                )
+            width = max(COLUMNS * LONGEST_LINE // len(rows), FEWEST)
+            one.set_xticks(middle, [fill(row.parameter, width) for row in rows])
+            one.set_ylabel("Sobol' index")
+            one.set_title(label, loc="left")
+            one.legend()
+        return figure
+
+
+def heat_map_figure(
+    labels: Sequence[str], x: np.ndarray, y: np.ndarray, colour: np.ndarray
+) -> Figure:
+    """Columns (runs,): cells where x and y form a grid, else points; of complete runs only."""
+    there = np.isfinite([x, y, colour]).all(axis=0)
+    with mpl.rc_context(TEXTS):
+        figure = Figure(figsize=(10, 7), layout="constrained")
+        axes = figure.subplots()
+        centred = (_centred(*column) for column in zip((x, y, colour), labels, strict=True))
+        (x, y, colour), labels = zip(*centred, strict=True)
+        xs, ys = np.unique(x), np.unique(y)
+        is_grid = min(len(xs), len(ys)) > 1 and np.isfinite([*xs, *ys]).all()
+        if is_grid and len(xs) * len(ys) == len(x) == len(set(zip(x, y, strict=True))):
+            cells = np.full((len(ys), len(xs)), np.nan)
+            cells[np.searchsorted(ys, y), np.searchsorted(xs, x)] = colour
+            shown = axes.pcolormesh(xs, ys, cells, cmap=COLOURS, shading="nearest")
+        else:
+            shown = axes.scatter(x[there], y[there], c=colour[there], cmap=COLOURS, s=14)
+        axes.grid(False)
+        axes.set_xlabel(labels[0])
+        axes.set_ylabel(labels[1])
+        figure.colorbar(shown, ax=axes).set_label(labels[2])
+        return figure

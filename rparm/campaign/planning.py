@@ -1,30 +1,45 @@
-"""Checks a campaign against its scenario or system, and turns it into a job."""
+"""Checks a campaign against its scenario or system, turns it into a job, and draws its points.
+
+Parameters of each run are points of the unit cube, by scipy and SALib, through distributions. They
+depend only on the campaign's text, so that each block can be made by itself.
+"""
 
 import math
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from functools import cached_property
 from typing import NoReturn
 
 import numpy as np
+from SALib.sample import sobol as saltelli
+from scipy import special
+from scipy.stats import qmc
 
 from rparm.campaign.bases import Base, ScenarioBase
-from rparm.campaign.campaign_file import Campaign, Distribution
-from rparm.campaign.job import Component, Job, Target
-from rparm.campaign.measures import (
+from rparm.campaign.campaign_file import WHOLE, Campaign, Distribution, grid_value
+from rparm.campaign.job import (
     FINAL_INTEGER,
     LYAPUNOV,
     PLAIN,
+    Component,
+    Job,
     Measure,
+    Target,
     final_integer,
     plain,
 )
 from rparm.errors import UserError, WrongValueError, did_you_mean, hint, one_line, placed
-from rparm.expressions.evaluation import Expression
+from rparm.expressions.expression import Expression
 from rparm.fmi.model import INPUTS, TOLERANCE, Value, Variable
-from rparm.texts import unit
+from rparm.units import unit
 
 RUN, FAILURE = "run", "failure"  # columns of every table
 MAX_RECORDED = 100_000_000  # numbers that a run records
+SMALLEST = 2.0**-54  # a normal distribution is cut there, where its values are still finite
+
+
+# ---- The job -------------------------------------------------------------------------------------
 
 
 def plan(campaign: Campaign, base: Base, where: object, also: Sequence[str] = ()) -> Job:
@@ -298,3 +313,115 @@ def constants(campaign: Campaign, base: Base) -> dict[str, float]:
         for name, value in known.items()
         if isinstance(value, int | float) and math.isfinite(value)
     }
+
+
+# ---- Points --------------------------------------------------------------------------------------
+
+
+class Sampler:
+    def __init__(self, campaign: Campaign) -> None:
+        self._campaign = campaign
+        self._distributions = list(campaign.parameters.values())
+
+    def points(self, runs: range) -> np.ndarray:
+        """Values of the parameters of consecutive runs, (runs, parameters)."""
+        if self._campaign.sampling == "grid":
+            return self._grid(runs)
+        cube = self._cube(runs)
+        columns = [sampled_values(d, cube[:, i]) for i, d in enumerate(self._distributions)]
+        return np.column_stack(columns)
+
+    def _grid(self, runs: range) -> np.ndarray:
+        """The last parameter changes fastest."""
+        sizes = [d.size for d in self._distributions]
+        indices = np.unravel_index(np.arange(runs.start, runs.stop), sizes)
+        axes = zip(self._distributions, indices, strict=True)
+        return np.column_stack([[grid_value(d, i) for i in axis.tolist()] for d, axis in axes])
+
+    def _cube(self, runs: range) -> np.ndarray:
+        """Points of the unit cube, (runs, parameters)."""
+        sampling, seed = self._campaign.sampling, self._campaign.seed
+        size = len(self._distributions)
+        if sampling in WHOLE:
+            return self._whole[runs.start : runs.stop]
+        if sampling == "random":
+            generator = np.random.PCG64(seed).advance(runs.start * size)
+            return np.random.Generator(generator).random((len(runs), size))
+        sequence = self._sobol
+        if sequence.num_generated > runs.start:
+            sequence.reset()
+        if sequence.num_generated < runs.start:
+            sequence.fast_forward(runs.start - sequence.num_generated)
+        with warnings.catch_warnings():  # that their number should be a power of 2
+            warnings.simplefilter("ignore", UserWarning)
+            return sequence.random(len(runs))
+
+    @cached_property
+    def _sobol(self) -> qmc.Sobol:
+        """The next points of the sequence: blocks are asked for in their order."""
+        size = len(self._distributions)
+        return qmc.Sobol(size, scramble=True, rng=self._campaign.seed)
+
+    @cached_property
+    def _whole(self) -> np.ndarray:
+        """All points of the unit cube, (runs, parameters)."""
+        campaign, size = self._campaign, len(self._distributions)
+        if campaign.sampling == "latin":
+            return qmc.LatinHypercube(size, rng=campaign.seed).random(campaign.runs)
+        return saltelli.sample(
+            sampling_problem(campaign), campaign.runs, calc_second_order=False, seed=campaign.seed
+        )
+
+
+def sampling_problem(campaign: Campaign) -> dict[str, object]:
+    """The campaign's parameters as SALib wants them: each between 0 and 1."""
+    names = list(campaign.parameters)
+    return {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
+
+
+def sampled_values(distribution: Distribution, probabilities: np.ndarray) -> np.ndarray:
+    """Values of a distribution at `probabilities`, (n,)."""
+    numbers = distribution.numbers
+    match distribution.kind:
+        case "uniform":
+            return numbers[0] + (numbers[1] - numbers[0]) * probabilities
+        case "log_uniform":
+            low, high = np.log(numbers)
+            return np.exp(low + (high - low) * probabilities)
+        case "normal":
+            inside = np.clip(probabilities, SMALLEST, 1 - SMALLEST / 2)
+            return numbers[0] + numbers[1] * special.ndtri(inside)
+    indices = np.minimum((probabilities * len(numbers)).astype(int), len(numbers) - 1)
+    return np.array(numbers)[indices]
+
+
+class Points:
+    """Parameters and derived values of the runs; expressions may name `constants`."""
+
+    def __init__(self, campaign: Campaign, constants: dict[str, float]) -> None:
+        self._sampler, self._constants = Sampler(campaign), constants
+        self._parameters = list(campaign.parameters)
+        self._expressions = campaign.expressions
+        self.names = [*self._parameters, *self._expressions]
+
+    def of(self, runs: range) -> np.ndarray:
+        """Values (runs, names); NaN where an expression is not defined."""
+        given = self._sampler.points(runs)
+        if not self._expressions:
+            return given
+        return np.array([self._with_derived(row) for row in given.tolist()])
+
+    def _with_derived(self, row: list[float]) -> list[float]:
+        known = self._constants | dict(zip(self._parameters, row, strict=True))
+        result = list(row)
+        for name, expression in self._expressions.items():
+            try:
+                known[name] = expression.value(known)
+            except (ArithmeticError, ValueError):
+                known[name] = np.nan
+            result.append(known[name])
+        return result
+
+    def targets(self, points: np.ndarray, job: Job) -> np.ndarray:
+        """Columns of `points` that go to the job's targets, in their order."""
+        return points[:, [self.names.index(name) for name, _ in job.targets]]

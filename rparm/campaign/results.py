@@ -26,8 +26,8 @@ from rparm.campaign.job import Job
 from rparm.campaign.planning import FAILURE, RUN, columns_of
 from rparm.campaign.runs import Rows
 from rparm.errors import UserError, reason
+from rparm.files import check_writable, whole, written
 from rparm.interruption import temporary_folder
-from rparm.output_files import check_writable, whole, written
 
 MANIFEST, BLOCKS, TRAJECTORIES = "manifest.json", "blocks", "trajectories"
 PACKAGES = ("dask", "distributed", "fmpy", "numba", "numpy", "pyarrow", "SALib", "scipy")

@@ -1,4 +1,7 @@
-"""Makes runs of a job on a worker: a runner per thread, whose instances are reset between runs."""
+"""Runs of a job on a worker: a runner per thread, whose instances are reset between runs.
+
+A worker of Dask gets FMUs and job once, as a plugin, also if it starts later or again.
+"""
 
 import threading
 from collections.abc import Iterator, Mapping, Sequence
@@ -8,12 +11,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from distributed import Worker, WorkerPlugin, get_worker
 
-from rparm.campaign.job import Job, Target
-from rparm.campaign.measures import Recorded
+from rparm.campaign.job import Job, Recorded, Target
 from rparm.errors import UserError, one_line
-from rparm.fmi.compiled.loop import Tangent
-from rparm.fmi.compiled.stepper import Stepper
+from rparm.fmi.compiled_loop import Stepper, Tangent
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 
@@ -214,3 +216,54 @@ class Workshop:
             self._local.runner = Runner(self._job, self._fmus)
             self._runners.append(self._local.runner)
         return self._local.runner.rows(numbers, points)
+
+
+# ---- Workers of Dask -----------------------------------------------------------------------------
+
+
+class Plugin(WorkerPlugin):
+    """FMUs and job of a campaign on a worker, which may have those of others, too."""
+
+    def __init__(self, name: str, job: Job, archives: Mapping[str, bytes]) -> None:
+        self.name, self._job, self._archives = name, job, archives
+        self._workshop: Workshop | None = None
+        self._lock = threading.Lock()
+        self._users = 0  # the worker, and threads that make runs
+
+    def setup(self, worker: Worker) -> None:
+        """Unpack the FMUs beside the worker's own files."""
+        self._workshop = Workshop(self._job, self._archives, Path(worker.local_directory))
+        self._users = 1
+
+    def teardown(self, worker: Worker) -> None:
+        """Remove them, after the runs that are under way."""
+        if self._workshop is not None:
+            self._leave()
+
+    def rows(self, numbers: Sequence[int], points: np.ndarray) -> Rows:
+        with self._lock:
+            if not self._users:
+                raise RuntimeError("the campaign has ended")
+            self._users += 1
+        try:
+            return self._workshop.rows(numbers, points)
+        finally:
+            self._leave()
+
+    def _leave(self) -> None:
+        with self._lock:
+            self._users -= 1
+            is_last = not self._users
+        if is_last:
+            self._workshop.close()
+
+    def __getstate__(self) -> tuple[str, Job, Mapping[str, bytes]]:
+        return self.name, self._job, self._archives
+
+    def __setstate__(self, state: tuple[str, Job, Mapping[str, bytes]]) -> None:
+        self.__init__(*state)
+
+
+def run_block(plugin: str, numbers: Sequence[int], points: np.ndarray) -> Rows:
+    """Make runs with the values (runs, targets) of the targets of a plugin's job."""
+    return get_worker().plugins[plugin].rows(numbers, points)

@@ -7,29 +7,28 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rparm import project
-from rparm.command_line.options import add_output, count, number, retyped
-from rparm.commands import Ended
+from rparm import console, project
+from rparm.command_line import Ended, add_output, count, number, retyped
+from rparm.console import Progress
 from rparm.errors import UserError, one_line
+from rparm.files import from_here, written
 from rparm.interruption import arrived
-from rparm.output import console
-from rparm.output.progress import Progress
-from rparm.output_files import from_here, written
-from rparm.scenarios.scenario import title
+from rparm.runs.scenario import title
 
 if TYPE_CHECKING:
     from distributed import Security
 
     from rparm.campaign.work import Work
 
-DESCRIPTION = (
-    "Runs what is missing of a campaign, on a cluster of Dask, and writes tables and a page. A "
-    "campaign that was stopped resumes. Runs that fail are results; only that of --replay is bad."
-)
 NEEDED = ("SALib", "cryptography", "distributed", "numba", "pyarrow", "scipy")
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
+def add_campaign_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Runs what is missing of a campaign, on a cluster of Dask, and writes tables and a "
+        "page. A campaign that was stopped resumes. Runs that fail are results; only that of "
+        "--replay is bad."
+    )
     parser.add_argument(
         "file", nargs="?", metavar="FILE.toml", help="the campaign, or the name of one of --list"
     )
@@ -73,7 +72,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(options: argparse.Namespace) -> Ended:
+def do_campaign(options: argparse.Namespace) -> Ended:
     """Run what is missing of the campaign; 0 when all runs are there, failed ones among them."""
     if options.list:
         found = [
@@ -85,7 +84,7 @@ def run(options: argparse.Namespace) -> Ended:
     file = project.campaign_file(options.file)
     project.check_installed(NEEDED, "campaign")
     # imported here: what a campaign needs may not be installed
-    from rparm.campaign import page, planning, replay, work
+    from rparm.campaign import page, planning, work
 
     security = _security(options)
 
@@ -97,7 +96,7 @@ def run(options: argparse.Namespace) -> Ended:
         if options.replay is not None:
             results.check()
             again = f"{_command(options)} --replay {options.replay}"
-            one = replay.replay(campaign, made.base, made.points, options.replay, folder, again)
+            one = work.replay(campaign, made.base, made.points, options.replay, folder, again)
             print(*one.lines, sep="\n")
             verdict = f"failed: {one.failure}" if one.failure else f"ran: run {options.replay}"
             return Ended(1 if one.failure else 0, verdict, one.document, page=one.page)
@@ -137,9 +136,9 @@ def _security(options: argparse.Namespace) -> "Security | None":
         return None
     if options.no_dashboard:
         raise UserError("--no-dashboard: that of a --scheduler is switched off where it starts")
-    from rparm.campaign import credentials  # takes long
+    from rparm.campaign import engine  # takes long
 
-    return credentials.of(options.scheduler, *certificates)
+    return engine.security_for(options.scheduler, *certificates)
 
 
 def _command(options: argparse.Namespace) -> str:
@@ -152,7 +151,7 @@ def _run_missing(options: argparse.Namespace, security: "Security | None", made:
     blocks = made.begin()
     if not blocks:
         return
-    from rparm.campaign import cluster, engine  # takes long
+    from rparm.campaign import engine  # takes long
 
     campaign, count = made.campaign, made.campaign.count
     ahead = sum(len(campaign.block_range(block)) for block in blocks)
@@ -162,7 +161,7 @@ def _run_missing(options: argparse.Namespace, security: "Security | None", made:
     try:
         with (
             made.results.workers_folder() as files,
-            cluster.opened(
+            engine.opened_cluster(
                 options.scheduler, options.workers, files, security, not options.no_dashboard
             ) as client,
         ):

@@ -8,27 +8,26 @@ from typing import Any
 import shtab
 
 from rparm import command_line, project
-from rparm.command_line.options import add_output
-from rparm.commands import Ended
-from rparm.output_files import write_text, written
-from rparm.system import comparison
+from rparm.command_line import COMMANDS, Ended, add_output
+from rparm.files import write_text, written
+from rparm.systems import comparison
 
 SCRIPT = Path(project.PROGRAM).name
-DESCRIPTION = (
-    "Prints a script that makes a shell complete commands, options, scenarios and files. In bash: "
-    f'eval "$({project.PROGRAM} completion bash)". In zsh the same with zsh, after compinit. In '
-    "tcsh: save it, then source the file."
-)
 # names of files that the shells look for
 SHELLS = {"bash": SCRIPT, "zsh": f"_{SCRIPT}", "tcsh": f"{SCRIPT}.tcsh"}
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
+def add_completion_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Prints a script that makes a shell complete commands, options, scenarios and files. "
+        f'In bash: eval "$({project.PROGRAM} completion bash)". In zsh the same with zsh, after '
+        "compinit. In tcsh: save it, then source the file."
+    )
     parser.add_argument("shell", choices=list(SHELLS), help="the shell that reads the script")
     add_output(parser, "write the script into this folder, by the name that the shell looks for")
 
 
-def run(options: argparse.Namespace) -> Ended:
+def do_completion(options: argparse.Namespace) -> Ended:
     """Print the script, with the names of all scenarios and systems."""
     script = shtab.complete(_all_commands(), options.shell)
     if options.output is None:
@@ -44,15 +43,15 @@ def _all_commands() -> argparse.ArgumentParser:
     whole = argparse.ArgumentParser(prog=SCRIPT)
     commands = whole.add_subparsers()
     known = _values()
-    for name, text in command_line.COMMANDS.items():
+    for name, command in COMMANDS.items():
         made = command_line.parser(name)
         for action in made._actions:
             value = known.get(f"{name} {action.metavar}") or known.get(str(action.metavar))
             if value:
                 action.complete = value
-        commands.add_parser(name, parents=[made], add_help=False, help=text)
+        commands.add_parser(name, parents=[made], add_help=False, help=command.text)
     commands.add_parser("help", help="explain a command").add_argument(
-        "name", choices=list(command_line.COMMANDS)
+        "name", choices=list(COMMANDS)
     )
     return whole
 
@@ -92,7 +91,10 @@ def _words(kind: str, names: Iterable[str], pattern: str = "") -> dict[str, Any]
         before = files["preamble"]["bash"]
         bash.append(f'{files["bash"]} "$1"')
         zsh += f" 'files:file:_files -g \"{pattern}\"'"
-    preamble = {"bash": before + _function(function, bash), "zsh": _function(function, [zsh])}
+    preamble = {
+        "bash": before + _function(function, bash),
+        "zsh": _function(function, [zsh]),
+    }
     return {"bash": function, "zsh": function, "tcsh": f"({words})", "preamble": preamble}
 
 

@@ -1,38 +1,37 @@
-"""`federation`: run variants of a system with each FMU in its own process, coupled by HELICS."""
+"""`federation` and `federate`: run a system with each FMU in its own process, coupled by HELICS."""
 
 import argparse
+import os
 import shlex
 import time
 from pathlib import Path
 
 import numpy as np
 
-from rparm import project, trajectory_csv
-from rparm.command_line.options import add_output, add_silence, add_system
-from rparm.commands import Ended
-from rparm.coupling.master import Master
+from rparm import console, files, project
+from rparm.command_line import Ended, add_document, add_output, add_silence, add_system
+from rparm.console import Progress
 from rparm.errors import UserError, hint
-from rparm.federation import SILENCE, addresses, federation, screen
+from rparm.federation import SILENCE, component, federation, network
+from rparm.federation.component import parts, real_connections
 from rparm.federation.federation import Record
 from rparm.federation.network import KEY, key
-from rparm.federation.parts import real_connections
-from rparm.output import console
-from rparm.output.progress import Progress
-from rparm.output.result_tables import FederationTable
-from rparm.output_files import check_writable, written
-from rparm.system import comparison, ecos, ssp, study
-from rparm.system.ssp import Ssp
-from rparm.texts import counted
+from rparm.files import check_writable, written
+from rparm.result_tables import FederationTable
+from rparm.systems import comparison, ecos, ssp
+from rparm.systems.master import Master
+from rparm.systems.ssp import Ssp
+from rparm.units import counted
 
-DESCRIPTION = (
-    "Runs variants of the closed loop with each FMU in its own process, coupled by HELICS, and "
-    "compares every value with that of the master that steps all in one process in Jacobi order. "
-    "The processes may be on several machines."
-)
 BOUND = 1e-12  # on the largest difference to the master, relative to the variable's largest value
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
+def add_federation_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Runs variants of the closed loop with each FMU in its own process, coupled by HELICS, "
+        "and compares every value with that of the master that steps all in one process in "
+        "Jacobi order. The processes may be on several machines."
+    )
     parser.add_argument("names", nargs="*", metavar="NAME", help="variants (default: all)")
     add_system(
         parser,
@@ -56,15 +55,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_output(parser, "write what was recorded of each variant into this folder, VARIANT.csv")
 
 
-def run(options: argparse.Namespace) -> Ended:
+def do_federation(options: argparse.Namespace) -> Ended:
     """Run the variants; compare each with the master that steps all in one process."""
-    screen.apart()
+    network.separate_messages()
     path = options.ssp
     if path is None:
-        folder, _ = study.of_coupling()
+        folder, _ = comparison.coupling_study()
         path = project.built(folder, ".ssp", "--ssp", options.fmi)
-    address = addresses.free() if options.listen is None else options.listen
-    addresses.check_free(address)
+    address = network.free_address() if options.listen is None else options.listen
+    network.check_address_is_free(address)
     if options.output:
         check_writable(options.output)
     key()  # what is wrong with it is said before anything runs
@@ -106,7 +105,7 @@ def run(options: argparse.Namespace) -> Ended:
 def _write(path: Path, record: Record) -> None:
     with written(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        trajectory_csv.write(path, record.times, record.names, record.values)
+        files.write_trajectory(path, record.times, record.names, record.values)
 
 
 def _command(path: Path, variant: str, component: str, address: str) -> str:
@@ -141,3 +140,44 @@ def _master(system: Ssp, variant: str, record: Record) -> tuple[float, float]:
     expected = rows[:, columns]
     scale = np.maximum(np.abs(expected).max(axis=0), np.finfo(float).tiny)
     return float((np.abs(record.values - expected) / scale).max()), seconds
+
+
+def add_federate_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Steps one component of a system until the federation has come to the end."
+    parser.add_argument("ssp", type=Path, metavar="SSP", help="the system")
+    parser.add_argument("variant", metavar="VARIANT")
+    parser.add_argument("component", metavar="COMPONENT")
+    parser.add_argument(
+        "--broker", required=True, metavar="ADDRESS", help="of the federation, as --listen there"
+    )
+    text = "most that a call of the FMU may take, or the broker be silent"
+    add_silence(parser, SILENCE, text)
+    add_document(parser)
+    # for processes that a federation starts: they end with their standard input
+    parser.add_argument("--owned", action="store_true", help=argparse.SUPPRESS)
+
+
+def do_federate(options: argparse.Namespace) -> Ended:
+    network.separate_messages()
+    network.check_address(options.broker)
+    network.check_host_has_address()
+    if KEY not in os.environ:
+        raise UserError(f"{KEY}: not in the environment, copy the whole line of the federation")
+    key()
+    with ssp.unpacked(options.ssp) as system:
+        made = parts(system, options.variant)
+        if options.component not in made:
+            known = hint(options.component, made, "there are")
+            raise UserError(f"{options.ssp}: has no component {options.component!r}{known}")
+        with system.unpacked_fmu(options.component) as fmu:
+            if not options.owned:
+                network.wait_for_listener(
+                    options.broker,
+                    options.silence,
+                    lambda: print(f"waiting for a federation at {options.broker}", flush=True),
+                )
+            is_gone = component.end_of_input().is_set if options.owned else lambda: False
+            component.run_component(
+                made[options.component], fmu, options.broker, options.silence, is_gone
+            )
+    return Ended(0, "", {"component": options.component})

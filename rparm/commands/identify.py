@@ -5,30 +5,27 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rparm import project
-from rparm.command_line.options import add_report, file_or_name, names, pairs, retyped
-from rparm.commands import Ended
+from rparm import console, project
+from rparm.command_line import Ended, add_report, file_or_name, names, pairs, retyped
 from rparm.errors import UserError, placed
-from rparm.input_files import number_in
-from rparm.output import console
-from rparm.output_files import check_writable, from_here, written
+from rparm.files import check_writable, from_here, number_in, written
 from rparm.units import SECONDS, typed_quantity
 
 if TYPE_CHECKING:
     from rparm.identification.identify import Identification
     from rparm.identification.request import Request
 
-DESCRIPTION = (
-    "Fits parameters of an FMU to logs of a machine, and says how well they are known: a table, a "
-    "page, and the result as a scenario and as parameter files."
-)
 PART = "identify"
 SEGMENT = "0.4"  # s
 SEVERAL = "parameters", "inputs", "measured", "set", "start", "columns", "units"
 GIVEN = *SEVERAL, "delay", "validate"
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
+def add_identify_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Fits parameters of an FMU to logs of a machine, and says how well they are known: a "
+        "table, a page, and the result as a scenario and as parameter files."
+    )
     parser.add_argument("fmu", nargs="?", metavar="FMU", help="a file, or a model of the project")
     parser.add_argument(
         "logs", nargs="*", type=Path, metavar="LOG.csv", help="with a column of times in s"
@@ -62,10 +59,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_report(parser, PART)
 
 
-def run(options: argparse.Namespace) -> Ended:
+def do_identify(options: argparse.Namespace) -> Ended:
     """Identify, print a table, write page and files."""
     from rparm.fmi.fmu_file import Fmu
-    from rparm.identification import identify, page, result_files, results
+    from rparm.identification import identify, page, results
 
     check_writable(options.report)
     path, request, true = _asked(options)
@@ -75,7 +72,7 @@ def run(options: argparse.Namespace) -> Ended:
     _print(found, true)
     with written(options.report):
         options.report.mkdir(parents=True, exist_ok=True)
-        files = result_files.write(found, options.report, model)
+        files = results.write_files(found, options.report, model)
         files.append(page.write(found, options.report, model, true, _again(options)))
     verdict = f"identified: {len(found.estimates)} parameters, page {from_here(files[-1])}"
     if not found.has_converged:
@@ -88,8 +85,7 @@ def run(options: argparse.Namespace) -> Ended:
 
 def _asked(options: argparse.Namespace) -> tuple[Path, "Request", dict[str, float]]:
     """FMU and request of the options; the parameters' true values, as far as they are known."""
-    from rparm.identification import demo
-    from rparm.identification.request import Request
+    from rparm.identification.request import Request, make_demo
 
     if options.demo:
         _refuse_others(options)
@@ -97,7 +93,7 @@ def _asked(options: argparse.Namespace) -> tuple[Path, "Request", dict[str, floa
         folder = options.report
         with written(folder):
             folder.mkdir(parents=True, exist_ok=True)
-        made = demo.make(folder)
+        made = make_demo(folder)
         print(f"log: {from_here(made.request.logs[0])}")
         return made.fmu, made.request, dict(made.true)
     if not options.fmu or not options.logs:

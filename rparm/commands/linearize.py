@@ -3,24 +3,22 @@
 import argparse
 from pathlib import Path
 
-from rparm import project
-from rparm.command_line.options import add_fmi, add_report, file_or_name, names, pairs, retyped
-from rparm.commands import Ended
+from rparm import console, project
+from rparm.command_line import Ended, add_fmi, add_report, file_or_name, names, pairs, retyped
 from rparm.errors import WrongValueError
-from rparm.output import console
-from rparm.output_files import check_writable, from_here, written
+from rparm.files import check_writable, from_here, written
 from rparm.units import SECONDS, typed_quantity
 
 MOST_COLUMNS, MOST_ROWS = 6, 12  # of matrices in the terminal
 SUFFIXES = (".fmu", ".ssp")
 SHORTEST = 1e-9  # s, of samples: pictures of much shorter ones overflow
-DESCRIPTION = (
-    "Finds an equilibrium, and A, B, C and D about it; of a system also the margins of a loop that "
-    "is broken, and the largest stable communication step."
-)
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
+def add_linearize_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Finds an equilibrium, and A, B, C and D about it; of a system also the margins of a "
+        "loop that is broken, and the largest stable communication step."
+    )
     parser.add_argument("what", metavar="FMU|SSP", help="a file, or a name of the project")
     add_fmi(parser, project.VERSIONS[0], "version of FMI where a name is given (default: 2)")
     parser.add_argument("--variant", default="", metavar="NAME", help="parameter set of a system")
@@ -50,48 +48,47 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_report(parser, "linearize")
 
 
-def run(options: argparse.Namespace) -> Ended:
+def do_linearize(options: argparse.Namespace) -> Ended:
     """Linearize, print the tables, write page and files."""
-    from rparm.linearization import explained, page, saving
-    from rparm.linearization.study import Request, study
+    from rparm.linearization import page, study
 
     for path in options.save:
-        saving.check(path)
+        study.check_file(path)
     check_writable(options.report)
     console.stage(f"linearizing {options.what}")
-    request = Request(
+    request = study.Request(
         options.what, pairs("--at", options.at), options.time, names(options.trim or ()),
         options.inputs and names(options.inputs), options.outputs and names(options.outputs),
         options.variant, options.cut, names(options.without or ()), options.fmi,
     )  # fmt: skip
-    found = study(request)
+    found = study.study(request)
     if options.step is not None:
         found.linear.sampled(options.step)  # a step that is too long is refused before the tables
     n, m, p = (len(getattr(found.linear, key)) for key in ("states", "inputs", "outputs"))
     tables = []
     if found.trimmed:
-        tables.append((explained.equilibrium(found), explained.EQUILIBRIUM))
+        tables.append((page.equilibrium_table(found), page.EQUILIBRIUM))
     if is_small := n + m <= MOST_COLUMNS and n + p <= MOST_ROWS:
-        tables.append((explained.matrices(found), explained.MATRICES))
+        tables.append((page.matrices_table(found), page.MATRICES))
     if n:
-        tables.append((explained.poles(found), explained.POLES))
+        tables.append((page.poles_table(found), page.POLES))
     if found.margins is not None:
-        tables.append((explained.margins(found.margins), explained.MARGINS))
+        tables.append((page.margins_table(found.margins), page.MARGINS))
     if found.largest:
-        tables.append((explained.largest(list(found.largest)), explained.STEPS))
+        tables.append((page.steps_table(list(found.largest)), page.STEPS))
     for table, text in tables:
         console.plain_table(table.title, table.head, table.rows)
         console.remark(text)
     hint = "Matrices: --json, --save and the page; --inputs and --outputs choose."
-    for text in [*explained.notes(found), *([] if is_small else [hint])]:
+    for text in [*page.notes(found), *([] if is_small else [hint])]:
         console.remark(text)
     for path in options.save:
-        saving.save(path, found, options.step)
+        study.save(path, found, options.step)
         print(f"saved: {from_here(path)}")
     with written(options.report):
         index = page.write(options.report, found, options.step, _command(options))
     print(f"page: {from_here(index)}")
-    document = saving.document(found, options.step) | {"page": index.absolute()}
+    document = study.document(found, options.step) | {"page": index.absolute()}
     verdict = f"linear: {n} states, {m} inputs, {p} outputs"
     return Ended(0, verdict, document, page=index)
 

@@ -7,33 +7,28 @@ from pathlib import Path
 
 import numpy as np
 
-from rparm import project
-from rparm.command_line.options import add_report, add_tolerance, retyped
-from rparm.commands import Ended
+from rparm import console, project, proof
+from rparm.command_line import Ended, add_report, add_tolerance, retyped
+from rparm.console import Progress
 from rparm.errors import UserError, WrongValueError, placed
+from rparm.files import check_writable, from_here, written
 from rparm.fmi.fmu_file import Fmu
-from rparm.output import console
-from rparm.output.progress import Progress
-from rparm.output_files import check_writable, from_here, written
-from rparm.proof import proven, prover
-from rparm.proof.proven import ASSUMED, ProvenReference
-from rparm.proof.prover import Enclosure, Prover
+from rparm.proof import ASSUMED, Enclosure, ProvenReference, Prover
 from rparm.report import proof_page
-from rparm.scenarios import scenario as scenarios
-from rparm.scenarios.scenario import Scenario
-from rparm.texts import counted, rounded_up, verdict
-from rparm.units import typed_quantity
+from rparm.runs import scenario as scenarios
+from rparm.runs.scenario import Scenario
+from rparm.units import counted, rounded_up, typed_quantity, verdict
 
-DESCRIPTION = (
-    "Encloses the exact motion of a scenario in intervals, by validated integration, and prints "
-    "how far the states in a run of the FMU are from it at most, for each method of integration. "
-    "Every value of the scenario's reference must be the double nearest to the exact one. Without "
-    f"a scenario, checks all references. Assumed are {ASSUMED}."
-)
 COLUMNS = {"values": 8, "nearest doubles": 8, "interval": 9}
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
+def add_prove_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Encloses the exact motion of a scenario in intervals, by validated integration, and "
+        "prints how far the states in a run of the FMU are from it at most, for each method of "
+        "integration. Every value of the scenario's reference must be the double nearest to "
+        f"the exact one. Without a scenario, checks all references. Assumed are {ASSUMED}."
+    )
     parser.add_argument(
         "name", nargs="?", metavar="SCENARIO", help="a scenario, or a file FILE.toml of your own"
     )
@@ -53,7 +48,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_report(parser)
 
 
-def run(options: argparse.Namespace) -> Ended:
+def do_prove(options: argparse.Namespace) -> Ended:
     """Prove the errors of a scenario's runs, or of all references."""
     if options.name is None:
         for option in ("method", "tolerance", "within"):
@@ -65,10 +60,10 @@ def run(options: argparse.Namespace) -> Ended:
     check_writable(options.report)
     own = Path(options.name).suffix.lower() == ".toml"
     path = Path(options.name) if own else project.scenario_file(options.name)
-    program = prover.of_scenario(path)
+    program = proof.prover_of(path)
     with Fmu(project.built(program.folder, ".fmu")) as fmu:
         scenario = scenarios.load(path, fmu.model)
-        methods = proven.methods(fmu, options.method)
+        methods = proof.methods_of(fmu, options.method)
         within = _within(options.within, program, fmu)
         enclosure = _enclosure(program, scenario, within)
         if enclosure.stopped is not None:
@@ -109,7 +104,7 @@ def _reference(fmu: Fmu, scenario: Scenario, enclosure: Enclosure) -> ProvenRefe
     """How good a scenario's reference is; prints what is wrong with it."""
     if enclosure.stopped is not None:
         raise UserError(f"{scenario.path}: proven up to {enclosure.stopped} s only")
-    good = proven.of_reference(fmu, scenario, enclosure)
+    good = proof.proven_reference(fmu, scenario, enclosure)
     for wrong in good.wrong:
         print(wrong)
     return good
@@ -162,19 +157,19 @@ def _runs(
     enclosure: Enclosure,
     methods: list[str],
     tolerance: float | None,
-) -> tuple[dict[str, dict[str, proven.ProvenError]], dict[str, np.ndarray]]:
+) -> tuple[dict[str, dict[str, proof.ProvenError]], dict[str, np.ndarray]]:
     """Print the largest errors of runs by each method; return these, and all errors by run."""
     units = [fmu.model.variables[name].unit for name in enclosure.names]
     heads = {f"{n} {u or ''}".strip(): 10 for n, u in zip(enclosure.names, units, strict=True)}
     print(f"{scenario.name}: largest distance from the exact motion at communication points")
-    names = [f"{m} at {proven.tolerance_of(m, tolerance or scenario.tolerance):g}" for m in methods]
+    names = [f"{m} at {proof.tolerance_of(m, tolerance or scenario.tolerance):g}" for m in methods]
     table = console.Table("method", [*names, "interval"], heads, result=0)
     found, courses = {}, {}
     for method, name in zip(methods, names, strict=True):
         with Progress(f"{scenario.name}, {method}", len(scenario.times) - 1) as progress:
             used = tolerance or scenario.tolerance
-            courses[name] = proven.bounds(fmu, scenario, enclosure, method, used, progress)
-        errors = proven.largest(courses[name], enclosure)
+            courses[name] = proof.error_bounds(fmu, scenario, enclosure, method, used, progress)
+        errors = proof.largest_errors(courses[name], enclosure)
         table.row(name, [rounded_up(e.error, 2) for e in errors.values()])
         table.row("  at", [f"{e.at:.4g} s" for e in errors.values()])
         found[method] = errors
@@ -187,7 +182,7 @@ def _references(options: argparse.Namespace) -> Ended:
     check_writable(options.report)
     found: dict[str, ProvenReference] = {}
     everything, rows = {}, []
-    for program in prover.provers().values():
+    for program in proof.provers().values():
         files = [x for x in project.scenario_files().values() if x.parents[1] == program.folder]
         table = console.Table("reference", [x.stem for x in files], COLUMNS)
         with Fmu(project.built(program.folder, ".fmu")) as fmu:

@@ -6,43 +6,37 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
-from rparm import project
-from rparm.command_line import COMMANDS, PROGRAM
-from rparm.command_line.options import add_fmi, add_report, add_tolerance
-from rparm.commands import Ended
-from rparm.commands import list as scenario_list
+from rparm import console, project, result_tables
+from rparm.command_line import Ended, add_fmi, add_report, add_tolerance
+from rparm.commands.files import do_list
+from rparm.console import Progress
 from rparm.errors import UserError, did_you_mean, placed, together
+from rparm.files import check_writable, from_here, missing, written
 from rparm.fmi.fmu_file import Fmu
-from rparm.input_files import missing
-from rparm.output import console, results
-from rparm.output.progress import Progress
-from rparm.output.result_tables import RunTable, SweepTable, measured
-from rparm.output.result_tables import convergence as convergence_table
-from rparm.output.results import Done
-from rparm.output_files import check_writable, from_here, written
-from rparm.project import VERSIONS
+from rparm.needs import COMMANDS
+from rparm.project import PROGRAM, VERSIONS
 from rparm.report import pages
 from rparm.report.writer import ReportWriter
+from rparm.result_tables import Done, RunTable, SweepTable, print_convergence, print_measured
 from rparm.runs import convergence
-from rparm.runs.comparison import Failure, Run, Runs
+from rparm.runs import scenario as scenarios
+from rparm.runs.comparison import TIGHTEST, TOLERANCES, Failure, Run, Runs, Sweep, sweep
 from rparm.runs.convergence import Convergence
-from rparm.runs.tolerance_sweep import TIGHTEST, TOLERANCES, Sweep, sweep
-from rparm.scenarios import scenario as scenarios
-from rparm.scenarios.scenario import Scenario
-from rparm.texts import counted, short
+from rparm.runs.scenario import Scenario
+from rparm.units import counted, short
 
-DESCRIPTION = (
-    "Simulates each scenario at its own tolerance and at 1e-11, and over the tolerances 1e-4 to "
-    "1e-11; compares all outputs with the reference, and prints the largest errors. Without names, "
-    "measures the order of convergence in the communication step too. The FMUs are of FMI 2.0; "
-    "those of FMI 3.0 must give the same bits."
-)
 SUFFIX = ".toml"
 FIRST, TWIN = VERSIONS  # of FMI: what runs, and what has to give the same bits
 QUICK = 20.0  # s, longest sweep that runs by default for a named scenario
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
+def add_run_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Simulates each scenario at its own tolerance and at 1e-11, and over the tolerances "
+        "1e-4 to 1e-11; compares all outputs with the reference, and prints the largest "
+        "errors. Without names, measures the order of convergence in the communication step "
+        "too. The FMUs are of FMI 2.0; those of FMI 3.0 must give the same bits."
+    )
     parser.add_argument(
         "names",
         nargs="*",
@@ -61,10 +55,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_tolerance(parser, "run at this relative tolerance only, without the sweep")
 
 
-def run(options: argparse.Namespace) -> Ended:
+def do_run(options: argparse.Namespace) -> Ended:
     """Run the scenarios and files that the options name, or all scenarios."""
     if options.list:
-        return scenario_list.run(options)
+        return do_list(options)
     with ExitStack() as stack:
         chosen, own, fmus, twins = _open(options, stack)
         _check(options, chosen, own, fmus)
@@ -94,7 +88,7 @@ def run(options: argparse.Namespace) -> Ended:
         console.stage("writing the report")
         groups = writer.grouped(done.runs)
         for group in groups.values():
-            measured(group[0])
+            print_measured(group[0])
         with written(options.report), Progress("report", len(groups), "pages") as progress:
             page = writer.write(groups, done.sweeps, done.studies, progress, done.failures)
     print()
@@ -114,7 +108,7 @@ def _ended(done: Done, report: Path, page: Path) -> Ended:
     if not wrong and done.own:
         verdict = f"ran: {counted(everything, 'scenario')}, errors estimated"
         verdict = f"{verdict} of {len(done.own)}" if done.chosen else verdict
-    document = {"passed": not wrong, **results.document(done), "report": report}
+    document = {"passed": not wrong, **result_tables.document(done), "report": report}
     if done.failures:
         error = together([UserError(failure.text) for failure in done.failures])
         return Ended(2, verdict, document, error, page)
@@ -364,6 +358,6 @@ def _convergence(fmus: Mapping[str, Fmu], twins: Mapping[str, Fmu]) -> list[Conv
         ahead = convergence.steps_ahead(problem, updated is not None)
         with Progress(f"{name}, all steps", ahead) as progress:
             study = convergence.study(fmu, problem, progress, updated)
-        convergence_table(study)
+        print_convergence(study)
         studies.append(study)
     return studies

@@ -1,32 +1,28 @@
-"""`system`: run variants of the systems in Ecos, compare them with references, write a report."""
+"""`system` and `coupling`: run systems, compare them, study what their coupling costs."""
 
 import argparse
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from rparm import project
-from rparm.command_line import PROGRAM
-from rparm.command_line.options import add_report, add_system
-from rparm.commands import Ended
-from rparm.coupling import in_process
+from rparm import console, project
+from rparm.command_line import Ended, add_report, add_system
 from rparm.errors import UserError, did_you_mean, hint, together
-from rparm.output import console
-from rparm.output.result_tables import VariantTable
-from rparm.output_files import check_writable, from_here, written
+from rparm.files import check_writable, from_here, written
+from rparm.project import PROGRAM
 from rparm.report import overview, system_page
 from rparm.report.overview import Entry
 from rparm.report.system_page import Section
-from rparm.system import comparison, ecos, ssp
-from rparm.system.comparison import Outcome, Reference
-from rparm.texts import counted
-
-DESCRIPTION = (
-    "Runs the variants of the systems in Ecos and compares every variable with the reference."
-)
+from rparm.result_tables import VariantTable
+from rparm.systems import comparison, ecos, master, ssp
+from rparm.systems.comparison import Outcome, Reference
+from rparm.units import counted
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
+def add_system_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Runs the variants of the systems in Ecos and compares every variable with the reference."
+    )
     add_system(parser)
     parser.add_argument(
         "names",
@@ -44,7 +40,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--list", action="store_true", help="name the systems and their variants")
 
 
-def run(options: argparse.Namespace) -> Ended:
+def do_system(options: argparse.Namespace) -> Ended:
     """Run the variants that the options name, or all; or name them."""
     with ExitStack() as stack:
         try:
@@ -129,7 +125,7 @@ def _run(
     entries: list[Entry] = []
     rows: list[dict[str, object]] = []
     absent = ecos.absent()
-    engine, where = (in_process.run, "this process") if absent else (ecos.run, "Ecos")
+    engine, where = (master.run_in_master, "this process") if absent else (ecos.run, "Ecos")
     if absent:
         print(f"{absent}: the master of rparm steps the systems, in the same order as Ecos")
     for section, references in plans:
@@ -151,11 +147,11 @@ def _run(
             with written(options.report):
                 entries.append(system_page.write_variant(options.report, section, outcome))
             if options.pictures:
-                from rparm.report.style import save  # matplotlib takes long to import
+                from rparm.report.pages import save_figure  # matplotlib takes long to import
 
                 with written(options.pictures):
                     options.pictures.mkdir(parents=True, exist_ok=True)
-                    save(
+                    save_figure(
                         section.study.figure(section.ssp, outcome), options.pictures / f"{name}.png"
                     )
             outcomes.append(outcome)
@@ -185,3 +181,32 @@ def _row(section: Section, outcome: Outcome) -> dict[str, object]:
         "seconds": outcome.run.wall_time,
         "passed": outcome.passed,
     }
+
+
+def add_coupling_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Steps the system in several orders, with inputs held and extrapolated and with step-size "
+        "control, and compares it with the solution in continuous time; predicts and measures the "
+        "largest stable steps of each system."
+    )
+    add_system(parser)
+    add_report(parser, "system")
+
+
+def do_coupling(options: argparse.Namespace) -> Ended:
+    from rparm.linearization.largest_step import study_steps
+
+    folder, known = comparison.coupling_study()
+    path = options.ssp or project.built(folder, ".ssp", "--ssp", options.fmi)
+    check_writable(options.report)
+    console.stage(f"studying the coupling of {folder.name}")
+    parts = known.study_coupling(path, options.report)
+    for other, rest in comparison.rests().items():
+        if other != folder and not options.ssp:
+            ssp = project.built(other, ".ssp", version=options.fmi)
+            parts[f"largest steps of {other.name}"] = study_steps(ssp, rest)
+    failed = [name for name, part in parts.items() if not part["passed"]]
+    picture = (options.report / known.COUPLING_PICTURE).absolute()
+    verdict = console.verdict_line(failed, parts, "part")
+    document = {"parts": parts, "picture": picture}
+    return Ended(1 if failed else 0, verdict, document, page=picture)

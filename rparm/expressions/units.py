@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from fractions import Fraction
 
-from rparm.expressions.tree import RELATIONS, ExpressionError, Node, in_order
+from rparm.expressions.expression import RELATIONS, ExpressionError, Node, in_order
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd")
 ANGLE = "rad"

@@ -1,20 +1,118 @@
-"""The process of one component: steps its FMU between the exchanges of the federation."""
+"""The process of one component: steps its FMU between the exchanges of the federation.
 
-from collections.abc import Callable
+Work that waits in HELICS runs in a thread: HELICS has no time limit and ignores signals.
+"""
+
+import hashlib
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, wait
+from dataclasses import dataclass
+from threading import Event, Thread
+from typing import TypeVar
 
 import numpy as np
 
-from rparm.coupling.connected_instance import begin, check_finite
-from rparm.errors import UserError
-from rparm.federation import watching
-from rparm.federation.network import Federate
-from rparm.federation.parts import Part
-from rparm.federation.watching import Silence
+from rparm.errors import UserError, hint
+from rparm.federation.network import Federate, mute_libraries
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.model import Value
+from rparm.interruption import ENDINGS
+from rparm.systems.master import begin_instance, check_finite
+from rparm.systems.ssp import Connection, Ssp
+
+Result = TypeVar("Result")
+POLL = 0.05  # s, between two looks
+LEAVE = 2.0  # s, for work and processes to end after a failure
 
 
-def run(
+# ---- Parts of a system ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where an input comes from: value `index` of what the component `component` publishes."""
+
+    component: str
+    index: int
+
+
+@dataclass(frozen=True)
+class Part:
+    """A component of a system, as one process steps it."""
+
+    component: str
+    parameters: dict[str, Value]
+    published: tuple[str, ...]  # Real outputs, in the order of the FMU
+    inputs: tuple[str, ...]  # connected Real inputs
+    sources: tuple[Source, ...]  # of each of `inputs`
+    constant: tuple[str, ...]  # outputs that feed an input which is no Real: they must not change
+    rounds: int  # exchanges in initialization after which no output changes any more
+    times: np.ndarray  # s, communication points
+    system: str  # variant and SHA-256 of the SSP: those of all processes must be the same
+
+    def check_same(self, other: str) -> None:
+        """UserError if the federation steps another variant, or that of another SSP."""
+        if other == self.system:
+            return
+        (here, own), (there, foreign) = self.system.rsplit(" ", 1), other.rsplit(" ", 1)
+        if here != there:
+            raise UserError(
+                f"{self.component}: its variant is {here!r}, that of the federation is {there!r}"
+            )
+        raise UserError(
+            f"{self.component}: its SSP is not that of the federation (SHA-256 {own[:12]}..., "
+            f"expected {foreign[:12]}...): copy the file"
+        )
+
+
+def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
+    """The parts of a variant, by component; UserError if it is unknown."""
+    system = ssp.system
+    if variant not in system.parameters:
+        known = hint(variant, system.parameters, "there are")
+        raise UserError(f"{ssp.path}: has no variant {variant!r}{known}")
+    published = {name: model.real_outputs for name, model in ssp.models.items()}
+    whole = f"{variant} {hashlib.sha256(ssp.path.read_bytes()).hexdigest()}"
+    made = {}
+    for component in system.components:
+        name = component.name
+        incoming = [c for c in real_connections(ssp) if c.end_component == name]
+        others = [c for c in system.connections if c not in real_connections(ssp)]
+        made[name] = Part(
+            component=name,
+            parameters=system.parameter_sets[variant].get(name, {}),
+            published=tuple(published[name]),
+            inputs=tuple(c.end_connector for c in incoming),
+            sources=tuple(
+                Source(c.start_component, published[c.start_component].index(c.start_connector))
+                for c in incoming
+            ),
+            constant=tuple(
+                dict.fromkeys(c.start_connector for c in others if c.start_component == name)
+            ),
+            rounds=len(system.components) + 1,
+            times=system.times,
+            system=whole,
+        )
+    return made
+
+
+def real_connections(ssp: Ssp) -> Sequence[Connection]:
+    return [
+        c
+        for c in ssp.system.connections
+        if ssp.variable(f"{c.start_component}.{c.start_connector}").type == "Real"
+    ]
+
+
+# ---- The process ---------------------------------------------------------------------------------
+
+
+def run_component(
     part: Part, fmu: Fmu, address: str, silence: float, is_gone: Callable[[], bool] = lambda: False
 ) -> None:
     """Step a component from the first to the last communication point.
@@ -50,7 +148,7 @@ def run(
         is_known = isinstance(error, UserError)
         federate.fail(str(error) if is_known else f"{name}: its process was ended")
 
-    watching.run(work, look, end)
+    run_watched(work, look, end)
 
 
 class _Stepper:
@@ -79,7 +177,7 @@ class _Stepper:
 
     def _initialize(self) -> None:
         part, instance = self._part, self._instance
-        begin(instance, part.times[0], part.times[-1], part.parameters)
+        begin_instance(instance, part.times[0], part.times[-1], part.parameters)
         self._federate.enter_initialization()
         self._give_early()
         for _ in range(part.rounds):
@@ -118,3 +216,64 @@ class _Stepper:
             else self._instance.integer(name)
             for name in self._part.constant
         ]
+
+
+# ---- Watching ------------------------------------------------------------------------------------
+
+
+def run_watched(
+    work: Callable[[], Result], look: Callable[[], None], end: Callable[[BaseException], None]
+) -> Result:
+    """Do `work`, and `look` now and then; `end` both if one fails or a signal arrives."""
+    outcome: Future[Result] = Future()
+
+    def do() -> None:
+        if hasattr(signal, "pthread_sigmask"):  # also for the threads of HELICS that begin here
+            endings = {getattr(signal, name) for name in ENDINGS if hasattr(signal, name)}
+            signal.pthread_sigmask(signal.SIG_BLOCK, endings)
+        try:
+            outcome.set_result(work())
+        except BaseException as error:
+            outcome.set_exception(error)
+
+    try:
+        Thread(target=do, daemon=True).start()
+        while not wait([outcome], POLL).done:
+            look()
+        return outcome.result()
+    except BaseException as error:
+        mute_libraries()
+        end(error)
+        wait([outcome], LEAVE)
+        raise
+
+
+class Silence:
+    """Detects calls of HELICS that take too long; counts polls, so suspension does not count."""
+
+    def __init__(self, federate: Federate, limit: float) -> None:
+        self._federate, self._limit = federate, limit
+        self._calls, self._looks = federate.calls, 0
+
+    def too_long(self) -> bool:
+        """For each look: whether the limit is reached since the last call, or the last True."""
+        is_new = self._federate.calls != self._calls
+        self._calls, self._looks = self._federate.calls, 0 if is_new else self._looks + 1
+        if self._looks * POLL < self._limit:
+            return False
+        self._looks = 0
+        return True
+
+
+def end_of_input() -> Event:
+    """Set as soon as standard input is at its end: its other side has closed it, or is gone."""
+    ended = Event()
+
+    def read() -> None:
+        # no buffer: the interpreter could not close one that a thread still reads
+        while os.read(sys.__stdin__.fileno(), 1024):
+            pass
+        ended.set()
+
+    Thread(target=read, daemon=True).start()
+    return ended

@@ -13,12 +13,11 @@ import numpy as np
 
 from rparm import project
 from rparm.errors import UserError
-from rparm.federation import SILENCE, watching
+from rparm.federation import SILENCE
+from rparm.federation.component import LEAVE, POLL, Part, Silence, parts, run_watched
 from rparm.federation.network import ABSENT, ANSWER, ENDED, Broker, Federate
-from rparm.federation.parts import Part, parts
-from rparm.federation.watching import LEAVE, POLL, Silence
 from rparm.interruption import temporary_folder, uninterrupted
-from rparm.system.ssp import Ssp
+from rparm.systems.ssp import Ssp
 
 RECORDER = "recorder"
 
@@ -95,7 +94,7 @@ def run(
             broker.end(str(error) if isinstance(error, UserError) else "it was interrupted")
 
         try:
-            return watching.run(lambda: _recorded(recorder, made, progress, connected), look, end)
+            return run_watched(lambda: _recorded(recorder, made, progress, connected), look, end)
         except UserError as error:
             _wait(processes)
             raise _failure(processes, folder) or error from error
@@ -121,7 +120,7 @@ def _opened(
         if still.too_long():
             raise UserError(f"no broker at {address}: HELICS has not returned for {silence:g} s")
 
-    with watching.run(work, look, lambda _: None) as broker:
+    with run_watched(work, look, lambda _: None) as broker:
         yield broker
 
 

@@ -1,12 +1,16 @@
-"""The functions of HELICS that a federation calls, with errors as the user's.
+"""The network of a federation: addresses, and the functions of HELICS with errors as the user's.
 
 HELICS counts communication points: its time k is the k-th of them, whatever its time in s. So no
 time is rounded to HELICS's own resolution, and every process calculates it from its own counter.
+HELICS writes to standard error on its own when connections end.
 """
 
+import errno
 import os
 import re
 import secrets
+import socket
+import sys
 import time
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -18,8 +22,10 @@ from typing import Any
 import numpy as np
 
 from rparm import project
-from rparm.errors import UserError, one_line
+from rparm.errors import UserError, one_line, reason
 
+LOCAL = "127.0.0.1"
+ATTEMPT_EVERY = 0.2  # s, before the next attempt to connect
 ENDED = "the federation ended"  # in what processes say that others have stopped
 ABSENT = "no federation at"  # the same of one that comes later
 ANSWER = 5.0  # s, for another process to answer
@@ -34,6 +40,92 @@ QUIET = "--loglevel=none"
 # One port, the broker's: with "zmq" each process needs one, by its number, and "zmq_ss" drops
 # messages when a process runs ahead.
 NETWORK = "tcp_ss"
+STDERR = 2  # file descriptor, to which libraries write
+_is_separate = False
+
+
+# ---- Addresses -----------------------------------------------------------------------------------
+
+
+def check_host_has_address() -> None:
+    """UserError where HELICS finds no address, not even 127.0.0.1: with no other one of IPv4."""
+    try:
+        # as HELICS asks: glibc does not count loopback
+        flags = socket.AI_ADDRCONFIG
+        socket.getaddrinfo(LOCAL, None, socket.AF_INET, socket.SOCK_STREAM, 0, flags)
+    except socket.gaierror as error:
+        raise UserError(
+            f"HELICS needs an IPv4 address besides {LOCAL}: connect to a network, or, on "
+            "Linux as root: ip address add 192.0.2.1/32 dev lo"
+        ) from error
+
+
+def free_address() -> str:
+    """An address on this machine at which nothing listens; UserError if HELICS finds none."""
+    check_host_has_address()
+    with socket.socket() as probe:
+        probe.bind((LOCAL, 0))
+        return f"tcp://{LOCAL}:{probe.getsockname()[1]}"
+
+
+def check_address(address: str) -> tuple[str, int]:
+    """Host and port; UserError for others, and for IPv6: HELICS would listen and never return."""
+    found = re.fullmatch(r"tcp://([\w.-]+):([1-9]\d{0,4})", address)
+    if not found or int(found[2]) > 65535 or found[1] == "0.0.0.0":
+        raise UserError(f"{address!r}: expected an address as tcp://192.168.0.1:23404")
+    return found[1], int(found[2])
+
+
+def check_address_is_free(address: str) -> None:
+    """UserError if no broker can listen at `address`."""
+    check_host_has_address()
+    refusal = _refusal_to_listen(*check_address(address))
+    if refusal:
+        raise UserError(f"nothing can listen at {address}: {refusal}")
+
+
+def wait_for_listener(address: str, seconds: float, say: Callable[[], object]) -> None:
+    """Wait until something listens at `address`; `say` so, if it does not yet.
+
+    HELICS would wait too, but print that it does, several times a second.
+
+    UserError if nothing has listened there after `seconds`, or the host is unknown.
+    """
+    place = check_address(address)
+    latest = time.monotonic() + seconds
+    is_said = False
+    while True:
+        try:
+            socket.create_connection(place, timeout=1.0).close()
+            return
+        except socket.gaierror as error:
+            raise UserError(f"{address}: {reason(error)}") from error
+        except OSError as error:
+            if time.monotonic() > latest:
+                raise UserError(f"nothing has listened at {address} for {seconds:g} s") from error
+        if not is_said:
+            say()
+            is_said = True
+        time.sleep(ATTEMPT_EVERY)
+
+
+def _refusal_to_listen(host: str, port: int) -> str:
+    """Why nothing can listen there; empty if it can."""
+    try:
+        with socket.socket() as probe:
+            if os.name == "posix":  # as HELICS does: connections that have ended do not count
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind((host, port))
+    except OSError as error:
+        known = {
+            errno.EADDRINUSE: f"port {port} is in use",
+            errno.EADDRNOTAVAIL: f"{host} is no address of this machine",
+        }
+        return known.get(error.errno, f"{host}, port {port}: {reason(error)}")
+    return ""
+
+
+# ---- HELICS --------------------------------------------------------------------------------------
 
 
 def helics() -> Any:
@@ -296,3 +388,27 @@ class Federate:
         if self._federate is not None:
             with suppress(self._h.HelicsException):  # it has ended already
                 self._h.helicsFederateGlobalError(self._federate, 1, text)
+
+
+# ---- Standard error ------------------------------------------------------------------------------
+
+
+def separate_messages() -> None:
+    """Give Python its own standard error from now on: to be called as the program starts."""
+    global _is_separate
+    with suppress(OSError, ValueError, AttributeError):  # closed, or not of the system
+        stream = sys.stderr
+        if not _is_separate and stream.fileno() == STDERR:
+            stream.flush()
+            own = os.dup(STDERR)
+            sys.stderr = os.fdopen(own, "w", 1, stream.encoding, stream.errors)
+            _is_separate = True
+
+
+def mute_libraries() -> None:
+    """Discard what libraries write from now on, if Python's messages are separate."""
+    if _is_separate:
+        with suppress(OSError):
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, STDERR)
+            os.close(nowhere)

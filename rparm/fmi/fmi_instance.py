@@ -22,7 +22,8 @@ from rparm.errors import UserError, one_line
 from rparm.fmi.model import Model, Value
 from rparm.project import check_current_folder
 
-OK, ERROR, FATAL = 0, 3, 4
+OK, DISCARD, ERROR, FATAL = 0, 2, 3, 4  # from DISCARD on, a status stops a run
+TERMINATED = 100  # no status of FMI: the FMU asks to end the simulation
 STATUS_NAMES = ("OK", "warning", "discard", "error", "fatal", "pending")  # the last: FMI 2.0
 MESSAGES_KEPT = 20
 # types of the variables that messages of FMI 2.0 refer to, by a letter

@@ -1,6 +1,15 @@
-"""FMUs as files: checked, read and unpacked once, for any number of runs."""
+"""FMUs as files: checked, read and unpacked once, for any number of runs; archives and their XML.
 
+Archives, SSPs too, may be hostile: they are refused before they fill the disk, write outside of
+their folder, mean another thing on another system or crash the process.
+"""
+
+import errno
 import re
+import stat
+import struct
+import unicodedata
+import zipfile
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
@@ -11,17 +20,23 @@ import fmpy
 from fmpy.model_description import ModelDescription, ValidationError
 from lxml import etree
 
-from rparm.archives import check_library, read_xml, unpack
 from rparm.errors import UserError, one_line, placed, reason
-from rparm.fmi.fmi2_instance import Fmi2Instance
-from rparm.fmi.fmi3_instance import Fmi3Instance
+from rparm.files import UnreadableError, check_regular, is_file, show
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.model import Model, described
-from rparm.fmi.model_exchange import Fmi2ModelExchange, Fmi3ModelExchange
-from rparm.input_files import UnreadableError, show
+from rparm.fmi.versions import Fmi2Instance, Fmi2ModelExchange, Fmi3Instance, Fmi3ModelExchange
 from rparm.interruption import temporary_folder
 from rparm.project import VERSIONS
 
+LARGEST_CONTENT = 2**30  # bytes of all files in an archive
+LARGEST_SYSTEM = 2**32  # bytes of all files in the FMUs of an SSP
+LARGEST_XML = 64_000_000  # bytes; parsed it takes some twenty times as much memory
+MOST_FILES = 10_000  # in an archive
+LONGEST_NAME = 400  # characters of a path in an archive, each other of which may be a folder
+# those of FMI and SSP; zipfile unpacks others without a limit of memory
+METHODS = {zipfile.ZIP_STORED: "stored", zipfile.ZIP_DEFLATED: "deflate"}
+ENCRYPTED = 0x1 | 0x40 | 0x2000  # flags: encrypted, strongly, with a hidden directory
+CONTROL = ("Cc", "Cs", "Zl", "Zp")  # categories of characters that end lines or control a terminal
 DESCRIPTION = "modelDescription.xml"
 LIBRARY_SUFFIX = fmpy.sharedLibraryExtension  # of this platform
 CO_SIMULATION, MODEL_EXCHANGE = "co-simulation", "model exchange"
@@ -32,6 +47,156 @@ INSTANCES: dict[tuple[str, str], type[Instance]] = {
     ("3.0", MODEL_EXCHANGE): Fmi3ModelExchange,
 }
 BINARY, SOURCE = re.compile(r"binaries/[^/]+/[^/]+"), re.compile(r"sources/.+\.c")
+
+
+# ---- Archives ------------------------------------------------------------------------------------
+
+
+def unpack(path: Path, folder: Path, kind: str, only: str | None = None) -> dict[str, int]:
+    """Unpack an archive, or one file of it, to an empty folder; nothing is written elsewhere.
+
+    Returns the bytes of all files in the archive, by their names: relative paths with "/".
+    UnreadableError for whatever is wrong with what should be an FMU or SSP (`kind`).
+    """
+    check_regular(path)
+    if path.is_dir():
+        raise UnreadableError(f"is a folder, expected an {kind}")
+    where = ""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            entries = archive.infolist()
+            _check(entries)
+            for entry in entries:
+                if only in (None, entry.filename):
+                    where = f"{_shown(entry.filename)} "
+                    file = Path(archive.extract(entry, folder))
+                    size = file.stat().st_size if is_file(file) else entry.file_size
+                    if size != entry.file_size:
+                        raise zipfile.BadZipFile(f"{size} bytes, expected {entry.file_size}")
+    except (UnreadableError, MemoryError):
+        raise
+    except Exception as error:  # zipfile and its decoders raise many
+        if isinstance(error, OSError) and error.errno != errno.EINVAL:  # not of a wrong offset
+            wrong = f"{where}cannot be {'unpacked' if where else 'read'}"
+        else:
+            wrong = f"{where}is damaged" if where else f"not an {kind}, a zip archive, or damaged"
+        raise UnreadableError(f"{wrong}: {one_line(reason(error))}") from error
+    return {entry.filename: entry.file_size for entry in entries if not entry.is_dir()}
+
+
+def read_xml(path: Path) -> etree._ElementTree:
+    """Parse an unpacked XML file; UnreadableError if it is none, too large, or has a DOCTYPE."""
+    size = path.stat().st_size
+    if size > LARGEST_XML:
+        raise UnreadableError(
+            f"has {size / 1e6:.0f} MB, expected at most {LARGEST_XML / 1e6:.0f} MB"
+        )
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True)
+    try:  # from bytes: given a name, libxml2 takes it for a URL
+        tree = etree.fromstring(path.read_bytes(), parser).getroottree()
+    except etree.XMLSyntaxError as error:
+        raise UnreadableError(f"not valid XML: {one_line(error.msg)}") from error
+    if tree.docinfo.doctype:
+        raise UnreadableError("has a DOCTYPE, leave it out")
+    return tree
+
+
+def wrong_name(name: str) -> str:
+    """Why the name of a file can be no path in an archive, or nothing."""
+    if len(name) > LONGEST_NAME:
+        return f"has a name of {len(name)} characters, expected at most {LONGEST_NAME}"
+    if any(unicodedata.category(character) in CONTROL for character in name):
+        return "has a control character in its name"
+    parts = name.split("/")
+    if name.startswith(("/", "\\")) or ":" in name or any(map(_leads_up, parts + name.split("\\"))):
+        return "would lie outside of its folder"
+    if "\\" in name:
+        return "has a backslash in its name, expected / between folders"
+    return "" if set(parts) - {"", "."} else "is no name of a file"
+
+
+def check_library(path: Path) -> None:
+    """Refuse a shared object (ELF, 64 bit) that is cut off: it would kill the process."""
+    with path.open("rb") as file:
+        header = file.read(64)
+        if header[:6] != b"\x7fELF\x02\x01" or len(header) < 64:
+            return  # of another kind: the loader says what is wrong
+        table = struct.unpack_from("<Q", header, 32)[0]
+        entry_size, count = struct.unpack_from("<HH", header, 54)
+        size = path.stat().st_size
+        if table + entry_size * count > size:
+            raise UnreadableError(f"is cut off: {size} bytes")
+        file.seek(table)
+        entries = file.read(entry_size * count)
+    for at in range(0, len(entries) - 39, max(entry_size, 40)):
+        kind, _, offset, _, _, length = struct.unpack_from("<IIQQQQ", entries, at)
+        if kind == 1 and offset + length > size:
+            raise UnreadableError(f"is cut off: {size} bytes, {offset + length} are loaded")
+
+
+def _check(entries: Sequence[zipfile.ZipInfo]) -> None:
+    """Refuse what is wrong with an archive by its directory."""
+    if len(entries) > MOST_FILES:
+        raise UnreadableError(f"has {len(entries)} files inside, expected at most {MOST_FILES}")
+    # unpacking ends at the sizes that the archive declares: they can be relied on
+    content = sum(entry.file_size for entry in entries)
+    if content > LARGEST_CONTENT:
+        raise UnreadableError(
+            f"has {content / 1e6:.0f} MB inside, expected at most {LARGEST_CONTENT / 1e6:.0f} MB"
+        )
+    places: dict[tuple[str, ...], zipfile.ZipInfo] = {}
+    for entry in entries:
+        # zipfile cuts the name at a null character, and may take another one from an extra field
+        original = entry.orig_filename
+        wrong = wrong_name(original) or wrong_name(entry.filename) or _wrong_entry(entry)
+        if wrong:
+            raise UnreadableError(f"{_shown(original)} {wrong}")
+        other = places.setdefault(_place(entry.filename), entry)
+        if other is not entry and not (other.is_dir() and entry.is_dir()):
+            if other.filename == entry.filename:
+                raise UnreadableError(f"{_shown(entry.filename)} is there twice")
+            both = f"{_shown(other.filename)} and {_shown(entry.filename)}"
+            raise UnreadableError(f"{both} are one file on some systems")
+    for place, entry in places.items():
+        for length in range(1, len(place)):
+            above = places.get(place[:length])
+            if above is not None and not above.is_dir():
+                raise UnreadableError(
+                    f"{_shown(above.filename)} is a file, and a folder of {_shown(entry.filename)}"
+                )
+
+
+def _leads_up(part: str) -> bool:
+    """Whether a part of a path is "..", or is so where blanks and dots at its end are dropped."""
+    return len(part) > 1 and not part.strip(" .")
+
+
+def _wrong_entry(entry: zipfile.ZipInfo) -> str:
+    """Why an entry cannot be unpacked, or nothing."""
+    if stat.S_IFMT(entry.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR):
+        return "is a link or a device, expected a file"
+    if entry.flag_bits & ENCRYPTED:
+        return "is encrypted"
+    if entry.compress_type not in METHODS:
+        known = " or ".join(METHODS.values())
+        return f"is compressed by method {entry.compress_type}, expected {known}"
+    return ""
+
+
+def _place(name: str) -> tuple[str, ...]:
+    """Where a file is unpacked: the same for names that some system takes for the same file.
+
+    Windows ignores case and drops blanks and dots at the end; macOS knows one form of an accent.
+    """
+    parts = unicodedata.normalize("NFC", name).casefold().split("/")
+    return tuple(part.rstrip(" .") for part in parts if part not in ("", "."))
+
+
+def _shown(name: str) -> str:
+    return show(name, 120)
+
+
+# ---- FMUs ----------------------------------------------------------------------------------------
 
 
 class Fmu(AbstractContextManager["Fmu"]):

@@ -9,10 +9,18 @@ from typing import Any
 from fmpy.model_description import DefaultExperiment, ModelDescription, ModelVariable, SimpleType
 
 from rparm.errors import WrongValueError, did_you_mean, hint
-from rparm.input_files import show
-from rparm.texts import number as short_number
-from rparm.texts import short
-from rparm.units import ANGLE, Displays, Units, display_unit, finite_number, quantity, units_of
+from rparm.files import show
+from rparm.units import (
+    ANGLE,
+    Displays,
+    Units,
+    display_unit,
+    finite_number,
+    quantity,
+    short,
+    units_of,
+)
+from rparm.units import number as short_number
 
 Value = float | int | bool | str
 TURN = 2 * math.pi

@@ -1,16 +1,37 @@
-"""Fits parameters, and a start state of each segment, by Levenberg and Marquardt's method.
+"""The fit: parameters, a start state of each segment, intervals, and what cannot be known.
 
-Segments share the parameters only. So the equations of a step are an arrow: orthogonal
-transformations take the start states out, segment by segment.
+Parameters and start states are fitted by Levenberg and Marquardt's method. Segments share the
+parameters only. So the equations of a step are an arrow: orthogonal transformations take the start
+states out, segment by segment.
+
+The classical covariance trusts that the residuals are white noise on the measured values. Where
+inputs are noisy or the model is not quite right, the residuals of a segment belong together, and it
+is too small. How much independent segments pull the parameters in different directions shows the
+covariance whatever happens within them: the "sandwich" of robust statistics. As there are few
+segments, it has the corrections that Bell and McCaffrey proposed (Survey Methodology 28, 2002): it
+is unbiased for white noise, and each parameter has its own degrees of freedom.
+
+The singular values of the residuals' derivatives show how many combinations of parameters have no
+effect on the measured values. They are named by as few parameters as possible: sets of columns that
+depend on each other, of which no column can be left out.
 """
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import stats
+from scipy.interpolate import CubicSpline
 
-from rparm.identification.residuals import Linear, Problem
+from rparm.errors import UserError
+from rparm.identification.logs import Segment
+from rparm.identification.request import DELAY, Parameters
+from rparm.identification.simulator import Simulator
 
+STEP, CENTRAL_STEP = 1e-6, 1e-5  # of differences, of the scale of what is changed
+ROUNDING = 4 * np.finfo(float).eps  # of outputs, relative
 MOST_STEPS = 60
 LONGEST = 1.0  # step of a parameter: e times its distance from a limit, or once its scale
 FIRST_RIDGE, LEAST_RIDGE, MOST_RIDGE = 1e-3, 1e-10, 1e8
@@ -19,6 +40,150 @@ ROUGH = 0.01  # of the cost: what a step gains where the first steps end
 FLAT = 0.05  # the same, what a step has gained: less ends the fit
 UNKNOWN = 1e-6  # singular value of a direction that the fit cannot know
 SMALLEST = 1e-3  # of the largest effect of a state: its weight in the ridge where it has none
+LEVEL = 0.95
+SUSPICIOUS = 1.5  # ratio of the standard deviations
+SMALL = 1e-8  # of the largest singular value of the states' columns: such a state has no effect
+FULL = 1 - 1e-9  # share of a segment in what is known: it cannot be checked by others
+NOTHING = 3e-6  # singular value of columns of length 1; differences leave 1e-7 where there is none
+COARSE = 1e-3  # the same at most, where rounding is seen
+EQUAL = 1e-3  # of two effects a unit, so that a sum of parameters is known
+MOST = 6  # parameters in a combination that is looked for
+TAKES_PART = 1e-4  # weight of a column in a combination of columns of length 1
+LAGS = 20
+REJECTED = 0.01  # probability below which residuals are not taken for noise
+
+
+# ---- Residuals -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """Residuals of a segment, (rows,), linear in what is changed, at one point."""
+
+    residuals: np.ndarray  # (rows,)
+    by_states: np.ndarray  # (rows, states), of their scales
+    by_parameters: np.ndarray  # (rows, parameters)
+
+    @property
+    def table(self) -> np.ndarray:
+        """All columns: states, parameters, residuals."""
+        return np.column_stack([self.by_states, self.by_parameters, self.residuals])
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What is to be fitted.
+
+    Numbers of a point are `z` (parameters,) and `x` (segments, states), states in their scales.
+    """
+
+    simulator: Simulator
+    parameters: Parameters
+    segments: Sequence[Segment]
+    noise: np.ndarray  # (outputs,): one of a residual, in the outputs' units
+    scales: np.ndarray  # (states,)
+    delay: float = 0.0  # s, if it is not among the parameters
+
+    def predicted(self, segment: Segment, z: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Outputs (rows, outputs) as they would be measured; UserError if the FMU fails."""
+        values, delay = self.parameters.values(z), self.delay
+        if DELAY in self.parameters.names:
+            index = self.parameters.names.index(DELAY)
+            values, delay = np.delete(values, index), values[index]
+        outputs = self.simulator.run(segment, np.append(values, x * self.scales))
+        return _late(segment.times, outputs, delay) if delay else outputs
+
+    def residuals(self, segment: Segment, z: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Predicted minus measured, (rows that count * outputs,), row by row, in `noise`."""
+        rows = segment.counts
+        difference = self.predicted(segment, z, x)[rows] - segment.measured[rows]
+        return (difference / self.noise).ravel()
+
+    def misfit(self, z: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Root mean square (outputs,) of predicted minus measured, in the outputs' units."""
+
+        def of(i: int) -> np.ndarray:
+            left = self.residuals(self.segments[i], z, x[i]).reshape(-1, len(self.noise))
+            return np.mean(left**2, axis=0)
+
+        squares = self.simulator.map(of, range(len(self.segments)))
+        return self.noise * np.sqrt(np.mean(squares, axis=0))
+
+    def tried(self, z: np.ndarray, x: np.ndarray, before: np.ndarray) -> tuple[float, np.ndarray]:
+        """Cost of a point, and the start states there, (segments, states).
+
+        Where the FMU refuses a start state of `x`, what it takes of the step from `before` is left:
+        a joint starts at a stop, for example. The cost is the sum of the squares of all residuals,
+        infinite where nothing helps.
+        """
+
+        def of(i: int) -> tuple[float, np.ndarray]:
+            for state in _shortened(x[i], before[i]):
+                with suppress(UserError):
+                    return float(np.sum(self.residuals(self.segments[i], z, state) ** 2)), state
+            return np.inf, before[i]
+
+        costs, states = zip(*self.simulator.map(of, range(len(self.segments))), strict=True)
+        total = sum(costs)
+        return (total if np.isfinite(total) else np.inf), np.array(states)
+
+    def rounding(self) -> float:
+        """Length of a column of central differences where there is no effect."""
+        largest = np.abs(self.segments[0].measured[self.segments[0].counts]).max(axis=0)
+        rows = sum(int(segment.counts.sum()) for segment in self.segments)
+        digits = ROUNDING * np.linalg.norm(largest / self.noise)
+        return float(digits * np.sqrt(rows) / CENTRAL_STEP)
+
+    def linear(self, z: np.ndarray, x: np.ndarray, is_exact: bool = False) -> list[Linear]:
+        """All segments, linear at a point.
+
+        Parameters
+        ----------
+        is_exact : bool
+            Whether differences are central: twice the runs, an error of the second order.
+        """
+
+        def of(i: int) -> Linear:
+            return self._linear(self.segments[i], z, x[i], is_exact)
+
+        return self.simulator.map(of, range(len(self.segments)))
+
+    def _linear(self, segment: Segment, z: np.ndarray, x: np.ndarray, is_exact: bool) -> Linear:
+        base = self.residuals(segment, z, x)
+        size = CENTRAL_STEP if is_exact else STEP
+        table = np.empty((len(base), len(x) + len(z)))
+        for k in range(table.shape[1]):
+            found = []  # differences forward and, where it is needed, backward
+            for step in (size, -size):
+                point = np.append(x, z)
+                point[k] += step
+                try:
+                    moved = self.residuals(segment, point[len(x) :], point[: len(x)])
+                except UserError:
+                    continue  # a start beyond a limit, for example
+                found.append((moved - base) / step)
+                if not is_exact:
+                    break
+            if not found:
+                raise UserError(f"{self.simulator.fmu.path}: runs on neither side of the solution")
+            table[:, k] = np.mean(found, axis=0)
+        return Linear(base, table[:, : len(x)], table[:, len(x) :])
+
+
+def _shortened(new: np.ndarray, old: np.ndarray) -> Iterator[np.ndarray]:
+    """A state (states,); if it is refused, without the step of one of them, then of all."""
+    yield new
+    for k in np.flatnonzero(new != old):
+        yield np.where(np.arange(len(new)) == k, old, new)
+    yield old
+
+
+def _late(times: np.ndarray, values: np.ndarray, delay: float) -> np.ndarray:
+    """Values (rows, outputs) that are seen `delay` s late."""
+    return CubicSpline(times, values, axis=0)(times - delay)
+
+
+# ---- The fit -------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,3 +283,284 @@ class _Arrow:
         left, values, _ = np.linalg.svd(rest[:, :-1] / self.weights, full_matrices=False)
         kept = left[:, values > UNKNOWN]
         return float(np.sum((kept.T @ rest[:, -1]) ** 2) + np.sum(triangles[:, :n, -1] ** 2))
+
+
+# ---- Intervals -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """A segment whose start state is as good as can be, whatever the parameters."""
+
+    by_parameters: np.ndarray  # (rows, parameters)
+    residuals: np.ndarray  # (rows,)
+    basis: np.ndarray  # (rows, n) orthonormal: what the states can explain
+
+
+def reduced(linear: Linear) -> Reduced:
+    """Take the start state out of a segment's equations."""
+    left, values, _ = np.linalg.svd(linear.by_states, full_matrices=False)
+    basis = left[:, values > SMALL * max(values.max(initial=0.0), 1e-300)]
+    rest, residuals = linear.by_parameters, linear.residuals
+    return Reduced(
+        rest - basis @ (basis.T @ rest), residuals - basis @ (basis.T @ residuals), basis
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Covariances:
+    """Of the fit's numbers of the parameters that are known."""
+
+    scatter: np.ndarray  # (known, known)
+    classical: np.ndarray  # (known, known)
+    degrees: np.ndarray  # (known,) of freedom, of the scatter; 0: there is one segment
+    variance: float  # of the residuals, as multiples of their noise
+
+    @property
+    def ratio(self) -> float:
+        """Ratio of the standard deviations, scatter to classical: root mean square of all."""
+        ratios = np.diag(self.scatter) / np.diag(self.classical)
+        return float(np.sqrt(ratios.mean())) if len(ratios) else 1.0
+
+    @property
+    def is_suspicious(self) -> bool:
+        """Whether the classical intervals would be too small."""
+        return self.ratio > SUSPICIOUS
+
+    @property
+    def halves(self) -> np.ndarray:
+        """Half the width (known,) of the intervals by scatter."""
+        factors = stats.t.ppf((1 + LEVEL) / 2, np.maximum(self.degrees, 1.0))
+        return factors * np.sqrt(np.diag(self.scatter))
+
+    @property
+    def classical_halves(self) -> np.ndarray:
+        """Half the width (known,) of the classical intervals."""
+        return stats.norm.ppf((1 + LEVEL) / 2) * np.sqrt(np.diag(self.classical))
+
+
+def covariances(segments: Sequence[Reduced], known: np.ndarray) -> Covariances:
+    """Covariances of the parameters at the indices `known`; the others are taken as given."""
+    n = len(known)
+    tables = [segment.by_parameters[:, known] for segment in segments]
+    inverse = np.linalg.inv(sum(table.T @ table for table in tables)) if n else np.empty((0, 0))
+    rows = sum(len(s.residuals) - s.basis.shape[1] for s in segments) - n
+    variance = sum(float(s.residuals @ s.residuals) for s in segments) / max(rows, 1)
+    classical = variance * inverse
+    if len(segments) < 2:
+        return Covariances(classical, classical, np.zeros(n), variance)
+    root = np.linalg.cholesky(inverse) if n else inverse  # inverse = root root'
+    moves = np.empty((len(segments), n))
+    norms = np.empty((len(segments), n))
+    overlaps = np.empty((len(segments), n, n))
+    for i, (segment, table) in enumerate(zip(segments, tables, strict=True)):
+        # in coordinates where the sum of all shares is the unit matrix
+        scaled = table @ root
+        shares, axes = np.linalg.eigh(scaled.T @ scaled)
+        shares = np.clip(shares, 0.0, FULL)
+        weight = (axes / np.sqrt(1 - shares)) @ axes.T
+        moves[i] = root @ weight @ scaled.T @ segment.residuals
+        overlaps[i] = (axes * shares / np.sqrt(1 - shares)) @ axes.T @ root.T
+        norms[i] = np.sum((root @ axes) ** 2 * shares / (1 - shares), axis=1)
+    return Covariances(moves.T @ moves, classical, _degrees(norms, overlaps), variance)
+
+
+def _degrees(norms: np.ndarray, overlaps: np.ndarray) -> np.ndarray:
+    """Degrees of freedom (known,): the first two moments are those of a chi-squared number.
+
+    Parameters
+    ----------
+    norms : ndarray, shape (segments, known)
+        Variance of the move by a segment, if segments were independent.
+    overlaps : ndarray, shape (segments, known, known)
+        What they share, as they are fitted together; the last axis is the parameter.
+    """
+    found = np.empty(norms.shape[1])
+    for k in range(len(found)):
+        shared = overlaps[:, :, k]
+        matrix = np.diag(norms[:, k]) - shared @ shared.T
+        found[k] = np.trace(matrix) ** 2 / np.sum(matrix**2)
+    return found
+
+
+# ---- Combinations without effect -----------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Combination:
+    """Parameters of which the log shows the joint effect only, or one without effect."""
+
+    names: tuple[str, ...]
+    effects: np.ndarray | None  # (names,) of each a unit, relative: their sum is known; or None
+
+    def __str__(self) -> str:
+        if len(self.names) == 1:
+            return f"{self.names[0]} has no effect"
+        if self.effects is None:
+            return f"{', '.join(self.names)} together"
+        first, *others = self.names
+        signs = [" + " if effect > 0 else " - " for effect in self.effects[1:]]
+        return first + "".join(map("".join, zip(signs, others, strict=True)))
+
+
+class Effects:
+    """Effects of parameters on the residuals, as columns that may depend on each other.
+
+    Parameters
+    ----------
+    effects : ndarray, shape (rows, parameters)
+        Derivatives of the residuals by numbers of order 1.
+    rounding : float
+        Length that a column of these has where there is no effect.
+    """
+
+    def __init__(self, effects: np.ndarray, rounding: float) -> None:
+        self.table = np.linalg.qr(effects, mode="r")
+        self.lengths = np.linalg.norm(self.table, axis=0)
+        self.units = self.table / np.where(self.lengths > 0, self.lengths, 1.0)
+        self.there = self.lengths > max(rounding, NOTHING * self.lengths.max(initial=0.0))
+        self._rounding = rounding
+
+    def depend(self, columns: Sequence[int]) -> bool:
+        """Whether columns depend on each other, to the precision that they have."""
+        return self._smallest(self.units[:, columns]) <= self.precision(columns)
+
+    def precision(self, columns: Sequence[int]) -> float:
+        """Smallest singular value of columns of length 1 that is not rounding."""
+        shortest = self.lengths[list(columns)].min(initial=np.inf)
+        return min(max(NOTHING, self._rounding / max(shortest, 1e-300)), COARSE)
+
+    @staticmethod
+    def _smallest(table: np.ndarray) -> float:
+        if table.shape[1] > table.shape[0]:
+            return 0.0
+        return float(np.linalg.svd(table, compute_uv=False)[-1])
+
+    @property
+    def basis(self) -> np.ndarray:
+        """Indices of as many parameters as can be known if the others are."""
+        found: list[int] = []
+        # the strongest first: those with clear effects are chosen before weak ones
+        for i in sorted(np.flatnonzero(self.there), key=lambda i: -self.lengths[i]):
+            if not self.depend([*found, int(i)]):
+                found.append(int(i))
+        return np.array(sorted(found), int)
+
+
+def combinations(effects: Effects, slopes: np.ndarray, names: Sequence[str]) -> list[Combination]:
+    """Name what cannot be known.
+
+    Parameters
+    ----------
+    slopes : ndarray, shape (parameters,)
+        Derivatives of the parameters by the numbers of `effects`, in their units.
+    """
+    found = [Combination((names[i],), None) for i in np.flatnonzero(~effects.there)]
+    classes = _classes(effects)
+    found += [_sum(effects.table, slopes, names, group) for group in classes if len(group) > 1]
+    found += [
+        Combination(tuple(names[i] for i in circuit), None)
+        for circuit in _circuits(effects, classes)
+    ]
+    return found
+
+
+def _classes(effects: Effects) -> list[list[int]]:
+    """Columns that are multiples of each other, together."""
+    found: list[list[int]] = []
+    for column in np.flatnonzero(effects.there).tolist():
+        for group in found:
+            if effects.depend([group[0], column]):
+                group.append(column)
+                break
+        else:
+            found.append([column])
+    return found
+
+
+def _sum(
+    table: np.ndarray, slopes: np.ndarray, names: Sequence[str], group: Sequence[int]
+) -> Combination:
+    """Parameters whose effects are multiples of each other."""
+    by_unit = table[:, group] / slopes[list(group)]
+    relative = by_unit.T @ by_unit[:, 0] / (by_unit[:, 0] @ by_unit[:, 0])
+    is_sum = np.allclose(np.abs(relative), 1.0, atol=EQUAL)
+    return Combination(tuple(names[i] for i in group), relative if is_sum else None)
+
+
+def _circuits(effects: Effects, classes: Sequence[Sequence[int]]) -> list[list[int]]:
+    """Sets of three columns or more, one of a class, that depend on each other; small ones first.
+
+    As many as there are combinations without effect, each with something that the others lack.
+    """
+    columns = [group[0] for group in classes]
+    if len(columns) < 3:
+        return []
+    values, right = np.linalg.svd(effects.units[:, columns])[1:]
+    values = np.append(values, np.zeros(len(columns) - len(values)))
+    null = right[values <= effects.precision(columns)]
+    weights = np.abs(null).max(axis=0, initial=0.0)
+    part = [column for column, weight in zip(columns, weights, strict=True) if weight > TAKES_PART]
+    found: list[list[int]] = []
+    vectors = np.empty((0, len(part)))
+    for size in range(3, min(len(part), MOST) + 1):
+        for places in itertools.combinations(range(len(part)), size):
+            if len(found) == len(null):
+                return found
+            chosen = [part[i] for i in places]
+            vector = np.zeros((1, len(part)))
+            vector[0, list(places)] = np.linalg.svd(effects.units[:, chosen])[2][-1]
+            is_smallest = np.abs(vector[0, list(places)]).min() > TAKES_PART
+            both = np.vstack([vectors, vector])
+            is_new = np.linalg.svd(both, compute_uv=False)[-1] > TAKES_PART
+            if effects.depend(chosen) and is_smallest and is_new:
+                found.append(chosen)
+                vectors = both
+    return found if len(found) == len(null) else [*found, part]  # of more than is looked through
+
+
+# ---- Whiteness of the residuals ------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Whiteness:
+    """Of the residuals of one output."""
+
+    correlations: np.ndarray  # (lags,): of 1, 2, ... rows
+    bound: float  # 95 % of the correlations of noise are smaller
+    statistic: float
+    p: float  # the probability of one as large, if the residuals were noise
+
+    @property
+    def is_white(self) -> bool:
+        """Whether they may be noise."""
+        return self.p >= REJECTED
+
+
+def whiteness(segments: Sequence[Reduced], outputs: int) -> list[Whiteness]:
+    """Test the residuals of each output, over pairs of rows within segments.
+
+    A start state that is estimated from a segment's rows makes its residuals a little correlated:
+    by the projection of the noise, which is known and taken off.
+    """
+    return [_of_output(segments, outputs, k) for k in range(outputs)]
+
+
+def _of_output(segments: Sequence[Reduced], outputs: int, k: int) -> Whiteness:
+    residuals = [segment.residuals[k::outputs] for segment in segments]
+    bases = [segment.basis[k::outputs] for segment in segments]
+    count = sum(map(len, residuals))
+    kept = sum(len(r) - float(np.sum(b**2)) for r, b in zip(residuals, bases, strict=True))
+    power = sum(float(r @ r) for r in residuals)
+    variance = power / max(kept, 1.0)
+    lags = min(LAGS, min(map(len, residuals)) - 2)
+    found = np.zeros(max(lags, 0))
+    pairs = np.zeros(len(found))
+    for lag in range(1, lags + 1):
+        for r, b in zip(residuals, bases, strict=True):
+            found[lag - 1] += r[lag:] @ r[:-lag] + variance * np.sum(b[lag:] * b[:-lag])
+            pairs[lag - 1] += len(r) - lag
+    found /= power or 1.0
+    statistic = float(np.sum(found**2 * count**2 / np.maximum(pairs, 1)))
+    p = float(stats.chi2.sf(statistic, max(len(found), 1)))
+    return Whiteness(found, 1.96 / np.sqrt(count), statistic, p)

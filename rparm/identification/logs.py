@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from rparm.errors import UserError
-from rparm.scenarios import logs
+from rparm.runs import inputs
 
 LENGTH = 0.4  # s, of a segment
 FEWEST_ROWS = 20  # of a segment
@@ -68,7 +68,7 @@ def read(
     UserError if one is not there, holds what is no number, or does not change where it should.
     """
     every = (*outputs.values(), *switches.values(), *reals.values())
-    log = logs.read(path).columns(time, [column.name for column in every])
+    log = inputs.read_log(path).columns(time, [column.name for column in every])
     times, values = log.times, log.values * [column.scale for column in every]
     measured, on, efforts = np.split(values, np.cumsum([len(outputs), len(switches)]), axis=1)
     if len(times) < FEWEST_ROWS:

@@ -1,31 +1,47 @@
-"""The page of an identification."""
+"""The page of an identification, with the picture of its residuals and correlations."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from rparm.fmi.model import Model
-from rparm.identification import figures, results
+from rparm.identification import results
+from rparm.identification.fit import Whiteness
 from rparm.identification.identify import Identification
-from rparm.identification.parameters import DELAY
-from rparm.report import assets
+from rparm.identification.request import DELAY
+from rparm.report import pages
 from rparm.report.overview import FAILED, RAN
-from rparm.report.pages import INDEX, RunPage, Table, write_page
+from rparm.report.pages import (
+    ERROR_COLORS,
+    INDEX,
+    MUTED,
+    RUN_COLOR,
+    STYLE,
+    RunPage,
+    Table,
+    save_figure,
+    write_page,
+)
 from rparm.report.run_data import Curve, Plot, RunData, thinned
-from rparm.report.style import save
-from rparm.texts import number, unit
+from rparm.units import minus, number, unit
 
 PICTURE = "correlations.png"
+TEXTS = STYLE | {"text.parse_math": False}
+DARK = 0.6  # cells of a larger correlation
+MOST_NUMBERS = 10  # parameters, whose correlations are written into their cells
 
 
 def write(
     found: Identification, folder: Path, model: Model, true: Mapping[str, float], again: str
 ) -> Path:
     """Write the page and its picture into a folder; its path. `again` is what makes it again."""
-    picture = figures.figure(found.whiteness, found.known, found.covariances.scatter)
-    save(picture, folder / PICTURE)
-    assets.write(folder)
+    picture = figure_of(found.whiteness, found.known, found.covariances.scatter)
+    save_figure(picture, folder / PICTURE)
+    pages.write_assets(folder)
     logs = ", ".join(recording.path.name for recording in found.recordings)
     page = RunPage(
         title=f"{found.model}: identified parameters",
@@ -50,8 +66,6 @@ def write(
 
 
 # ---- Plots ---------------------------------------------------------------------------------------
-
-
 def _data(found: Identification, model: Model) -> RunData:
     """Residuals and measured over simulated values of the first log, and of the second."""
     shown = found.segments[: found.of_first]
@@ -91,8 +105,6 @@ def _validation(found: Identification, model: Model, times: np.ndarray) -> list[
 
 
 # ---- Tables --------------------------------------------------------------------------------------
-
-
 def _tables(found: Identification, model: Model, true: Mapping[str, float]) -> list[Table]:
     return [
         _parameters(found, true),
@@ -171,3 +183,53 @@ def _second(found: Identification, model: Model) -> Table:
         "unstable motion runs away after a while, however exact they are; it is followed until the "
         f"error is a tenth of the range. Its segments by themselves have chi2 = {second.chi2:.4g}.",
     )
+
+
+def correlations(covariance: np.ndarray) -> np.ndarray:
+    """Correlations of a covariance (n, n)."""
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    return covariance / np.outer(deviations, deviations)
+
+
+def figure_of(
+    tests: Mapping[str, Whiteness], names: Sequence[str], covariance: np.ndarray
+) -> Figure:
+    """Draw both; `names` are those of the covariance's parameters."""
+    with mpl.rc_context(TEXTS):
+        made = Figure(figsize=(11, 4.2), layout="constrained")
+        left, right = made.subplots(1, 2)
+        _autocorrelations(left, tests)
+        _correlations(right, names, correlations(covariance))
+        return made
+
+
+def _autocorrelations(axes: Axes, tests: Mapping[str, Whiteness]) -> None:
+    width = 0.8 / max(len(tests), 1)
+    for i, (name, test) in enumerate(tests.items()):
+        lags = np.arange(1, len(test.correlations) + 1)
+        colour = (RUN_COLOR, *ERROR_COLORS)[i % (1 + len(ERROR_COLORS))]
+        places = lags + (i - (len(tests) - 1) / 2) * width
+        axes.bar(places, test.correlations, width, color=colour, label=name)
+    bound = max((test.bound for test in tests.values()), default=0.0)
+    for level in (-bound, bound):
+        axes.axhline(level, color=MUTED, linestyle=(0, (5, 3)), linewidth=1)
+    axes.set_title("autocorrelation of the residuals; 95 % of noise is between the lines", size=9)
+    axes.set_xlabel("lag in rows")
+    axes.legend()
+
+
+def _correlations(axes: Axes, names: Sequence[str], values: np.ndarray) -> None:
+    axes.set_title("correlations of the parameters", size=9)
+    axes.grid(False)
+    if not names:
+        axes.set_axis_off()
+        return
+    shown = axes.imshow(values, cmap="RdBu", vmin=-1, vmax=1)
+    axes.set_xticks(range(len(names)), names, rotation=40, ha="right")
+    axes.set_yticks(range(len(names)), names)
+    axes.figure.colorbar(shown, ax=axes)
+    if len(names) <= MOST_NUMBERS:
+        for (i, k), value in np.ndenumerate(values):
+            colour = "white" if abs(value) > DARK else "black"
+            middle = {"ha": "center", "va": "center", "size": 8}
+            axes.text(k, i, minus(f"{value:.2f}"), color=colour, **middle)

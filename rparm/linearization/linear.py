@@ -1,20 +1,30 @@
-"""A linear model in continuous time, with the names of what it describes."""
+"""Linear models: A, B, C and D of an FMU at a point, by its directional derivatives."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from rparm.errors import UserError, hint
-from rparm.linearization.matrices import eigenvalues
+from rparm.errors import UserError, WrongValueError, did_you_mean, hint, placed
+from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.model import PARAMETERS, Model, Value, Variable
+from rparm.units import typed_quantity
 
 if TYPE_CHECKING:
     from control import StateSpace
 
 TERMS = 13  # of Taylor's series of an exponential
+CANCELLED = 1e-13  # of the terms of a sum: what rounding leaves if it is 0
+ROUNDING = 1e-15  # relative, for each row and column: of singular values that are 0
+SAMPLED = (
+    "is sampled, which no linear model in continuous time can be: set its sample time to 0 if it "
+    "has one"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,3 +181,298 @@ def _places(known: Sequence[str], wanted: Sequence[str] | None, option: str) -> 
         if name in wanted[:i]:
             raise UserError(f"{option}: {name} is given twice")
     return [known.index(name) for name in (known if wanted is None else wanted)]
+
+
+# ---- Matrices ------------------------------------------------------------------------------------
+
+
+def eigenvalues(A: np.ndarray) -> np.ndarray:
+    """Eigenvalues of A, shape (n,): those that are 0 exactly so, also if they are multiple.
+
+    States that influence each other form a block. Blocks are taken one by one, each in units that
+    suit it: so neither units nor fast poles of other blocks cost accuracy.
+    """
+    both = closure(A.T != 0)
+    both &= both.T
+    found = [
+        _of_block(A[np.ix_(block, block)])
+        for i in range(len(A))
+        if not (block := np.flatnonzero(both[i]))[0] < i
+    ]
+    return np.concatenate([np.zeros(0, complex), *found])
+
+
+def _of_block(A: np.ndarray) -> np.ndarray:
+    """Eigenvalues of states that all influence each other."""
+    if len(A) == 1:
+        return A[0].astype(complex)
+    scale = scales(A)
+    A = A * scale / scale[:, None]
+    size, zeros = np.linalg.norm(A, 2), 0
+    while len(A):  # take poles at 0 out, which rounding would spread if they are multiple
+        _, values, rows = np.linalg.svd(A)
+        if values[-1] > len(A) * ROUNDING * size:
+            break
+        v = rows[-1]
+        k = int(np.abs(v).argmax())
+        rest = np.arange(len(A)) != k
+        A = A[np.ix_(rest, rest)] - np.outer(v[rest] / v[k], A[k, rest])
+        zeros += 1
+    return np.concatenate([np.zeros(zeros, complex), np.linalg.eigvals(A)])
+
+
+def zeros(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> np.ndarray:
+    """Finite zeros of C (s - A)^-1 B + D, which has one input and one output."""
+    from scipy.linalg import eigvals
+
+    n = len(A)
+    found = eigvals(np.block([[A, B], [C, D]]), np.diag([1.0] * n + [0.0]))
+    return found[np.isfinite(found)]
+
+
+def cleared(entries: np.ndarray, terms: np.ndarray) -> np.ndarray:
+    """Entries with 0 where their terms, whose sizes add up to `terms`, cancel but for rounding."""
+    return np.where(np.abs(entries) > CANCELLED * terms, entries, 0.0)
+
+
+def closure(arrows: np.ndarray) -> np.ndarray:
+    """Which nodes can be reached from which, (nodes, nodes), in no step or more."""
+    reached = arrows | np.eye(len(arrows), dtype=bool)
+    while True:
+        further = reached @ reached
+        if np.array_equal(further, reached):
+            return reached
+        reached = further
+
+
+def scales(A: np.ndarray) -> np.ndarray:
+    """Units of states, powers of 2, that make rows and columns of about the same size."""
+    from scipy.linalg import matrix_balance
+
+    return matrix_balance(A, permute=False, separate=True)[1][0] if len(A) else np.ones(0)
+
+
+# ---- Of an FMU -----------------------------------------------------------------------------------
+
+
+def linear_model(instance: Instance) -> Linear:
+    """The linear model of an instance after its initialization, with all states.
+
+    UserError if a value is not finite.
+    """
+    model = instance.fmu.model
+    variables = model.variables.values()
+    inputs = [v.name for v in variables if v.causality == "input" and v.type == "Real"]
+    outputs = [n for n in model.real_outputs if model.variables[n].variability != "discrete"]
+    unknowns, knowns = [*model.derivatives, *outputs], [*model.states, *inputs]
+    values = instance.reals([*knowns, *unknowns])
+    with instance.explained("at the point"):
+        values.get()
+    partials = instance.partials(unknowns, knowns)
+    _check_finite(instance, values.names, values.view)
+    _check_finite(instance, unknowns, partials.sum(axis=1))
+    n, m = len(model.states), len(inputs)
+    x, u, rates, y = np.split(values.view, np.cumsum([n, m, n]))
+    return Linear(
+        states=model.states,
+        inputs=tuple(inputs),
+        outputs=tuple(outputs),
+        A=partials[:n, :n],
+        B=partials[:n, n:],
+        C=partials[n:, :n],
+        D=partials[n:, n:],
+        x=x,
+        u=u,
+        y=y,
+        rates=rates,
+        at=dict(zip(knowns, [*x.tolist(), *u.tolist()], strict=True)),
+        left_out=tuple(name for name in model.real_outputs if name not in outputs),
+    )
+
+
+def _check_finite(instance: Instance, names: list[str], numbers: np.ndarray) -> None:
+    bad = np.flatnonzero(~np.isfinite(numbers))
+    if len(bad):
+        raise UserError(f"{instance.name}: {names[bad[0]]} or a derivative of it is not finite")
+
+
+def require_derivatives(fmu: Fmu) -> None:
+    """Refuse an FMU that gives no directional derivatives."""
+    if not fmu.model.gives_directional_derivatives:
+        raise UserError(f"{fmu.path}: gives no directional derivatives, which A, B, C, D are from")
+
+
+class FmuSubject(ExitStack):
+    """One FMU to linearize; a context manager, which keeps one instance.
+
+    Parameters
+    ----------
+    fmu : Fmu
+        Open as long as this; of either kind.
+    time : float
+        s.
+    """
+
+    def __init__(self, fmu: Fmu, time: float = 0.0) -> None:
+        super().__init__()
+        require_derivatives(fmu)
+        self.fmu, self.time = fmu, time
+        self._is_new = True
+        self._instance = self.enter_context(fmu.instance(fmu.path.stem))
+
+    def variable(self, name: str) -> Variable:
+        """What the FMU declares of a variable; UserError if it has none of that name."""
+        return known_variable(self.fmu.model, name, str(self.fmu.path))
+
+    def at(self, values: Mapping[str, Value]) -> Linear:
+        """The linear model where parameters, states and inputs have these values."""
+        instance = self._instance
+        if not self._is_new:
+            instance.reset()
+        self._is_new = False
+        instance.set_up(self.time, None)
+        for name, value in values.items():
+            instance.set(name, value)
+        instance.enter_initialization()
+        instance.exit_initialization()
+        return linear_model(instance)
+
+    def held(self, found: Linear) -> list[str]:
+        """States of `found` that are held."""
+        return held_states(found, self.fmu.model)
+
+    def check(self, found: Linear) -> None:
+        """Refuse an FMU that is sampled: its derivatives are 0 between samples."""
+        instance, model = self._instance, self.fmu.model
+        if is_sampled(found, model, model.real_outputs, lambda: next_event(instance)):
+            raise UserError(f"{self.fmu.path}: {SAMPLED}")
+
+
+def next_event(instance: Instance) -> float | None:
+    """Time of the next time event in s, if the FMU can be asked: model exchange only."""
+    return getattr(instance, "next_event", None)
+
+
+def known_variable(model: Model, name: str, where: str) -> Variable:
+    """A variable of a model; UserError if there is none of that name."""
+    if name not in model.variables:
+        known = [v.name for v in model.variables.values() if v.causality == "input"]
+        guess = did_you_mean(name, model.variables)
+        label = f" (states and inputs: {', '.join([*model.states, *known])})"
+        raise UserError(f"{where}: has no variable {name!r}{guess or label}")
+    return model.variables[name]
+
+
+def is_settable(variable: Variable) -> bool:
+    """Whether a point may say its value: a state, an input or a parameter."""
+    is_state = variable.causality in ("output", "local") and variable.initial == "exact"
+    return is_state or variable.causality == "input" or variable.is_a(PARAMETERS)
+
+
+# ---- States without rates ------------------------------------------------------------------------
+
+
+def held_states(found: Linear, model: Model) -> list[str]:
+    """States that stand still whatever inputs and states do: velocities, and what they move.
+
+    A velocity is held if it and its derivative are 0, and no state or input changes its derivative,
+    though the FMU declares that some do. A position is held if only held velocities move it.
+    """
+    responses = np.hstack([found.A, found.B]) != 0
+    is_still = (found.rates == 0) & (found.x == 0) & ~responses.any(axis=1)
+    causes = [model.dependencies.get(name, ("anything",)) for name in model.derivatives]
+    held = is_still & np.array([bool(some) for some in causes], bool)
+    moved_by_held = np.zeros(len(held), bool)
+    n = len(found.states)
+    if held.any():
+        by_others = responses[:, :n][:, ~held].any(axis=1) | responses[:, n:].any(axis=1)
+        moved_by_held = responses.any(axis=1) & ~by_others & (found.rates == 0)
+    return [name for name, out in zip(found.states, held | moved_by_held, strict=True) if out]
+
+
+def is_sampled(
+    found: Linear,
+    model: Model,
+    outputs: Sequence[str],
+    next_event: Callable[[], float | None],
+) -> bool:
+    """Whether `outputs` follow inputs only at ticks.
+
+    That is so if all that depend on inputs are discrete, and if no state or input changes one of
+    the others now and the FMU announces a time event.
+    """
+    following = [name for name in outputs if _depends_on_inputs(model, name)]
+    rows = [found.outputs.index(name) for name in following if name in found.outputs]
+    if not following or not rows:
+        return bool(following)
+    responds = np.hstack([found.C, found.D])[rows].any(axis=1)
+    return not responds.all() and next_event() is not None
+
+
+def _depends_on_inputs(model: Model, name: str) -> bool:
+    causes = model.dependencies.get(name, tuple(model.variables))
+    return any(model.variables[cause].causality == "input" for cause in causes)
+
+
+# ---- The point -----------------------------------------------------------------------------------
+
+
+class Subject(Protocol):
+    """What can be linearized: an FMU or a system."""
+
+    def variable(self, name: str) -> Variable:
+        """What is declared of a variable; UserError if there is none of that name."""
+        ...
+
+    def at(self, values: Mapping[str, Value]) -> Linear:
+        """The linear model where parameters, states and inputs have these values."""
+        ...
+
+
+def checked_point(
+    subject: Subject, given: Mapping[str, Any], with_outputs: bool = False
+) -> tuple[dict[str, Value], dict[str, float]]:
+    """Values to set, and values that outputs are to have; in the variables' units.
+
+    UserError if a variable is unknown, cannot be set, or does not take the value.
+
+    Parameters
+    ----------
+    given : mapping
+        Numbers, or texts with or without a unit ("30deg"), by name.
+    with_outputs : bool
+        Whether outputs may be given.
+    """
+    values: dict[str, Value] = {}
+    targets: dict[str, float] = {}
+    for name, value in given.items():
+        variable = subject.variable(name)
+        is_target = variable.causality == "output" and not is_settable(variable)
+        if is_target and variable.variability == "discrete":
+            raise UserError(f"{name}: is discrete, which no equilibrium can aim at")
+        if is_target and not with_outputs:
+            raise UserError(f"{name}: is an output, which --trim leads to a value")
+        if not is_target and not is_settable(variable):
+            raise UserError(f"{name}: is calculated, expected a state, an input or a parameter")
+        with placed(name):
+            number = _checked_value(variable, value)
+        if is_target:
+            targets[name] = float(number)
+        else:
+            values[name] = number
+    return values, targets
+
+
+def _checked_value(variable: Variable, given: Any) -> Value:
+    given = given.item() if isinstance(given, np.generic) else given
+    if not isinstance(given, str):
+        return variable.checked(given)
+    if variable.type == "Real":
+        number = typed_quantity(given, variable.units)
+        variable.check_range(number, number)
+        return number
+    if variable.type == "Boolean":
+        if given not in ("true", "false"):
+            raise WrongValueError(f"expected true or false, got {given!r}")
+        return given == "true"
+    return variable.checked(int(given) if given.lstrip("-").isdecimal() else given)

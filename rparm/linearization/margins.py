@@ -9,10 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rparm.linearization.linear import Linear
-from rparm.linearization.matrices import cleared, zeros
-from rparm.linearization.minimal import minimal, suited
-from rparm.linearization.responses import bounded_response, frequencies, frequency_response
+from rparm.linearization.linear import Linear, cleared, zeros
+from rparm.linearization.responses import (
+    bounded_response,
+    frequencies,
+    frequency_response,
+    minimal,
+    suited,
+)
 
 ROUNDING = 1e-12  # relative, of a real part that is 0
 DECADES = 2  # below the slowest and above the fastest pole, zero or crossing: where to search

@@ -13,8 +13,7 @@ import numpy as np
 
 from rparm.errors import UserError, WrongValueError, hint
 from rparm.fmi.model import Value
-from rparm.linearization.linear import Linear
-from rparm.linearization.point import Subject
+from rparm.linearization.linear import Linear, Subject
 
 MOST_STEPS = 60
 MOST_HALVINGS = 30

@@ -15,10 +15,10 @@ import numpy as np
 from rparm import project
 from rparm.fmi.model import Value
 from rparm.runs.comparison import Run
+from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import Result
-from rparm.scenarios.scenario import Scenario
-from rparm.system.comparison import Outcome
-from rparm.system.ssp import Ssp
+from rparm.systems.comparison import Outcome
+from rparm.systems.ssp import Ssp
 
 Rows = Sequence[int] | np.ndarray | slice  # of a run, that are shown
 EVERY = slice(None)

@@ -1,8 +1,4 @@
-"""The overview of a report: what ran, section by section, whichever command ran it.
-
-Each section has a folder in the report, and in it the file `ENTRIES`, which the overview is made
-from: so scenarios, systems and files of users show up together though different commands run them.
-"""
+"""The overview of the report: a line for each page, with a sparkline of its error or motion."""
 
 import json
 from collections.abc import Collection, Sequence
@@ -10,15 +6,15 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from rparm.output_files import write_text
-from rparm.report import assets, pages
+import numpy as np
+
+from rparm.files import write_text
+from rparm.report import pages
 from rparm.report.pages import RunPage
-from rparm.report.sparkline import HEIGHT, WIDTH, scale_of
-from rparm.report.sparkline import path as sparkline
+from rparm.report.run_data import Plot
 
 ENTRIES = "entries.json"
 PASSED, FAILED, RAN = "passed", "FAILED", "ran"  # RAN: there was nothing to compare with
-
 SCENARIOS, STUDIES, SYSTEM, FILES = "scenarios", "studies", "system", "files"
 # folder -> title; in the order of the overview
 SECTIONS = {
@@ -27,6 +23,9 @@ SECTIONS = {
     SYSTEM: "Variants of the systems",
     STUDIES: "Studies",
 }
+WIDTH, HEIGHT, MARGIN = 100.0, 24.0, 2.0  # of the view box
+SPACE = "\N{NO-BREAK SPACE}"  # before a unit
+COLUMNS = 60  # the curve's extremes in each are drawn
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,10 @@ def write_page(folder: Path, name: str, page: RunPage, group: str, **more: objec
         plot, x = page.data.plots[0], page.data.x
         curve = plot.curves[0]
         fields |= {"line": sparkline(x, curve.values), "line_text": plot.text}
-        fields |= {"line_of": curve.name, "line_scale": scale_of(x, plot, page.data.axis.unit)}
+        fields |= {
+            "line_of": curve.name,
+            "line_scale": sparkline_scale(x, plot, page.data.axis.unit),
+        }
     return Entry(**fields | more)
 
 
@@ -98,7 +100,7 @@ def read(report: Path, section: str) -> list[Entry]:
 
 def write(report: Path) -> Path:
     """Write the overview, and what its pages load."""
-    assets.write(report)
+    pages.write_assets(report)
     sections = []
     for folder, title in SECTIONS.items():
         entries = read(report, folder)
@@ -131,3 +133,40 @@ def _summary(entries: Sequence[Entry]) -> dict[str, object]:
         "passed": sum(entry.status == PASSED for entry in compared),
         "worst": max(known, key=lambda entry: entry.error, default=None),
     }
+
+
+def sparkline_scale(x: np.ndarray, plot: Plot, unit: str) -> str:
+    """Between which values the first curve of a plot runs, and how long `x` is (`unit`)."""
+    values = plot.curves[0].values[np.isfinite(plot.curves[0].values)]
+    if not len(values):
+        return ""
+    low, high = (f"{value:.3g}" for value in (values.min(), values.max()))
+    between = low if low == high else f"{low} to {high}"
+    parts = (f"{between} {plot.unit}".strip(), f"{x[-1] - x[0]:.3g} {unit}")
+    return ", ".join(SPACE.join(part.rsplit(" ", 1)) for part in parts)
+
+
+def sparkline(x: np.ndarray, y: np.ndarray) -> str:
+    """Path of an SVG of `WIDTH` by `HEIGHT` through points (rows,), `x` ascending; may be empty."""
+    finite = np.isfinite(y)
+    x, y = x[finite], y[finite]
+    if not len(x):
+        return ""
+    column = np.zeros(len(x), int)
+    length = x[-1] - x[0]
+    if length > 0:
+        column = np.minimum((x - x[0]) / length * COLUMNS, COLUMNS - 1).astype(int)
+    rows = {0, len(x) - 1}
+    for i in np.unique(column):
+        members = np.flatnonzero(column == i)
+        rows |= {int(members[np.argmin(y[members])]), int(members[np.argmax(y[members])])}
+    kept = sorted(rows)
+    across = (x[kept] - x[0]) / length if length > 0 else np.zeros(len(kept))
+    height = np.ptp(y)
+    up = (y[kept] - y.min()) / height if height > 0 else np.full(len(kept), 0.5)
+    points = zip(
+        MARGIN + across * (WIDTH - 2 * MARGIN),
+        HEIGHT - MARGIN - up * (HEIGHT - 2 * MARGIN),
+        strict=True,
+    )
+    return "M" + "L".join(f"{a:.4g} {b:.4g}" for a, b in points)

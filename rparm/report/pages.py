@@ -1,21 +1,28 @@
-"""HTML pages, made from the templates beside this file."""
+"""Parts, assets and pictures that all pages of the report share."""
 
+import base64
+import functools
+import gzip
 import os
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from rparm import texts
-from rparm.output_files import write_text
+from rparm import project, units
+from rparm.files import whole, write_text
 from rparm.report.run_data import RunData
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 INDEX = "index.html"
 NUMERIC = re.compile(r"-?\d[\d.]*(e[+-]?\d+)?( m?s)?|nan|–")  # of cells aligned to the right
-
 _templates = Environment(
     loader=FileSystemLoader(Path(__file__).parent / "templates"),
     autoescape=True,
@@ -23,12 +30,46 @@ _templates = Environment(
     trim_blocks=True,
     lstrip_blocks=True,
 )
+ASSETS = "assets"  # in the report
+ASSET_SOURCES = Path(__file__).parent / "assets"
+PLOTLY = "plotly.js"
+UNPACK = "unpack.js"  # becomes PLOTLY
+INK, MUTED, GRID = "#22303c", "#6b7885", "#e3e8ec"
+REFERENCE_COLOR, RUN_COLOR = "#a9c5de", "#1d4e79"
+ERROR_COLORS = ("#d1793a", "#2f8f83", "#7a5195", "#8a8d3f")
+DASHED = (0, (5, 3))
+STYLE = {
+    "font.size": 10,
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": MUTED,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.unicode_minus": True,
+    "axes.formatter.useoffset": False,
+    "grid.color": GRID,
+    "grid.linewidth": 0.8,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "legend.frameon": False,
+    "figure.facecolor": "white",
+    "savefig.dpi": 130,
+}
+
+
 _templates.filters |= {
     "address": lambda path: quote(os.fsencode(path)),
-    "minus": texts.minus,
-    "number": texts.number,
-    "short": texts.short,
+    "minus": units.minus,
+    "number": units.number,
+    "short": units.short,
 }
+
+
 _templates.tests |= {
     "numeric": lambda cell: NUMERIC.fullmatch(str(cell)) is not None,
     "command": lambda cell: isinstance(cell, Command),
@@ -78,3 +119,57 @@ def write_page(path: Path, template: str, **values: object) -> Path:
     """Write a page, complete or not at all; return its path."""
     write_text(path, _templates.get_template(template).render(values))
     return path
+
+
+# ---- Assets --------------------------------------------------------------------------------------
+
+
+def write_assets(report: Path) -> None:
+    """Write the assets that a report does not have yet: all of them, or none if that fails."""
+    folder = report / ASSETS
+    folder.mkdir(parents=True, exist_ok=True)
+    made: list[Path] = []
+    try:
+        for source in sorted(ASSET_SOURCES.iterdir()):
+            name, content = source.name, source.read_bytes()
+            if name == UNPACK:
+                name, content = PLOTLY, _plotly()
+            target = folder / name
+            if not target.is_file() or target.read_bytes() != content:
+                with whole(target) as path:
+                    path.write_bytes(content)
+                made.append(target)
+    except OSError:
+        for target in made:
+            target.unlink(missing_ok=True)
+        with suppress(OSError):  # not empty
+            folder.rmdir()
+        raise
+
+
+@functools.cache
+def _plotly() -> bytes:
+    """The library, compressed, in a script that unpacks it."""
+    file = project.plotly_script()
+    bundle = file.read_bytes()
+    bundle = gzip.decompress(bundle) if file.suffix == ".gz" else bundle
+    version = re.search(rb"plotly\.js v(\S+)", bundle[:200])
+    assert version is not None
+    packed = base64.b64encode(gzip.compress(bundle, mtime=0)).decode("ascii")
+    script = (ASSET_SOURCES / UNPACK).read_text(encoding="utf-8")
+    return (
+        script.replace("@VERSION@", version[1].decode("ascii"))
+        .replace("@PACKED@", packed)
+        .encode("utf-8")
+    )
+
+
+# ---- Pictures ------------------------------------------------------------------------------------
+
+
+def save_figure(figure: "Figure", path: Path) -> None:
+    """Write a picture in the style of all; complete or not at all."""
+    import matplotlib as mpl  # takes long
+
+    with whole(path) as temporary, mpl.rc_context(STYLE):
+        figure.savefig(temporary, metadata={"Software": None})

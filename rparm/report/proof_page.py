@@ -6,19 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
+from rparm import proof
 from rparm.fmi.model import Model
-from rparm.proof import proven
-from rparm.proof.proven import ProvenReference
-from rparm.proof.prover import Enclosure
-from rparm.report import assets
+from rparm.proof import Enclosure, ProvenReference
+from rparm.report import pages
 from rparm.report.overview import FAILED, PASSED
 from rparm.report.pages import INDEX, RunPage, Table, write_run
 from rparm.report.run_data import Curve, Plot, RunData, thinned
-from rparm.scenarios.scenario import Scenario
-from rparm.texts import SMALLEST, counted, number, rounded_up, unit
+from rparm.runs.scenario import Scenario
+from rparm.units import SMALLEST, counted, number, rounded_up, unit
 
 FOLDER = "proofs"  # of the report
-ASSUMES = f"The proof assumes {proven.ASSUMED}."
+ASSUMES = f"The proof assumes {proof.ASSUMED}."
 
 
 def write(
@@ -100,7 +99,7 @@ def _status(references: Iterable[ProvenReference]) -> str:
 
 
 def _write(report: Path, name: str, page: RunPage) -> Path:
-    assets.write(report)
+    pages.write_assets(report)
     (report / FOLDER).mkdir(parents=True, exist_ok=True)
     with_overview = (report / INDEX).exists()
     return write_run(report / FOLDER / f"{name}.html", replace(page, overview=with_overview))
@@ -109,7 +108,9 @@ def _write(report: Path, name: str, page: RunPage) -> Path:
 def _largest(model: Model, enclosure: Enclosure, errors: Mapping[str, np.ndarray]) -> Table:
     """Largest error of each state in each run, and when."""
     heads = [f"{n} in {unit(model.variables[n].unit)}" for n in enclosure.names]
-    found = {run: proven.largest(course, enclosure).values() for run, course in errors.items()}
+    found = {
+        run: proof.largest_errors(course, enclosure).values() for run, course in errors.items()
+    }
     rows = [
         (run, *(f"{rounded_up(e.error, 2)} at {e.at:.4g} s" for e in largest))
         for run, largest in found.items()

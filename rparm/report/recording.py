@@ -23,12 +23,12 @@ import numpy as np
 
 from rparm import project
 from rparm.errors import UserError, did_you_mean, one_line
+from rparm.files import whole, written
 from rparm.fmi.fmu_file import Fmu
-from rparm.output_files import whole, written
 from rparm.report import motion
+from rparm.runs import scenario as scenarios
 from rparm.runs.comparison import Runs
-from rparm.scenarios import scenario as scenarios
-from rparm.system import comparison, ssp, study
+from rparm.systems import comparison, ssp
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -114,7 +114,7 @@ def _of_variant(name: str, others: list[str]) -> dict[str, Any] | None:
     for system, folder in project.systems().items():
         with ssp.unpacked(project.built(folder, ".ssp")) as opened:
             if name in opened.system.parameters:
-                experiment = study.load(folder).EXPERIMENT
+                experiment = comparison.load_study(folder).EXPERIMENT
                 expected = comparison.load_reference(opened, name, folder, experiment)
                 return motion.of_outcome(
                     system, opened, comparison.simulate(opened, name, expected)

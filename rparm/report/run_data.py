@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rparm.runs.reference import SMALLEST_SCALE
+from rparm.runs.comparison import SMALLEST_SCALE
 
 MOST_ROWS = 800  # of a page, so that a report stays small
 FEWEST_PACKED = 8  # numbers; shorter lists stay as they are

@@ -1,28 +1,27 @@
-"""The page of a scenario, and its line in the overview."""
+"""The page of a scenario's runs, with what was measured of its outputs."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 
-from rparm import trajectory_csv
+from rparm import files
 from rparm.fmi.model import Model, Value, Variable
-from rparm.proof import proven
-from rparm.proof.proven import ProvenError
+from rparm.proof import ASSUMED, ProvenError, errors_of_run
 from rparm.report import motion, overview
-from rparm.report.measured_data import measured_tables, with_measured
 from rparm.report.overview import FAILED, PASSED, RAN, Entry
 from rparm.report.pages import RunPage, Table
 from rparm.report.run_data import Curve, Plot, RunData, result_curve, thinned
-from rparm.report.signal_texts import describe
-from rparm.runs.comparison import Failure, Run, estimated_from
-from rparm.runs.measured import comparisons
+from rparm.runs.comparison import Comparison, Failure, Run, comparisons, estimated_from
+from rparm.runs.inputs import Constant, Logged, Signal, Sines, Switches
+from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import Result
-from rparm.scenarios.scenario import Scenario
-from rparm.texts import bits, milliseconds, number, ordinal, rounded_up, sentence, short, unit
+from rparm.units import bits, milliseconds, number, ordinal, rounded_up, sentence, short, unit
 
 DIGITS = 12  # of values; the references of the project have more, users' files have none
+MOST_POINTS = 8  # of a table, to be listed
 
 
 def write(
@@ -40,7 +39,7 @@ def write(
     csv = _write_values(folder / f"{name}.csv", first.result, columns, digits)
     rows, plots = _thinned(_plots(runs, columns))
     moving, times = motion.of_run(first, rows), first.result.times[rows]
-    proof = proven.of_run(scenario, first.result) or {}
+    proof = errors_of_run(scenario, first.result) or {}
     page = RunPage(
         title=scenario.title,
         description=scenario.description,
@@ -48,7 +47,7 @@ def write(
         facts=[*_facts(first), *_proven(proof, first.fmu.model)],
         data=RunData(scenario.name, scenario.title, times, plots, motion=moving),
         tables=_tables(runs),
-        notes=[*_notes(runs), *([f"The proven error assumes {proven.ASSUMED}."] if proof else [])],
+        notes=[*_notes(runs), *([f"The proven error assumes {ASSUMED}."] if proof else [])],
         failures=[
             *(sentence(run.violation) for run in runs if run.violation),
             *map(_described, failures),
@@ -110,7 +109,7 @@ def _write_values(
 ) -> str:
     """Write the file of values; its name."""
     values = np.column_stack([column.astype(float) for column in columns.values()])
-    trajectory_csv.write(file, result.times, list(columns), values, digits, True)
+    files.write_trajectory(file, result.times, list(columns), values, digits, True)
     return file.name
 
 
@@ -282,7 +281,7 @@ def _start_tables(scenario: Scenario, model: Model) -> list[Table]:
                 "Inputs",
                 ("input", "unit", "course", "meaning"),
                 [
-                    (name, unit(known.unit), describe(signal), known.description)
+                    (name, unit(known.unit), describe_signal(signal), known.description)
                     for name, signal in scenario.signals.items()
                     if (known := model.variables[name])
                 ],
@@ -341,3 +340,66 @@ def _errors(runs: Sequence[Run]) -> Table:
     ]
     note = "Largest difference from the reference, relative to the output's largest value."
     return Table("Errors of all outputs", head, rows, note=note, folded=True)
+
+
+def with_measured(
+    plots: Sequence[Plot], comparisons: Sequence[Comparison], model: Model
+) -> list[Plot]:
+    """`plots` with what was measured beside what was simulated, in new plots if need be."""
+    result = list(plots)
+    for compared in comparisons:
+        name = compared.name
+        drawn = (i for i, plot in enumerate(result) if name in [x.name for x in plot.curves])
+        index = next(drawn, len(result))
+        if index == len(result):
+            simulated = result_curve(name, compared.simulated)
+            result.append(Plot(name, unit(model.variables[name].unit), [simulated]))
+        curve = result_curve(f"{name} measured", compared.measured)
+        result[index] = replace(result[index], curves=[*result[index].curves, curve])
+    return result
+
+
+def measured_tables(comparisons: Sequence[Comparison], model: Model) -> list[Table]:
+    """A table of how far the simulation is from what was measured; none without measurements."""
+    if not comparisons:
+        return []
+    rows = [
+        (c.name, unit(model.variables[c.name].unit), f"{c.rms:.4g}", f"{c.largest:.4g}", c.source)
+        for c in comparisons
+    ]
+    return [
+        Table(
+            "Difference from what was measured",
+            ("output", "unit", "RMS", "largest", "log"),
+            rows,
+            note="Simulated less measured, over the rows of the values that the log covers.",
+        )
+    ]
+
+
+def describe_signal(signal: Signal) -> str:
+    """An input as text."""
+    if isinstance(signal, Constant):
+        return f"constant {number(signal.value)}"
+    if isinstance(signal, Sines):
+        terms = [
+            f"{number(amplitude)} sin(2π {number(frequency)} Hz t"
+            + (f" {'+' if phase > 0 else '−'} {number(abs(phase))})" if phase else ")")
+            for amplitude, frequency, phase in signal.terms
+        ]
+        return " + ".join(([number(signal.offset)] if signal.offset else []) + terms)
+    if isinstance(signal, Logged):
+        return f"{signal.source}, {'held' if signal.is_held else 'linear in between'}"
+    if isinstance(signal, Switches):
+        if len(signal.points) == 1:
+            return str(signal.points[0][1]).lower()
+        return ", ".join(f"{str(on).lower()} from {number(time)} s" for time, on in signal.points)
+    if len(signal.points) <= MOST_POINTS:
+        points = (f"{number(value)} at {number(time)} s" for time, value in signal.points)
+        return ", ".join(points) + (", linear in between" if len(signal.points) > 1 else "")
+    low, high = (f(value for _, value in signal.points) for f in (min, max))
+    begin, end = signal.points[0][0], signal.points[-1][0]
+    return (
+        f"table of {len(signal.points)} points from {number(begin)} to {number(end)} s, values "
+        f"from {number(low)} to {number(high)}, linear in between"
+    )

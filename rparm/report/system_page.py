@@ -9,21 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from rparm import project, trajectory_csv
+from rparm import files, project
 from rparm.errors import StoppedError, UserError
+from rparm.files import whole
 from rparm.fmi.model import KINDS
-from rparm.output_files import whole
-from rparm.report import assets, motion, overview
+from rparm.report import motion, overview, pages
 from rparm.report.overview import FAILED, PASSED, SYSTEM, Entry
 from rparm.report.pages import RunPage, Table
 from rparm.report.run_data import Plot, RunData, result_curve, thinned
 from rparm.report.scenario_page import cells, meanings
-from rparm.system import ecos
-from rparm.system.comparison import BOUND, Outcome
-from rparm.system.ssp import Ssp
-from rparm.system.structure import System
-from rparm.system.study import Diagram, Study, load
-from rparm.texts import milliseconds, short, unit
+from rparm.systems import ecos
+from rparm.systems.comparison import BOUND, Diagram, Outcome, Study, load_study
+from rparm.systems.ssp import Ssp, System
+from rparm.units import milliseconds, short, unit
 
 MOST_ROWS = 350  # of a file of values, which has many columns
 DIGITS = 12  # there; errors have a bound of 1e-7
@@ -39,7 +37,7 @@ class Section:
     @cached_property
     def study(self) -> Study:
         """What its folder says of it."""
-        return load(self.folder)
+        return load_study(self.folder)
 
     @property
     def variants(self) -> list[str]:
@@ -129,7 +127,7 @@ def write_failed(report: Path, section: Section, variant: str, error: UserError)
 
 def _folder(report: Path, section: Section) -> Path:
     """Folder of the pages, with what they share."""
-    assets.write(report)
+    pages.write_assets(report)
     folder = report / SYSTEM
     folder.mkdir(parents=True, exist_ok=True)
     with whole(folder / f"{section.name}.svg") as path:
@@ -161,7 +159,7 @@ def _data(section: Section, outcome: Outcome) -> tuple[np.ndarray, RunData]:
 def _values(folder: Path, outcome: Outcome, rows: np.ndarray) -> dict[str, str]:
     """Write the file of values; what the page says of it."""
     run, csv = outcome.run, f"{outcome.variant}.csv"
-    trajectory_csv.write(folder / csv, run.times[rows], run.names, run.values[rows], DIGITS, True)
+    files.write_trajectory(folder / csv, run.times[rows], run.names, run.values[rows], DIGITS, True)
     every = milliseconds(np.diff(run.times[rows]).max(initial=0.0))
     note = f"It has a row every {every}, the extremes of the plots in between, and {DIGITS} digits."
     return {"csv": csv, "csv_note": note}

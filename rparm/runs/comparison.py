@@ -1,18 +1,171 @@
-"""Runs of scenarios compared with their references."""
+"""Runs compared: with references, with logs, over tolerances, and of FMI 2.0 with 3.0."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
-from rparm import project
+import numpy as np
+
+from rparm import files, project
 from rparm.errors import StoppedError, UserError
+from rparm.files import is_file, read_toml
 from rparm.fmi.fmu_file import Fmu
-from rparm.runs import reference, simulation
-from rparm.runs.reference import Compared, Reference
+from rparm.fmi.model import Model
+from rparm.runs import simulation
+from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import Result
-from rparm.scenarios.scenario import Scenario
-from rparm.texts import short
+from rparm.units import short
 
+SMALLEST_SCALE = 1e-3  # in the variable's unit; below it an error counts as absolute
+ERROR_PER_TOLERANCE = 1000.0
+# largest error allowed at a tolerance, and at every tighter one
+BOUNDS = {1e-8: 1e-6, 1e-11: 1e-8}
+# name -> names whose absolute values are summed up to the scale of its error
+Summed = Mapping[str, tuple[str, ...]]
 ESTIMATE_TOLERANCE = 1e-11  # of the run that errors are estimated from, or a tighter one
+TOLERANCES = tuple(float(f"1e-{exponent}") for exponent in range(4, 12))  # loosest first
+TIGHTEST = TOLERANCES[-1]
+LARGEST_RISE = 3.0  # of the error, from one tolerance to the next tighter one
+SMALLEST_GAIN = 1000.0  # by which the tightest tolerance beats the loosest
+SMALL_ENOUGH = 1e-10  # an error below it needs no gain
+
+
+# ---- References ----------------------------------------------------------------------------------
+
+
+class Compared:
+    """A run that has been compared: which of its variables is farthest from the reference."""
+
+    errors: dict[str, float]  # by name, as `errors` gives them
+
+    @property
+    def worst(self) -> str:
+        """The variable with the largest error; NaN counts as larger than all."""
+        return list(self.errors)[int(np.argmax(list(self.errors.values())))]
+
+    @property
+    def error(self) -> float:
+        """The largest error of all variables; NaN if one of them is."""
+        return self.errors[self.worst]
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    path: Path
+    times: np.ndarray  # (rows,) s
+    names: tuple[str, ...]
+    values: np.ndarray  # (rows, len(names)) in the variables' units
+    summed: Summed = field(default_factory=dict)
+
+    def column(self, name: str) -> np.ndarray:
+        """Values of one variable, (rows,)."""
+        if name not in self.names:
+            raise UserError(f"{self.path}, line 1: has no column {name!r}")
+        return self.values[:, self.names.index(name)]
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """Values of all variables, (rows,) each."""
+        return dict(zip(self.names, self.values.T, strict=True))
+
+    def scale(self, name: str) -> float:
+        """What an error of a variable is divided by, in its unit."""
+        return error_scale(self.columns, name, self.summed)
+
+
+def load_reference(scenario: Scenario, model: Model) -> Reference:
+    """Read and check the reference of `scenario`, which was checked against `model`.
+
+    UserError if the file is missing, damaged, or not of this scenario; names the line and the
+    command that makes references.
+    """
+    path = project.reference_file(scenario.path, model.name)
+    folder = project.model_folder(scenario.path)
+    wrong = reference_failure(path, folder, scenario.name)
+    (_, *names), table = files.read_trajectory(path, wrong)
+    _check_names(names, model, wrong)
+    _check_times(table[:, 0], scenario, wrong)
+    return Reference(path, table[:, 0], tuple(names), table[:, 1:], read_summed(folder))
+
+
+def reference_failure(path: Path, folder: Path, name: str) -> files.Failure:
+    """Makes errors of the reference `name` of a model or system, with how to make it again."""
+    return files.csv_failure(path, f"; {project.making_references(folder, name)}")
+
+
+def read_summed(folder: Path) -> Summed:
+    """Errors of a model or system, by folder, that a sum scales; UserError if the file is wrong."""
+    path = project.scales_file(folder)
+    if not is_file(path):
+        return {}
+    content = read_toml(path)
+    for name, terms in content.items():
+        if not (isinstance(terms, list) and terms and all(isinstance(x, str) for x in terms)):
+            raise UserError(f"{path}: {name}: expected a list of variables")
+    return {name: tuple(terms) for name, terms in content.items()}
+
+
+def error_scale(columns: Mapping[str, np.ndarray], name: str, summed: Summed) -> float:
+    """What an error of a variable is divided by, in its unit: its largest value, or that of a sum.
+
+    `columns` are the reference of all variables, (rows,) each; a sum of which a term is missing
+    does not count.
+    """
+    terms = summed.get(name, ())
+    if not terms or not set(terms) <= set(columns):
+        terms = (name,)
+    largest = float(np.max(sum(np.abs(columns[term]) for term in terms)))
+    return max(largest, SMALLEST_SCALE)
+
+
+def errors_against(result: Result, reference: Reference) -> dict[str, float]:
+    """Error of each variable of `result`, relative: its largest difference over time / `scale`."""
+    return {
+        name: float(np.max(np.abs(values - reference.column(name)))) / reference.scale(name)
+        for name, values in zip(result.names, result.values.T, strict=True)
+    }
+
+
+def error_bound(tolerance: float) -> float:
+    """Largest error allowed of a run at a relative tolerance.
+
+    1000 times the tolerance, and no more than 1e-6 from tolerance 1e-8 on and 1e-8 from tolerance
+    1e-11 on: of these the least that applies.
+    """
+    applying = [error for loosest, error in BOUNDS.items() if tolerance <= loosest]
+    return min([ERROR_PER_TOLERANCE * tolerance, *applying])
+
+
+def _check_names(names: Sequence[str], model: Model, wrong: files.Failure) -> None:
+    """Check that every Real output is there, and nothing else: all columns are compared."""
+    for name in names:
+        if name not in model.variables or model.variables[name].type != "Real":
+            raise wrong(f"the model has no Real variable {name!r}", 1)
+        if names.count(name) > 1:
+            raise wrong(f"column {name!r} is there twice", 1)
+    for name in model.real_outputs:
+        if name not in names:
+            raise wrong(f"has no column {name!r}", 1)
+    for name in names:
+        if name not in model.real_outputs:
+            raise wrong(f"{name!r} is not an output of the model", 1)
+
+
+def _check_times(times: np.ndarray, scenario: Scenario, wrong: files.Failure) -> None:
+    """Check that the times are those communication points that the scenario asks for."""
+    expected = scenario.times[scenario.reference_rows]
+    shared = min(len(times), len(expected))
+    differing = np.flatnonzero(times[:shared] != expected[:shared])
+    other = f"does not match {scenario.path}: expected"
+    if len(differing):
+        row = int(differing[0])
+        found = f"found {float(times[row])!r} s"
+        raise wrong(f"{other} time {float(expected[row])!r} s, {found}", row + 2)
+    if len(times) != len(expected):
+        raise wrong(f"{other} {len(expected)} rows, found {len(times)}", shared + 1)
+
+
+# ---- Runs ----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -38,7 +191,7 @@ class Run(Compared):
     @property
     def bound(self) -> float:
         """The largest error allowed at this tolerance."""
-        return reference.bound(self.result.tolerance)
+        return error_bound(self.result.tolerance)
 
     @property
     def passed(self) -> bool:
@@ -82,7 +235,7 @@ class Runs:
         """Return the reference of `scenario`, read once."""
         if scenario.name not in self._references:
             model = self._fmus[scenario.model].model
-            self._references[scenario.name] = reference.load(scenario, model)
+            self._references[scenario.name] = load_reference(scenario, model)
         return self._references[scenario.name]
 
     def steps_ahead(
@@ -101,7 +254,7 @@ class Runs:
         if key not in self._runs:
             expected, fmu = self.reference(scenario), self._fmus[scenario.model]
             result = simulation.simulate(fmu, scenario, tolerance, progress)
-            errors = reference.errors(result, expected)
+            errors = errors_against(result, expected)
             self._runs[key] = Run(scenario, fmu, result, expected, errors)
         return self._runs[key]
 
@@ -132,9 +285,9 @@ class Runs:
         other = estimated_from(tolerance, scenario.smallest_tolerance)
         exact = simulation.simulate(fmu, scenario, other, progress)
         folder = project.models().get(scenario.model)
-        summed = {} if folder is None else reference.read_summed(folder)
+        summed = {} if folder is None else read_summed(folder)
         expected = Reference(scenario.path, exact.times, exact.names, exact.values, summed)
-        errors = reference.errors(result, expected)
+        errors = errors_against(result, expected)
         return Run(scenario, fmu, result, expected, errors, compared=False)
 
 
@@ -157,3 +310,98 @@ def differing(one: Result, other: Result) -> tuple[str, ...]:
     )
     names = dict.fromkeys((*columns, *others))
     return tuple(name for name in names if columns.get(name) != others.get(name))
+
+
+# ---- Logs ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """An output that was measured, at the times of a run's rows."""
+
+    name: str
+    source: str  # file and column of the log
+    measured: np.ndarray  # (rows,); NaN where the log has no values
+    simulated: np.ndarray  # (rows,)
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean square of the differences, in the variable's unit."""
+        # scaled, so that no square overflows
+        largest = self.largest
+        return largest * float(np.sqrt(np.mean((self._differences / (largest or 1.0)) ** 2)))
+
+    @property
+    def largest(self) -> float:
+        """Largest difference, in the variable's unit."""
+        return float(np.max(np.abs(self._differences)))
+
+    @property
+    def _differences(self) -> np.ndarray:
+        rows = ~np.isnan(self.measured)
+        return self.simulated[rows] - self.measured[rows]
+
+
+def comparisons(scenario: Scenario, result: Result) -> Iterator[Comparison]:
+    """What a scenario has measured, compared with a run of it."""
+    elapsed = scenario.elapsed[scenario.reference_rows][: len(result.times)]
+    for name, log in scenario.measured.items():
+        measured = np.where(log.covers(elapsed), log.values(elapsed), np.nan)
+        simulated = result.values[:, result.names.index(name)]
+        yield Comparison(name, log.source, measured, simulated)
+
+
+# ---- Tolerances ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Errors of one scenario over the tolerances."""
+
+    scenario: Scenario
+    tolerances: tuple[float, ...]  # loosest first
+    errors: tuple[float, ...]  # relative, one per tolerance
+    violations: list[str]
+
+    @property
+    def passed(self) -> bool:
+        return not self.violations
+
+
+def sweep(
+    runs: Runs,
+    scenario: Scenario,
+    progress: Callable[[int], object] | None = None,
+    tolerances: Sequence[float] = TOLERANCES,
+) -> Sweep:
+    """`scenario` at all `tolerances`, loosest first, and what breaks the rules."""
+    errors = tuple(runs.run(scenario, tolerance, progress).error for tolerance in tolerances)
+    return Sweep(scenario, tuple(tolerances), errors, sweep_violations(tolerances, errors))
+
+
+def sweep_violations(tolerances: Sequence[float], errors: Sequence[float]) -> list[str]:
+    """Rules that errors over tolerances (loosest first) break, one sentence each.
+
+    An error stays within its bound; it never grows to more than 3 times that of the next looser
+    tolerance; at the tightest it is at most 1/1000 of that at the loosest, or below 1e-10. The
+    comparisons are such that NaN breaks them.
+    """
+    texts = []
+    for tolerance, error in zip(tolerances, errors, strict=True):
+        largest = error_bound(tolerance)
+        if not error <= largest:
+            texts.append(
+                f"error {error:.2e} at tolerance {tolerance:g} is above its bound {largest:.0e}"
+            )
+    for i in range(1, len(errors)):
+        if not errors[i] <= LARGEST_RISE * errors[i - 1]:
+            texts.append(
+                f"error {errors[i]:.2e} at tolerance {tolerances[i]:g} is more than "
+                f"{LARGEST_RISE:g} times the {errors[i - 1]:.2e} at {tolerances[i - 1]:g}"
+            )
+    if not (errors[-1] <= errors[0] / SMALLEST_GAIN or errors[-1] < SMALL_ENOUGH):
+        texts.append(
+            f"error {errors[-1]:.2e} at tolerance {tolerances[-1]:g} is above 1/{SMALLEST_GAIN:g} "
+            f"of the {errors[0]:.2e} at {tolerances[0]:g}"
+        )
+    return texts

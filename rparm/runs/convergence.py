@@ -19,14 +19,14 @@ from fmpy.fmi1 import FMICallException
 
 from rparm import project
 from rparm.errors import UserError
-from rparm.fmi.fmi3_instance import Fmi3Instance
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Model
+from rparm.fmi.versions import Fmi3Instance
+from rparm.runs import scenario as scenarios
 from rparm.runs import simulation
-from rparm.scenarios import scenario as scenarios
-from rparm.scenarios.scenario import Scenario
-from rparm.scenarios.signals import Sines
+from rparm.runs.inputs import Sines
+from rparm.runs.scenario import Scenario
 
 FACTORS = (64, 32, 16, 8, 4, 2, 1)  # communication steps, in shortest steps of the problem
 ORDERS = (0, 1, 2, 3)  # of the highest input derivative that is set; 0: zero-order hold

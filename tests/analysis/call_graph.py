@@ -146,16 +146,16 @@ def imported_modules(path: Path) -> Iterator[str]:
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
-def package_graph(package: Path) -> Graph:
-    """Graph of the folders and modules directly in a package."""
+def package_graph(package: Path, root: Path) -> Graph:
+    """Return the graph of the folders and modules directly in a package below `root`."""
     graph: Graph = {}
+    prefix = ".".join(package.relative_to(root).parts) + "."
     own = {path.stem for path in package.iterdir() if path.is_dir() or path.suffix == ".py"}
     for path in sorted(package.rglob("*.py")):
         below = path.relative_to(package)
         node = Path(below.parts[0]).stem
         for name in imported_modules(path):
-            top, _, rest = name.partition(".")
-            needed = rest.split(".")[0]
-            if top == package.name and needed in own - {node}:
+            needed = name.removeprefix(prefix).split(".")[0]
+            if name.startswith(prefix) and needed in own - {node}:
                 add(graph, node, needed, f"{below.as_posix()}: {name}")
     return graph

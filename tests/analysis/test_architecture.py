@@ -81,6 +81,18 @@ MAY_IMPORT = {
 # modules of rparm that only lead to another folder
 ELSEWHERE = {("rparm", "models"): "models", ("rparm", "fmu_tools"): "fmu"}
 
+# packages of Python whose modules and folders use each other in one direction
+PACKAGES = [path.parent for path in sorted(ROOT.glob("rparm/**/__init__.py"))]
+
+# what Python runs, and large packages that it must not load
+NOT_LOADED = {
+    "import rparm.campaign.runs": {"scipy.stats", "SALib", "matplotlib"},
+    "from rparm.__main__ import main; main(['list']);"
+    "import rparm.commands.run, rparm.commands.system": {
+        "dask", "distributed", "numba", "pyarrow", "SALib",
+    },
+}  # fmt: skip
+
 # ---- C: includes ---------------------------------------------------------------------------------
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
@@ -210,8 +222,19 @@ def test_imports_follow_the_architecture() -> None:
     assert list(wrong_imports(ROOT)) == []
 
 
-def test_no_circle_of_folders_and_modules_of_rparm() -> None:
-    assert circles(package_graph(ROOT / "rparm")) == []
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.name)
+def test_no_circle_of_folders_and_modules(package: Path) -> None:
+    assert circles(package_graph(package, ROOT)) == []
+
+
+@pytest.mark.parametrize(("code", "unneeded"), NOT_LOADED.items())
+def test_what_is_not_needed_is_not_loaded(code: str, unneeded: set[str]) -> None:
+    code = f"import sys\n{code}\nprint(*(set(sys.modules) & {unneeded}))"
+    command = [sys.executable, "-P", "-c", code]
+    given = {**os.environ, "PYTHONPATH": str(ROOT)}
+    run = subprocess.run(command, capture_output=True, text=True, env=given)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.splitlines()[-1] == ""
 
 
 @pytest.fixture
@@ -321,7 +344,7 @@ def test_a_circle_of_imports_is_noticed(project: Path) -> None:
     write(project, "rparm/pages/first.py", "import rparm.pages.second\nimport rparm.other\n")
     write(project, "rparm/pages/second.py", "from rparm.unit import Fmu\n")
     write(project, "rparm/other.py", "if TYPE_CHECKING:\n    import rparm.pages.first\n")
-    assert circles(package_graph(project / "rparm")) == [
+    assert circles(package_graph(project / "rparm", project)) == [
         "pages -> unit (pages/second.py: rparm.unit.Fmu); unit -> pages (unit.py: rparm.pages)"
     ]
 

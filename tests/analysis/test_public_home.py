@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 import yaml
 
-from rparm.command_line import COMMANDS
+from rparm.needs import COMMANDS
 from tests.support.paths import ROOT
 
 HOME = ROOT / ".github"
@@ -16,11 +16,6 @@ FORMS = sorted(path for path in HOME.glob("ISSUE_TEMPLATE/*.yml") if path.stem !
 
 def read(path: Path) -> Any:
     return yaml.safe_load(path.read_text(encoding="utf-8"))
-
-
-def steps() -> list[str]:
-    jobs = read(HOME / "workflows" / "release.yml")["jobs"]
-    return [step["run"] for job in jobs.values() for step in job["steps"] if "run" in step]
 
 
 @pytest.mark.parametrize("path", FORMS, ids=lambda path: path.stem)
@@ -35,21 +30,14 @@ def test_a_form_asks_for_what_is_needed(path: Path) -> None:
     assert any(field.get("validations", {}).get("required") for field in fields.values())
 
 
-def test_the_workflow_calls_what_there_is() -> None:
-    text = "\n".join(steps())
-    scripts = set(re.findall(r"\./(\w+\.sh)", text))
-    assert scripts == {"test.sh", "release.sh"}
-    assert all((ROOT / script).is_file() for script in scripts)
-    commands = set(re.findall(r"-m rparm ([\w-]+)", text))
-    assert commands == {"build", "list", "new-model", "run"} and commands <= set(COMMANDS)
-
-
-def test_the_workflow_may_only_read() -> None:
+def test_the_workflow_calls_what_there_is_and_may_only_read() -> None:
     workflow = read(HOME / "workflows" / "release.yml")
+    jobs = workflow["jobs"].values()
+    text = "\n".join(step.get("run", "") for job in jobs for step in job["steps"])
+    scripts, commands = (set(re.findall(x, text)) for x in (r"\./(\w+\.sh)", r"-m rparm ([\w-]+)"))
+    assert scripts == {"test.sh", "release.sh"} and all((ROOT / x).is_file() for x in scripts)
+    assert commands == {"build", "list", "new-model", "run"} and commands <= set(COMMANDS)
     assert workflow["permissions"] == {"contents": "read"}
-    assert not any("permissions" in job for job in workflow["jobs"].values())
-
-
-def test_it_is_said_that_the_workflow_has_not_run() -> None:
+    assert not any("permissions" in job for job in jobs)
     page = (ROOT / "docs" / "release.md").read_text(encoding="utf-8")
     assert re.search(r"`\.github/workflows/release\.yml` .*has not run yet", page, re.DOTALL)

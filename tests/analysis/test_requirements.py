@@ -27,15 +27,14 @@ OPTIONS = {"-r run.in", "-r run.txt", "--only-binary :all:"}
 # What each environment runs: patterns of files; what they import of the project belongs to it too.
 COMMANDS = {
     "run": (
-        "rparm/__main__.py", "rparm/commands/[!cfil]*.py", "rparm/commands/coupling.py",
-        "rparm/commands/completion.py", "rparm/commands/fmu.py", "rparm/commands/list.py",
-        "rparm/system/ecos.py", "models/*/animation.py", "models/*/study.py",
+        "rparm/__main__.py", "rparm/commands/[!cfil]*.py", "rparm/commands/completion.py",
+        "rparm/commands/files.py", "rparm/systems/ecos.py",
+        "models/*/animation.py", "models/*/study.py",
         "fmu/generate.py", "fmu/document.py", "fmu/references.py", "fmu/package.py",
         "fmu/source_code.py", "fmu/equations_to_fmu.py",
     ),
     "campaign": (
-        "rparm/commands/campaign.py", "rparm/campaign/*.py", "rparm/fmi/compiled/*.py",
-        "rparm/runs/compiled_steps.py",
+        "rparm/commands/campaign.py", "rparm/campaign/*.py", "rparm/fmi/compiled_*.py",
     ),
     "control": (
         "rparm/commands/linearize.py", "rparm/linearization/*.py", "rparm/commands/identify.py",
@@ -48,7 +47,7 @@ COMMANDS = {
 # what others use only where its packages are installed
 OPTIONAL = (
     "rparm/campaign/*.py", "rparm/federation/*.py", "rparm/identification/*.py",
-    "rparm/linearization/*.py", "rparm/runs/compiled_steps.py",
+    "rparm/linearization/*.py", "rparm/fmi/compiled_*.py",
 )  # fmt: skip
 # each of these runs in the environment of its importer
 ELSEWHERE = [*(ROOT / "tests" / "importers").glob("run_*.py")]

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rparm import project, trajectory_csv
+from rparm import files, project
 from rparm.fmi.fmu_file import Fmu
 from rparm.report import motion
 from rparm.runs.comparison import Run, Runs
-from rparm.system import comparison, ecos, ssp
-from rparm.system.comparison import Outcome
+from rparm.systems import comparison, ecos, ssp
+from rparm.systems.comparison import Outcome
 from tests.animation.player_page import show
 from tests.support.browser import Browser
 from tests.support.paths import ROOT
@@ -43,7 +43,7 @@ def variants(request: pytest.FixtureRequest) -> Iterator[tuple[str, ssp.Ssp, lis
         outcomes = []
         for variant in opened.system.parameters:
             path = project.variant_reference_file(folder, variant)
-            names, table = trajectory_csv.read(path, lambda text, _: ValueError(text))
+            names, table = files.read_trajectory(path, lambda text, _: ValueError(text))
             done = ecos.Run(names[1:], table[:, 0], table[:, 1:], 0.0, ())
             outcomes.append(Outcome(variant, len(table) - 1, done, {}))
         yield request.param, opened, outcomes
@@ -52,8 +52,8 @@ def variants(request: pytest.FixtureRequest) -> Iterator[tuple[str, ssp.Ssp, lis
 def test_rows_are_those_of_the_csv_file(grasp: Run, tmp_path: Path) -> None:
     result = grasp.result
     file = tmp_path / "run.csv"
-    trajectory_csv.write(file, result.times, result.names, result.values)
-    names, table = trajectory_csv.read(file, lambda text, _: ValueError(text))
+    files.write_trajectory(file, result.times, result.names, result.values)
+    names, table = files.read_trajectory(file, lambda text, _: ValueError(text))
     rows = slice(None, None, 7)
     data = json.loads(json.dumps(motion.of_run(grasp, rows), allow_nan=False))
     assert data["time"] == table[rows, 0].tolist()
@@ -155,7 +155,7 @@ def test_systems_record_what_is_animated() -> None:
             path = project.variant_reference_file(
                 ROOT / "models" / system, next(iter(opened.system.parameters))
             )
-            names, _ = trajectory_csv.read(path, lambda text, _: ValueError(text))
+            names, _ = files.read_trajectory(path, lambda text, _: ValueError(text))
             assert set(names[1:]) <= recorded
 
 

@@ -11,7 +11,7 @@ from rparm.campaign import bases, campaign_file, planning
 from rparm.campaign.campaign_file import Campaign
 from rparm.campaign.engine import Engine
 from rparm.campaign.job import Job
-from rparm.campaign.points import Points
+from rparm.campaign.planning import Points
 from rparm.campaign.results import Results
 from rparm.campaign.runs import Rows, Runner, open_fmus
 

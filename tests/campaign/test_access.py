@@ -14,7 +14,7 @@ import psutil
 import pytest
 from distributed import Client
 
-from rparm.campaign import cluster, credentials
+from rparm.campaign import engine
 from rparm.errors import UserError
 from tests.campaign.cluster import certificates, processes
 from tests.campaign.cluster.processes import ENVIRONMENT
@@ -30,7 +30,7 @@ CHANGES = [("runs = 40", "runs = 240"), ("block = 8", "block = 6")]
 
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
-    with cluster.opened(None, 1, tmp_path_factory.mktemp("workers")) as client:
+    with engine.opened_cluster(None, 1, tmp_path_factory.mktemp("workers")) as client:
         yield client
 
 
@@ -150,11 +150,11 @@ def test_a_cluster_with_certificates(own: Files, other: Files, tmp_path: Path) -
             (address, (other[0], *own[1:])),
             (plain, (None, None, None)),
         ):
-            security = credentials.of(place, *files)
+            security = engine.security_for(place, *files)
             words = re.escape(f"{place}: the scheduler cannot be reached: ") + "[^\n]+$"
             with (
                 pytest.raises(UserError, match=words),
-                cluster.opened(place, None, tmp_path, security),
+                engine.opened_cluster(place, None, tmp_path, security),
             ):
                 pass
 
@@ -201,13 +201,13 @@ def test_dasks_configuration_has_certificates(own: Files, other: Files) -> None:
         )
 
     with configured(*own):
-        made = credentials.of(TLS, None, None, None)
+        made = engine.security_for(TLS, None, None, None)
         assert made.get_tls_config_for_role("client")["key"] == str(own[2])
         assert made.require_encryption
-        given = credentials.of(TLS, *other)  # those of the command line go before
+        given = engine.security_for(TLS, *other)  # those of the command line go before
         assert given.get_tls_config_for_role("client")["ca_file"] == str(other[0])
     with (
         configured(*own[:2], other[2]),
         pytest.raises(UserError, match="are not a certificate and its private key"),
     ):
-        credentials.of(TLS, None, None, None)
+        engine.security_for(TLS, None, None, None)

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rparm.campaign import analysis
-from rparm.campaign.measures import LYAPUNOV, Measure, Recorded, plain
-from rparm.campaign.points import Points
+from rparm.campaign import page
+from rparm.campaign.job import LYAPUNOV, Measure, Recorded, plain
+from rparm.campaign.planning import Points
 from tests.campaign.files import ARM, campaign
 from tests.campaign.runners import rows, runner
 
@@ -107,7 +107,7 @@ def test_indices_of_ishigami_are_within_their_confidence(seed: int, tmp_path: Pa
     changes = [("sobol", "indices"), ("40", "2048"), ("seed = 3", f"seed = {seed}")]
     given = campaign(tmp_path, TEXT, changes)
     x, y, z = Points(given, {}).of(range(given.count)).T
-    found = analysis.indices(given, np.sin(x) + A * np.sin(y) ** 2 + B * z**4 * np.sin(x))
+    found = page.sobol_indices(given, np.sin(x) + A * np.sin(y) ** 2 + B * z**4 * np.sin(x))
     first, total = ishigami_indices()
     assert [row.parameter for row in found] == ["x", "y", "z"]
     for row, known_first, known_total in zip(found, first, total, strict=True):
@@ -121,16 +121,16 @@ def test_groups_with_a_failed_run_are_left_out(tmp_path: Path) -> None:
     x, y, _ = Points(given, {}).of(range(given.count)).T
     values = 3 * x + 4 * y
     values[[2, 700]] = np.nan
-    assert len(analysis.groups(given, values)) == 510
-    found = analysis.indices(given, values)
+    assert len(page.saltelli_groups(given, values)) == 510
+    found = page.sobol_indices(given, values)
     for row, known in zip(found, (9 / 25, 16 / 25, 0.0), strict=True):
         assert abs(row.first - known) <= max(row.first_confidence, 2e-3)
 
 
 def test_what_does_not_vary_has_no_indices(tmp_path: Path) -> None:
     given = campaign(tmp_path, TEXT, [("sobol", "indices"), ("40", "8")])
-    assert analysis.indices(given, np.full(given.count, 3.0)) == []
-    assert analysis.indices(given, np.full(given.count, np.nan)) == []
+    assert page.sobol_indices(given, np.full(given.count, 3.0)) == []
+    assert page.sobol_indices(given, np.full(given.count, np.nan)) == []
 
 
 def test_indices_of_the_arm_agree_with_a_regression(tmp_path: Path) -> None:
@@ -149,30 +149,30 @@ def test_indices_of_the_arm_agree_with_a_regression(tmp_path: Path) -> None:
     assert np.std(columns @ coefficients - values) < 0.02 * np.std(values)
     parts = coefficients[1:] ** 2 * [1 / 3, 1 / 5, 1 / 3, 1 / 5, 1 / 9]
     first = [parts[0] + parts[1], parts[2] + parts[3]] / parts.sum()
-    for row, other in zip(analysis.indices(given, values), first, strict=True):
+    for row, other in zip(page.sobol_indices(given, values), first, strict=True):
         assert abs(row.first - other) <= row.first_confidence + 1e-3
 
 
 def test_the_worst_runs_come_first() -> None:
     values = np.array([3.0, np.nan, 9.0, 1.0, 9.0] + [0.0] * 20)
-    assert analysis.worst(values)[:4] == [2, 4, 0, 3]
-    assert len(analysis.worst(values)) == 10
+    assert page.worst(values)[:4] == [2, 4, 0, 3]
+    assert len(page.worst(values)) == 10
 
 
 def test_quantiles_leave_out_failed_runs() -> None:
     values = np.append(np.arange(101.0), [np.nan, np.inf])
-    assert analysis.quantiles(values) == [0, 5, 50, 95, 100]
-    assert np.isnan(analysis.quantiles(np.array([np.nan]))).all()
+    assert page.quantiles(values) == [0, 5, 50, 95, 100]
+    assert np.isnan(page.quantiles(np.array([np.nan]))).all()
 
 
 def test_failures_are_counted_by_reason() -> None:
-    found = analysis.failures(["", "a", "b", "", "b"])
+    found = page.failures(["", "a", "b", "", "b"])
     assert [(x.reason, x.count, x.run) for x in found] == [("b", 2, 2), ("a", 1, 1)]
 
 
 def test_reasons_that_differ_in_numbers_are_one() -> None:
     many = [f"m2 = {-1.5e-3 * i} is refused at t = {i / 8}s: 1e-09 to inf" for i in range(1000)]
-    found = analysis.failures([*many, "m1 = 2 is refused", "m1 = -.5e+7 is refused", "m1 = nan"])
+    found = page.failures([*many, "m1 = 2 is refused", "m1 = -.5e+7 is refused", "m1 = nan"])
     assert [(x.reason, x.count, x.run) for x in found] == [
         (many[0], 1000, 0),
         ("m1 = 2 is refused", 2, 1000),

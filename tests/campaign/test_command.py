@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from rparm.campaign import figures, page
+from rparm.campaign import page
 from rparm.commands.campaign import _command
 from tests.campaign.cluster.processes import ENVIRONMENT, finish, start, table
 from tests.campaign.files import commands, write
@@ -110,7 +110,7 @@ def test_an_error_of_the_page_loses_no_results(
 ) -> None:
     output = copied(done, tmp_path)
     with monkeypatch.context() as patched:
-        patched.setattr(figures, "distributions", lambda _: 1 / 0)
+        patched.setattr("rparm.campaign.page.distributions_figure", lambda _: 1 / 0)
         code, _, error = console(*of(done, output))
     assert code == 2 and "the page cannot be written: ZeroDivisionError" in error
     assert "the results are complete" in error

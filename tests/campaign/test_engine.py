@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 from distributed import Client
 
-from rparm.campaign import cluster, engine
-from rparm.campaign.worker import Plugin
+from rparm.campaign import engine
+from rparm.campaign.runs import Plugin
 from rparm.errors import UserError
 from tests.campaign.cluster import processes
 from tests.campaign.cluster.processes import (
@@ -93,7 +93,7 @@ def test_a_campaign_whose_workers_are_gone_ends(
     monkeypatch.setattr(engine, "COUNT_EVERY", 100)
     with (
         processes.cluster(LOOPBACK, [LOOPBACK]) as (address, _, arms),
-        cluster.opened(address, None, tmp_path) as client,
+        engine.opened_cluster(address, None, tmp_path) as client,
     ):
         registered(arms[0])
         with (
@@ -115,7 +115,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 def local(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Client, Path]]:
     """A cluster of one worker, and the folder of its files."""
     folder = tmp_path_factory.mktemp("workers")
-    with cluster.opened(None, 1, folder) as client:
+    with engine.opened_cluster(None, 1, folder) as client:
         yield client, folder
 
 
@@ -206,9 +206,9 @@ def test_a_cluster_that_cannot_start_is_one_line(
     def refuse(**_: object) -> None:
         raise RuntimeError("Cluster failed to start:\nno loopback")  # as distributed says it
 
-    monkeypatch.setattr(cluster, "SpecCluster", refuse)
+    monkeypatch.setattr(engine, "SpecCluster", refuse)
     expected = "cannot connect at 127.0.0.1: Cluster failed to start: no loopback$"
-    with pytest.raises(UserError, match=expected), cluster.opened(None, 1, tmp_path):
+    with pytest.raises(UserError, match=expected), engine.opened_cluster(None, 1, tmp_path):
         pass
 
 
@@ -249,7 +249,7 @@ def test_fmus_stay_until_runs_under_way_have_ended(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shop = Shop()
-    monkeypatch.setattr("rparm.campaign.worker.Workshop", lambda *_: shop)
+    monkeypatch.setattr("rparm.campaign.runs.Workshop", lambda *_: shop)
     plugin = Plugin("name", None, {})
     plugin.setup(SimpleNamespace(local_directory=tmp_path))
     assert plugin.rows(plugin, None)
@@ -293,11 +293,11 @@ def crashing(tmp_path: Path) -> Path:
 def test_a_run_that_takes_its_worker_down(
     crashing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(cluster.SETTINGS, "distributed.scheduler.allowed-failures", 1)
+    monkeypatch.setitem(engine.SETTINGS, "distributed.scheduler.allowed-failures", 1)
     with runner(campaign(tmp_path, ARM, CRASHING_RUNS), tmp_path) as (runs, job, points):
         expected = rows(runs, job, points, range(8)).measures[:, 0]
     with (
-        cluster.opened(None, 1, tmp_path / "workers") as client,
+        engine.opened_cluster(None, 1, tmp_path / "workers") as client,
         engine_of(client, tmp_path / "test.toml", tmp_path / "output", crashing) as (made, results),
     ):
         made.run(range(3), lambda _: None)

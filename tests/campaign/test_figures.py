@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from rparm.campaign import figures
-from rparm.campaign.analysis import Index
-from rparm.report.style import save
+from rparm.campaign import page
+from rparm.campaign.page import Index
+from rparm.report.pages import save_figure
 
 RANDOM = np.random.default_rng(4)
 STRANGE = r"a $\frac$ b"  # no formula of matplotlib's
@@ -34,8 +34,8 @@ def texts(figure: Figure) -> list[str]:
 
 @pytest.fixture(scope="module")
 def histograms(tmp_path_factory: pytest.TempPathFactory) -> Figure:
-    figure = figures.distributions(NARROW)
-    save(figure, tmp_path_factory.mktemp("figures") / "picture.png")
+    figure = page.distributions_figure(NARROW)
+    save_figure(figure, tmp_path_factory.mktemp("figures") / "picture.png")
     return figure
 
 
@@ -76,12 +76,12 @@ def test_texts_of_files_are_no_formulas(tmp_path: Path) -> None:
     found = {STRANGE: [Index(STRANGE, 0.5, 0.1, 0.6, np.nan)]}
     x, y = (part.ravel() for part in np.meshgrid(np.arange(3.0), np.arange(4.0)))
     pictures = (
-        figures.distributions({STRANGE: x}),
-        figures.indices(found),
-        figures.heat_map([STRANGE] * 3, x, y, x * y),
+        page.distributions_figure({STRANGE: x}),
+        page.indices_figure(found),
+        page.heat_map_figure([STRANGE] * 3, x, y, x * y),
     )
     for picture in pictures:
-        save(picture, tmp_path / "picture.png")
+        save_figure(picture, tmp_path / "picture.png")
         assert STRANGE in texts(picture)
 
 
@@ -89,19 +89,19 @@ def test_a_map_leaves_out_what_has_no_value(tmp_path: Path) -> None:
     x, y = (part.ravel() for part in np.meshgrid(np.arange(3.0), np.arange(4.0)))
     colour = x + 10 * y
     colour[[2, 7]] = np.nan
-    figure = figures.heat_map(["x", "y", "c"], x, y, colour)
-    save(figure, tmp_path / "picture.png")
+    figure = page.heat_map_figure(["x", "y", "c"], x, y, colour)
+    save_figure(figure, tmp_path / "picture.png")
     cells = figure.axes[0].collections[0].get_array()
     assert np.array_equal(np.ma.filled(cells, np.nan).ravel(), colour, equal_nan=True)
     x[5] = np.nan  # no grid any more
-    figure = figures.heat_map(["x", "y", "c"], x, y, colour)
-    save(figure, tmp_path / "picture.png")
+    figure = page.heat_map_figure(["x", "y", "c"], x, y, colour)
+    save_figure(figure, tmp_path / "picture.png")
     points = figure.axes[0].collections[0].get_offsets()
     assert len(points) == 12 - 3
 
 
 def test_a_map_of_what_hardly_varies(tmp_path: Path) -> None:
     x, y = (part.ravel() for part in np.meshgrid(1 + np.arange(3) * 2.0**-52, np.arange(4.0)))
-    figure = figures.heat_map(["x", "y", "c"], x, y, 5 + x * 1e-15)
-    save(figure, tmp_path / "picture.png")
+    figure = page.heat_map_figure(["x", "y", "c"], x, y, 5 + x * 1e-15)
+    save_figure(figure, tmp_path / "picture.png")
     assert any("x \N{MINUS SIGN} 1" in text for text in texts(figure))

@@ -10,11 +10,10 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from rparm.campaign.measures import LYAPUNOV
+from rparm.campaign.job import LYAPUNOV
 from rparm.campaign.runs import Rows
-from rparm.fmi.compiled.calls import DERIVATIVE, DO_STEP
-from rparm.fmi.compiled.fmi3_adapters import ADDRESSES
-from rparm.fmi.compiled.loop import COLUMNS
+from rparm.fmi.compiled_fmi3 import ADDRESSES
+from rparm.fmi.compiled_loop import COLUMNS, DERIVATIVE, DO_STEP
 from tests.campaign.cluster.processes import completed
 from tests.campaign.files import ARM, HEAD, campaign, commands, write
 from tests.campaign.runners import rows, runner

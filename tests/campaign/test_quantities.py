@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rparm.campaign import bases, quantities
+from rparm.campaign import bases
 from rparm.campaign.campaign_file import Campaign
-from rparm.campaign.points import Points
+from rparm.campaign.planning import Points
 from rparm.errors import UserError
 from tests.campaign.files import ARM, HEAD, campaign, write
 from tests.campaign.runners import rows, runner
@@ -37,7 +37,7 @@ PAIRS = [
 
 def converted(given: Campaign) -> Campaign:
     with bases.opened(given, FMUS["rp_manipulator"]) as base:
-        return quantities.in_si(given, base, "test")
+        return bases.in_si(given, base, "test")
 
 
 @pytest.mark.parametrize(("old", "new", "numbers"), PAIRS)
@@ -110,7 +110,7 @@ def test_a_system_takes_units_too(tmp_path: Path) -> None:
     )
     given = campaign(tmp_path, text)
     with bases.opened(given, BUILD / "ClosedLoop.ssp") as base:
-        in_si = quantities.in_si(given, base, "test")
+        in_si = bases.in_si(given, base, "test")
     assert in_si.set == {"arm.q1": -math.pi / 2}
     assert in_si.parameters["arm.a"].numbers == [0.05, 0.1]
 

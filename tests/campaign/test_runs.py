@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from rparm.campaign import bases
-from rparm.campaign.measures import LYAPUNOV
-from rparm.coupling.master import Master
+from rparm.campaign.job import LYAPUNOV
 from rparm.fmi.fmu_file import Fmu
 from rparm.runs.simulation import simulate
-from rparm.system import ssp
+from rparm.systems import ssp
+from rparm.systems.master import Master
 from tests.campaign.files import ARM, HEAD, campaign
 from tests.campaign.runners import rows, runner
 from tests.support.paths import ROOT

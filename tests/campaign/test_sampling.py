@@ -7,8 +7,7 @@ import pytest
 from scipy import stats
 
 from rparm.campaign.campaign_file import Distribution, grid_value
-from rparm.campaign.points import Points
-from rparm.campaign.sampling import Sampler
+from rparm.campaign.planning import Points, Sampler
 from tests.campaign.files import ARM, campaign
 
 SAMPLINGS = ("random", "sobol", "latin", "indices")

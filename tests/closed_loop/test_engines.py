@@ -2,7 +2,7 @@
 
 import pytest
 
-from rparm.system import comparison, ssp
+from rparm.systems import comparison, ssp
 from tests.support.systems import BOUND, CASES, CLOSED_LOOP, System, difference
 
 OF_FMI_3 = [case for case in CASES if case[1] not in ("heavy_payload", "horizontal_plane")]

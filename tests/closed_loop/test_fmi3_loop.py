@@ -9,7 +9,7 @@ from rparm.models.closed_loop.coupling import loop as closed_loop
 from rparm.models.closed_loop.coupling.loop import METHODS, REFERENCE_AHEAD, ClosedLoop, Method
 
 from rparm.errors import UserError
-from rparm.system import ssp
+from rparm.systems import ssp
 from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, edited, edited_fmu, replace
 

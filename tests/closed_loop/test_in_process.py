@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from rparm import project
-from rparm.coupling import in_process
-from rparm.system import comparison, ecos, ssp, study
+from rparm.systems import comparison, ecos, master, ssp
 from tests.support.rparm_project import Console
 
 ABSENT = "ecospy is not installed"
@@ -19,13 +18,13 @@ def compared(name: str, variants: Sequence[str] | None = None) -> list[compariso
     """Variants of a system, or all, stepped in this process."""
     folder = project.systems()[name]
     with ssp.unpacked(project.built(folder, ".ssp")) as opened:
-        experiment = study.load(folder).EXPERIMENT
+        experiment = comparison.load_study(folder).EXPERIMENT
         return [
             comparison.simulate(
                 opened,
                 variant,
                 comparison.load_reference(opened, variant, folder, experiment),
-                in_process.run,
+                master.run_in_master,
             )
             for variant in variants or opened.system.parameters
         ]
@@ -43,7 +42,9 @@ def test_it_reads_what_ecos_reads() -> None:
     path = project.built(project.systems()["machine"], ".ssp")
     with ssp.unpacked(path) as opened:
         names = [*comparison.recorded(opened), *comparison.discrete(opened)]
-        ours, theirs = (run(opened, "pick_and_place", names) for run in (in_process.run, ecos.run))
+        ours, theirs = (
+            run(opened, "pick_and_place", names) for run in (master.run_in_master, ecos.run)
+        )
     assert ours.names == theirs.names and ours.values.shape == theirs.values.shape
     scale = np.maximum(np.abs(theirs.values).max(axis=0), 1e-3)
     difference = np.abs(ours.values - theirs.values) / scale

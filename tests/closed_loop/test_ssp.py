@@ -11,8 +11,8 @@ import pytest
 
 import rparm
 from rparm.errors import UserError
-from rparm.system import ssp
-from rparm.system.structure import Connector
+from rparm.systems import ssp
+from rparm.systems.ssp import Connector
 from tests.support.rparm_project import Console
 from tests.support.ssp_files import (
     ALGORITHM,

@@ -10,8 +10,8 @@ from lxml import etree
 
 from rparm import project
 from rparm.project import VERSIONS
-from rparm.system import ssp
-from rparm.system.ssp_reader import NAMESPACES
+from rparm.systems import ssp
+from rparm.systems.ssp import NAMESPACES
 from tests.support.paths import ROOT
 
 sys.path.insert(0, str(ROOT / "fmu"))

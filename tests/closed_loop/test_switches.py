@@ -6,10 +6,10 @@ from contextlib import ExitStack
 import numpy as np
 import pytest
 
-from rparm.coupling.master import Master, Snapshot
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
-from rparm.system.structure import Connection
+from rparm.systems.master import Master, Snapshot
+from rparm.systems.ssp import Connection
 from tests.support.paths import ROOT
 
 COMPONENTS = {"trajectory": "RPTrajectory", "controller": "RPController", "plant": "RPPlant"}

@@ -13,7 +13,7 @@ from rparm.models.closed_loop.study import EXPERIMENT
 
 from rparm.errors import UserError
 from rparm.report import overview
-from rparm.system import comparison, ssp
+from rparm.systems import comparison, ssp
 from tests.support.paths import ROOT
 from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, not_a_number, read_csv, replace

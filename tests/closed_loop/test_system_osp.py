@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rparm.system import comparison, ssp
+from rparm.systems import comparison, ssp
 from tests.importers.osp import libcosim, only_variant
 from tests.support.ssp_files import edited
 from tests.support.systems import BOUND, CASES, CLOSED_LOOP, MACHINE_SYSTEM, System, difference

@@ -7,7 +7,7 @@ import pytest
 
 from rparm import project
 from rparm.errors import UserError
-from rparm.system import study
+from rparm.systems import comparison
 from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, Edit, edited, replace
 from tests.support.systems import CLOSED_LOOP
@@ -102,11 +102,11 @@ def test_a_system_without_a_folder_is_refused(add: Add, tmp_path: Path, console:
 
 
 def test_one_system_has_a_study_of_its_coupling(monkeypatch: pytest.MonkeyPatch) -> None:
-    folder, known = study.of_coupling()
+    folder, known = comparison.coupling_study()
     assert folder.name == "closed_loop" and callable(known.study_coupling)
     for folders, found in (({}, "none"), ({"a": folder, "b": folder}, "closed_loop, closed_loop")):
         paths = {name: Path(name) / path.name for name, path in folders.items()}
         monkeypatch.setattr(project, "systems", lambda paths=paths: paths)
-        monkeypatch.setattr(study, "load", lambda _: known)
+        monkeypatch.setattr(comparison, "load_study", lambda _: known)
         with pytest.raises(UserError, match=f"study of its coupling, found {found}"):
-            study.of_coupling()
+            comparison.coupling_study()

@@ -12,14 +12,14 @@ import numpy as np
 from tests.support.paths import ROOT
 
 sys.path.insert(0, str(ROOT / "fmu"))
-from building import contents, runtime  # noqa: E402
+import building  # noqa: E402
 from equations import c_model, declaration, lock  # noqa: E402
 from equations.model_file import ModelFile, ModelFileError, read  # noqa: E402
 from equations_to_c import toml  # noqa: E402
 
 __all__ = [
-    "Model", "ModelFileError", "c_model", "contents", "declaration", "declared", "lock", "read",
-    "read_text", "runtime", "toml",
+    "Model", "ModelFileError", "building", "c_model", "declaration", "declared", "lock", "read",
+    "read_text", "toml",
 ]  # fmt: skip
 
 BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).parent

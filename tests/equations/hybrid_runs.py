@@ -14,7 +14,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 
-from tests.equations.compiled import BUILD, contents, declaration, lock, read_text, runtime
+from tests.equations.compiled import BUILD, building, declaration, lock, read_text
 from tests.equations.hybrid_models import Polynomial
 
 METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3, "taylor": 4}
@@ -41,9 +41,9 @@ class Unit:
     def __init__(self, folder: Path, text: str) -> None:
         file = read_text(folder, text)
         keys = lock.references(Path("no-such-file"), declaration.keys(file))
-        declared = contents.write_c(file, keys, folder)
-        self.made = runtime.Runtime.load(BUILD / "runtime" / "runtime.json", True)
-        self.objects = self.made.compile([folder / name for name in contents.C_FILES], folder)
+        declared = building.write_c(file, keys, folder)
+        self.made = building.Runtime.load(BUILD / "runtime" / "runtime.json", True)
+        self.objects = self.made.compile([folder / name for name in building.C_FILES], folder)
         self.folder = folder
         self.guids = {"fmi2": declared.guid, "fmi3": declared.token("fmi3")}
         self.references = {name: v.reference for name, v in declared.variables.items()}

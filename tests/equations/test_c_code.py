@@ -19,12 +19,12 @@ import sympy
 from tests.support.paths import ROOT
 
 sys.path.insert(0, str(ROOT / "fmu"))
-from equations.c_derived import Derived, Wanted  # noqa: E402
-from equations.c_interpreter import Interpreter  # noqa: E402
-from equations.c_placement import settled  # noqa: E402
-from equations.c_text import CTextError, read  # noqa: E402
-from equations.c_values import Conditions  # noqa: E402
 from equations.graph import Graph  # noqa: E402
+from plain_c.blocks import settled  # noqa: E402
+from plain_c.derived import Derived, Wanted  # noqa: E402
+from plain_c.interpreter import Interpreter  # noqa: E402
+from plain_c.text import CTextError, read  # noqa: E402
+from plain_c.values import Conditions  # noqa: E402
 
 REAL = '#include "real.h"\n'
 WARNINGS = ["-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wpedantic", "-Werror"]

@@ -13,8 +13,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from rparm.expressions.parser import parse
-from rparm.expressions.tree import Node
+from rparm.expressions.expression import Node, parse
 from tests.equations.compiled import Model
 from tests.equations.examples import METHODS, build, simulated
 

@@ -10,7 +10,7 @@ import pytest
 
 import rparm
 from rparm.fmi.fmu_file import read_model
-from rparm.scenarios import scenario as scenarios
+from rparm.runs import scenario as scenarios
 from tests.equations.examples import example
 from tests.support.rparm_project import assert_one_line, call, repacked
 

@@ -5,10 +5,17 @@ import random
 
 import pytest
 
-from rparm.expressions.evaluation import evaluated, parsed
-from rparm.expressions.kinds import CONDITION, check_kinds
-from rparm.expressions.parser import parse
-from rparm.expressions.tree import FUNCTIONS, ExpressionError, in_order, names
+from rparm.expressions.expression import (
+    CONDITION,
+    FUNCTIONS,
+    ExpressionError,
+    check_kinds,
+    evaluated,
+    in_order,
+    names,
+    parse,
+    parsed,
+)
 from rparm.expressions.units import ONE, exponents, shown, unit_of, unit_of_exponents
 
 VALUES = {"x": 0.75, "y": -1.25, "z": 3.0}

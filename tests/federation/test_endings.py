@@ -14,11 +14,11 @@ import psutil
 import pytest
 
 from rparm.errors import UserError
-from rparm.federation import addresses, component, watching
+from rparm.federation import component, network
+from rparm.federation.component import parts
 from rparm.federation.federation import run
 from rparm.federation.network import KEY, Broker, Federate
-from rparm.federation.parts import parts
-from rparm.system import ssp
+from rparm.systems import ssp
 from tests.federation.processes import Process, Start, federation
 from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP, edited, replace
@@ -71,7 +71,7 @@ def test_something_else_elsewhere_is_refused_by_both(
     """Another variant, or another SSP, in which the arm has another tolerance."""
     change = {"resources/arm_nominal.ssv": replace("1e-11", "1e-10")}
     other = system or edited(SSP, tmp_path / "Other.ssp", change)
-    address = addresses.free()
+    address = network.free_address()
     here = federation(start, "--listen", address, "--elsewhere", "arm")
     there = federate(start, other, variant, address)
     for process in (here, there):
@@ -84,7 +84,7 @@ def test_something_else_elsewhere_is_refused_by_both(
 def test_one_that_waits_for_others_can_be_stopped(
     start: Start, number: int, code: int, tmp_path: Path
 ) -> None:
-    here = federation(start, "--listen", addresses.free(), "--elsewhere", "arm")
+    here = federation(start, "--listen", network.free_address(), "--elsewhere", "arm")
     children = components(here, 2)
     here.send_signal(number)
     here.communicate(timeout=15.0)  # HELICS would wait without end
@@ -94,7 +94,7 @@ def test_one_that_waits_for_others_can_be_stopped(
 
 
 def test_components_end_with_the_process_that_is_killed(start: Start) -> None:
-    here = federation(start, "--listen", addresses.free(), "--elsewhere", "arm")
+    here = federation(start, "--listen", network.free_address(), "--elsewhere", "arm")
     children = components(here, 2)
     here.kill()
     assert gone(children), "HELICS notices it after a minute"
@@ -115,7 +115,7 @@ def test_the_command_that_is_printed_steps_the_component(
 ) -> None:
     """With its key in the environment: other users see command lines."""
     monkeypatch.delenv(KEY)
-    address = addresses.free()
+    address = network.free_address()
     here = federation(start, "--listen", address, "--elsewhere", "arm")
     key, program, *arguments = shlex.split(here.stdout.readline().removeprefix("waiting for: "))
     assert program == "./run.sh"
@@ -136,7 +136,7 @@ def test_a_component_that_is_silent_is_named(start: Start) -> None:
 
 
 def test_a_broker_that_is_silent_is_named(start: Start) -> None:
-    address = addresses.free()
+    address = network.free_address()
     here = federation(start, "--listen", address, "--elsewhere", "arm", "controller")
     components(here, 1)
     there = start("federate", str(SSP), "nominal", "arm", "--broker", address, "--silence", SILENCE)
@@ -152,7 +152,7 @@ def test_a_broker_that_is_silent_is_named(start: Start) -> None:
 
 def test_a_standstill_is_ended() -> None:
     """The arm, here, takes part in one exchange only; what answers for it is HELICS."""
-    address = addresses.free()
+    address = network.free_address()
     with ssp.unpacked(SSP) as system:
         part = parts(system, "nominal")["arm"]
         arm = Federate("arm", address, ["controller"])
@@ -173,12 +173,12 @@ def test_a_component_that_cannot_join_ends_the_federation(monkeypatch: pytest.Mo
     monkeypatch.setattr("rparm.federation.federation.ABSENT", "(--help explains)")
     monkeypatch.setattr("rparm.federation.federation.arguments", lambda *_: ["no-command"])
     with ssp.unpacked(SSP) as system, pytest.raises(UserError, match="--help explains"):
-        run(system, "nominal", addresses.free(), elsewhere=["arm"])
+        run(system, "nominal", network.free_address(), elsewhere=["arm"])
 
 
 def test_a_broker_that_does_not_open_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rparm.federation.federation.Broker", lambda *_: time.sleep(LIMIT))
-    address = addresses.free()
+    address = network.free_address()
     words = f"no broker at {address}: HELICS has not returned for 1 s"
     with ssp.unpacked(SSP) as system, pytest.raises(UserError, match=words):
         run(system, "nominal", address, silence=1.0)
@@ -188,7 +188,7 @@ def test_a_broker_that_does_not_close_is_left(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr("helics.helicsBrokerDisconnect", lambda _: time.sleep(LIMIT))
     monkeypatch.setattr("rparm.federation.network.ANSWER", 0.5)
     begin = time.monotonic()
-    with Broker(2, addresses.free()):
+    with Broker(2, network.free_address()):
         pass
     assert time.monotonic() - begin < LIMIT / 2
 
@@ -197,7 +197,7 @@ def test_an_fmu_that_does_not_return_is_named() -> None:
     def hang(_: str) -> None:
         time.sleep(LIMIT)
 
-    address = addresses.free()
+    address = network.free_address()
     with ssp.unpacked(SSP) as system:
         part = parts(system, "nominal")["arm"]
     begin = time.monotonic()
@@ -206,7 +206,7 @@ def test_an_fmu_that_does_not_return_is_named() -> None:
         pytest.raises(UserError, match="arm: its FMU has not returned for 1 s"),
     ):
         broker.announce(part.system)
-        component.run(part, SimpleNamespace(instance=hang), address, 1.0)
+        component.run_component(part, SimpleNamespace(instance=hang), address, 1.0)
     assert time.monotonic() - begin < LIMIT, "it was waited for"
 
 
@@ -214,11 +214,11 @@ def test_what_helics_writes_as_it_ends_is_nobodys_message() -> None:
     """Such as "asio system error in context loop", now and then after Ctrl-C."""
     code = (
         "import os, sys, threading;"
-        "from rparm.federation import screen, watching;"
-        "screen.apart();"
+        "from rparm.federation import component, network;"
+        "network.separate_messages();"
         "wait, noise = threading.Event().wait, lambda _: os.write(2, b'asio\\n');"
         "os.write(2, b'library\\n'); print('ours', file=sys.stderr)\n"
-        "try: watching.run(wait, lambda: 1 / 0, noise)\n"
+        "try: component.run_watched(wait, lambda: 1 / 0, noise)\n"
         "except ZeroDivisionError as error: print(error, file=sys.stderr)"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
@@ -228,7 +228,7 @@ def test_what_helics_writes_as_it_ends_is_nobodys_message() -> None:
 
 def test_signals_come_to_the_thread_that_watches() -> None:
     """HELICS's threads begin in that of the work, and would be interrupted."""
-    blocked = watching.run(
+    blocked = component.run_watched(
         lambda: signal.pthread_sigmask(signal.SIG_BLOCK, ()), lambda: None, lambda _: None
     )
     assert {signal.SIGINT, signal.SIGTERM, signal.SIGHUP} <= blocked

@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rparm.coupling.master import Master
 from rparm.errors import UserError
-from rparm.federation import addresses, federation
-from rparm.federation.parts import parts, real_connections
+from rparm.federation import federation, network
+from rparm.federation.component import parts, real_connections
 from rparm.fmi.fmu_file import Fmu
-from rparm.system import ssp
-from rparm.system.ssp import Ssp
+from rparm.systems import ssp
+from rparm.systems.master import Master
+from rparm.systems.ssp import Ssp
 from tests.federation.processes import Start
 from tests.support.paths import ROOT
 from tests.support.rparm_project import Console
@@ -55,7 +55,7 @@ def by_the_master(system: Ssp, variant: str) -> tuple[tuple[str, ...], np.ndarra
 
 @pytest.mark.parametrize("variant", ["nominal", "heavy_payload_integral"])
 def test_values_are_those_of_the_master(short: Ssp, variant: str) -> None:
-    record = federation.run(short, variant, addresses.free())
+    record = federation.run(short, variant, network.free_address())
     names, rows = by_the_master(short, variant)
     assert set(record.names) == set(names)
     expected = rows[:, [names.index(name) for name in record.names]]
@@ -67,7 +67,7 @@ def test_values_are_those_of_the_master(short: Ssp, variant: str) -> None:
 
 def test_a_component_may_be_stepped_elsewhere(short: Ssp, start: Start) -> None:
     """By a command that is started first, as on another machine."""
-    address = addresses.free()
+    address = network.free_address()
     arguments = federation.arguments(short.path, "nominal", "arm", address)
     other = start(*arguments)
     time.sleep(8.0)  # longer than HELICS itself would wait, 4 s
@@ -75,7 +75,7 @@ def test_a_component_may_be_stepped_elsewhere(short: Ssp, start: Start) -> None:
     text, _ = other.communicate(timeout=30)
     assert other.returncode == 0
     assert text == f"waiting for a federation at {address}\n"
-    together = federation.run(short, "nominal", addresses.free())
+    together = federation.run(short, "nominal", network.free_address())
     assert np.array_equal(record.values, together.values)
 
 
@@ -88,7 +88,7 @@ def test_what_an_fmu_refuses_is_the_message(tmp_path: Path) -> None:
     changes = {STRUCTURE: SHORT, ARM: replace(TOLERANCE, none)}
     path = edited(SSP, tmp_path / "NoInertia.ssp", changes)
     with ssp.unpacked(path) as system, pytest.raises(UserError, match="arm: .* I1z"):
-        federation.run(system, "nominal", addresses.free())
+        federation.run(system, "nominal", network.free_address())
 
 
 def test_it_is_a_document(short: Ssp) -> None:
@@ -133,20 +133,20 @@ def test_a_port_that_is_in_use_is_named() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
         with pytest.raises(UserError, match=f"port {port} is in use"):
-            addresses.check_free(f"tcp://127.0.0.1:{port}")
+            network.check_address_is_free(f"tcp://127.0.0.1:{port}")
 
 
 def test_one_that_listens_is_waited_for() -> None:
-    address = addresses.free()
+    address = network.free_address()
     said = []
     with pytest.raises(UserError, match=f"nothing has listened at {address} for 1 s"):
-        addresses.wait_for(address, 1.0, lambda: said.append("wait"))
+        network.wait_for_listener(address, 1.0, lambda: said.append("wait"))
     assert said == ["wait"]
-    with socket.create_server(addresses.check_form(address)):
-        addresses.wait_for(address, 1.0, lambda: pytest.fail("nothing to wait for"))
+    with socket.create_server(network.check_address(address)):
+        network.wait_for_listener(address, 1.0, lambda: pytest.fail("nothing to wait for"))
 
 
 def test_an_unknown_host_is_not_waited_for() -> None:
     address = "tcp://no-such-host.invalid:23404"
     with pytest.raises(UserError, match=address):
-        addresses.wait_for(address, 60.0, lambda: pytest.fail("it is waited for"))
+        network.wait_for_listener(address, 60.0, lambda: pytest.fail("it is waited for"))

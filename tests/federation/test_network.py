@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rparm.errors import UserError
-from rparm.federation import addresses
+from rparm.federation import network
 from rparm.federation.network import Broker, Federate
 
 LIMIT = 30.0  # s
@@ -40,7 +40,7 @@ def begun(pool: ThreadPoolExecutor, one: Federate, two: Federate) -> None:
 
 
 def test_a_vector_is_read_after_the_next_exchange(pool: ThreadPoolExecutor) -> None:
-    address = addresses.free()
+    address = network.free_address()
     with Broker(2, address):
         one, two = joined(address)
         begun(pool, one, two)
@@ -54,7 +54,7 @@ def test_a_vector_is_read_after_the_next_exchange(pool: ThreadPoolExecutor) -> N
 
 def test_values_of_another_exchange_are_no_values(pool: ThreadPoolExecutor) -> None:
     """`one` publishes nothing before the exchange, which looks like a message that is late."""
-    address = addresses.free()
+    address = network.free_address()
     with Broker(2, address):
         one, two = joined(address)
         begun(pool, one, two)
@@ -68,8 +68,8 @@ def test_values_of_another_exchange_are_no_values(pool: ThreadPoolExecutor) -> N
 
 
 def test_one_port_is_enough(pool: ThreadPoolExecutor) -> None:
-    address = addresses.free()
-    _, port = addresses.check_form(address)
+    address = network.free_address()
+    _, port = network.check_address(address)
     with ExitStack() as stack:
         for other in range(port + 1, port + 20):
             with suppress(OSError, OverflowError):  # in use already, or no port
@@ -82,7 +82,7 @@ def test_one_port_is_enough(pool: ThreadPoolExecutor) -> None:
 
 def test_what_is_stepped_is_waited_for(pool: ThreadPoolExecutor) -> None:
     """Or one could refuse it, and end the federation, before those have joined who must hear it."""
-    address = addresses.free()
+    address = network.free_address()
     with Broker(1, address) as broker:
         one = Federate("one", address, [])
         one.join()
@@ -96,7 +96,7 @@ def test_what_is_stepped_is_waited_for(pool: ThreadPoolExecutor) -> None:
 
 
 def test_who_is_unknown_may_be_to_come() -> None:
-    address = addresses.free()
+    address = network.free_address()
     with Broker(2, address) as broker:
         one = Federate("one", address, [])
         one.join()
@@ -105,7 +105,7 @@ def test_who_is_unknown_may_be_to_come() -> None:
 
 
 def test_a_federation_that_ended_steps_nothing() -> None:
-    address = addresses.free()
+    address = network.free_address()
     with Broker(1, address):
         one = Federate("one", address, [])
         one.join()

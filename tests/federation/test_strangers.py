@@ -9,7 +9,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from rparm.federation import addresses
+from rparm.federation import network
 from rparm.federation.network import KEY
 from tests.federation.processes import Process, Start, federation, wait_for_steps
 from tests.support.hosts import DEVICE, Network
@@ -24,7 +24,7 @@ LIMIT = 120.0  # s
 
 def said(address: str, user: int | None, *arguments: str) -> str:
     """What a stranger says."""
-    _, port = addresses.check_form(address)
+    _, port = network.check_address(address)
     environment = {name: value for name, value in os.environ.items() if name != KEY}
     who = (str(port), str(-1 if user is None else user), *arguments)
     return subprocess.run(
@@ -40,10 +40,10 @@ def said(address: str, user: int | None, *arguments: str) -> str:
 
 def test_strangers_change_nothing(start: Start, user: int | None) -> None:
     """Neither one that takes the place of the arm, nor one that only wants to see."""
-    address = addresses.free()
+    address = network.free_address()
     here = federation(start, "--listen", address, "--elsewhere", "arm")
     assert here.stdout.readline().startswith("waiting for: ")
-    addresses.wait_for(address, LIMIT, lambda: None)
+    network.wait_for_listener(address, LIMIT, lambda: None)
     for arguments in (["arm"], ["arm", "--brokerkey=**"], ["other", "--observer"]):
         assert said(address, user, *arguments).startswith("refused: "), arguments
     there = start("federate", str(SSP), "nominal", "arm", "--broker", address)
@@ -56,7 +56,7 @@ def test_strangers_change_nothing(start: Start, user: int | None) -> None:
 
 
 def test_a_federation_has_one_port_on_loopback(start: Start) -> None:
-    address = addresses.free()
+    address = network.free_address()
     here = federation(start, "--listen", address, "--elsewhere", "arm")
     there = start("federate", str(SSP), "nominal", "arm", "--broker", address)
     wait_for_steps(here)

@@ -4,10 +4,10 @@ import fmpy
 import numpy as np
 import pytest
 
-from rparm.runs import reference
-from rparm.runs.reference import Reference
+from rparm.runs import comparison
+from rparm.runs.comparison import Reference
+from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import Result
-from rparm.scenarios.scenario import Scenario
 from tests.support.instances import LoadedFmu
 from tests.support.rparm_project import declared, load, names_of, staircase
 
@@ -42,7 +42,7 @@ def simulate(loaded: LoadedFmu, scenario: Scenario, expected: Reference, toleran
     assert np.all(np.abs(recorded["time"][rows] - times) <= near)
     values = np.column_stack([recorded[name][rows] for name in expected.names])
     result = Result(tolerance, times, expected.names, values, 0, 0.0, None, None, ())
-    return max(reference.errors(result, expected).values())
+    return max(comparison.errors_against(result, expected).values())
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -54,7 +54,7 @@ def test_fmpy_follows_the_reference(loaded: LoadedFmu, name: str) -> None:
     tolerance, so it is the solver's.
     """
     scenario = load(name)
-    expected = reference.load(scenario, declared(scenario.model))
+    expected = comparison.load_reference(scenario, declared(scenario.model))
     error = simulate(loaded, scenario, expected, 1e-8)
     if error > 1e-5:
         assert error <= 2e-3
@@ -65,5 +65,5 @@ def test_fmpy_follows_the_reference(loaded: LoadedFmu, name: str) -> None:
 def test_inputs_at_rest_need_no_finer_tolerance(loaded: LoadedFmu) -> None:
     for name in ("coasting", "constant_effort", "constant_effort_single_step"):
         scenario = load(name)
-        expected = reference.load(scenario, declared(scenario.model))
+        expected = comparison.load_reference(scenario, declared(scenario.model))
         assert simulate(loaded, scenario, expected, 1e-8) <= 1e-5

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rparm.project import model_folder
-from rparm.scenarios.scenario import Scenario
+from rparm.runs.scenario import Scenario
 from tests.support.instances import instantiated, set_value
 from tests.support.rparm_project import FILES, FMUS, NAMES, fmi3_fmu, load, staircase
 

@@ -22,7 +22,7 @@ PAGES = (MODEL / "README.md", MODEL / "derivation.md")
 SVG = "{http://www.w3.org/2000/svg}"
 
 sys.path.insert(0, str(ROOT / "fmu"))
-from latex_to_mathml import FormulaError, mathml
+from document import FormulaError, mathml
 
 
 def run_document(

@@ -35,9 +35,9 @@ from rparm.models.closed_loop.study import EXPERIMENT  # noqa: E402
 from rparm.errors import UserError  # noqa: E402
 from rparm.fmi.fmu_file import read_model  # noqa: E402
 from rparm.fmi.model import Model  # noqa: E402
-from rparm.runs import reference  # noqa: E402
-from rparm.scenarios import scenario as scenarios  # noqa: E402
-from rparm.system import comparison, ssp  # noqa: E402
+from rparm.runs import scenario as scenarios  # noqa: E402
+from rparm.runs.comparison import load_reference  # noqa: E402
+from rparm.systems import comparison, ssp  # noqa: E402
 
 SLOWEST = 5.0  # s of processor time, for one file
 MODEL = "rp_manipulator"
@@ -266,7 +266,7 @@ class Fuzz:
         )
 
     def read_scenario(self, declared: Model) -> None:
-        reference.load(scenarios.load(self.scenario, declared), declared)
+        load_reference(scenarios.load(self.scenario, declared), declared)
 
     def an_fmu(self) -> None:
         path = self.folder / "model.fmu"

@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from rparm.identification.parameters import DELAY
+from rparm.identification.request import DELAY
 from tests.identification.synthetic import PLANT, Machine, identified, write
 
 LATE = 1.4e-3  # s

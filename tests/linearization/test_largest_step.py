@@ -13,14 +13,19 @@ from rparm.models.machine.stability import Contact, growth
 from rparm.models.machine.study import REST as MACHINE
 from scipy.linalg import expm
 
-from rparm.coupling.master import INPUTS, ORDERS
-from rparm.linearization.largest_step import LargestStep, largest_steps, transition
+from rparm.linearization.largest_step import (
+    LargestStep,
+    Resting,
+    largest_steps,
+    resting,
+    transition,
+)
 from rparm.linearization.linear import Linear
-from rparm.linearization.stable_steps import Resting, resting
-from rparm.system.structure import Connection
+from rparm.systems.master import INPUT_MODES, ORDERS
+from rparm.systems.ssp import Connection
 from tests.support.paths import ROOT
 
-WAYS = [(order, inputs) for order in ORDERS for inputs in INPUTS]
+WAYS = [(order, inputs) for order in ORDERS for inputs in INPUT_MODES]
 NEAR = 0.005  # of the predicted step: where simulations die out and grow
 SYSTEMS = {"ClosedLoop": replace(LOOP, sequence=()), "Machine": MACHINE}
 
@@ -51,7 +56,7 @@ def test_pages_say_what_is_predicted(fmu: Path) -> None:
     page = (ROOT / "models" / "machine" / "README.md").read_text(encoding="utf-8")
     for order, start in (("jacobi", "| Jacobi |"), ("gauss_seidel", "| Gauss-Seidel, in the")):
         (row,) = [line for line in page.splitlines() if line.startswith(start)]
-        for inputs, cell in zip(INPUTS, row.split("|")[2:], strict=False):
+        for inputs, cell in zip(INPUT_MODES, row.split("|")[2:], strict=False):
             assert cell.strip() == f"{1e3 * found[order, inputs]:.3f} ms"
     page = (ROOT / "models" / "closed_loop" / "coupling.md").read_text(encoding="utf-8")
     with opened(fmu, "ClosedLoop", sequence=LOOP.sequence) as system:

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from rparm.fmi.fmu_file import CO_SIMULATION, MODEL_EXCHANGE, Fmu
-from rparm.linearization.derivatives import FmuSubject
-from rparm.linearization.linear import Linear
+from rparm.linearization.linear import FmuSubject, Linear
 from tests.linearization import exact_models
 from tests.linearization.exact_models import Exact
 

@@ -12,8 +12,9 @@ from scipy.io import loadmat
 
 import rparm
 from rparm import __main__ as cli
-from rparm.linearization import figures
 from rparm.linearization.margins import frequency_response
+from rparm.linearization.page import steps_figure
+from rparm.linearization.responses import sampled_response
 
 POSE = {"q1": "30 deg", "q2": "0.1 m"}
 H = 0.01
@@ -70,7 +71,7 @@ def test_it_is_that_of_python_control() -> None:
     one = model.select(["tau1"], ["q1"])
     w = np.array([0.1, 1.0, 50.0])
     np.testing.assert_allclose(frequency_response(one)(w), one.ss()(1j * w), rtol=1e-9)
-    response = figures.sampled_response(one, H)(w)
+    response = sampled_response(one, H)(w)
     np.testing.assert_allclose(response, one.zoh(H)(np.exp(1j * w * H)), rtol=1e-9)
 
 
@@ -178,7 +179,7 @@ def test_a_page_with_pictures_explains_itself(
 
 def test_samples_too_dense_to_be_seen_are_not_drawn() -> None:
     model = rparm.linearize("RPManipulator").select(["tau1"], ["q1"])
-    counts = [len(figures.steps(model, step).axes[0].lines) for step in (1e-2, 1e-9)]
+    counts = [len(steps_figure(model, step).axes[0].lines) for step in (1e-2, 1e-9)]
     assert counts == [2, 1]
 
 

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from rparm.linearization import explained, figures
+from rparm.linearization import page
 from rparm.linearization.linear import Linear
 from rparm.linearization.margins import Margins, margins
-from rparm.linearization.minimal import minimal
+from rparm.linearization.responses import minimal
 from rparm.linearization.study import Study
 
 LOOPS = int(os.environ.get("MARGIN_LOOPS", "60"))
@@ -199,7 +199,7 @@ def test_poles_at_0_are_0_and_slow_ones_are_not() -> None:
     poles = linear(A, np.eye(4)[:, [1]], np.eye(4)[[2]]).poles
     assert np.count_nonzero(poles) == 2 and np.abs(poles[2:]) == pytest.approx(np.sqrt(1.03e6))
     slow = linear(np.array([[-1e-7, 1.0], [0.0, -1e4]]), np.eye(2)[:, [1]], np.eye(2)[[0]])
-    table = explained.poles(Study(Path(), slow, {}))
+    table = page.poles_table(Study(Path(), slow, {}))
     assert [row[0] for row in table.rows] == ["-1e-07", "-10000"]
 
 
@@ -208,14 +208,16 @@ def test_pictures_draw_the_peaks() -> None:
     loop = rational(*LOOPS_BY_NAME["mode of damping 0.001"])
     w = np.linspace(0.999, 1.001, 20001) * W
     peak = np.abs(loop.ss()(1j * w)).max()
-    drawn = figures.bode(loop, None, margins(loop)).axes[0].lines[0]
+    drawn = page.bode_figure(loop, None, margins(loop)).axes[0].lines[0]
     hertz, decibels = drawn.get_data()
     near = np.abs(2 * np.pi * hertz / W - 1) < 0.1
     assert decibels[near].max() == pytest.approx(20 * np.log10(peak), abs=0.01)
-    real, imag = figures.nyquist(loop, None).axes[0].lines[0].get_data()
+    real, imag = page.nyquist_figure(loop, None).axes[0].lines[0].get_data()
     steps = np.hypot(np.diff(real), np.diff(imag))[np.hypot(real, imag)[1:] < 3]
     assert steps.max() < 0.15 * peak
-    sampled = figures.bode(loop, 0.07).axes[0].lines[1].get_data()  # the mode folds to 29.8 rad/s
+    sampled = (
+        page.bode_figure(loop, 0.07).axes[0].lines[1].get_data()
+    )  # the mode folds to 29.8 rad/s
     near = np.abs(2 * np.pi * sampled[0] / (2 * np.pi / 0.07 - W) - 1) < 0.01
     assert sampled[1][near].max() > 20 * np.log10(0.3)
 

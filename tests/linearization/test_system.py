@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from rparm.errors import UserError
-from rparm.linearization.connections import connected, looped
 from rparm.linearization.linear import Linear
 from rparm.linearization.margins import margins, open_loop
 from rparm.linearization.study import Request, study
-from rparm.linearization.system import SystemSubject
-from rparm.system import ssp
-from rparm.system.structure import Connection
+from rparm.linearization.system import SystemSubject, connected, looped
+from rparm.systems import ssp
+from rparm.systems.ssp import Connection
 
 
 @contextmanager

@@ -9,8 +9,7 @@ import pytest
 
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import MODEL_EXCHANGE, Fmu
-from rparm.linearization import point
-from rparm.linearization.derivatives import FmuSubject
+from rparm.linearization.linear import FmuSubject, checked_point
 from rparm.linearization.trim import Trimmed, trim
 
 M1, M2, LC1, L1, A, G = 2.0, 1.0, 0.25, 0.5, 0.1, 9.81  # start values of the arm's parameters
@@ -36,7 +35,7 @@ def plant(fmu: Path) -> Iterator[FmuSubject]:
 
 
 def trimmed(plant: FmuSubject, free: list[str], **given: object) -> Trimmed:
-    values, targets = point.checked(plant, given, with_outputs=True)
+    values, targets = checked_point(plant, given, with_outputs=True)
     return trim(plant, values, free, targets)
 
 

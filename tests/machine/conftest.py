@@ -6,8 +6,8 @@ import pytest
 from rparm.models.machine.systems import SEQUENCE
 
 from rparm.fmi.fmu_file import Fmu
-from rparm.system import ssp
-from rparm.system.ssp import Ssp
+from rparm.systems import ssp
+from rparm.systems.ssp import Ssp
 from tests.support.ssp_files import MACHINE
 
 

@@ -7,7 +7,7 @@ from rparm.models.machine.continuous import BOUND, METHODS, SMALLEST, VARIANTS, 
 
 from rparm.fmi.fmu_file import Fmu
 from rparm.runs.convergence import slope
-from rparm.system.ssp import Ssp
+from rparm.systems.ssp import Ssp
 
 
 @pytest.mark.parametrize("power", [1, 2])

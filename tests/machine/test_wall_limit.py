@@ -10,7 +10,7 @@ from rparm.models.machine.stability import Contact, exact_least_damping, least_d
 from rparm.models.machine.wall_limit import CASES, DEPTH, MASS, MOVED, PUSH, STEP, STEPS, Measure
 
 from rparm.fmi.fmu_file import Fmu
-from rparm.system.ssp import Ssp
+from rparm.systems.ssp import Ssp
 from tests.importers.osp import libcosim
 
 STIFFNESS = 1e4  # N/m

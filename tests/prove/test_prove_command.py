@@ -15,17 +15,16 @@ import pytest
 from flint import arb
 
 import rparm
-from rparm import project
+from rparm import project, proof
 from rparm.__main__ import main
 from rparm.commands import prove
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
-from rparm.proof import proven, prover
-from rparm.runs import reference
-from rparm.scenarios import scenario as scenarios
-from rparm.texts import rounded_up
+from rparm.runs import comparison
+from rparm.runs import scenario as scenarios
+from rparm.units import rounded_up
 
-PROVER = prover.provers()["rp_manipulator"]
+PROVER = proof.provers()["rp_manipulator"]
 STATES = {"q1", "q2", "dq1", "dq2"}
 OWN = """
 model = "rp_manipulator"
@@ -70,8 +69,8 @@ def test_proven_error_is_what_a_run_and_the_interval_say(own: Path) -> None:
     with Fmu(rparm.fmu("rp_manipulator")) as fmu:
         scenario = scenarios.load(own, fmu.model)
         enclosure = PROVER.enclose(scenario).of(PROVER.states)
-        bounds = proven.bounds(fmu, scenario, enclosure, "erk", 1e-8)
-        error = proven.largest(bounds, enclosure)["q1"]
+        bounds = proof.error_bounds(fmu, scenario, enclosure, "erk", 1e-8)
+        error = proof.largest_errors(bounds, enclosure)["q1"]
     own.write_text(OWN + '[parameters]\nsolver_method = "erk"\n')
     run = rparm.Scenario(own).run()
     apart = np.abs(run["q1"] - enclosure.high[:, 0])
@@ -111,7 +110,7 @@ def test_taylor_is_proven_to_1e_13_in_all_scenarios(path: Path) -> None:
     with Fmu(rparm.fmu("rp_manipulator")) as fmu:
         scenario = scenarios.load(path, fmu.model)
         states = PROVER.enclose(scenario).of(PROVER.states)
-        errors = proven.bounds(fmu, scenario, states, "taylor", 1e-13)
+        errors = proof.error_bounds(fmu, scenario, states, "taylor", 1e-13)
     assert errors.max() <= 1e-13
 
 
@@ -166,7 +165,7 @@ def test_every_wrong_value_of_a_reference_is_found(name: str, copies: Path) -> N
     with Fmu(rparm.fmu("rp_manipulator")) as fmu:
         scenario = scenarios.load(project.scenario_file(name), fmu.model)
         enclosure = PROVER.enclose(scenario)
-        right = reference.load(scenario, fmu.model)
+        right = comparison.load_reference(scenario, fmu.model)
         assert list(right.names) == COLUMNS
         for i, column in enumerate(COLUMNS):
             for row in (0, draw.randrange(1, len(right.values) - 1), len(right.values) - 1):
@@ -175,8 +174,8 @@ def test_every_wrong_value_of_a_reference_is_found(name: str, copies: Path) -> N
                     values[row, i] = fault(float(values[row, i]))
                     planted = replace(right, values=values)
                     with pytest.MonkeyPatch.context() as patch:
-                        patch.setattr(reference, "load", lambda *_, x=planted: x)
-                        good = proven.of_reference(fmu, scenario, enclosure)
+                        patch.setattr(comparison, "load_reference", lambda *_, x=planted: x)
+                        good = proof.proven_reference(fmu, scenario, enclosure)
                     (wrong,) = good.wrong
                     assert not good.passed and good.values - good.nearest == 1, kind
                     assert (wrong.line, wrong.column) == (row + 2, column), kind
@@ -256,10 +255,10 @@ def test_a_truncated_reference_is_refused(copies: Path, capsys: pytest.CaptureFi
     assert f"{path}, line 362: is cut off in the middle" in capsys.readouterr().err
 
 
-def around_one(low: float) -> prover.Enclosure:
+def around_one(low: float) -> proof.Enclosure:
     """A tiny interval around 1 + low."""
     one = np.ones((1, 1))
-    return prover.Enclosure(np.zeros(1), ("x",), one, low * one, 1e-20 * one, None, ())
+    return proof.Enclosure(np.zeros(1), ("x",), one, low * one, 1e-20 * one, None, ())
 
 
 def test_a_value_that_is_not_the_nearest_is_not_called_so() -> None:
@@ -267,16 +266,16 @@ def test_a_value_that_is_not_the_nearest_is_not_called_so() -> None:
     enclosure = around_one(0.0)
     rows = np.arange(1)
     above, below = np.nextafter(one, 2), np.nextafter(one, 0)
-    assert prover.is_nearest(one, enclosure, rows)
-    assert prover.is_nearest(one, around_one(2.0**-53 * 0.99), rows)
-    assert not prover.is_nearest(one, around_one(-(2.0**-53) * 0.51), rows)  # doubles are denser
-    assert not prover.is_nearest(above, enclosure, rows)
-    assert not prover.is_nearest(below, enclosure, rows)
+    assert proof.is_nearest(one, enclosure, rows)
+    assert proof.is_nearest(one, around_one(2.0**-53 * 0.99), rows)
+    assert not proof.is_nearest(one, around_one(-(2.0**-53) * 0.51), rows)  # doubles are denser
+    assert not proof.is_nearest(above, enclosure, rows)
+    assert not proof.is_nearest(below, enclosure, rows)
 
 
 def test_a_value_between_two_doubles_is_nearest_to_neither() -> None:
     one = np.ones((1, 1))
-    assert not prover.is_nearest(one, around_one(2.0**-53), np.arange(1))
+    assert not proof.is_nearest(one, around_one(2.0**-53), np.arange(1))
 
 
 def test_where_the_proof_ends(own: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -352,7 +351,7 @@ def test_a_broad_start_is_proven_in_pieces() -> None:
 
 def test_halves_cover_a_start() -> None:
     start = {"x": (0.1, 0.3), "y": (1.0, 0.0)}
-    left, right = prover.halves(start)
+    left, right = proof.halves(start)
     assert left["y"] == right["y"] == (1.0, 0.0)
     ends = [(Fraction(value), Fraction(radius)) for value, radius in (left["x"], right["x"])]
     assert ends[0][0] - ends[0][1] <= Fraction(0.1) - Fraction(0.3)

@@ -14,8 +14,8 @@ from flint import arb
 
 from rparm import project
 from rparm.fmi.fmu_file import read_model
-from rparm.runs import convergence, reference
-from rparm.scenarios import scenario as scenarios
+from rparm.runs import comparison, convergence
+from rparm.runs import scenario as scenarios
 from tests.prove.exact_motion import integrate, outputs, value_at
 from tests.prove.problems import (
     BUILD,
@@ -61,7 +61,7 @@ def half_unit(values: np.ndarray) -> np.ndarray:
 def test_references_are_nearest_doubles(path: Path) -> None:
     scenario = scenarios.load(path, MODEL)
     balls = enclosures(problem_of(scenario).text)[scenario.reference_rows]
-    values = reference.load(scenario, MODEL).values
+    values = comparison.load_reference(scenario, MODEL).values
     assert balls[:, :, 2].max() < 1e-21
     errors = np.abs((values - balls[:, :, 0]) - balls[:, :, 1]) + balls[:, :, 2]
     assert np.all(errors <= half_unit(values) + 2.0**-800)

@@ -22,7 +22,7 @@ import flint
 import pytest
 from flint import arb, arb_series
 
-from rparm.expressions.tree import in_order
+from rparm.expressions.expression import in_order
 from tests.prove.faults import COMPILE, Fault
 from tests.prove.problems import SOURCES
 from tests.support.paths import ROOT
@@ -30,9 +30,9 @@ from tests.support.paths import ROOT
 sys.path.insert(0, str(ROOT / "fmu"))
 import motion_series  # noqa: E402
 import operands  # noqa: E402
-from equations.c_interpreter import Interpreter  # noqa: E402
-from equations.c_text import read  # noqa: E402
 from equations.graph import Graph, Value  # noqa: E402
+from plain_c.interpreter import Interpreter  # noqa: E402
+from plain_c.text import read  # noqa: E402
 
 PLAIN = SOURCES.parent
 PARAMETERS = tuple(f"parameters.{x}" for x in ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g"))

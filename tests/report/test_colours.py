@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from rparm.report.assets import SOURCES
+from rparm.report.pages import ASSET_SOURCES
 
 TEXTS = ("ink", "muted", "accent", "good", "bad")
 LINES = ("reference", "effort", "stop", *(f"curve{i}" for i in range(1, 7)))
@@ -23,7 +23,7 @@ BLIND = {
 
 def schemes() -> dict[str, dict[str, np.ndarray]]:
     """Colours as linear sRGB, (3,) each, of light and dark."""
-    text = (SOURCES / "page.css").read_text(encoding="utf-8")
+    text = (ASSET_SOURCES / "page.css").read_text(encoding="utf-8")
     blocks = re.findall(r":root \{(.*?)\}", text, re.DOTALL)
     assert len(blocks) == 2
     found = {}

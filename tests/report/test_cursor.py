@@ -8,7 +8,7 @@ import pytest
 from selenium.webdriver.common.keys import Keys
 
 from rparm.report.run_data import ROUNDING
-from rparm.runs.reference import SMALLEST_SCALE
+from rparm.runs.comparison import SMALLEST_SCALE
 from tests.report.conftest import LATE, SCENARIOS, STRANGE, VARIANT, show
 from tests.support.browser import Browser
 from tests.support.ssp_files import read_csv

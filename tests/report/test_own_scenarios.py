@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from rparm.report.overview import Entry, forget, read, record
-from rparm.report.signal_texts import describe
-from rparm.scenarios import scenario
-from rparm.scenarios.signals import Table
+from rparm.report.scenario_page import describe_signal
+from rparm.runs import scenario
+from rparm.runs.inputs import Table
 from tests.report.conftest import CONTENT, STRANGE, show
 from tests.support.browser import Browser
 from tests.support.rparm_project import FMUS, Console, declared
@@ -232,10 +232,10 @@ def test_other_scenarios_stay_when_some_run_again(console: Console) -> None:
 
 def test_a_long_table_is_summed_up() -> None:
     points = tuple((float(i), float(i % 3)) for i in range(3))
-    assert describe(Table(points)) == "0 at 0 s, 1 at 1 s, 2 at 2 s, linear in between"
+    assert describe_signal(Table(points)) == "0 at 0 s, 1 at 1 s, 2 at 2 s, linear in between"
     many = tuple((i / 10, float(i % 7)) for i in range(50))
     summed = "table of 50 points from 0 to 4.9 s, values from 0 to 6, linear in between"
-    assert describe(Table(many)) == summed
+    assert describe_signal(Table(many)) == summed
 
 
 def test_the_page_of_a_file_is_opened(console: Console, monkeypatch: pytest.MonkeyPatch) -> None:

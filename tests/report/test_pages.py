@@ -8,7 +8,7 @@ import pytest
 
 from rparm import project
 from rparm.report.system_page import MOST_ROWS
-from rparm.system import comparison, ssp
+from rparm.systems import comparison, ssp
 from tests.report import sizes
 from tests.report.conftest import LATE, SCENARIOS, STRANGE, VARIANT, show
 from tests.support.browser import Browser

@@ -13,10 +13,10 @@ from zipfile import ZipFile, ZipInfo
 import pytest
 
 from rparm import __main__ as cli
-from rparm import archives
 from rparm.errors import UserError
+from rparm.fmi import fmu_file
 from rparm.fmi.fmu_file import Fmu
-from rparm.system import ssp
+from rparm.systems import ssp
 from tests.support.paths import ROOT
 from tests.support.rparm_project import assert_one_line, repacked
 from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, replace
@@ -228,14 +228,14 @@ def test_archives_that_grow(refuse: Callable[..., None], monkeypatch: pytest.Mon
     files = [(entry(f"data/{i}", zipfile.ZIP_DEFLATED), bytes(20_000_000)) for i in range(4)]
     content = archive(*files)
     assert len(content) < 1_000_000
-    monkeypatch.setattr(archives, "LARGEST_CONTENT", 70_000_000)
+    monkeypatch.setattr(fmu_file, "LARGEST_CONTENT", 70_000_000)
     refuse(content, "has 80 MB inside, expected at most 70 MB")
     refuse(archive(*((str(i), b"") for i in range(10_001))), "has 10004 files inside")
 
 
 def test_a_system_whose_fmus_grow(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each within its limit: some commands unpack all of them."""
-    monkeypatch.setattr("rparm.system.ssp_checks.LARGEST_SYSTEM", SSP.stat().st_size // 2)
+    monkeypatch.setattr("rparm.systems.ssp.LARGEST_SYSTEM", SSP.stat().st_size // 2)
     with pytest.raises(UserError, match="the FMUs up to component '.*' have more than"):
         ssp_opened(SSP)
 

@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 from rparm.models.closed_loop.coupling.loop import opened as opened_loop
 
-from rparm import input_files
+from rparm import files
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
-from rparm.runs import reference
-from rparm.scenarios import scenario as scenarios
-from rparm.system import ssp
+from rparm.runs import comparison
+from rparm.runs import scenario as scenarios
+from rparm.systems import ssp
 from tests.support.paths import ROOT
 from tests.support.rparm_project import declared
 from tests.support.ssp_files import SSP, Edit, edited, replace
@@ -47,7 +47,9 @@ def reference_file(model: Path) -> Path:
 
 
 def read(model: Path) -> None:
-    reference.load(scenarios.load(scenario_file(model), declared(MODEL)), declared(MODEL))
+    comparison.load_reference(
+        scenarios.load(scenario_file(model), declared(MODEL)), declared(MODEL)
+    )
 
 
 def refused(action: Callable[[], object], *parts: str) -> None:
@@ -103,7 +105,7 @@ def test_files_of_other_editors_are_read(model: Path) -> None:
 
 
 def test_files_that_are_too_large(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(input_files, "LARGEST_TOML", 10_000_000)
+    monkeypatch.setattr(files, "LARGEST_TOML", 10_000_000)
     with scenario_file(model).open("r+b") as file:
         file.truncate(10_000_001)
     refused(lambda: read(model), f"{SCENARIO}.toml: is larger than 10 MB")
@@ -148,9 +150,13 @@ def test_a_reference_cut_anywhere_is_refused(model: Path) -> None:
     content = path.read_bytes()
     for length in range(len(content)):
         path.write_bytes(content[:length])
-        refused(lambda: reference.load(scenario, declared(MODEL)), str(path), "make_references.py")
+        refused(
+            lambda: comparison.load_reference(scenario, declared(MODEL)),
+            str(path),
+            "make_references.py",
+        )
     path.write_bytes(content)
-    reference.load(scenario, declared(MODEL))
+    comparison.load_reference(scenario, declared(MODEL))
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from rparm.fmi.fmu_file import Fmu
-from rparm.runs import reference
+from rparm.runs import comparison
 from rparm.runs.comparison import Runs
 from tests.support.instances import ERROR, OK, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
@@ -262,7 +262,7 @@ def test_scenarios_meet_the_limits(name: str, joint: int, limits: set[str]) -> N
 def test_currents_of_the_scenarios_end_within_their_limit() -> None:
     for name in SCENARIOS:
         scenario = load(name)
-        table = reference.load(scenario, declared(FOLDER.name))
+        table = comparison.load_reference(scenario, declared(FOLDER.name))
         for joint in (1, 2):
             limit = scenario.start_values[f"current_max{joint}"]
             settled = scenario.times[scenario.reference_rows] > scenario.start + 0.04

@@ -15,7 +15,7 @@ import pytest
 from fmpy.fmi2 import FMU2Model
 
 from rparm.fmi.fmu_file import Fmu
-from rparm.runs import reference
+from rparm.runs import comparison
 from rparm.runs.comparison import Runs
 from tests.rp_controller.controller_symbolic import (
     ARM,
@@ -244,7 +244,7 @@ def test_references_and_units_of_the_arm_are_the_arms(
 )
 def test_scenarios_meet_limits_and_leave_them(name: str, effort: str, limit: float) -> None:
     scenario = load(f"controller_{name}")
-    column = reference.load(scenario, declared(FOLDER.name)).column(effort)
+    column = comparison.load_reference(scenario, declared(FOLDER.name)).column(effort)
     assert {max(-1, min(1, int(u / limit))) for u in column} == {-1, 0, 1}
     assert abs(column).max() == limit
 

@@ -15,7 +15,7 @@ import pytest
 from fmpy.fmi2 import FMU2Model
 
 from rparm.fmi.fmu_file import Fmu
-from rparm.runs import reference
+from rparm.runs import comparison
 from rparm.runs.comparison import Runs
 from tests.support.instances import ERROR, OK, Instance, LoadedFmu, status_of
 from tests.support.rparm_project import declared, fmi3_fmu, load
@@ -276,7 +276,7 @@ def test_the_scenario_meets_its_reference(path: Path, version: str) -> None:
     with Fmu(path if version == "fmi2" else fmi3_fmu(path)) as opened:
         assert Runs({"rp_controller": opened}).run(scenario, 1e-8).error < 1e-14
     for name, limit in (("tau1", 14.0), ("f2", 9.0)):
-        column = reference.load(scenario, declared("rp_controller")).column(name)
+        column = comparison.load_reference(scenario, declared("rp_controller")).column(name)
         assert abs(column).max() == limit and np.unique(column).size > 50
 
 

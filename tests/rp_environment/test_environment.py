@@ -18,7 +18,7 @@ import sympy as sp
 from fmpy import fmi2
 
 from rparm.fmi.fmu_file import Fmu
-from rparm.runs import reference
+from rparm.runs import comparison
 from rparm.runs.comparison import Runs
 from tests.support.instances import DISCARD, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
@@ -323,7 +323,7 @@ def test_scenarios_meet_their_references(path: Path, name: str) -> None:
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_scenarios_touch_and_release(name: str) -> None:
-    expected = reference.load(load(name), declared(FOLDER.name))
+    expected = comparison.load_reference(load(name), declared(FOLDER.name))
     penetration, force = expected.column("penetration"), expected.column("wall_force")
     touches = np.flatnonzero((penetration[1:] > 0) & (penetration[:-1] == 0))
     assert len(touches) >= 3 and (penetration == 0).sum() >= 20

@@ -140,7 +140,7 @@ WRENCH = ("ee_fx", "ee_fy", "ee_mz")
 
 
 class Loop:
-    """Plant and wall, stepped as rparm/coupling/master.py does, the plant first."""
+    """Plant and wall, stepped as rparm/systems/master.py does, the plant first."""
 
     def __init__(self, arm: Instance, wall: Instance, order: str, inputs: str) -> None:
         self.arm, self.wall = arm, wall

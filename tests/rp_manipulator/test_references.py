@@ -17,7 +17,7 @@ from rparm.models.rp_manipulator.references.make_references import (
     derive,
 )
 
-from rparm.scenarios.scenario import Scenario
+from rparm.runs.scenario import Scenario
 from tests.support.paths import ROOT
 from tests.support.rparm_project import declared, load, names_of
 

@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 
-from rparm.scenarios.scenario import Scenario
+from rparm.runs.scenario import Scenario
 from tests.support.rparm_project import declared, load, names_of
 
 SHIPPED = {name: load(name) for name in names_of("rp_manipulator")}

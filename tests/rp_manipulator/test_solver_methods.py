@@ -8,11 +8,9 @@ import pytest
 from rparm.models.rp_manipulator.references import make_references
 
 from rparm.fmi.fmu_file import Fmu
-from rparm.runs import reference, simulation
-from rparm.runs.comparison import Runs
-from rparm.runs.reference import Reference
-from rparm.runs.tolerance_sweep import TOLERANCES, sweep
-from rparm.scenarios.scenario import Scenario
+from rparm.runs import comparison, simulation
+from rparm.runs.comparison import TOLERANCES, Reference, Runs, sweep
+from rparm.runs.scenario import Scenario
 from tests.support.paths import ROOT
 from tests.support.rparm_project import load as load_scenario
 from tests.support.rparm_project import names_of
@@ -75,7 +73,7 @@ def jumping(size: float, **parameters: float) -> Scenario:
 def exact() -> dict[float, Reference]:
     """Solutions of the independent equations, by the size of the jumps."""
     equations = make_references.Reference()
-    summed = reference.read_summed(ROOT / "models" / "rp_manipulator")
+    summed = comparison.read_summed(ROOT / "models" / "rp_manipulator")
     found = {}
     for size in JUMPS:
         scenario = jumping(size)
@@ -96,7 +94,7 @@ def test_jumps_of_all_sizes_keep_the_accuracy(
         result = simulation.simulate(
             opened, jumping(size, solver_method=METHODS[method]), tolerance
         )
-        errors[size] = max(reference.errors(result, exact[size]).values())
+        errors[size] = max(comparison.errors_against(result, exact[size]).values())
     assert max(errors.values()) < 3 * tolerance
     usual = max(errors[JUMPS[0]], tolerance / 100)
     assert max(error for size, error in errors.items() if size <= 1) < 2 * usual

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rparm.models.rp_plant.references import make_references
 
-from rparm.scenarios.scenario import Scenario
+from rparm.runs.scenario import Scenario
 from tests.support.rparm_project import load, names_of
 
 SCENARIOS = {name: load(name) for name in names_of("rp_plant")}

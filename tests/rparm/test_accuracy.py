@@ -12,10 +12,8 @@ import pytest
 from rparm.fmi.fmu_file import Fmu
 from rparm.report import scenario_page
 from rparm.report.writer import ReportWriter
-from rparm.runs import comparison, reference, simulation, tolerance_sweep
-from rparm.runs.comparison import Runs
-from rparm.runs.reference import Reference
-from rparm.runs.tolerance_sweep import Sweep
+from rparm.runs import comparison, simulation
+from rparm.runs.comparison import Reference, Runs, Sweep
 from tests.report.sizes import OF_SCENARIOS
 from tests.support.paths import FOLDERS
 from tests.support.rparm_project import LONG, NAMES, SHORT, load
@@ -35,7 +33,7 @@ def runs(opened: Fmu) -> Iterator[Runs]:
 
 @pytest.fixture(scope="module")
 def sweeps(runs: Runs) -> dict[str, Sweep]:
-    return {name: tolerance_sweep.sweep(runs, load(name)) for name in NAMES}
+    return {name: comparison.sweep(runs, load(name)) for name in NAMES}
 
 
 # ---- error measure and bounds
@@ -49,7 +47,7 @@ def measured(expected: dict[str, list[float]], got: dict[str, list[float]]) -> d
     values = np.array([*expected.values()]).T
     table = Reference(Path("ref.csv"), np.arange(2.0), tuple(expected), values, SUMMED)
     result = SimpleNamespace(names=tuple(got), values=np.array([*got.values()]).T)
-    return reference.errors(result, table)
+    return comparison.errors_against(result, table)
 
 
 @pytest.mark.parametrize(
@@ -95,22 +93,22 @@ def test_values_that_are_not_finite_fail(runs: Runs) -> None:
     + [(1e-11, 1e-8), (1e-12, 1e-9)],
 )
 def test_bound(tolerance: float, expected: float) -> None:
-    assert reference.bound(tolerance) == pytest.approx(expected, rel=1e-12)
-    assert tolerance not in reference.BOUNDS or reference.bound(tolerance) <= expected
+    assert comparison.error_bound(tolerance) == pytest.approx(expected, rel=1e-12)
+    assert tolerance not in comparison.BOUNDS or comparison.error_bound(tolerance) <= expected
 
 
 def test_rules_on_errors_over_tolerances() -> None:
     tolerances = (1e-4, 1e-5, 1e-6)
-    assert not tolerance_sweep.violations(tolerances, (1e-3, 3e-3, 1e-6))
-    assert not tolerance_sweep.violations(tolerances, (2e-10, 5e-11, 9e-11))
-    assert not tolerance_sweep.violations(tolerances, (0.0, 0.0, 0.0))
-    (above,) = tolerance_sweep.violations(tolerances, (0.2, 1e-5, 1e-6))
+    assert not comparison.sweep_violations(tolerances, (1e-3, 3e-3, 1e-6))
+    assert not comparison.sweep_violations(tolerances, (2e-10, 5e-11, 9e-11))
+    assert not comparison.sweep_violations(tolerances, (0.0, 0.0, 0.0))
+    (above,) = comparison.sweep_violations(tolerances, (0.2, 1e-5, 1e-6))
     assert "2.00e-01 at tolerance 0.0001 is above its bound 1e-01" in above
-    (rise,) = tolerance_sweep.violations(tolerances, (1e-2, 1e-6, 3.1e-6))
+    (rise,) = comparison.sweep_violations(tolerances, (1e-2, 1e-6, 3.1e-6))
     assert "more than 3 times" in rise
-    (gain,) = tolerance_sweep.violations(tolerances, (1e-4, 1e-5, 1.1e-7))
+    (gain,) = comparison.sweep_violations(tolerances, (1e-4, 1e-5, 1.1e-7))
     assert "above 1/1000" in gain
-    assert len(tolerance_sweep.violations(tolerances, (1e-4, math.nan, 1e-8))) == 3
+    assert len(comparison.sweep_violations(tolerances, (1e-4, math.nan, 1e-8))) == 3
 
 
 # ---- the built FMU
@@ -131,9 +129,9 @@ def test_nothing_runs_twice(
     runs: Runs, sweeps: dict[str, Sweep], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delattr(simulation, "simulate")
-    again = tolerance_sweep.sweep(runs, load(LONG))
+    again = comparison.sweep(runs, load(LONG))
     assert again.errors == sweeps[LONG].errors
-    assert runs.steps_ahead(load(LONG), tolerance_sweep.TOLERANCES) == 0
+    assert runs.steps_ahead(load(LONG), comparison.TOLERANCES) == 0
 
 
 # ---- report

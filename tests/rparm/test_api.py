@@ -10,10 +10,10 @@ import pytest
 
 import rparm
 from docs import python_api
-from rparm import project, trajectory_csv
+from rparm import files, project
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
-from rparm.scenarios import scenario as scenarios
+from rparm.runs import scenario as scenarios
 from tests.support.paths import ROOT
 
 RUN = {"stop_time": 1.0, "step": 0.01}
@@ -86,7 +86,7 @@ def test_a_table_is_a_mapping_with_units(arm: Path, tmp_path: Path) -> None:
     with pytest.raises(KeyError, match="did you mean 'q1'"):
         table["q11"]
     table.to_csv(tmp_path / "run.csv")
-    names, values = trajectory_csv.read(tmp_path / "run.csv", lambda text, _: ValueError(text))
+    names, values = files.read_trajectory(tmp_path / "run.csv", lambda text, _: ValueError(text))
     assert names == tuple(table)
     assert np.array_equal(values, np.column_stack(list(table.values())))
     with pytest.raises(UserError, match="cannot be written"):

@@ -8,7 +8,7 @@ import pytest
 
 import rparm
 from rparm.errors import UserError
-from rparm.system import study
+from rparm.systems import comparison
 
 
 def test_a_system_runs_by_all_engines() -> None:
@@ -40,7 +40,7 @@ def test_what_the_coupling_costs_is_asked_of_the_system_that_knows(
 ) -> None:
     loop = rparm.System("closed_loop")
     asked: list[tuple[Path, Path]] = []
-    folder, module = study.of_coupling()
+    folder, module = comparison.coupling_study()
     monkeypatch.setattr(
         module, "study_coupling", lambda *given: asked.append(given) or {"part": {"passed": True}}
     )

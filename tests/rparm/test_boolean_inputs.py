@@ -5,12 +5,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from rparm.coupling.master import Master
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import CO_SIMULATION, INSTANCES, Fmu
-from rparm.runs import simulation
-from rparm.scenarios import scenario
-from rparm.system.structure import Connection
+from rparm.runs import scenario, simulation
+from rparm.systems.master import Master
+from rparm.systems.ssp import Connection
 from tests.support.rparm_project import BUILD, fmi3_fmu
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, timed, toy
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rparm import trajectory_csv
+from rparm import files
 from rparm.commands import run as run_command
 from tests.support.paths import ROOT
 from tests.support.rparm_project import (
@@ -145,7 +145,7 @@ def test_runs_as_a_module_and_stops_at_once_on_ctrl_c(project: Path, fmu: Path) 
     rows = np.loadtxt(file, delimiter=",", skiprows=1)
     rows[:, 0] = load(LONG, project).times[load(LONG, project).reference_rows]
     names = [name.strip('"') for name in file.read_text().splitlines()[0].split(",")]
-    trajectory_csv.write(file, rows[:, 0], names[1:], rows[:, 1:])
+    files.write_trajectory(file, rows[:, 0], names[1:], rows[:, 1:])
 
     shutil.copytree(ROOT / "rparm", project / "rparm")
     command = [sys.executable, "-u", "-m", "rparm", "run", LONG, "--fmu", str(fmu)]

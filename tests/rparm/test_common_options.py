@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from rparm import command_line, project, trajectory_csv
+from rparm import command_line, files, project
 from rparm.command_line import COMMANDS
 from rparm.commands.completion import SCRIPT, SHELLS
-from rparm.system import study
+from rparm.systems import comparison
 from tests.support.paths import ROOT
 from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, edited, replace
@@ -73,7 +73,7 @@ def test_the_playground_is_copied_and_shown(
 def test_the_picture_of_the_coupling_is_shown(
     tmp_path: Path, shown: list[str], monkeypatch: pytest.MonkeyPatch, console: Console
 ) -> None:
-    _, module = study.of_coupling()
+    _, module = comparison.coupling_study()
 
     def draw(_: Path, report: Path) -> dict[str, dict[str, object]]:
         (report / module.COUPLING_PICTURE).touch()
@@ -116,7 +116,9 @@ def test_a_federation_writes_what_it_recorded(
     code, out, err = console("federation", *arguments)
     assert code == 0 and err == "--open: federation has written no page\n" and shown == []
     (row,) = json.loads(out)["variants"]
-    names, values = trajectory_csv.read(tmp_path / "nominal.csv", lambda text, _: ValueError(text))
+    names, values = files.read_trajectory(
+        tmp_path / "nominal.csv", lambda text, _: ValueError(text)
+    )
     assert names[0] == "time" and "arm.q1" in names and len(values) == row["steps"] + 1
 
 

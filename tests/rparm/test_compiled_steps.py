@@ -12,10 +12,10 @@ import pytest
 import rparm
 from rparm.errors import StoppedError
 from rparm.fmi.fmu_file import Fmu
-from rparm.runs import compiled_steps, simulation
+from rparm.runs import scenario as scenarios
+from rparm.runs import simulation
+from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import Result
-from rparm.scenarios import scenario as scenarios
-from rparm.scenarios.scenario import Scenario
 from tests.support.rparm_project import BUILD, FMUS, NAMES, edit, fmi3_fmu, load
 from tests.support.toy_model import timed
 
@@ -30,14 +30,14 @@ def opened(folder: str, version: int) -> Fmu:
 def which_loop(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     """Names of the loops that ran."""
     ran: list[str] = []
-    for module, name in ((simulation, "_step_through"), (compiled_steps, "step_through")):
-        loop = getattr(module, name)
+    for name in ("_step_through", "_step_compiled"):
+        loop = getattr(simulation, name)
 
-        def named(*arguments: object, loop: Callable = loop, name: str = module.__name__) -> object:
-            ran.append(name.rpartition(".")[2])
+        def named(*arguments: object, loop: Callable = loop, name: str = name) -> object:
+            ran.append(name)
             return loop(*arguments)
 
-        monkeypatch.setattr(module, name, named)
+        monkeypatch.setattr(simulation, name, named)
     monkeypatch.setattr(simulation, "_steps_made", 0)
     return ran
 
@@ -60,7 +60,7 @@ def test_a_scenario_has_the_same_bits(name: str, version: int, which_loop: list[
     with opened(scenario.model, version) as fmu:
         result = assert_same(fmu, scenario)
     assert len(result.values) == len(scenario.reference_rows)
-    assert which_loop == ["simulation", "compiled_steps"]
+    assert which_loop == ["_step_through", "_step_compiled"]
 
 
 @pytest.mark.parametrize("version", ["fmi2", "fmi3"])
@@ -134,12 +134,13 @@ def test_it_is_used_where_it_pays(monkeypatch: pytest.MonkeyPatch, which_loop: l
     rparm.simulate(FMUS["rp_manipulator"], stop_time=1.0, step=0.1)
     with opened("rp_plant", 2) as fmu:
         assert simulation.simulate(fmu, load("stick_slip")).integers
-    assert which_loop == ["simulation"] * 2 + ["compiled_steps"] * 4 + ["simulation"]
+    plain, compiled = ["_step_through"], ["_step_compiled"]
+    assert which_loop == plain * 2 + compiled * 4 + plain
 
 
 def test_without_numba_the_plain_loop_runs(
     monkeypatch: pytest.MonkeyPatch, which_loop: list[str]
 ) -> None:
-    monkeypatch.setitem(sys.modules, "rparm.runs.compiled_steps", None)
+    monkeypatch.setitem(sys.modules, "rparm.fmi.compiled_loop", None)
     table = rparm.simulate(FMUS["rp_manipulator"], stop_time=1.0, step=0.1)
-    assert len(table["time"]) == 11 and which_loop == ["simulation"]
+    assert len(table["time"]) == 11 and which_loop == ["_step_through"]

@@ -8,22 +8,19 @@ import random
 import subprocess
 import sys
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rparm import command_line
+from rparm import command_line, result_tables
 from rparm import project as project_folders
 from rparm.command_line import COMMANDS
+from rparm.console import json_line, results_stream, stage, verdict_line
 from rparm.fmi.fmu_file import Fmu
-from rparm.output import result_tables, streams
-from rparm.output.console import stage, verdict_line
-from rparm.output.result_tables import RunTable, SweepTable
-from rparm.runs.comparison import Run, Runs
-from rparm.runs.tolerance_sweep import TOLERANCES, Sweep
-from rparm.texts import seconds, short, shortened
+from rparm.result_tables import RunTable, SweepTable
+from rparm.runs.comparison import TOLERANCES, Run, Runs, Sweep
+from rparm.units import seconds, short, shortened
 from tests.support.paths import ROOT
 from tests.support.rparm_project import FMUS, LONG, SHORT, Console, load
 from tests.support.ssp_files import SSP
@@ -159,7 +156,7 @@ def test_every_command_prints_a_document(console: Console, arguments: list[str],
 
 def test_numbers_that_json_does_not_know_are_null() -> None:
     content = {"a": [math.nan, np.float64(1.5), np.inf], "b": {"c": (Path("x"), np.int64(3), True)}}
-    assert streams.document(content) == '{"a": [null, 1.5, null], "b": {"c": ["x", 3, true]}}'
+    assert json_line(content) == '{"a": [null, 1.5, null], "b": {"c": ["x", 3, true]}}'
 
 
 NOISE = """
@@ -207,7 +204,7 @@ def test_help_fits_and_names_every_command(console: Console) -> None:
     assert all(f"  {command} " in text for command in COMMANDS)
     assert max(map(len, text.splitlines())) <= 80
     modules = {path.stem for path in (ROOT / "rparm/commands").glob("[a-z]*.py")}
-    assert modules == {command.replace("-", "_") for command in COMMANDS}
+    assert modules == {command.module for command in COMMANDS.values()}
     for command in COMMANDS:
         for arguments in (["help", command], [command, "--help"]):
             code, text, _ = console(*arguments)
@@ -237,10 +234,10 @@ def test_the_playground_is_where_it_is_said_to_be(
 def test_the_folder_for_results_has_two_names(capsys: pytest.CaptureFixture[str]) -> None:
     """--report is what --output was called: it works, and no help shows it."""
     for name in ("run", "system"):
-        module = import_module(f"rparm.commands.{name}")
+        add_options = command_line.function(name, "add_{}_options")
         for option in ("--output", "--report"):
             parser = argparse.ArgumentParser()
-            module.add_options(parser)
+            add_options(parser)
             assert parser.parse_args([option, "here"]).report == Path("here")
         assert parser.parse_args([]).report == project_folders.report_folder()
         assert "--output DIR" in parser.format_help() and "--report" not in parser.format_help()
@@ -298,7 +295,7 @@ def test_stages_are_for_terminals(
         monkeypatch.setattr(sys.stderr, "isatty", lambda known=is_terminal: known, raising=False)
         stage("building")
         assert capsys.readouterr().err == ("building ...\n" if is_terminal else "")
-        with streams.of_results(as_json=False, quiet=True):
+        with results_stream(as_json=False, quiet=True):
             stage("building")
         assert capsys.readouterr().err == ""
 

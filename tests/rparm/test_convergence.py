@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from rparm import result_tables
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
-from rparm.output import result_tables
 from rparm.project import convergence_files
 from rparm.report.writer import ReportWriter
 from rparm.runs import convergence
@@ -30,7 +30,7 @@ from rparm.runs.convergence import (
     Convergence,
     Problem,
 )
-from rparm.scenarios.signals import Sines
+from rparm.runs.inputs import Sines
 from tests.support.paths import ROOT
 from tests.support.rparm_project import Console, declared, load, repacked
 
@@ -236,7 +236,7 @@ def test_slopes_from_too_few_errors_fail(
     found = made_up(problem, *coefficients, floor=floor)
     assert not found.passed
     assert any(text.startswith(complaint) for text in found.violations)
-    result_tables.convergence(found)
+    result_tables.print_convergence(found)
     assert "FAILED" in capsys.readouterr().out
 
 

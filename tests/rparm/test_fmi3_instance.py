@@ -16,15 +16,7 @@ from rparm.errors import UserError, WrongValueError
 from rparm.fmi.fmu_file import Fmu, read_model
 from rparm.fmi.model import Variable
 from rparm.runs import convergence, simulation
-from tests.support.rparm_project import FMUS, SHORT, declared, fmi3_fmu, load, names_of, repacked
-
-
-@pytest.fixture(scope="module", params=FMUS)
-def both(request: pytest.FixtureRequest) -> Iterator[tuple[str, Fmu, Fmu]]:
-    """Folder of a model, and its FMUs of FMI 2.0 and 3.0."""
-    path = FMUS[request.param]
-    with Fmu(path) as first, Fmu(fmi3_fmu(path)) as second:
-        yield request.param, first, second
+from tests.support.rparm_project import FMUS, SHORT, declared, fmi3_fmu, load, repacked
 
 
 @pytest.fixture(scope="module")
@@ -36,27 +28,17 @@ def opened3(fmu: Path) -> Iterator[Fmu]:
 # ---- the same as in FMI 2.0 ----------------------------------------------------------------------
 
 
-def test_the_models_are_the_same(both: tuple[str, Fmu, Fmu]) -> None:
-    _, first, second = both
-    assert (first.model.fmi_version, second.model.fmi_version) == ("2.0", "3.0")
-    own = first.model.variables.keys() ^ second.model.variables.keys()
+@pytest.mark.parametrize("path", FMUS.values(), ids=lambda path: path.stem)
+def test_the_models_are_the_same(path: Path) -> None:
+    first, second = read_model(path), read_model(fmi3_fmu(path))
+    assert (first.fmi_version, second.fmi_version) == ("2.0", "3.0")
+    own = first.variables.keys() ^ second.variables.keys()
     assert own <= {"der_q1", "der_q2"}  # other names of dq1 and dq2, which FMI 3.0 does not need
-    for name in first.model.variables.keys() & second.model.variables.keys():
-        assert first.model.variables[name] == second.model.variables[name]
+    for name in first.variables.keys() & second.variables.keys():
+        assert first.variables[name] == second.variables[name]
     empty = {"variables": {}, "fmi_version": ""}
-    assert replace(first.model, **empty) == replace(second.model, **empty)
-    assert first.model.real_outputs == second.model.real_outputs
-
-
-@pytest.mark.parametrize("tolerance", [1e-5, 1e-11])
-def test_all_scenarios_give_the_same_bits(both: tuple[str, Fmu, Fmu], tolerance: float) -> None:
-    model, *fmus = both
-    for name in names_of(model):
-        first, second = (simulation.simulate(fmu, load(name), tolerance) for fmu in fmus)
-        assert first.names == second.names
-        assert first.values.tobytes() == second.values.tobytes(), name
-        assert first.solver_steps == second.solver_steps
-        assert first.solver_rhs_evaluations == second.solver_rhs_evaluations
+    assert replace(first, **empty) == replace(second, **empty)
+    assert first.real_outputs == second.real_outputs
 
 
 @pytest.mark.parametrize("order", convergence.ORDERS)

@@ -34,7 +34,7 @@ if kind == "folder":
     is_ours = lambda arguments: os.path.basename(arguments[0]).startswith("rparm-")
     os.mkdir = interrupted(os.mkdir, is_ours)
 else:
-    is_child = lambda arguments: "rparm.system.ecos" in arguments[0]
+    is_child = lambda arguments: "rparm.systems.ecos" in arguments[0]
     subprocess._fork_exec = interrupted(subprocess._fork_exec, is_child)
 sys.exit(_as_program())
 """

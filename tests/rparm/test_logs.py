@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from rparm.errors import UserError
-from rparm.scenarios import logs, scenario
-from rparm.scenarios.scenario import Scenario
+from rparm.runs import inputs, scenario
+from rparm.runs.scenario import Scenario
 from tests.rparm.test_boolean_inputs import SWITCHED
 from tests.support.rparm_project import FMUS, Console
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, TOY, toy
@@ -225,7 +225,7 @@ def test_what_is_no_file(write: Write, section: str, monkeypatch: pytest.MonkeyP
     folder = write("").parent
     os.mkfifo(folder / "pipe")
     (folder / "big").write_bytes(b"time,force\n" + b"0" * 100)
-    monkeypatch.setattr(logs, "LARGEST", 100)
+    monkeypatch.setattr(inputs, "LARGEST_LOG", 100)
     for file, message in (
         ("none.csv", "none.csv: no such file"),
         ("bigg", "bigg: no such file, did you mean 'big'?"),

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from rparm.coupling import step_control
-from rparm.coupling.master import Master, Snapshot
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
-from rparm.system.structure import Connection
+from rparm.systems import step_control
+from rparm.systems.master import Master, Snapshot
+from rparm.systems.ssp import Connection
 from tests.support.rparm_project import BUILD, fmi3_fmu
 
 H, STEPS = 0.05, 40

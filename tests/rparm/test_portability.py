@@ -19,10 +19,10 @@ import pytest
 
 from rparm.errors import UserError
 from rparm.fmi import fmu_file
-from rparm.fmi.fmi2_instance import Fmi2Instance
 from rparm.fmi.fmu_file import Fmu
-from rparm.runs import reference, simulation
-from rparm.scenarios import scenario as scenarios
+from rparm.fmi.versions import Fmi2Instance
+from rparm.runs import comparison, simulation
+from rparm.runs import scenario as scenarios
 from tests.support.paths import ROOT, SYSTEMS
 from tests.support.rparm_project import (
     BUILD,
@@ -86,7 +86,7 @@ def _not_portable_call(call: ast.Call) -> Iterator[str]:
         yield f"{name} without encoding"
     if name == "os.open" or not re.search(r"(^|\.)(open|read_text|write_text)$", name):
         return
-    if name in ("read_text", "write_text"):  # rparm.input_files, rparm.output_files
+    if name in ("read_text", "write_text"):  # rparm.files, rparm.files
         return
     mode = ""
     if name.endswith("open"):
@@ -191,12 +191,12 @@ def test_run_without_what_windows_lacks(fmu: Path, tmp_path: Path) -> None:
 
 def test_files_with_the_line_ends_of_windows_are_read(project: Path, fmu: Path) -> None:
     expected = load(SHORT, project)
-    before = reference.load(expected, declared("rp_manipulator"))
+    before = comparison.load_reference(expected, declared("rp_manipulator"))
     for path in (expected.path, reference_file(project, SHORT)):
         path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
     scenario = scenarios.load(expected.path, declared("rp_manipulator"))
     assert scenario.description == expected.description
-    after = reference.load(scenario, declared("rp_manipulator"))
+    after = comparison.load_reference(scenario, declared("rp_manipulator"))
     assert after.names == before.names and np.array_equal(after.values, before.values)
 
 
@@ -325,8 +325,8 @@ def test_the_child_is_killed_where_there_are_no_process_groups() -> None:
 
 
 def test_components_are_found_by_paths_of_windows() -> None:
-    from rparm.system import ecos
-    from rparm.system import ssp as ssp_archives
+    from rparm.systems import ecos
+    from rparm.systems import ssp as ssp_archives
 
     with ssp_archives.unpacked(BUILD / "ClosedLoop.ssp") as opened:
         component = opened.system.components[0]

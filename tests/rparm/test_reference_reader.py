@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rparm.errors import UserError
-from rparm.runs import reference
+from rparm.runs import comparison
 from tests.support.rparm_project import LONG, NAMES, declared, edit, load, reference_file
 
 Change = Callable[[list[str]], list[str]]  # of the lines of a file
@@ -19,7 +19,7 @@ MAKE_REFERENCES = "build/venv/bin/python models/rp_manipulator/references/make_r
 
 def refused(project: Path, name: str = LONG) -> str:
     with pytest.raises(UserError) as caught:
-        reference.load(load(name, project), declared("rp_manipulator"))
+        comparison.load_reference(load(name, project), declared("rp_manipulator"))
     text = str(caught.value)
     assert str(reference_file(project, name)) in text
     assert f"{MAKE_REFERENCES} {name}" in text
@@ -31,7 +31,7 @@ def test_reads_references() -> None:
     for name in NAMES:
         loaded = load(name)
         model = declared(loaded.model)
-        read = reference.load(loaded, model)
+        read = comparison.load_reference(loaded, model)
         assert list(read.names) == model.real_outputs
         assert read.values.shape == (len(loaded.reference_rows), len(read.names))
         assert np.array_equal(read.times, loaded.times[loaded.reference_rows])
@@ -79,12 +79,12 @@ def test_missing_or_binary_reference(project: Path) -> None:
 
 def test_a_reference_of_an_installed_package_is_compressed(project: Path) -> None:
     scenario, model = load(LONG, project), declared("rp_manipulator")
-    expected = reference.load(scenario, model)
+    expected = comparison.load_reference(scenario, model)
     file = reference_file(project, LONG)
     packed = file.with_name(f"{file.name}.xz")
     packed.write_bytes(lzma.compress(file.read_bytes()))
     file.unlink()
-    assert reference.load(scenario, model).values.tobytes() == expected.values.tobytes()
+    assert comparison.load_reference(scenario, model).values.tobytes() == expected.values.tobytes()
     packed.write_bytes(packed.read_bytes()[:-9])
     assert "is damaged" in refused(project)
 
@@ -118,6 +118,6 @@ def test_wrong_scales(project: Path, content: str) -> None:
     with pytest.raises(
         UserError, match=r"scales\.toml: total_energy: expected a list of variables"
     ):
-        reference.load(load(LONG, project), declared("rp_manipulator"))
+        comparison.load_reference(load(LONG, project), declared("rp_manipulator"))
     path.unlink()
-    assert reference.load(load(LONG, project), declared("rp_manipulator")).summed == {}
+    assert comparison.load_reference(load(LONG, project), declared("rp_manipulator")).summed == {}

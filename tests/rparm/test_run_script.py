@@ -1,4 +1,4 @@
-"""run.sh: which command it calls where, what it builds before, and what is printed where.
+"""run.sh: what it sets up and builds, which command it calls where, and what is printed where.
 
 Set-up, CMake and Python are small scripts here that say how they are called.
 """
@@ -6,14 +6,16 @@ Set-up, CMake and Python are small scripts here that say how they are called.
 import json
 import os
 import pty
+import shlex
 import shutil
 import subprocess
+import tomllib
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
-from rparm.command_line import COMMANDS, EXIT_CODES
+from rparm.needs import COMMANDS, overview, plan
 from tests.support.paths import ROOT
 
 SETUP = """#!/bin/sh
@@ -38,6 +40,8 @@ def root(tmp_path: Path) -> Path:
     scenarios = Path("models/rp_plant/scenarios")
     shutil.copytree(ROOT / scenarios, root / scenarios)
     shutil.copy(ROOT / "run.sh", root)
+    (root / "rparm").mkdir()
+    shutil.copy(ROOT / "rparm" / "needs.py", root / "rparm")
     for name, text in {
         "setup.sh": SETUP,
         "bin/cmake": CMAKE,
@@ -63,62 +67,69 @@ def call(root: Path, *arguments: str, stderr: int = subprocess.PIPE) -> subproce
     )
 
 
-NOT_BUILT = [
-    (["list"], ["list"]),
-    (["--list"], ["--list"]),
-    (["--version"], ["--version"]),
-    (["run", "--list"], ["run", "--list"]),
-    (["--json", "list"], ["--json", "list"]),
-    (["help", "system"], ["help", "system"]),
-    (["help", "playground"], ["help", "playground"]),
-    (["--json", "help"], ["--json", "help"]),
-    (["--help", "--json"], ["--help", "--json"]),
-    (["completion", "bash"], ["completion", "bash"]),
-    (["system", "--help"], ["system", "--help"]),
-    (["federate", "a", "b"], ["federate", "a", "b"]),
-    (["sytem"], ["sytem"]),  # no name of a scenario: refused at once
-    (["my_scenario", "--quiet"], ["my_scenario", "--quiet"]),
-]
-BUILT = [
-    ([], ["run"]),
-    (["--json"], ["run", "--json"]),
-    (["--fmi", "3"], ["--fmi", "3"]),
-    (["power_off", "a b"], ["power_off", "a b"]),
-    (["My Scenario.TOML"], ["My Scenario.TOML"]),
-    (["system", "--json", "--", "--help"], ["system", "--json", "--", "--help"]),
-    (["new", "x"], ["new", "x"]),
-    (["fmu", "RPPlant"], ["fmu", "RPPlant"]),
-    (["playground", "--open"], ["playground", "--open"]),
-]
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "- all no no run"),
+        (["--json"], "- all no yes run"),
+        (["--", "--help"], "- all no no run"),
+        (["--fmi", "3"], "- all no no -"),
+        (["power_off", "a b"], "- all no no -"),
+        (["My Scenario.TOML"], "- all no no -"),
+        (["system", "--json", "--", "--help", "--quiet"], "- all no yes -"),
+        (["--quiet", "campaign", "x"], "campaign all yes no -"),
+        (["federate", "a", "b"], "federation - no no -"),
+        (["playground", "--open"], "release playground no no -"),
+        (["new", "x"], "- all no no -"),
+        (["new-model", "x"], "- - no no -"),
+        (["completion", "bash"], "- - no no -"),
+        (["help"], "- overview no no -"),
+        (["--quiet", "--help"], "- overview yes no -"),
+        (["--help", "--json"], "- - no yes -"),
+        (["help", "playground"], "- - no no -"),
+        (["linearize", "x", "-h"], "- - no no -"),
+        (["--version"], "- - no no -"),
+        (["--list"], "- - no no -"),
+        (["run", "--list"], "- - no no -"),
+        (["sytem"], "- - no no -"),  # no name of a scenario: refused at once
+        (["power_off*"], "- - no no -"),
+        (["my_scenario", "--quiet"], "- - yes no -"),
+    ],
+)
+def test_what_a_command_needs(arguments: list[str], words: str) -> None:
+    assert " ".join(plan(arguments, ROOT / "models")) == words
+
+
+def test_locks_and_extras_are_there() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    for command in COMMANDS.values():
+        assert not command.lock or (ROOT / "requirements" / f"{command.lock}.txt").is_file()
+        assert command.extra in ("", *project["optional-dependencies"])
 
 
 @pytest.mark.parametrize(
-    ("arguments", "wanted", "built"),
-    [(*case, False) for case in NOT_BUILT] + [(*case, True) for case in BUILT],
+    ("arguments", "wanted", "lock", "target"),
+    [
+        ("list", "list", "", ""),
+        ("federate 'a b'", "federate 'a b'", "--federation", ""),
+        ("", "run", "", "all"),
+        ("playground --open", "playground --open", "--release", "playground"),
+        ("--quiet system", "--quiet system", "", "all"),
+    ],
 )
 def test_which_command_is_called(
-    root: Path, arguments: list[str], wanted: list[str], built: bool
+    root: Path, arguments: str, wanted: str, lock: str, target: str
 ) -> None:
     """In the user's folder, and with nothing on standard output but what the command prints."""
-    done = call(root, *arguments)
-    assert done.returncode == 0, done.stderr
+    done = call(root, *shlex.split(arguments))
     found = json.loads(done.stdout)
     assert found["here"] == str(root.parent / "folder of a user")
-    assert found["arguments"] == ["-P", "-m", "rparm", *wanted]
-    assert (root / "build/built").exists() == built
-    said = done.stderr.splitlines()
-    what = "the playground" if "playground" in arguments else "the FMUs"
-    stages = ["run.sh: configuring", f"run.sh: building {what}"] if built else []
-    if "--quiet" in arguments:
-        assert said == []
-    else:
-        assert said[0].startswith("set up") and said[1:] == stages
-    assert done.stderr.replace("\n", "").isprintable()
-
-
-def test_quiet_says_nothing(root: Path) -> None:
-    done = call(root, "--quiet", "system")
-    assert (done.returncode, done.stderr) == (0, "") and (root / "build/built").exists()
+    assert found["arguments"] == ["-P", "-m", "rparm", *shlex.split(wanted)]
+    built = root / "build/built"
+    assert not target if not built.exists() else f"--target {target} " in built.read_text()
+    name = "the FMUs" if target == "all" else f"the {target}"
+    said = [f"set up {lock}", *["run.sh: configuring", f"run.sh: building {name}"] * bool(target)]
+    assert (done.returncode, done.stderr.splitlines()) == (0, [] if "quiet" in wanted else said)
 
 
 @pytest.mark.parametrize("arguments", [["power_off"], ["playground"], ["--quiet", "power_off"]])
@@ -156,11 +167,8 @@ def test_a_set_up_that_fails_is_a_document_too(root: Path) -> None:
     assert json.loads(done.stdout) == {"exit_code": 2, "error": "the set-up failed"}
 
 
-def test_help_names_every_command(root: Path) -> None:
+def test_the_overview_needs_no_set_up(root: Path) -> None:
+    (root / "setup.sh").unlink()
     for arguments in (["help"], ["--help"], ["-h"], ["--quiet", "help"]):
         done = call(root, *arguments)
-        assert (done.returncode, done.stderr) == (0, "")
-        for command in (*COMMANDS.keys() - {"run"}, "help COMMAND"):
-            assert f"./run.sh {command} " in done.stdout
-        assert EXIT_CODES.removeprefix("exit codes: ") in done.stdout
-        assert max(map(len, done.stdout.splitlines())) <= 80
+        assert (done.returncode, done.stdout, done.stderr) == (0, f"{overview('./run.sh')}\n", "")

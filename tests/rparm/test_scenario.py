@@ -9,7 +9,7 @@ import pytest
 
 from rparm import project
 from rparm.errors import UserError
-from rparm.scenarios import scenario
+from rparm.runs import scenario
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, TOY, timed, toy
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from rparm.errors import UserError
-from rparm.scenarios import scenario
+from rparm.runs import scenario
 from tests.support.toy_model import HEAD, TIME, TOY, timed
 
 # mistakes: the text of the file, what the message says

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from fmpy import fmi2
 
-from rparm import trajectory_csv
+from rparm import files
+from rparm.console import Progress
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
-from rparm.output import progress as progress_module
+from rparm.runs import scenario as scenarios
 from rparm.runs import simulation
-from rparm.scenarios import scenario as scenarios
 from tests.support.rparm_project import LONG, SHORT, edit, fmi3_fmu, load, repacked
 from tests.support.ssp_files import edited
 
@@ -44,7 +44,7 @@ def test_progress_counts_all_steps(opened: Fmu, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_progress_is_silent_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    with progress_module.Progress("work", 200) as progress:
+    with Progress("work", 200) as progress:
         progress(50)
     assert capsys.readouterr() == ("", "")
 
@@ -102,7 +102,7 @@ def test_a_call_that_fails_is_explained(
 def test_csv_is_in_the_cross_check_layout(tmp_path: Path) -> None:
     file = tmp_path / "out.csv"
     values = np.array([[1 / 3, -0.1], [1e300, 5e-324]])
-    trajectory_csv.write(file, np.array([0.0, 0.1]), ["q1", "a,b"], values)
+    files.write_trajectory(file, np.array([0.0, 0.1]), ["q1", "a,b"], values)
     lines = file.read_text().splitlines()
     assert lines[0] == '"time","q1","a,b"'
     assert lines[1] == "0,0.33333333333333331,-0.10000000000000001"
@@ -116,9 +116,9 @@ def test_csv_appears_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.Mon
     def full(_: float) -> str:
         raise OSError("disk full")
 
-    monkeypatch.setattr(trajectory_csv, "_shortest", full)
+    monkeypatch.setattr(files, "_shortest", full)
     with pytest.raises(OSError, match="disk full"):
-        trajectory_csv.write(file, np.zeros(2), ["q1"], np.zeros((2, 1)), None)
+        files.write_trajectory(file, np.zeros(2), ["q1"], np.zeros((2, 1)), None)
     assert file.read_text() == "before"
     assert list(tmp_path.iterdir()) == [file]
 

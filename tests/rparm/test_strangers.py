@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from rparm import project
-from rparm.command_line import NO_READER
-from rparm.command_line.options import file_or_name, retyped
+from rparm.command_line import file_or_name, retyped
+from rparm.needs import NO_READER
 from tests.support.paths import ROOT
 from tests.support.rparm_project import BUILD, Console
 

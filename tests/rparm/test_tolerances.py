@@ -10,9 +10,9 @@ import pytest
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import METHOD, SMALLEST_TOLERANCES, TOLERANCE
+from rparm.runs import scenario as scenarios
 from rparm.runs.comparison import Runs
-from rparm.scenarios import scenario as scenarios
-from rparm.scenarios.scenario import Scenario
+from rparm.runs.scenario import Scenario
 from tests.support.rparm_project import FMUS, SHORT, Console, declared, fmi3_fmu
 from tests.support.ssp_files import SSP, edited, replace
 

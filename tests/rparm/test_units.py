@@ -10,8 +10,8 @@ import pytest
 
 from rparm.errors import UserError, WrongValueError
 from rparm.fmi.model import Variable
-from rparm.scenarios import scenario
-from rparm.scenarios.signals import Sines, Table
+from rparm.runs import scenario
+from rparm.runs.inputs import Sines, Table
 from rparm.units import SECONDS, typed_quantity
 from tests.support.rparm_project import FMUS, NAMES, declared, load
 from tests.support.toy_model import DESCRIPTION, TOY, toy

@@ -14,8 +14,8 @@ from rparm import __main__ as cli
 from rparm import project
 from rparm.fmi.fmu_file import read_model
 from rparm.fmi.model import Model
-from rparm.scenarios import scenario as scenarios
-from rparm.scenarios.scenario import Scenario
+from rparm.runs import scenario as scenarios
+from rparm.runs.scenario import Scenario
 from tests.support.paths import FOLDERS, ROOT
 
 BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).absolute().parent

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rparm.system import comparison, ecos, ssp
+from rparm.systems import comparison, ecos, ssp
 from tests.support.paths import ROOT
 from tests.support.ssp_files import MACHINE, SSP, read_csv
 

@@ -11,8 +11,8 @@ from rparm.models.closed_loop.coupling.delays import Tracking
 from rparm.models.closed_loop.coupling.step_doubling import LOCAL, Doubling
 from rparm.models.closed_loop.coupling.step_errors import StepErrors
 
-from rparm.report.style import DASHED, GRID, INK, MUTED, STYLE
-from rparm.texts import short
+from rparm.report.pages import DASHED, GRID, INK, MUTED, STYLE
+from rparm.units import short
 
 COLORS = ("#d1793a", "#1d4e79", "#b0435f", "#2f8f83")
 

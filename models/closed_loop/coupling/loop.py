@@ -1,4 +1,4 @@
-"""The closed loop, stepped by the master of rparm.coupling in several ways.
+"""The closed loop, stepped by the master of rparm in several ways.
 
 The same components, connections and parameters as in Ecos (ClosedLoop.ssp). Errors are relative to
 the closed loop in continuous time (../references). The page ../coupling.md says which results are
@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 from rparm.models.closed_loop.experiment import STOP
 
-from rparm import project, trajectory_csv
-from rparm.coupling.master import Master
+from rparm import files, project
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value
-from rparm.system import ssp
-from rparm.system.structure import Connection
+from rparm.systems import ssp
+from rparm.systems.master import Master
+from rparm.systems.ssp import Connection
 
 FOLDER = Path(__file__).resolve().parents[1]
 REFERENCES = FOLDER / "references"
@@ -169,8 +169,8 @@ def grid(stop: float, step: float) -> np.ndarray:
 
 def read_reference(path: Path) -> Columns:
     """Columns of a reference by name, with "time"."""
-    wrong = trajectory_csv.failure(path)
-    names, table = trajectory_csv.read(path, wrong)
+    wrong = files.csv_failure(path)
+    names, table = files.read_trajectory(path, wrong)
     if not set(STATES) <= set(names):
         raise wrong("not a reference of the closed loop", 1)
     return dict(zip(names, table.T, strict=True))

@@ -12,9 +12,9 @@ from rparm.models.closed_loop.coupling.step_doubling import study_doubling
 from rparm.models.closed_loop.coupling.step_errors import StepErrors, study_step_errors
 from rparm.models.closed_loop.study import REST
 
-from rparm.linearization import stable_steps
-from rparm.output_files import from_here, written
-from rparm.report.style import save
+from rparm.files import from_here, written
+from rparm.linearization import largest_step
+from rparm.report.pages import save_figure
 
 
 def run(path: Path, ssp: Path) -> dict[str, dict[str, object]]:
@@ -30,9 +30,9 @@ def run(path: Path, ssp: Path) -> dict[str, dict[str, object]]:
         _print(tables.payload_lines(payload))
         doubling = study_doubling(loop)
         _print(tables.doubling_lines(doubling))
-        limits = stable_steps.study(ssp, REST)
+        limits = largest_step.study_steps(ssp, REST)
     with written(path):
-        save(figure(step_errors, tracking, doubling), path)
+        save_figure(figure(step_errors, tracking, doubling), path)
     print(f"\npicture: {from_here(path)}")
     return {
         "step errors": {

@@ -13,7 +13,7 @@ from rparm.models.closed_loop.coupling.loop import (
     read_reference,
 )
 
-from rparm.coupling import step_control
+from rparm.systems import step_control
 
 FAST_AND_SLOW = Path(__file__).resolve().with_name("fast_and_slow.csv")
 RATES = ("arm.dq1", "arm.dq2", "arm.ddq1", "arm.ddq2")

@@ -6,7 +6,7 @@ from rparm.models.closed_loop.coupling.payload import Payload
 from rparm.models.closed_loop.coupling.step_doubling import Doubling
 from rparm.models.closed_loop.coupling.step_errors import StepErrors
 
-from rparm.texts import short, verdict
+from rparm.units import short, verdict
 
 
 def step_error_lines(study: StepErrors) -> list[str]:

@@ -22,7 +22,7 @@ from rparm.models.closed_loop.coupling.step_doubling import (  # noqa: E402
 )
 from rparm.models.closed_loop.references.closed_loop import monolithic  # noqa: E402
 
-from rparm import trajectory_csv  # noqa: E402
+from rparm import files  # noqa: E402
 
 ROWS_PER_SECOND = 50
 PARAMETERS = {f"{c}.{name}": value for c, values in FAST.items() for name, value in values.items()}
@@ -32,7 +32,7 @@ def write(output: Path) -> None:
     times = np.arange(round(FAST_STOP * ROWS_PER_SECOND) + 1) / ROWS_PER_SECOND
     columns = monolithic(PARAMETERS, times)
     values = np.column_stack([columns[name] for name in STATES]).astype(np.float64) + 0.0
-    trajectory_csv.write(output, times, STATES, values)
+    files.write_trajectory(output, times, STATES, values)
 
 
 def main() -> None:

@@ -15,7 +15,7 @@ MODEL_FOLDER = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(MODEL_FOLDER.parents[1]))
 
 from rparm.models import reference_files
-from rparm.scenarios.scenario import Scenario
+from rparm.runs.scenario import Scenario
 
 MODEL = "RPActuator"
 INPUTS = ("tau1_cmd", "f2_cmd", "dq1", "dq2")

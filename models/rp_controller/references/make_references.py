@@ -21,7 +21,7 @@ sys.path.insert(0, str(MODEL_FOLDER.parents[1]))
 from rparm.models.rp_plant.references import equations as plant
 
 from rparm.models import reference_files
-from rparm.scenarios.scenario import Scenario
+from rparm.runs.scenario import Scenario
 
 MODEL = "RPController"
 REFERENCES = ("q1_ref", "q2_ref", "dq1_ref", "dq2_ref", "ddq1_ref", "ddq2_ref")

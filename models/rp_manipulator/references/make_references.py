@@ -21,7 +21,7 @@ sys.path.insert(0, str(MODEL_FOLDER.parents[1]))
 
 from rparm.errors import UserError
 from rparm.models import reference_files
-from rparm.scenarios.scenario import Scenario
+from rparm.runs.scenario import Scenario
 
 MODEL = "RPManipulator"
 PARAMETERS = ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g")

@@ -16,12 +16,12 @@ from make_references import INPUTS, MODEL_FOLDER, PARAMETERS, STATES, derive
 
 from rparm import project
 from rparm.errors import UserError
+from rparm.files import write_text
 from rparm.fmi.fmu_file import read_model
-from rparm.output_files import write_text
 from rparm.runs import convergence
-from rparm.scenarios import scenario as scenarios
-from rparm.scenarios.scenario import Scenario
-from rparm.scenarios.signals import Sines
+from rparm.runs import scenario as scenarios
+from rparm.runs.inputs import Sines
+from rparm.runs.scenario import Scenario
 
 ON_THE_WAY = 1000  # points at which the largest values are looked for
 

@@ -18,7 +18,7 @@ from rparm.models.rp_plant.references.motion import Motion
 from rparm.models.rp_plant.references.solver import Solver
 
 from rparm.models import reference_files
-from rparm.scenarios.scenario import Scenario
+from rparm.runs.scenario import Scenario
 
 MODEL = "RPPlant"
 ATTACHED = "payload_attached"

@@ -10,8 +10,8 @@ import pytest
 
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
+from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import initialize
-from rparm.scenarios.scenario import Scenario
 from tests.rp_plant.fmu.plant_runs import METHODS, each_method
 from tests.support.rparm_project import load, names_of
 

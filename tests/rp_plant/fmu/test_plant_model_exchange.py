@@ -11,9 +11,9 @@ import pytest
 
 from rparm import project
 from rparm.fmi.fmu_file import Fmu
-from rparm.runs.reference import bound
+from rparm.runs.comparison import error_bound
+from rparm.runs.scenario import load
 from rparm.runs.simulation import initialize
-from rparm.scenarios.scenario import load
 from tests.rp_plant.fmu.plant_model_exchange import STATES, model
 from tests.rp_plant.fmu.plant_runs import (
     AT_REST,
@@ -222,7 +222,7 @@ def test_cvode_on_the_scenarios(plant: Fmu, path: Path) -> None:
             inputs.set()
             instance.do_step(scenario.times[i], step)
         expected = [*read(instance, *STATES), instance.integer("event_count")]
-    np.testing.assert_allclose(found[0], expected, rtol=0, atol=bound(scenario.tolerance))
+    np.testing.assert_allclose(found[0], expected, rtol=0, atol=error_bound(scenario.tolerance))
 
 
 def test_a_joint_past_its_stop_that_leaves_is_no_event(plant: Fmu) -> None:

@@ -1,0 +1,219 @@
+"""Makes FMUs of a file with equations, outside CMake: generates, compiles, links to the runtime.
+
+runtime.json says what there is to link (runtime.cmake). Paths in it begin at its folder.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from declaration.c_tables import value_references, variable_table
+from declaration.load import Declaration, assemble, check
+from document import document
+from equations import declaration, lock
+from equations.model_file import ModelFile
+from equations_file import ModelFileError
+from fmi2.model_description import model_description as fmi2_description
+from fmi3.model_description import terminals_and_icons
+from generate import release_files
+from program import Provenance
+from source_code import Library, Manifest, collect, manifest, write
+
+C_FILES = ("equations.c", "variables.c")
+PLACES = {"fmi2": "", "fmi3": "fmi3"}  # below the folder of the output
+SYSTEM_COMPILERS = ("gcc", "clang")
+INSTALL = 'pip install "rparm[build]" installs zig'
+
+
+def write_c(file: ModelFile, references: dict[lock.Key, int], folder: Path) -> Declaration:
+    """Write all files that the FMUs are made of; its declaration."""
+    _write(folder, declaration.generated(file))
+    declared = assemble(file.path, check(file.path, declaration.declared(file, references)))
+    tables = {"variables.c": variable_table, "value_references.h": value_references}
+    _write(folder, {name: table(declared) for name, table in tables.items()})
+    return declared
+
+
+def _write(folder: Path, texts: dict[str, str]) -> None:
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8", newline="\n")
+
+
+def build(
+    file: ModelFile, references: dict[lock.Key, int], runtimes: list[Runtime], work: Path
+) -> dict[str, list[tuple[str, Path]]]:
+    """Make all that the FMUs consist of, in the empty folder `work`.
+
+    What they contain, by the version of FMI: names in the archive, and files.
+    """
+    declared = write_c(file, references, work)
+    provenance = Provenance(runtimes[0].content["version"])
+    texts = {
+        "model.toml": file.text,
+        "terminalsAndIcons.xml": terminals_and_icons(declared),
+        "modelDescription.xml": fmi2_description(declared, provenance),
+    }
+    _write(work, texts)
+    document([work / "README.md"], work / "modelDescription.xml", work / "documentation")
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        libraries = list(pool.map(lambda runtime: _libraries(file.name, runtime, work), runtimes))
+    entries = {}
+    for version in PLACES:
+        folder = work / version
+        folder.mkdir()
+        _write_sources(version, runtimes[0], work, folder / "sources")
+        _write(folder, release_files(version, declared, provenance, folder / "sources"))
+        entries[version] = [
+            *(built[version] for built in libraries),
+            (f"resources/{file.name}.toml", work / "model.toml"),
+            *_below(folder, ""),
+            *_below(work / "documentation", "documentation/"),
+            *_licenses(runtimes),
+        ]
+    terminals = work / "terminalsAndIcons.xml"
+    entries["fmi3"].append((f"terminalsAndIcons/{terminals.name}", terminals))
+    return entries
+
+
+def _libraries(name: str, runtime: Runtime, work: Path) -> dict[str, tuple[str, Path]]:
+    """The shared object for one platform, by the version of FMI, with its name in the archive."""
+    folder = work / runtime.content["platform"]
+    folder.mkdir()
+    objects = runtime.compile([work / source for source in C_FILES], folder)
+    built = {}
+    for version in PLACES:
+        library = folder / f"{name}{runtime.content['suffix']}"
+        runtime.link(version, objects, library)
+        kept = library.rename(folder / f"{version}{library.suffix}")
+        built[version] = (f"{runtime.content['versions'][version]['folder']}/{library.name}", kept)
+    return built
+
+
+def _write_sources(version: str, runtime: Runtime, work: Path, output: Path) -> None:
+    """The folder sources/ of an FMU: all that its shared object consists of."""
+    own = Library("model", [work / name for name in C_FILES], [work], None)
+    write(collect(runtime.sources(version, own, work)).texts, output)
+
+
+def _licenses(runtimes: list[Runtime]) -> Iterable[tuple[str, Path]]:
+    found = {
+        f"documentation/licenses/{name}": runtime.folder / path
+        for runtime in runtimes
+        for name, path in runtime.content["licenses"].items()
+    }
+    return found.items()
+
+
+def _below(folder: Path, name: str) -> list[tuple[str, Path]]:
+    paths = (path for path in folder.rglob("*") if path.is_file())
+    return [(f"{name}{path.relative_to(folder).as_posix()}", path) for path in paths]
+
+
+@dataclass(frozen=True)
+class Runtime:
+    """A runtime.json."""
+
+    content: dict[str, Any]
+    folder: Path
+    compiler: list[str]  # the words that start it
+
+    @classmethod
+    def load(cls, path: Path, of_this_machine: bool) -> Runtime:
+        """ModelFileError if it is not there, or no compiler for it.
+
+        For this machine, a compiler of its own comes before zig.
+        """
+        try:
+            content = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise ModelFileError(f"{path}: cannot be used: {error}") from None
+        return cls(content, path.resolve().parent, _found(content["compiler"], of_this_machine))
+
+    def paths(self, listed: list[str]) -> list[Path]:
+        """Files or folders of a list in runtime.json."""
+        return [self.folder / item for item in listed if item]
+
+    def compile(self, sources: list[Path], work: Path) -> list[Path]:
+        """The objects of source files, in the folder `work`."""
+        # what warnings are about, the user has not written
+        options = [o for o in self.content["options"] if o and not o.startswith("-W")]
+        folders = [f"-I{path}" for path in self.paths(self.content["include"])]
+        objects = []
+        for source in sources:
+            objects.append(work / f"{source.stem}.o")
+            here = os.path.relpath(source, work)  # no folder's name gets into the object
+            self.run(work, *options, *folders, "-c", here, "-o", objects[-1].name)
+        return objects
+
+    def link(self, version: str, objects: list[Path], target: Path) -> None:
+        """The shared object of a version of FMI, in the folder of the objects."""
+        options = [option.replace("@NAME@", target.stem) for option in self.content["link"]]
+        parts = [*self.content["versions"][version]["objects"], *self.content["libraries"]]
+        own = [path.name for path in objects]
+        self.run(target.parent, *own, *self.paths(parts), *options, "-o", target.name)
+
+    def run(self, folder: Path, *arguments: object) -> None:
+        """Run the compiler in a folder; ModelFileError if it fails."""
+        command = [*self.compiler, *map(str, arguments)]
+        environment = os.environ | {"ZIG_LOCAL_CACHE_DIR": str(folder / "zig")}
+        try:
+            ended = subprocess.run(
+                command,
+                cwd=folder,
+                env=environment,
+                capture_output=True,
+                encoding="utf-8",
+                errors="replace",
+                check=False,
+            )
+        except OSError as error:
+            raise ModelFileError(
+                f"{command[0]}: cannot be run: {error.strerror}; {INSTALL}"
+            ) from None
+        if ended.returncode:
+            lines = [line for line in ended.stderr.splitlines() if "error" in line]
+            reason = (lines or ended.stderr.splitlines() or ["no message"])[0]
+            # the C is right: what fails is the compiler
+            raise ModelFileError(
+                f"{command[0]}: {reason:.300}; gcc and clang need binutils, {INSTALL}"
+            )
+
+    def sources(self, version: str, own: Library, root: Path) -> Manifest:
+        """All that the shared object of a version consists of, with the model's own part."""
+        content = self.content
+        entries = [content["versions"][version]["sources"], *content["sources"]]
+        shared = manifest(entries, content["roots"], self.folder)
+        include = [*own.include, *self.paths(content["include"])]
+        model = Library(own.name, own.sources, include, own.prelude)
+        return Manifest([model, *shared.libraries], shared.roots | {own.name: root})
+
+
+def _found(words: list[str], of_this_machine: bool) -> list[str]:
+    """A compiler as runtime.json names it, or one of this machine, else zig."""
+    if Path(words[0]).is_absolute() and shutil.which(words[0]):
+        return words
+    if of_this_machine:
+        for name in SYSTEM_COMPILERS:
+            command = shutil.which(name)
+            if command is not None:
+                return [command]
+    options = words[1:] if Path(words[0]).stem == "zig" else ["cc"]
+    package = find_spec("ziglang")
+    if package is not None and package.origin is not None:
+        zig = Path(package.origin).with_name("zig.exe" if sys.platform == "win32" else "zig")
+        return [str(zig), *options]
+    command = shutil.which("zig")
+    if command is None:
+        compilers = "gcc, clang or zig" if of_this_machine else "zig"
+        raise ModelFileError(f"{compilers}: not installed, {INSTALL}")
+    return [command, *options]

@@ -1,0 +1,451 @@
+"""C that is derived from functions in plain C: Jacobians, and derivatives along a curve.
+
+Derivatives along a curve follow the rules of polynomials of degree 2: they give x, x' and x'' of a
+product, a quotient and a function from x, x' and x'' of its arguments. To derive twice would give
+more operations, and other rounding.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from equations.c_code import indented
+from equations.graph import STILL, Graph, Value, is_number
+from pycparser import c_ast
+
+from plain_c.blocks import WIDTH, Blocks, wrapped
+from plain_c.interpreter import Interpreter
+from plain_c.memory import Array, Pointer, Structure, is_real, is_whole
+from plain_c.text import CTextError, Program, refused
+from rparm.expressions.expression import in_order
+
+Rates = Callable[[Value], tuple[Value, Value] | None]  # of a leaf; None: it rests
+Place = tuple[str | int, ...]  # a part of an argument, from its name
+KINDS = ("jacobian", "rates", "derivatives")
+FORM = "NAME = jacobian|rates|derivatives of FUNCTION [OUTPUT ...] by ARGUMENT ..."
+
+
+class Curve:
+    """Derivatives of a graph's values, from the derivatives of its leaves, `rates`."""
+
+    def __init__(self, graph: Graph, rates: Rates) -> None:
+        self.graph, self.rates = graph, rates
+        self.zero, self.two = graph.number(0.0), graph.number(2.0)
+        self.firsts: dict[Value, Value] = {}
+        self.seconds: dict[Value, Value] = {}
+
+    def first(self, roots: Iterable[Value]) -> list[Value]:
+        """First derivatives."""
+        roots = list(roots)
+        for y in in_order(roots, self.firsts):
+            if not y.arguments:
+                rates = self.rates(y)
+                self.firsts[y] = rates[0] if rates else self.zero
+                self.seconds[y] = rates[1] if rates else self.zero
+            elif y.op in STILL or all(self.rests(a) for a in y.arguments):
+                self.firsts[y] = self.seconds[y] = self.zero
+            else:
+                self.firsts[y] = self._first(y, [self.firsts[a] for a in y.arguments])
+        return [self.firsts[root] for root in roots]
+
+    def rests(self, y: Value) -> bool:
+        """Whether the derivatives of a value are 0."""
+        return is_number(self.firsts[y], 0.0) and is_number(self.seconds.get(y, self.zero), 0.0)
+
+    def second(self, roots: Iterable[Value]) -> list[Value]:
+        """Second derivatives."""
+        roots = list(roots)
+        self.first(roots)
+        for y in in_order(roots, self.seconds):
+            self.seconds[y] = self._second(y)
+        return [self.seconds[root] for root in roots]
+
+    def _first(self, y: Value, d: list[Value]) -> Value:
+        simple = self.graph.simple
+        match y.op:
+            case "sqrt":  # from x = y^2
+                return simple("/", d[0], self.graph.value("*", self.two, y))
+            case "atan2":  # from (x^2 + z^2) y' = z x' - x z'
+                x, z = y.arguments
+                area_rate = simple("-", simple("*", z, d[0]), simple("*", x, d[1]))
+                return simple("/", area_rate, self._square_sum(y))
+        return self.graph.chain(y, d)
+
+    def _square_sum(self, y: Value) -> Value:
+        x, z = (self.graph.value("*", a, a) for a in y.arguments)
+        return self.graph.value("+", z, x)
+
+    def _second(self, y: Value) -> Value:
+        simple = self.graph.simple
+        d = [self.firsts[a] for a in y.arguments]
+        dd = [self.seconds[a] for a in y.arguments]
+        match y.op:
+            case "*":
+                a, b = y.arguments
+                mixed = simple("*", simple("*", self.two, d[0]), d[1])
+                return simple("+", simple("+", simple("*", dd[0], b), mixed), simple("*", a, dd[1]))
+            case "/":
+                b = y.arguments[1]
+                mixed = simple("*", simple("*", self.two, self.firsts[y]), d[1])
+                rest = simple("-", simple("-", dd[0], mixed), simple("*", y, dd[1]))
+                return simple("/", rest, b)
+            case "sqrt":
+                mixed = simple("*", simple("*", self.two, self.firsts[y]), self.firsts[y])
+                return simple("/", simple("-", dd[0], mixed), self.graph.value("*", self.two, y))
+            case "atan2":
+                x, z = y.arguments
+                half_rate = simple("+", simple("*", z, d[1]), simple("*", x, d[0]))
+                area = simple("-", simple("*", z, dd[0]), simple("*", x, dd[1]))
+                mixed = simple("*", simple("*", self.two, self.firsts[y]), half_rate)
+                return simple("/", simple("-", area, mixed), self._square_sum(y))
+            case "exp":
+                return simple("*", y, simple("+", dd[0], simple("*", d[0], d[0])))
+            case "+" | "-" | "negative" | "moving_as" | "if":
+                return self.graph.chain(y, dd)
+        slopes = self.graph.slopes(y)
+        total = self.zero
+        for slope, of_argument in zip(slopes, dd, strict=True):
+            total = simple("+", total, simple("*", slope, of_argument))
+        for of_slope, of_argument in zip(self.first(slopes), d, strict=True):
+            total = simple("+", total, simple("*", of_slope, of_argument))
+        return total
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is to be derived from a function.
+
+    kind: "jacobian", "rates" (first derivatives along a curve) or "derivatives" (first and second).
+    of: the arguments that it writes, if not of all. by: the arguments that move.
+    """
+
+    name: str
+    kind: str
+    function: str
+    of: tuple[str, ...]
+    by: tuple[str, ...]
+
+    @staticmethod
+    def read(text: str) -> Wanted:
+        """What a text of the form `FORM` says."""
+        match text.split():
+            case [name, "=", kind, "of", function, *rest] if kind in KINDS and "by" in rest:
+                at = rest.index("by")
+                return Wanted(name, kind, function, tuple(rest[:at]), tuple(rest[at + 1 :]))
+        raise CTextError(f"{text!r}: is not {FORM}")
+
+
+@dataclass
+class Derived:
+    """Derives from the functions of a program. modes: names of possible values of integer parts."""
+
+    program: Program
+    modes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+
+    def text(self, wanted: Iterable[Wanted], header: str) -> str:
+        """Text of the C file; header: what it includes, with the prototypes."""
+        parts = [Function(self, each).text() for each in wanted]
+        own = [path.name for path in self.program.files]
+        lines = [
+            "/* Derived from equations in plain C by the build: change those, not this file.",
+            " * Operations keep their order, and values their names: d_x is the first derivative",
+            " * of x along a curve, dd_x the second, x_by_y the derivative of x by y.",
+            " *",
+            *wrapped_list(" * Read: ", own),
+            " */",
+            f'#include "{header}"',
+            "",
+            "#include <math.h>",
+            "#include <stddef.h>",
+        ]
+        return "\n".join([*lines, "", "\n\n".join(parts), ""])
+
+
+class Function:
+    """One derived function."""
+
+    def __init__(self, derived: Derived, wanted: Wanted) -> None:
+        self.wanted, self.program = wanted, derived.program
+        self.graph = Graph(has_switches=False, is_guarded=False)
+        self.interpreter = Interpreter(
+            self.program, self.graph, doubles_move="real" not in self.program.typedefs,
+            is_exact=False, warn=derived.warnings.append,
+        )  # fmt: skip
+        function = self.program.functions.get(wanted.function)
+        if function is None:
+            name = self.program.files[0].name
+            raise CTextError(f"{name}: has no function {wanted.function}")
+        self.function = function
+        self.parameters = self.interpreter.parameters(function)
+        self.kinds = {parameter.name: kind for parameter, kind in self.parameters}
+        for name in wanted.by:
+            if name not in self.kinds:
+                raise refused(function.decl, f"{wanted.function} has no argument {name}")
+        self.modes, self.enumerators = self._modes(derived.modes)
+        self.places: dict[Value, Place] = {}
+        self.names: dict[Value, str] = {}
+        _, self.written = self.interpreter.run(wanted.function, self._leaf)
+        self.outs = {str(place[0]) for place in self.written}
+
+    def _modes(
+        self, modes: Mapping[str, tuple[str, ...]]
+    ) -> tuple[dict[str, tuple[int, ...]], dict[str, dict[int, str]]]:
+        """Possible values of integer parts, and the names of these."""
+        values: dict[str, tuple[int, ...]] = {}
+        names: dict[str, dict[int, str]] = {}
+        for place, words in modes.items():
+            found = {}
+            for word in words:
+                is_number = word.lstrip("-").isdigit()
+                found[int(word) if is_number else self.interpreter.enumerator(word)] = word
+            values[place], names[place] = tuple(sorted(found)), found
+        return values, names
+
+    def _leaf(self, place: Place, kind: Any) -> Any:
+        text = shown(place, self.kinds[place[0]])
+        if is_whole(kind):
+            key = general(place)
+            known = [mode for mode in self.modes if f".{key}".endswith(f".{mode}")]
+            domain = self.modes[known[0]] if known else None
+            self.enumerators[text] = self.enumerators[known[0]] if known else {}
+            return self.interpreter.conditions.leaf(text, domain)
+        moves = place[0] in self.wanted.by
+        last = max(i for i, part in enumerate(place) if isinstance(part, str))
+        leaf = self.graph.value("state" if moves else "parameter", name=text)
+        name = self.names[leaf] = "_".join(map(str, place[last:]))
+        if moves:
+            self.places[leaf] = place
+            for prefix, order in (("d", "first"), ("dd", "second")):
+                derivative = self.graph.value(order, name=self._derivative(place, order))
+                self.names[derivative] = f"{prefix}_{name}"
+        return leaf
+
+    # ---- Text ------------------------------------------------------------------------------------
+
+    def text(self) -> str:
+        outputs = self._outputs()
+        if self.wanted.kind == "jacobian":
+            return self._jacobian(outputs)
+        return self._along_curve(outputs)
+
+    def _outputs(self) -> dict[Place, Value]:
+        """What the function writes, in the order of its declaration."""
+        written = {
+            place: value
+            for place, value in self.written.items()
+            if not self.wanted.of or place[0] in self.wanted.of
+        }
+        for place, value in written.items():
+            if not isinstance(value, Value):
+                name = shown(place, self.kinds[place[0]])
+                raise refused(self.function.decl, f"{name} is a whole number: nothing to derive")
+        order = {name: i for i, name in enumerate(self.kinds)}
+        places = sorted(written, key=lambda place: (order[place[0]], self._rank(place)))
+        return {place: written[place] for place in places}
+
+    def _rank(self, place: Place) -> tuple[int, ...]:
+        """Position of a part among all of its argument."""
+        kind, found = pointed(self.kinds[place[0]]), []
+        for part in place[1:]:
+            if isinstance(kind, Structure):
+                fields = self.interpreter.types.fields(kind, self.function)
+                found.append(list(fields).index(str(part)))
+                kind = fields[str(part)]
+            else:
+                found.append(int(part))
+                kind = kind.of if isinstance(kind, Array) else kind
+        return tuple(found)
+
+    def _jacobian(self, outputs: dict[Place, Value]) -> str:
+        """J[i + n j]: derivative of output i by variable j."""
+        variables = self._variables()
+        one, zero, n = self.graph.number(1.0), self.graph.number(0.0), len(outputs)
+        targets: dict[str, Value] = {}
+        names = self.interpreter.names | self.names
+        for j, place in enumerate(variables):
+            leaf = self._leaf(place, None)
+            label = "_".join(map(str, place[1:] if len(self.wanted.by) == 1 else place))
+            label = f"{place[0]}{label}" if label[:1].isdigit() else label
+            curve = Curve(self.graph, lambda y, at=leaf: (one, zero) if y is at else None)
+            for i, first in enumerate(curve.first(outputs.values())):
+                targets[f"J[{i + n * j}]"] = first
+            for value, name in self.interpreter.names.items():
+                first = curve.firsts.get(value)
+                if first is not None and first.arguments:
+                    names.setdefault(first, f"{name}_by_{label}")
+        parameters = [*self._read(self.outs), "double J[]"]
+        return self._definition(self.wanted.name, parameters, self._lines(targets, names))
+
+    def _variables(self) -> list[Place]:
+        """Parts of the arguments that move, in their order."""
+        return [
+            place for name in self.wanted.by for place in self._parts((name,), self.kinds[name])
+        ]
+
+    def _parts(self, place: Place, kind: Any) -> list[Place]:
+        kind = pointed(kind)
+        if isinstance(kind, Array):
+            if kind.length is None:
+                raise refused(self.function.decl, f"the array {place[0]} has no size")
+            return [p for i in range(kind.length) for p in self._parts((*place, i), kind.of)]
+        if isinstance(kind, Structure):
+            fields = self.interpreter.types.fields(kind, self.function)
+            return [p for name, of in fields.items() for p in self._parts((*place, name), of)]
+        return [place] if is_real(kind) else []
+
+    def _along_curve(self, outputs: dict[Place, Value]) -> str:
+        """First and, if they are wanted, second derivatives."""
+        orders = ("first", "second") if self.wanted.kind == "derivatives" else ("first",)
+        curve = Curve(self.graph, self._rates)
+        found = {"first": curve.first(outputs.values())}
+        if "second" in orders:
+            found["second"] = curve.second(outputs.values())
+        names = self.interpreter.names | self.names
+        for prefix, derivatives in (("d", curve.firsts), ("dd", curve.seconds)):
+            for value, name in self.interpreter.names.items():
+                derivative = derivatives.get(value)
+                if derivative is not None and derivative.arguments:
+                    names.setdefault(derivative, f"{prefix}_{name}")
+        targets = {
+            order: {
+                self._derivative(place, order): value
+                for place, value in zip(outputs, found[order], strict=True)
+            }
+            for order in orders
+        }
+        outs = {str(place[0]) for place in outputs}
+        read = self._read(self.outs - {*self.wanted.by})
+        moving = [
+            (self._parameter(d, self._of_order(d.name, order), d.name not in outs), order)
+            for order in orders
+            for d in self._declared()
+            if d.name in outs | {*self.wanted.by}
+        ]
+        name, given = self.wanted.name, [*read, *(text for text, _ in moving)]
+        firsts = self._lines(targets["first"], names)
+        if len(orders) == 1:
+            return self._definition(name, given, firsts)
+        both = self._lines(targets["first"] | targets["second"], names)
+        half = [*read, *(text for text, order in moving if order == "first")]
+        calls = [
+            f"if ({self._of_order(next(iter(outs)), 'second')} == NULL) {{",
+            f"    {name}_first({', '.join(map(parameter_name, half))});",
+            "} else {",
+            f"    {name}_second({', '.join(map(parameter_name, given))});",
+            "}",
+        ]
+        parts = ((f"{name}_first", half, firsts), (f"{name}_second", given, both))
+        texts = [self._definition(*part, storage="static ") for part in parts]
+        return "\n\n".join([*texts, self._definition(name, given, calls)])
+
+    def _rates(self, leaf: Value) -> tuple[Value, Value] | None:
+        place = self.places.get(leaf)
+        if place is None:
+            return None
+        first, second = (
+            self.graph.value(order, name=self._derivative(place, order))
+            for order in ("first", "second")
+        )
+        return first, second
+
+    def _derivative(self, place: Place, order: str) -> str:
+        """Where the derivative of a part is."""
+        return shown((self._of_order(str(place[0]), order), *place[1:]), self.kinds[place[0]])
+
+    def _of_order(self, name: str, order: str) -> str:
+        return order if len(self.wanted.by) == 1 and name in self.wanted.by else f"{name}_{order}"
+
+    def _declared(self) -> list[c_ast.Decl]:
+        return [parameter for parameter, _ in self.parameters]
+
+    def _parameter(self, declared: c_ast.Decl, name: str, is_const: bool) -> str:
+        """Declaration of a parameter by another name."""
+        kind = self.kinds[declared.name]
+        if is_real(kind) or is_whole(kind):
+            return f"{'double' if is_real(kind) else kind} {name}"
+        const = "const " if is_const else ""
+        if isinstance(kind, Array):
+            sizes = ""
+            while isinstance(kind, Array):
+                sizes += f"[{'' if kind.length is None else kind.length}]"
+                kind = kind.of
+            return f"{const}{c_name(kind)} {name}{sizes}"
+        return f"{const}{c_name(kind.to)} *{name}"
+
+    def _read(self, names: Collection[str]) -> list[str]:
+        """Parameters that are passed on, but those with these names."""
+        return [self._parameter(d, d.name, True) for d in self._declared() if d.name not in names]
+
+    def _lines(self, targets: Mapping[str, Value], names: Mapping[Value, str]) -> list[str]:
+        taken = {*self.kinds, "first", "second", "J"}
+        taken |= {f"{name}_{order}" for name in self.kinds for order in ("first", "second")}
+        return Blocks(targets, names, self.interpreter.conditions, self.enumerators, taken).lines()
+
+    def _definition(
+        self, name: str, parameters: list[str], lines: list[str], storage: str = ""
+    ) -> str:
+        """Text of a function."""
+        head, own = f"{storage}void {name}(", []
+        indent = len(head)
+        for i, parameter in enumerate(parameters):
+            more = parameter + (") {" if i + 1 == len(parameters) else ", ")
+            if len(head) + len(more.rstrip()) > WIDTH:
+                own.append(head.rstrip())
+                head = " " * indent
+            head += more
+        body = [part for line in indented(lines) for part in wrapped(line)]
+        words = set(re.findall(r"\w+", "\n".join(body)))
+        unread = [n for n in map(parameter_name, parameters) if n not in words]
+        return "\n".join([*own, head, *(f"    (void){n};" for n in unread), *body, "}"])
+
+
+def pointed(kind: Any) -> Any:
+    """What an argument is of."""
+    return kind.to if isinstance(kind, Pointer) else kind
+
+
+def shown(place: Place, kind: Any) -> str:
+    """A part of an argument in C."""
+    text, rest = str(place[0]), list(place[1:])
+    if isinstance(kind, Pointer) and not isinstance(kind.to, Array | Structure):
+        return f"*{text}"
+    for i, part in enumerate(rest):
+        is_first = i == 0 and isinstance(kind, Pointer)
+        if isinstance(part, int):
+            text += f"[{part}]"
+        else:
+            text += f"->{part}" if is_first else f".{part}"
+    return text
+
+
+def general(place: Place) -> str:
+    """A part of an argument, of any index."""
+    return ".".join(str(part) for part in place if isinstance(part, str))
+
+
+def c_name(kind: Any) -> str:
+    """A type in C."""
+    if isinstance(kind, Structure):
+        return f"struct {kind.name}"
+    return "double" if is_real(kind) else str(kind)
+
+
+def parameter_name(text: str) -> str:
+    """Name of a parameter in its declaration."""
+    return text.replace("*", " ").split()[-1].partition("[")[0]
+
+
+def wrapped_list(head: str, words: list[str]) -> list[str]:
+    """Words behind each other in lines of a comment."""
+    lines, line = [], head
+    for i, word in enumerate(words):
+        more = word + ("," if i + 1 < len(words) else "")
+        if len(line) + len(more) > 98:
+            lines.append(line.rstrip())
+            line = " *   "
+        line += f"{more} "
+    return [*lines, line.rstrip()]

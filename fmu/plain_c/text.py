@@ -1,0 +1,265 @@
+"""Plain C of equations as syntax trees, and what is refused of it before it is interpreted.
+
+A small preprocessor reads include guards and `#include "name.h"`; pycparser reads the rest. The
+rules that users read are in models/README.md.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pycparser import c_ast
+from pycparser.c_parser import CParser, ParseError
+
+# nothing of them is read: sin, bool and others are known
+SYSTEM_HEADERS = ("math.h", "stdbool.h", "stddef.h", "stdlib.h")
+PRELUDE = "typedef _Bool bool;\ntypedef unsigned long size_t;\n"
+DIRECTIVE = re.compile(r"\s*#\s*(\w*)\s*(.*?)\s*$")
+COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/|\"(?:\\.|[^\"\\\n])*\"", re.DOTALL)
+PLACE = re.compile(r"(?P<file>.*?):(?P<line>\d+)(?::\d+)?: (?P<text>.*)", re.DOTALL)
+# what to write instead of a statement or an expression that is no part of the equations' C
+INSTEAD = {
+    c_ast.While: "a while loop has no fixed number of rounds: use for (int i = 0; i < N; i++)",
+    c_ast.DoWhile: "a do loop has no fixed number of rounds: use for (int i = 0; i < N; i++)",
+    c_ast.Switch: "switch is not read: use if and else if",
+    c_ast.Goto: "goto is not read: use if, or an early return",
+    c_ast.Label: "labels are not read: use if, or an early return",
+    c_ast.Break: "break is not read: use a loop with a fixed number of rounds, and if in it",
+    c_ast.Continue: "continue is not read: use if in the loop",
+    c_ast.Cast: "casts are not read: declare a variable of that type and give it the value",
+    c_ast.Union: "unions are not read: use a struct",
+}
+NO_TYPES = {
+    "float": "float is not read: use double",
+    "char": "characters are not read: use int or an enum",
+    "long": "only int is read for whole numbers",
+    "short": "only int is read for whole numbers",
+    "unsigned": "only int is read for whole numbers",
+}
+
+
+class CTextError(ValueError):
+    """What is wrong with a file: its name, the line and the reason in one line."""
+
+
+def refused(node: c_ast.Node | None, reason: str) -> CTextError:
+    """The error of a place in a text."""
+    places = [found.coord for found in walk(node) if found.coord] if node else []
+    coord = places[0] if places else None
+    return CTextError(f"{coord.file}:{coord.line}: {reason}" if coord else reason)
+
+
+@dataclass
+class Program:
+    """Declarations of a text by their names."""
+
+    functions: dict[str, c_ast.FuncDef] = field(default_factory=dict)
+    structs: dict[str, c_ast.Struct] = field(default_factory=dict)
+    typedefs: dict[str, c_ast.Node] = field(default_factory=dict)
+    enumerators: dict[str, c_ast.Enumerator | None] = field(default_factory=dict)
+    enums: dict[str, c_ast.Enum] = field(default_factory=dict)
+    constants: dict[str, c_ast.Decl] = field(default_factory=dict)
+    declared: set[str] = field(default_factory=set)  # functions without a body
+    files: list[Path] = field(default_factory=list)
+
+
+# ---- Preprocessor --------------------------------------------------------------------------------
+class Preprocessor:
+    """The text of files with all that they include, with marks where each line is from."""
+
+    def __init__(self, folders: Iterable[Path], ignored: Iterable[str]) -> None:
+        self.folders, self.ignored = list(folders), {*ignored, *SYSTEM_HEADERS}
+        self.defined: set[str] = set()
+        self.files: list[Path] = []
+        self.lines: list[str] = []
+
+    def add(self, path: Path, shown: str = "") -> None:
+        """Add a file; shown: its name in messages."""
+        shown = shown or path.name
+        try:
+            text = path.read_text(encoding="utf-8")
+        except OSError as error:
+            raise CTextError(f"{path}: cannot be read: {error.strerror}") from None
+        except UnicodeDecodeError:
+            raise CTextError(f"{path}: is not UTF-8") from None
+        self.files.append(path)
+        self.lines.append(f'# 1 "{shown}"')
+        skipping: list[bool] = []  # of each #ifndef that is open
+        for number, line in enumerate(without_comments(text).split("\n"), 1):
+            found = DIRECTIVE.match(line)
+            if found is None:
+                self.lines.append("" if any(skipping) else line)
+                continue
+            self.directive(found[1], found[2], skipping, path, f"{shown}:{number}")
+            self.lines.append(f'# {number + 1} "{shown}"')
+        if skipping:
+            raise CTextError(f"{shown}:{number}: #ifndef without #endif")
+
+    def directive(self, name: str, rest: str, skipping: list[bool], path: Path, place: str) -> None:
+        """One line that begins with #."""
+        if name == "ifndef":
+            skipping.append(rest in self.defined)
+        elif name == "endif" and skipping:
+            skipping.pop()
+        elif any(skipping) or name in ("", "pragma"):
+            pass
+        elif name == "define" and rest.isidentifier():
+            self.defined.add(rest)
+        elif name == "define":
+            what = rest.split()[0] if rest else "it"
+            raise CTextError(
+                f"{place}: macros with values are not read: write an enum for a whole number, or "
+                f"static const double {what.partition('(')[0]} = ..."
+            )
+        elif name == "include":
+            self.include(rest, path, place)
+        else:
+            raise CTextError(f"{place}: #{name} is not read: only include guards and #include are")
+
+    def include(self, rest: str, path: Path, place: str) -> None:
+        name = rest[1:-1]
+        if name in self.ignored:
+            return
+        if rest.startswith('"'):
+            for folder in (path.parent, *self.folders):
+                header = folder / name
+                if header.is_file():
+                    if header.resolve() not in [file.resolve() for file in self.files]:
+                        self.add(header, name)
+                    return
+            raise CTextError(f"{place}: {name} is not there")
+        raise CTextError(f"{place}: <{name}> is not read: <math.h> and <stdbool.h> are enough")
+
+
+def without_comments(text: str) -> str:
+    """The text with comments as spaces, and lines that end in a backslash joined."""
+
+    def blank(found: re.Match[str]) -> str:
+        return found[0] if found[0].startswith('"') else re.sub(r"[^\n]", " ", found[0])
+
+    joined = re.sub(r"((?:[^\n]*\\\n)+)([^\n]*)", _joined, text)
+    return COMMENT.sub(blank, joined)
+
+
+def _joined(found: re.Match[str]) -> str:
+    lines = found[1].count("\n")
+    return found[1].replace("\\\n", "") + found[2] + "\n" * lines
+
+
+# ---- Parser --------------------------------------------------------------------------------------
+def read(path: Path, folders: Iterable[Path] = (), ignored: Iterable[str] = ()) -> Program:
+    """What a file declares, with all that it includes.
+
+    folders: where included files are, besides the file's own folder. ignored: names of headers that
+    are not opened.
+    """
+    preprocessor = Preprocessor(folders, ignored)
+    preprocessor.add(path)
+    text = '# 1 "prelude"\n' + PRELUDE + "\n".join(preprocessor.lines)
+    try:
+        tree = CParser().parse(text, path.name)
+    except ParseError as error:
+        raise CTextError(_rephrased(str(error), text, path.name)) from None
+    except RecursionError:
+        raise CTextError(f"{path.name}: is nested too deeply") from None
+    program = Program(files=preprocessor.files)
+    for node in tree.ext:
+        _add(program, node)
+    return program
+
+
+def _rephrased(message: str, text: str, name: str) -> str:
+    """A message of pycparser for a reader who does not know parsers."""
+    found = PLACE.fullmatch(message)
+    if found is None:  # "name: At end of input"
+        line = _lines(text, name)
+        return f"{name}:{line}: the file ends too early: a }} or ; is missing"
+    reason = found["text"]
+    place = f"{found['file']}:{found['line']}"
+    if reason.startswith("before: "):
+        token = reason.removeprefix("before: ")
+        return f"{place}: {token} does not fit here: often a ; is missing before it"
+    if reason == "Invalid function definition":
+        return f"{place}: this is no declaration: a type or a ; may be missing before it"
+    return f"{place}: {reason[:1].lower()}{reason[1:]}"
+
+
+def _lines(text: str, name: str) -> int:
+    """Number of the last line that is not empty, of the file with this name."""
+    current, number, last = "", 0, 1
+    for line in text.split("\n"):
+        found = re.fullmatch(r'# (\d+) "(.*)"', line)
+        if found:
+            number, current = int(found[1]), found[2]
+            continue
+        if current == name and line.strip():
+            last = number
+        number += 1
+    return last
+
+
+def _add(program: Program, node: c_ast.Node) -> None:
+    """Put a declaration at the top of a file into the program."""
+    if isinstance(node, c_ast.FuncDef):
+        name = node.decl.name
+        if name in program.functions:
+            raise refused(node.decl, f"{name} is defined twice")
+        program.functions[name] = node
+        _note_types(program, node)
+    elif isinstance(node, c_ast.Typedef):
+        program.typedefs[node.name] = node.type
+        _note_types(program, node)
+    elif isinstance(node, c_ast.Decl):
+        _note_types(program, node)
+        if isinstance(node.type, c_ast.FuncDecl):
+            program.declared.add(node.name)
+        elif node.init is not None and "const" not in node.quals:
+            raise refused(node, f"{node.name} may change: write const in front of it")
+        elif node.init is not None:
+            program.constants[node.name] = node
+        elif node.name is not None and "extern" not in node.storage:
+            raise refused(
+                node, f"{node.name} keeps a value between calls: pass it as an argument instead"
+            )
+
+
+def _note_types(program: Program, node: c_ast.Node) -> None:
+    """Note structs and enums that are defined in a declaration."""
+    for child in walk(node):
+        if isinstance(child, c_ast.Struct) and child.decls is not None:
+            program.structs[child.name or f"at {child.coord}"] = child
+        elif isinstance(child, c_ast.Enum) and child.values is not None:
+            program.enums[child.name or f"at {child.coord}"] = child
+            for enumerator in child.values.enumerators:
+                program.enumerators[enumerator.name] = enumerator
+
+
+def walk(node: c_ast.Node) -> Iterator[c_ast.Node]:
+    """All nodes of a tree, each before its children."""
+    todo = [node]
+    while todo:
+        found = todo.pop()
+        yield found
+        todo += [child for _, child in found.children()][::-1]
+
+
+def check_function(function: c_ast.FuncDef) -> None:
+    """Refuse a function with something that is no part of the equations' C."""
+    for node in walk(function):
+        match node:
+            case c_ast.IdentifierType():
+                for name in NO_TYPES.keys() & set(node.names):
+                    raise refused(node, NO_TYPES[name])
+            case c_ast.Decl() if node is not function.decl and "static" in node.storage:
+                if "const" not in node.quals:
+                    reason = f"{node.name} keeps a value between calls: leave out static"
+                    raise refused(node, reason)
+            case c_ast.UnaryOp(op="sizeof" | "~" | "_Alignof"):
+                raise refused(node, f"{node.op} is not read")
+            case c_ast.BinaryOp(op="&" | "|" | "^" | "<<" | ">>"):
+                raise refused(node, f"{node.op} is not read: use && || ! for conditions")
+            case _ if type(node) in INSTEAD:
+                raise refused(node, INSTEAD[type(node)])

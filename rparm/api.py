@@ -1,0 +1,493 @@
+"""The names that programs use: runs as tables, studies, and FMUs of own equations.
+
+All values are in the units of their variables (SI), times in s. Mistakes raise
+`rparm.errors.UserError`, whose text is one line.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rparm import files, project, proof
+from rparm.building import build
+from rparm.errors import UserError, hint
+from rparm.federation import federation, network
+from rparm.files import written
+from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.model import Model, Value
+from rparm.runs import scenario as scenarios
+from rparm.runs import simulation
+from rparm.runs.comparison import load_reference
+from rparm.runs.simulation import Input
+from rparm.systems import comparison, ecos, master, ssp
+
+if TYPE_CHECKING:
+    from rparm.identification.identify import Identification
+    from rparm.linearization.linear import Linear
+
+
+__all__ = [
+    "Scenario", "System", "Table", "build", "fmu", "identify", "linearize", "run_campaign",
+    "simulate",
+]  # fmt: skip
+
+
+# ---- Runs ----------------------------------------------------------------------------------------
+
+
+class Table(Mapping[str, np.ndarray]):
+    """Columns of a run, by the names of variables; "time" is the first.
+
+    Attributes
+    ----------
+    units : dict of str to str
+        Of the columns that have one.
+    """
+
+    def __init__(
+        self,
+        times: np.ndarray,
+        names: Sequence[str],
+        values: np.ndarray,
+        units: Mapping[str, str | None],
+    ) -> None:
+        self._names, self._times, self._values = tuple(names), times, values
+        self._columns = {"time": times} | dict(zip(names, values.T, strict=True))
+        known = {"time": "s"} | dict(units)
+        self.units = {name: unit for name in self._columns if (unit := known.get(name))}
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self._columns:
+            raise KeyError(f"no column {name!r}{hint(name, self._columns)}")
+        return self._columns[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        return len(self._columns)
+
+    def __repr__(self) -> str:
+        columns = ", ".join(self._columns)
+        return f"Table of {len(self._times)} rows: {columns}"
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write all columns to a file, with 17 significant digits."""
+        with written(path):
+            files.write_trajectory(Path(path), self._times, self._names, self._values)
+
+    def to_pandas(self) -> Any:
+        """The columns as a pandas.DataFrame; pandas must be installed."""
+        import pandas
+
+        return pandas.DataFrame(dict(self))
+
+
+def fmu(name: str, fmi: int = 2) -> Path:
+    """File of an FMU of the project.
+
+    Parameters
+    ----------
+    name : str
+        Of the FMU without its suffix, or of the folder of its model.
+    fmi : int
+        Version of FMI: 2 or 3.
+    """
+    return project.built(project.model(name), ".fmu", version=version(fmi))
+
+
+def simulate(
+    fmu: str | Path,
+    *,
+    stop_time: float,
+    step: float,
+    start_time: float = 0.0,
+    start_values: Mapping[str, Value] | None = None,
+    inputs: Mapping[str, Input] | None = None,
+    outputs: Sequence[str] | None = None,
+    tolerance: float = 1e-8,
+) -> Table:
+    """Run an FMU for co-simulation, of FMI 2.0 or 3.0.
+
+    Where numba is installed, a compiled loop makes the steps. The first run of a program loads it
+    for half a second; the first one ever compiles it for some seconds.
+
+    Parameters
+    ----------
+    fmu : path
+        Any FMU; see `fmu` for those of the project.
+    stop_time, step, start_time : float
+        s. `step` is the communication step; a whole number of them leads to the stop time.
+    start_values : mapping, optional
+        Parameters and states by name: numbers, texts with a unit ("30 deg"), items' names.
+    inputs : mapping, optional
+        Each a number, a function of time in s, a pair (times, values) that is interpolated, or the
+        values at all communication points. It is read at the beginning of a step and held over it.
+    outputs : sequence of str, optional
+        Real outputs to return; default: all.
+    tolerance : float
+        Relative, of the integrator.
+
+    Returns
+    -------
+    Table
+        Row i is what is read right after the step to time i; row 0 at the start.
+    """
+    path = Path(fmu)
+    times = simulation.communication_points(start_time, stop_time, step)
+    if not (simulation.is_finite_number(tolerance) and 0 < tolerance < 1):
+        raise UserError(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")
+    with Fmu(path) as opened:
+        model = opened.model
+        names = list(model.real_outputs if outputs is None else outputs)
+        for name in names:
+            if name not in model.real_outputs:
+                raise UserError(
+                    f"{path}: has no Real output {name!r}{hint(name, model.real_outputs)}"
+                )
+        values = simulation.start_values(model, start_values or {})
+        signals = {
+            name: simulation.input_values(model, name, x, times)
+            for name, x in (inputs or {}).items()
+        }
+        run = scenarios.Scenario(
+            name=path.stem, model=model.name, path=path, title=path.stem, description="",
+            parameters=values, initial={}, start=times[0], stop=times[-1], steps=(step,),
+            tolerance=tolerance, times=times, elapsed=times - times[0], signals={}, inputs=signals,
+            reference_every=1, defaults=model.start_values,
+        )  # fmt: skip
+        result = simulation.simulate(opened, run, compiled=True)
+        columns = [result.names.index(name) for name in names]
+        return Table(result.times, names, result.values[:, columns], _units(model))
+
+
+class Scenario:
+    """A scenario of the project by its name, or one of your own by its file.
+
+    Parameters
+    ----------
+    name : str or path
+        Of a scenario, or a path that ends with .toml.
+    """
+
+    def __init__(self, name: str | Path) -> None:
+        own = Path(name).suffix.lower() == ".toml"
+        self.path = Path(name) if own else project.scenario_file(str(name))
+        self.title = scenarios.title(self.path)
+
+    def run(self, *, fmi: int = 2, tolerance: float | None = None) -> Table:
+        """Run it on the FMU of its model, or that its file names; rows are those of its reference.
+
+        Parameters
+        ----------
+        fmi : int
+            Version of FMI: 2 or 3; an FMU that the file names has its own.
+        tolerance : float, optional
+            Relative; default: that of the scenario.
+        """
+        with self._opened(fmi) as (opened, loaded):
+            loaded = replace(loaded, panels=())  # Integers, which only pages draw, cost time
+            result = simulation.simulate(opened, loaded, tolerance, compiled=True)
+            return Table(result.times, result.names, result.values, _units(opened.model))
+
+    def errors(self, table: Table) -> dict[str, float]:
+        """Largest error of each output of a run against the reference, relative to its scale."""
+        with self._opened(2) as (opened, loaded):
+            expected = load_reference(loaded, opened.model)
+        if len(table["time"]) != len(expected.times):
+            raise UserError(f"{self.path}: the reference has {len(expected.times)} rows")
+        return {
+            name: float(np.abs(table[name] - column).max()) / expected.scale(name)
+            for name, column in expected.columns.items()
+        }
+
+    def proven_errors(
+        self, *, method: str | None = None, tolerance: float | None = None
+    ) -> dict[str, float]:
+        """How far each state in a run is from the exact motion at most, by validated integration.
+
+        Assumed are the equations of motion, exact parameters and inputs as given, and IEEE doubles.
+
+        Parameters
+        ----------
+        method : str, optional
+            Of integration; default: that of the scenario.
+        tolerance : float, optional
+            Relative; default: that of the scenario.
+
+        Returns
+        -------
+        dict of str to float
+            Largest distance at communication points, by the name of the state, in its unit.
+        """
+        program = proof.prover_of(self.path)
+        with self._opened(2) as (opened, loaded):
+            enclosure = program.enclose(loaded).of(program.states)
+            if enclosure.stopped is not None:
+                raise UserError(f"{self.path}: the proof holds up to {enclosure.stopped!r} s only")
+            used = method or opened.model.method(loaded.parameters)
+            (used,) = proof.methods_of(opened, used)
+            found = proof.error_bounds(
+                opened, loaded, enclosure, used, tolerance or loaded.tolerance
+            )
+        return dict(zip(enclosure.names, found.max(axis=0).tolist(), strict=True))
+
+    @contextmanager
+    def _opened(self, fmi: int) -> Iterator[tuple[Fmu, scenarios.Scenario]]:
+        subject = scenarios.subject_of(self.path)
+        with Fmu(project.fmu_of(subject, version=version(fmi))) as opened:
+            yield opened, scenarios.load(self.path, opened.model)
+
+
+class System:
+    """A system of connected FMUs, by its name or the path of its SSP.
+
+    Attributes
+    ----------
+    variants : tuple of str
+        Names of its parameter sets; "default" if it has none.
+    notes : tuple of str
+        What was chosen where the SSP says nothing: times, values of inputs that nothing feeds.
+    """
+
+    def __init__(self, name: str | Path, *, fmi: int = 2) -> None:
+        self.path = Path(name)
+        if self.path.suffix.lower() != ".ssp":
+            known = project.systems()
+            if name not in known:
+                raise UserError(f"no system {str(name)!r}{hint(str(name), known)}")
+            self.path = project.built(known[str(name)], ".ssp", version=version(fmi))
+        with ssp.unpacked(self.path) as opened:
+            self.variants = tuple(opened.system.parameters)
+            self.notes = tuple(opened.notes)
+
+    def run(self, variant: str | None = None, *, engine: str = "master") -> Table:
+        """Step a variant from its start to its stop time, in Jacobi order.
+
+        Parameters
+        ----------
+        variant : str, optional
+            Default: the first one.
+        engine : str
+            "master", that of rparm; "ecos", where ecospy is installed; "helics", each FMU in its
+            own process, where helics is installed.
+
+        Returns
+        -------
+        Table
+            Columns "component.variable": all Real outputs and states, read after the inputs of
+            the next step have been set. With "helics": all Real outputs, read after
+            the step.
+        """
+        variant = self.variants[0] if variant is None else variant
+        if variant not in self.variants:
+            raise UserError(
+                f"{self.path}: has no variant {variant!r}{hint(variant, self.variants)}"
+            )
+        engines = {
+            "master": master.run_in_master,
+            "ecos": ecos.run,
+            "helics": lambda ssp, variant, _: federation.run(ssp, variant, network.free_address()),
+        }
+        if engine not in engines:
+            raise UserError(f"engine: expected one of {', '.join(engines)}, got {engine!r}")
+        with ssp.unpacked(self.path) as opened:
+            run = engines[engine](opened, variant, comparison.recorded(opened))
+            units = {name: opened.variable(name).unit for name in run.names}
+        return Table(run.times, run.names, run.values, units)
+
+    def study_coupling(self, output: str | Path) -> dict[str, dict[str, object]]:
+        """Study what the coupling costs, if the system has such a study; prints its tables.
+
+        Parameters
+        ----------
+        output : path
+            Folder for its picture.
+
+        Returns
+        -------
+        dict of str to dict
+            Numbers of each part of the study; "passed" says whether they are as expected.
+        """
+        folder, known = comparison.coupling_study()
+        if not project.is_built_from(self.path.stem, folder):
+            raise UserError(f"{self.path}: has no study of its coupling, {folder.name} has one")
+        return known.study_coupling(self.path, Path(output))
+
+
+def version(fmi: int) -> str:
+    """Version of FMI by its first digit; UserError if it is none of `project.VERSIONS`."""
+    found = project.fmi_version(fmi)
+    if found is None:
+        raise UserError(f"fmi: expected 2 or 3, got {fmi!r}")
+    return found
+
+
+def _units(model: Model) -> dict[str, str | None]:
+    return {variable.name: variable.unit for variable in model.variables.values()}
+
+
+# ---- Studies -------------------------------------------------------------------------------------
+
+
+def linearize(
+    fmu_or_ssp: str | Path,
+    *,
+    at: Mapping[str, Value] | None = None,
+    time: float | None = None,
+    trim: Sequence[str] = (),
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+    variant: str = "",
+    break_at: str = "",
+    without: Sequence[str] = (),
+    fmi: int = 2,
+) -> "Linear":
+    """The linear model of an FMU or a system at a point; docs/linear-models.md explains.
+
+    Parameters
+    ----------
+    fmu_or_ssp : path or str
+        A file, or a name of the project; a name is taken from version `fmi` of FMI.
+    at : mapping, optional
+        States, inputs and parameters by name, as numbers or texts with a unit ("30 deg"); with
+        `trim` also outputs, and first guesses of what is moved. In a system names are
+        "component.variable".
+    time : float, optional
+        s; default: the start of the FMU's default experiment, or of the system.
+    trim : sequence of str
+        States and inputs to move until the point is an equilibrium.
+    inputs, outputs : sequence of str, optional
+        Those of the model; default: all.
+    variant, break_at, without
+        Of a system: its parameter set (default: the first), an input whose connection is cut, and
+        components that are taken as ideal.
+
+    Returns
+    -------
+    Linear
+        `A`, `B`, `C`, `D`; `states`, `inputs`, `outputs`, `held`; `ss()` and `zoh(step)` give them
+        to python-control.
+    """
+    with _needing("control"):
+        from rparm.linearization.study import Request, study
+    asked = Request(
+        fmu_or_ssp, at or {}, time, tuple(trim), inputs, outputs, variant, break_at, tuple(without),
+        version=version(fmi),
+    )  # fmt: skip
+    return study(asked).linear
+
+
+def identify(
+    fmu: str | Path,
+    logs: str | Path | Sequence[str | Path],
+    *,
+    parameters: Sequence[str],
+    inputs: Sequence[str],
+    measured: Sequence[str],
+    settings: Mapping[str, Value] | None = None,
+    start: Mapping[str, Value] | None = None,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    delay: bool = False,
+    validate: str | Path | None = None,
+    segment: float = 0.4,
+    tolerance: float = 1e-8,
+) -> "Identification":
+    """Fit parameters of an FMU to logs of a machine; needs the extra `control`.
+
+    Parameters
+    ----------
+    fmu : path
+        Any FMU for co-simulation whose states can be set; see `fmu` for those of the project.
+    logs : path or sequence of path
+        CSV files with a row of names; "time" in s.
+    parameters : sequence of str
+        To be estimated. "name>other" stays above another parameter.
+    inputs, measured : sequence of str
+        Inputs and Real outputs that the logs have.
+    settings, start : mapping, optional
+        Values of other parameters; where the fit begins, of parameters and of states.
+    columns, units : mapping, optional
+        Names and units of columns, by variable, where they differ from its own.
+    delay : bool
+        Estimate by how much the measured values are late, too.
+    validate : path, optional
+        A log to run with the result.
+    segment, tolerance : float
+        Length of a segment in s; relative tolerance of the integrator.
+
+    Returns
+    -------
+    Identification
+        `estimates` by name, each with `value`, `low` and `high` (95 %, by the scatter between
+        segments) and `classical`; `combinations` that cannot be known; `chi2`, `whiteness`,
+        `validation`, `warnings`.
+    """
+    with _needing("control"):
+        from rparm.identification import identify as identification
+        from rparm.identification.request import Request
+    files = [logs] if isinstance(logs, str | Path) else logs
+    request = Request(
+        logs=[Path(log) for log in files], parameters=parameters, inputs=inputs,
+        measured=measured, settings=settings or {}, starts=start or {}, columns=columns or {},
+        units=units or {}, with_delay=delay, segment=segment, tolerance=tolerance,
+        validation=None if validate is None else Path(validate),
+    )  # fmt: skip
+    with Fmu(Path(fmu)) as opened:
+        return identification.identify(opened, request)
+
+
+def run_campaign(
+    file: str | Path,
+    *,
+    output: str | Path | None = None,
+    fmu: str | Path | None = None,
+    workers: int | None = None,
+) -> dict[str, np.ndarray]:
+    """Make all runs of a campaign that are missing, in processes of this machine.
+
+    The processes import your program: call this under ``if __name__ == "__main__":``.
+
+    Parameters
+    ----------
+    file : path or str
+        The campaign, as the command takes it.
+    output : path, optional
+        Folder for the results; default: that in the file, or that of the command.
+    fmu : path, optional
+        The FMU or SSP; default: that of the project.
+    workers : int, optional
+        Number of processes; default: one a core.
+
+    Returns
+    -------
+    dict of str to ndarray
+        A value a run, (runs,), in SI units: "run", parameters, what is kept, and "failure", why a
+        run failed, else empty.
+    """
+    with _needing("campaign"):
+        from rparm.campaign import engine, work
+    with work.opened(
+        project.campaign_file(file), fmu and Path(fmu), output and Path(output)
+    ) as made:
+        if blocks := made.begin():
+            with (
+                made.results.workers_folder() as files,
+                engine.opened_cluster(None, workers, files) as client,
+            ):
+                made.run(client, blocks)
+        return made.table()
+
+
+@contextmanager
+def _needing(extra: str) -> Iterator[None]:
+    """Say how to install what an extra of the distribution has, if an import finds it missing."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        raise project.not_installed(str(error.name), extra) from error

@@ -1,0 +1,270 @@
+"""The command line: which command arguments ask for, and options that commands share."""
+
+import argparse
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NoReturn
+
+from rparm import needs, project
+from rparm.errors import UserError, WrongValueError, did_you_mean
+from rparm.needs import COMMANDS, COMMON, DEFAULT, EXIT_CODES, HELP, VERSION
+from rparm.project import PROGRAM, VERSIONS
+from rparm.units import SECONDS, typed_quantity
+
+EPILOG = f"""With --json, standard output has one JSON document and nothing else. "exit_code" is in
+it, and "error" with the message if there is one. A command that is interrupted prints none.
+{EXIT_CODES}."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a command has ended."""
+
+    code: int  # to exit with
+    verdict: str  # the last line
+    document: Mapping[str, object] = field(default_factory=dict)  # for programs
+    error: UserError | None = None
+    page: Path | None = None  # that --open shows
+
+
+class Answered(Exception):
+    """Help or the version was asked for, and no command is to run; `text` has it."""
+
+    def __init__(self, name: str, text: str) -> None:
+        super().__init__(text)
+        self.name, self.text = name, text.rstrip("\n")
+
+
+def overview() -> str:
+    """Return the help on everything: the commands in a line each."""
+    return needs.overview(PROGRAM)
+
+
+def function(command: str, form: str) -> Any:
+    """Return the function of a command that is named in this form, as "do_{}"."""
+    module = import_module(f"rparm.commands.{COMMANDS[command].module}")
+    return getattr(module, form.format(command.replace("-", "_")))
+
+
+def parsed(arguments: Sequence[str]) -> argparse.Namespace:
+    """Options of the command that `arguments` ask for; `command` is its name.
+
+    Names and options without a command are those of `run`. Only the module of the command is
+    imported, because some take long.
+
+    UserError if something in them is wrong. Raises Answered if no command is to run.
+    """
+    first, *rest = arguments
+    while first in COMMON and rest:  # may stand in front of the command
+        first, *rest = [*rest, first]
+    if first == VERSION:
+        raise Answered("version", project.version())
+    if first in HELP:
+        raise Answered("help", _help([name for name in rest if name not in COMMON]))
+    if first == "--list":
+        first = "list"
+    if first not in COMMANDS:
+        first, rest = DEFAULT, [first, *rest]
+    options = parser(first).parse_args(rest)
+    options.command = first
+    return options
+
+
+def _help(names: Sequence[str]) -> str:
+    """Help on the first of `names`, or on everything if there are none."""
+    if not names:
+        return overview()
+    if names[0] not in COMMANDS:
+        guess = did_you_mean(names[0], COMMANDS)
+        raise UserError(f"no command {names[0]!r}{guess} ({PROGRAM} help names them)")
+    return parser(names[0]).format_help()
+
+
+def parser(command: str) -> argparse.ArgumentParser:
+    """Return the parser of a command's options."""
+    made = _Parser(
+        prog=f"{PROGRAM} {command}",
+        epilog=EPILOG,
+        allow_abbrev=False,  # --json is looked for before anything is parsed
+    )
+    function(command, "add_{}_options")(made)
+    add_common(made)
+    return made
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        """One line, like every other mistake of the user."""
+        raise UserError(f"{message} (--help explains)")
+
+    def print_help(self, file: object = None) -> NoReturn:
+        """Leave it to whoever prints."""
+        raise Answered("help", self.format_help())
+
+    def parse_args(self, *arguments, **keywords) -> argparse.Namespace:
+        """Propose the closest option for an unknown one."""
+        options, rest = self.parse_known_args(*arguments, **keywords)
+        if rest:
+            guess = did_you_mean(rest[0].partition("=")[0], self._option_string_actions)
+            self.error(f"unrecognized arguments: {' '.join(rest)}{guess}")
+        return options
+
+
+def add_common(parser: argparse.ArgumentParser) -> None:
+    """Options of all commands."""
+    parser.add_argument(
+        "--json",
+        action="store_true",
+        help="print one JSON document on standard output, and all else on standard error",
+    )
+    parser.add_argument(
+        "--quiet", action="store_true", help="print the last line only, and what is wrong"
+    )
+    parser.add_argument(
+        "--open", action="store_true", help="then show what was written in a browser"
+    )
+
+
+def add_system(
+    parser: argparse.ArgumentParser,
+    ssp: str = "the system (default: all)",
+    fmi: str = "systems with FMUs of this version of FMI (default: 2)",
+) -> None:
+    """Which system: a file, or one of a version of FMI."""
+    choice = parser.add_mutually_exclusive_group()
+    choice.add_argument("--ssp", type=Path, metavar="PATH", help=ssp)
+    add_fmi(choice, VERSIONS[0], fmi)
+
+
+def add_fmi(parser: argparse._ActionsContainer, default: str | None, text: str) -> None:
+    """Which version of FMI, as one of `VERSIONS`."""
+    parser.add_argument("--fmi", type=_version, metavar="{2,3}", default=default, help=text)
+
+
+def add_tolerance(parser: argparse.ArgumentParser, text: str) -> None:
+    """The tolerance of the integrator."""
+    parser.add_argument("--tolerance", type=relative_tolerance, metavar="X", help=text)
+
+
+def add_report(parser: argparse.ArgumentParser, part: str = "") -> None:
+    """Where pages and results go."""
+    folder = project.report_folder(part)
+    # its name until version 0.1
+    parser.add_argument("--report", type=Path, default=folder, help=argparse.SUPPRESS)
+    parser.add_argument(
+        "--output",
+        dest="report",
+        type=Path,
+        metavar="DIR",
+        default=folder,
+        help=f"folder for pages and results (default: {project.from_root(folder)})",
+    )
+
+
+def add_output(parser: argparse.ArgumentParser, text: str) -> None:
+    """Where something else goes than pages and results."""
+    parser.add_argument("--output", type=Path, metavar="DIR", help=text)
+
+
+def add_document(parser: argparse.ArgumentParser) -> None:
+    """Where the document goes, for a command that writes nothing else."""
+    parser.add_argument(
+        "--output",
+        dest="document",
+        type=Path,
+        metavar="DIR",
+        help="write what --json prints into this folder, too",
+    )
+
+
+def add_silence(parser: argparse.ArgumentParser, default: float, text: str) -> None:
+    """How long something may be silent."""
+    parser.add_argument(
+        "--silence",
+        type=_seconds,
+        metavar="TIME",
+        default=default,
+        help=f"{text} (default: {default:g} s)",
+    )
+
+
+def number(text: str) -> int:
+    """Number of a run, from 0."""
+    if not text.isdecimal() or len(text) > 12:
+        raise argparse.ArgumentTypeError(f"expected the number of a run, got {text!r}")
+    return int(text)
+
+
+def count(text: str) -> int:
+    """How many, from 1."""
+    if not text.isdecimal() or not 1 <= int(text) <= 10_000:
+        raise argparse.ArgumentTypeError(f"expected a number from 1 to 10000, got {text!r}")
+    return int(text)
+
+
+def pairs(option: str, given: Sequence[str]) -> dict[str, str]:
+    """Names and texts of values "NAME=VALUE"; UserError if one has another form or comes twice."""
+    found: dict[str, str] = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        if not (name and equals and value):
+            raise UserError(f"{option}: expected NAME=VALUE, got {text!r}")
+        if name in found:
+            raise UserError(f"{option}: {name} is given twice")
+        found[name] = value
+    return found
+
+
+def names(given: Sequence[str]) -> list[str]:
+    """Names between commas, or given one by one."""
+    return [name.strip() for text in given for name in text.split(",") if name.strip()]
+
+
+def retyped(command: str, positional: Iterable[object], given: Mapping[str, object]) -> str:
+    """What to type for a command again, in the project's folder; without options not given."""
+    parts = [project.PROGRAM, command, *map(_typed, positional)]
+    for name, value in given.items():
+        if value is True:
+            parts.append(f"--{name}")
+        elif value is not None and value is not False and value != "" and value != []:
+            values = value if isinstance(value, list) else [value]
+            parts += [f"--{name}", *map(_typed, values)]
+    return shlex.join(parts)
+
+
+def file_or_name(given: str, suffixes: Iterable[str]) -> str | Path:
+    """What was typed where a file is expected or a name of the project, for `retyped`."""
+    return Path(given) if Path(given).suffix.lower() in suffixes else given
+
+
+def _typed(value: object) -> str:
+    return str(project.from_root(value) if isinstance(value, Path) else value)
+
+
+def relative_tolerance(text: str) -> float:
+    with suppress(ValueError):
+        if 0 < float(text) < 1:
+            return float(text)
+    raise argparse.ArgumentTypeError(f"expected a number between 0 and 1, got {text!r}")
+
+
+def _seconds(text: str) -> float:
+    with suppress(WrongValueError):
+        seconds = typed_quantity(text, SECONDS)
+        if seconds >= 1:
+            return seconds
+    raise argparse.ArgumentTypeError(
+        f"expected 1 s or more: a number, or one with s, ms, cs or ks, got {text!r}"
+    )
+
+
+def _version(text: str) -> str:
+    version = project.fmi_version(text)
+    if version is not None:
+        return version
+    known = " or ".join(version[0] for version in VERSIONS)
+    raise argparse.ArgumentTypeError(f"expected {known}, got {text!r}")

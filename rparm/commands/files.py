@@ -1,0 +1,192 @@
+"""`new`, `new-model`, `build`, `fmu`, `list`, `playground`: write or name files."""
+
+import argparse
+import re
+import shlex
+from pathlib import Path
+
+from rparm import console, project
+from rparm.command_line import Ended, add_document, add_fmi, add_output
+from rparm.errors import UserError
+from rparm.files import (
+    check_for_windows,
+    copied,
+    create,
+    from_folder,
+    from_here,
+    written,
+)
+from rparm.project import VERSIONS
+from rparm.runs import scenario
+
+SUFFIX = ".toml"
+MODEL_NAME = re.compile("[A-Za-z][A-Za-z0-9_]*", re.ASCII)
+MODEL_FILE = """\
+# A body on a spring: change it to what you simulate. examples/models/README.md explains the file.
+name = "{name}"
+description = "Body on a spring"
+experiment = {{ stop = 10.0, step = 0.01, tolerance = 1e-8 }}
+
+[parameters]                    # may be changed while the model runs
+mass = {{ start = 1.0, unit = "kg", min = 1e-6, description = "Mass of the body" }}
+k = {{ start = 4.0, unit = "N/m", description = "Of the spring" }}
+c = {{ start = 0.2, unit = "N.s/m", min = 0, description = "Of the damper" }}
+
+[inputs]                        # set from outside, 0 at the start unless given
+force = {{ unit = "N" }}
+
+[states]                        # derivative: by the time; states are outputs
+x = {{ start = 1.0, unit = "m", derivative = "v" }}
+v = {{ unit = "m/s", derivative = "(force - spring - c * v) / mass" }}
+
+[where]                         # results that others use, in any order
+spring = "k * x"
+
+[outputs]
+energy = {{ value = "(mass * v**2 + spring * x) / 2", unit = "J" }}
+
+[check]                         # of parameters; the text is the message if it does not hold
+"a body with neither spring nor damper drifts away" = "k > 0 or c > 0"
+"""
+
+
+def add_new_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        f"Writes NAME.toml, a scenario with comments that runs as it is: {project.PROGRAM} "
+        "NAME.toml."
+    )
+    parser.add_argument("name", metavar="NAME", help="name of the scenario, or path of its file")
+    parser.add_argument(
+        "--model",
+        metavar="MODEL",
+        help="what to simulate, or a file .fmu (default: the model with the most scenarios)",
+    )
+    add_output(parser, "folder for the file (default: this one, or that of the path)")
+
+
+def do_new(options: argparse.Namespace) -> Ended:
+    from rparm.fmi.fmu_file import read_model  # takes long
+
+    path = _scenario_path(options.name)
+    if options.output:
+        path = options.output / path
+    if Path(options.model or "").suffix.lower() == ".fmu":
+        subject = Path(options.model)
+        key, name = "fmu", from_folder(subject, path.parent)
+    else:
+        subject = project.model(options.model) if options.model else _usual_model()
+        key, name = "model", subject.name
+    model = read_model(project.fmu_of(subject))
+    text = scenario.template(path.stem, key, name, model)
+    if options.output:
+        with written(path):
+            options.output.mkdir(parents=True, exist_ok=True)
+    create(path, text)
+    verdict = f"{path}: written; run it by {project.PROGRAM} {shlex.quote(str(path))}"
+    return Ended(0, verdict, {"file": path.absolute(), "model": name}, page=path)
+
+
+def _scenario_path(name: str) -> Path:
+    """File for a name, with or without its suffix; UserError for one that no file can have."""
+    path = Path(name)
+    if not path.name or not path.stem.strip() or name.endswith(("/", "\\")):
+        raise UserError(f"{name!r} is no name for a scenario")
+    if any(not character.isprintable() for character in name):
+        raise UserError(f"{name!r}: a name has printable characters only")
+    if path.name.startswith("-"):
+        raise UserError(f"{name!r}: a name begins with no hyphen, it would be an option")
+    check_for_windows(path.name)
+    return path if path.suffix.lower() == SUFFIX else path.with_name(path.name + SUFFIX)
+
+
+def _usual_model() -> Path:
+    """Folder of the model that has the most scenarios."""
+    folders = list(project.models().values())
+    if not folders:
+        raise UserError(f"{project.models_folder()}: has no scenarios")
+    return max(folders, key=lambda folder: len(list(folder.glob("scenarios/*.toml"))))
+
+
+def add_new_model_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        f"Writes NAME.toml, a model of one's own with comments: {project.PROGRAM} build NAME.toml "
+        "makes FMUs of it."
+    )
+    parser.add_argument("name", metavar="NAME", help="of the FMU: letters, digits and _")
+    add_output(parser, "folder for the file (default: the current one)")
+
+
+def do_new_model(options: argparse.Namespace) -> Ended:
+    if not MODEL_NAME.fullmatch(options.name):
+        raise UserError(
+            f"{options.name!r} is no name for a model: a letter, then letters, digits, _"
+        )
+    check_for_windows(options.name)
+    path = (options.output or Path()) / f"{options.name}.toml"
+    with written(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    create(path, MODEL_FILE.format(name=options.name))
+    verdict = f"{path}: written; {project.PROGRAM} build {shlex.quote(str(path))} makes FMUs of it"
+    return Ended(0, verdict, {"file": path.absolute()}, page=path.absolute())
+
+
+def add_build_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Makes FMUs of the equations in FILE.toml, for FMI 2.0 and 3.0: NAME.fmu and "
+        f"fmi3/NAME.fmu. {project.page_of_models()} explains the file. Beside it FILE.lock.toml "
+        "keeps the value references."
+    )
+    parser.add_argument("file", metavar="FILE.toml", type=Path, help="the file with the equations")
+    parser.add_argument(
+        "--platforms", action="store_true", help="for all platforms, by zig, not for this machine"
+    )
+    add_output(parser, "folder for the FMUs (default: the current one)")
+
+
+def do_build(options: argparse.Namespace) -> Ended:
+    from rparm.building import build
+
+    paths = build(options.file, output=options.output or Path(), platforms=options.platforms)
+    verdict = f"{' and '.join(map(str, paths))}: built"
+    return Ended(0, verdict, {"fmus": [path.absolute() for path in paths]})
+
+
+def add_fmu_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Copies the FMU of a model, for another tool."
+    parser.add_argument("name", metavar="NAME", help="name of the FMU, or of its model")
+    add_fmi(parser, VERSIONS[0], "its version of FMI (default: 2)")
+    add_output(parser, "copy it into this folder (default: the current one)")
+
+
+def do_fmu(options: argparse.Namespace) -> Ended:
+    """Copy the FMU; a file that has its name is replaced."""
+    file = project.built(project.model(options.name), ".fmu", version=options.fmi)
+    path = copied(file, (options.output or Path()) / file.name)
+    verdict = f"{path}: FMI {options.fmi}, {path.stat().st_size} bytes"
+    return Ended(0, verdict, {"file": path.absolute(), "fmi_version": options.fmi})
+
+
+def add_list_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Prints the name and the title of every scenario."
+    add_document(parser)
+
+
+def do_list(_: argparse.Namespace) -> Ended:
+    files = project.scenario_files()
+    found = [
+        {"name": name, "title": scenario.title(path), "model": project.model_folder(path).name}
+        for name, path in files.items()
+    ]
+    return Ended(0, console.titles(found), {"scenarios": found})
+
+
+def add_playground_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Says where the page with the plant is; --open shows it."
+    add_output(parser, "copy the page into this folder")
+
+
+def do_playground(options: argparse.Namespace) -> Ended:
+    page = project.playground_page()
+    if options.output:
+        page = copied(page, options.output / "playground.html")
+    return Ended(0, str(from_here(page)), {"page": page.absolute()}, page=page)

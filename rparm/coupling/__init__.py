@@ -1,1 +1,0 @@
-"""A master that steps connected FMUs, and its step-size control."""

@@ -1,1 +1,0 @@
-"""Steps FMUs from code that numba compiles: microseconds less a call than ctypes takes."""

@@ -1,0 +1,116 @@
+"""Functions with the prototypes of FMI 2.0 that call an FMU of FMI 3.0: the loop knows only these.
+
+In place of the component, each adapter takes a row of pointers: to the FMU's instance, then to its
+functions, in the order of `compiled_loop.FUNCTIONS`. Importing this module compiles them.
+"""
+
+import numpy as np
+from llvmlite import ir
+from numba import carray, cfunc, njit, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from rparm.fmi.fmi_instance import DISCARD, TERMINATED
+
+INSTANCE, SET_FLOAT64, GET_FLOAT64, SET_BOOLEAN, GET_BOOLEAN, DO_STEP, DERIVATIVE = range(7)
+GET_INT32 = 7
+POINTER, SIZE, REAL, STATUS = types.voidptr, types.uintp, types.float64, types.int32
+ROW = types.CPointer(POINTER)
+BOOLEAN_2, BOOLEAN_3 = types.int32, types.uint8
+_move = cfunc(STATUS(ROW, POINTER, SIZE, POINTER), cache=True)
+
+
+@intrinsic
+def _call(_context, function, arguments):
+    """Call a function; its status. The types of the arguments, a tuple, are its prototype."""
+    kinds = [POINTER if isinstance(kind, types.ArrayCTypes) else kind for kind in arguments]
+    assert set(kinds) <= {POINTER, SIZE, REAL, BOOLEAN_3}
+
+    def generate(_context, builder, _signature, given):
+        function, packed = given
+        values = cgutils.unpack_tuple(builder, packed)
+        kinds = [value.type for value in values]
+        prototype = ir.FunctionType(ir.IntType(32), kinds).as_pointer()
+        # what C does with a bool
+        extended = {i: ("zeroext",) for i, kind in enumerate(kinds) if kind == ir.IntType(8)}
+        return builder.call(builder.bitcast(function, prototype), values, arg_attrs=extended)
+
+    return STATUS(function, types.BaseTuple.from_types(kinds)), generate
+
+
+@intrinsic
+def _place(_context):
+    """Eight bytes of the calling function's stack, all 0."""
+
+    def generate(_context, builder, _signature, _arguments):
+        place = cgutils.alloca_once(builder, ir.IntType(64), zfill=True)
+        return builder.bitcast(place, cgutils.voidptr_t)
+
+    return POINTER(), generate
+
+
+# ---- Values --------------------------------------------------------------------------------------
+@njit(cache=True, nogil=True)
+def _move_booleans(row, function, references, count, values):
+    """A Boolean is an int in FMI 2.0 and a byte in FMI 3.0."""
+    ints = carray(values, count, np.int32)
+    truths = np.empty(count, np.bool_)
+    for i in range(count):
+        truths[i] = ints[i] != 0
+    status = _call(row[function], (row[INSTANCE], references, count, truths.ctypes, count))
+    for i in range(count):
+        ints[i] = truths[i]
+    return status
+
+
+@_move
+def _set_real(row, references, count, values):
+    return _call(row[SET_FLOAT64], (row[INSTANCE], references, count, values, count))
+
+
+@_move
+def _get_real(row, references, count, values):
+    return _call(row[GET_FLOAT64], (row[INSTANCE], references, count, values, count))
+
+
+@_move
+def _get_integer(row, references, count, values):
+    return _call(row[GET_INT32], (row[INSTANCE], references, count, values, count))
+
+
+@_move
+def _set_boolean(row, references, count, values):
+    return _move_booleans(row, SET_BOOLEAN, references, count, values)
+
+
+@_move
+def _get_boolean(row, references, count, values):
+    return _move_booleans(row, GET_BOOLEAN, references, count, values)
+
+
+# ---- Steps ---------------------------------------------------------------------------------------
+@cfunc(STATUS(ROW, REAL, REAL, BOOLEAN_2), cache=True)
+def _do_step(row, time, length, final):
+    """Of an instance without event mode and early return."""
+    event, terminates, early, reached = _place(), _place(), _place(), _place()
+    results = event, terminates, early, reached
+    status = _call(row[DO_STEP], (row[INSTANCE], time, length, BOOLEAN_3(final), *results))
+    if status < DISCARD and carray(terminates, 1, np.bool_)[0]:
+        return TERMINATED
+    return status
+
+
+@cfunc(STATUS(ROW, POINTER, SIZE, POINTER, SIZE, POINTER, POINTER), cache=True)
+def _derivative(row, unknowns, unknown_count, knowns, known_count, direction, result):
+    given = unknowns, unknown_count, knowns, known_count
+    return _call(
+        row[DERIVATIVE], (row[INSTANCE], *given, direction, known_count, result, unknown_count)
+    )
+
+
+ADAPTERS = (
+    _set_real, _get_real, _set_boolean, _get_boolean, _do_step, _derivative, _get_integer,
+)  # fmt: skip
+
+
+ADDRESSES = tuple(adapter.address for adapter in ADAPTERS)

@@ -1,0 +1,277 @@
+"""Instances of FMUs of FMI 2.0 and 3.0, for co-simulation and at a point for model exchange.
+
+Masters here use neither event mode nor early return of FMI 3.0. Instances for model exchange are
+initialized and read, not integrated: what an FMU answers at one time, either kind answers.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from ctypes import Array, byref, c_double, sizeof
+from functools import partial
+
+import fmpy
+import numpy as np
+from fmpy import fmi2, fmi3
+from fmpy.fmi1 import FMICallException
+
+from rparm.errors import UserError
+from rparm.fmi.fmi_instance import (
+    Call,
+    InputPolynomials,
+    Instance,
+    SavedState,
+    UnpackedFmu,
+    doubles,
+)
+
+# Without them FMUs send errors only. They cost nothing as long as all is well.
+LOGGED = ("logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal")
+MOST_UPDATES = 100  # of the discrete states at one time
+
+
+class Fmi2Instance(Instance):
+    # the folder of FMI 3.0 first, because on Arm linux64 may be for x86-64
+    PLATFORMS = (fmpy.platform_tuple, fmpy.platform)
+    LIBRARY = fmi2.FMU2Slave
+    INSTANTIATE = "fmi2Instantiate"
+    MARKS = r"##|%%|#([ribs])(\d+)#"  # references and formats: FMI 2.0, section 2.1.5
+    SETTERS = {
+        "Real": "setReal",
+        "Integer": "setInteger",
+        "Enumeration": "setInteger",
+        "Boolean": "setBoolean",
+        "String": "setString",
+    }
+
+    def __init__(self, fmu: UnpackedFmu, name: str, smooth_inputs: Sequence[str] = ()) -> None:
+        super().__init__(fmu, name, smooth_inputs)
+        # The texts are taken as sent: fmpy's proxy, which fills in printf arguments, has one logger
+        # for the whole process. The structure stays referenced for as long as the FMU uses it.
+        self._callbacks = fmi2.fmi2CallbackFunctions()
+        self._callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._log)
+        self._callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+        self._callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
+
+    def _instantiate(self) -> None:
+        self.fmi.instantiate(callbacks=self._callbacks, loggingOn=False)
+
+    def _log(
+        self, _environment: int, _instance: bytes, status: int, _category: bytes, message: bytes
+    ) -> None:
+        self._keep_unless_ok(status, message)
+
+    def set_up(self, start: float, stop: float | None, tolerance: float | None = None) -> None:
+        with self.explained("in initialization"):
+            self.fmi.setupExperiment(tolerance=tolerance, startTime=start, stopTime=stop)
+
+    def enter_initialization(self) -> None:
+        with self.explained("in initialization"):
+            self.fmi.enterInitializationMode()
+
+    def _integer(self, reference: int) -> int:
+        return self.fmi.getInteger([reference])[0]
+
+    def _real_calls(self, references: Array, values: Array) -> tuple[Call, Call]:
+        fmi, arguments = self.fmi, (self.fmi.component, references, len(references), values)
+        return partial(fmi.fmi2GetReal, *arguments), partial(fmi.fmi2SetReal, *arguments)
+
+    def _derivative_call(self, references: Array, orders: Array, values: Array) -> Call:
+        arguments = self.fmi.component, references, len(references), orders, values
+        return partial(self.fmi.fmi2GetRealOutputDerivatives, *arguments)
+
+    def input_polynomials(self, names: Sequence[str], order: int) -> InputPolynomials:
+        fmi, count = self.fmi, len(names)
+        memory, numbers = doubles(count * (order + 1))
+        rows = numbers.reshape(order + 1, count)
+        set_values = self.reals(names, (c_double * count).from_buffer(memory)).set
+        further = count * order
+        if not further:
+            return InputPolynomials(rows, set_values)
+        set_derivatives = partial(
+            fmi.fmi2SetRealInputDerivatives,
+            fmi.component,
+            self._references([*names] * order),
+            further,
+            (fmi2.fmi2Integer * further)(*np.repeat(np.arange(1, order + 1), count).tolist()),
+            (c_double * further).from_buffer(memory, count * sizeof(c_double)),
+        )
+
+        def set_all() -> None:
+            set_values()
+            set_derivatives()
+
+        return InputPolynomials(rows, set_all)
+
+    def do_step(self, start: float, length: float, goes_back: bool = False) -> None:
+        final = fmi2.fmi2False if goes_back else fmi2.fmi2True
+        self.fmi.fmi2DoStep(self.fmi.component, start, length, final)
+
+    def saved_state(self) -> SavedState:
+        fmi = self.fmi
+        return SavedState(
+            fmi.component, fmi.fmi2GetFMUstate, fmi.fmi2SetFMUstate, fmi.fmi2FreeFMUstate
+        )
+
+
+class Fmi3Instance(Instance):
+    """An instance of an FMU of FMI 3.0.
+
+    FMI 3.0 has no derivatives of inputs: in a step, the FMU asks for the values of the inputs at
+    times inside of it (intermediate update), and is given those of the polynomials or functions.
+    """
+
+    PLATFORMS = (fmpy.platform_tuple,)
+    LIBRARY = fmi3.FMU3Slave
+    INSTANTIATE = "fmi3InstantiateCoSimulation"
+    MARKS = r"##|#()(\d+)#"  # references: FMI 3.0, section 2.2.3
+    SETTERS = {
+        "Real": "setFloat64",
+        "Integer": "setInt32",
+        "Enumeration": "setInt64",
+        "Boolean": "setBoolean",
+        "String": "setString",
+    }
+
+    def _instantiate(self) -> None:
+        fmi, smooth = self.fmi, bool(self.smooth_inputs)
+        fmi.instantiate(
+            logMessage=self._log,
+            intermediateUpdate=self._update if smooth else None,
+            requiredIntermediateVariables=self._references(self.smooth_inputs) if smooth else None,
+        )
+        self._log_warnings()
+        self._inputs: Callable[[float], object] | None = None  # sets those of a time in a step, s
+        self._start = 0.0  # s, of the present step
+        self._raised: BaseException | None = None  # in a callback, where it would be lost
+
+        # what a step reports
+        self._terminates = fmi3.fmi3Boolean()
+        self._time = fmi3.fmi3Float64()  # that it has reached, s
+        self._event, self._early = fmi3.fmi3Boolean(), fmi3.fmi3Boolean()
+        results = (self._event, self._terminates, self._early, self._time)
+        self._results = tuple(map(byref, results))
+
+    def _log_warnings(self) -> None:
+        logged = [name for name in LOGGED if name in self.fmu.log_categories]
+        if logged:
+            with suppress(FMICallException):  # messages are not worth a run
+                self.fmi.setDebugLogging(True, logged)
+
+    def _log(self, _environment: int, status: int, _category: bytes, message: bytes) -> None:
+        self._keep_unless_ok(status, message)
+
+    def set_up(self, start: float, stop: float | None, tolerance: float | None = None) -> None:
+        self._experiment = tolerance, start, stop
+
+    def enter_initialization(self) -> None:
+        with self.explained("in initialization"):
+            self.fmi.enterInitializationMode(*self._experiment)
+
+    def _integer(self, reference: int) -> int:
+        return self.fmi.getInt32([reference])[0]
+
+    def _real_calls(self, references: Array, values: Array) -> tuple[Call, Call]:
+        fmi, count = self.fmi, len(references)
+        arguments = fmi.component, references, count, values, count
+        return partial(fmi.fmi3GetFloat64, *arguments), partial(fmi.fmi3SetFloat64, *arguments)
+
+    def _derivative_call(self, references: Array, orders: Array, values: Array) -> Call:
+        count = len(references)
+        arguments = self.fmi.component, references, count, orders, values, count
+        return partial(self.fmi.fmi3GetOutputDerivatives, *arguments)
+
+    def input_polynomials(self, names: Sequence[str], order: int) -> InputPolynomials:
+        coefficients = np.zeros((order + 1, len(names)))
+        inputs, powers = self.reals(names), np.arange(order + 1)
+        factorials = np.array([math.factorial(power) for power in powers], dtype=float)
+
+        def set_in_step(time: float) -> None:
+            elapsed = time - self._start
+            inputs.view[:] = elapsed**powers / factorials @ coefficients
+            inputs.set()
+
+        def set_all() -> None:
+            set_in_step(self._start)
+            self._inputs = set_in_step if order else None
+
+        return InputPolynomials(coefficients, set_all)
+
+    def input_functions(
+        self, names: Sequence[str], values: Callable[[float], Sequence[float] | np.ndarray]
+    ) -> None:
+        """Let Real inputs, of `smooth_inputs`, be functions of time (s) in all further steps."""
+        inputs = self.reals(names)
+
+        def set_in_step(time: float) -> None:
+            inputs.view[:] = values(time)
+            inputs.set()
+
+        self._inputs = set_in_step
+
+    def _update(self, _environment: int, time: float, set_requested: bool, *_: object) -> None:
+        """Called by the FMU within a step."""
+        if not set_requested or self._inputs is None:
+            return
+        try:
+            self._inputs(time)
+        except BaseException as error:  # Ctrl-C, too
+            self._raised = error
+
+    def do_step(self, start: float, length: float, goes_back: bool = False) -> None:
+        final = fmi3.fmi3False if goes_back else fmi3.fmi3True
+        self._start = start
+        try:
+            self.fmi.fmi3DoStep(self.fmi.component, start, length, final, *self._results)
+        finally:
+            if self._raised is not None:
+                error, self._raised = self._raised, None
+                raise error
+        if self._terminates.value:
+            time = self._time.value
+            raise UserError(f"{self.name}: the FMU ends the simulation at t = {time!r} s")
+
+    def saved_state(self) -> SavedState:
+        fmi = self.fmi
+        return SavedState(
+            fmi.component, fmi.fmi3GetFMUState, fmi.fmi3SetFMUState, fmi.fmi3FreeFMUState
+        )
+
+
+class _ModelExchange(Instance):
+    """Ends initialization in continuous-time mode, after all events of the start."""
+
+    next_event: float | None = None  # s, of the next time event
+
+    def exit_initialization(self) -> None:
+        super().exit_initialization()
+        with self.explained("at the events of the start"):
+            for _ in range(MOST_UPDATES):
+                needed, terminates, _, _, has_next, time = self._update_discrete_states()
+                if terminates:
+                    raise UserError(f"{self.name}: the FMU ends the simulation at its start")
+                if not needed:
+                    break
+            else:
+                raise UserError(f"{self.name}: its discrete states do not settle at the start")
+            self.fmi.enterContinuousTimeMode()
+        self.next_event = time if has_next else None
+
+
+class Fmi2ModelExchange(_ModelExchange, Fmi2Instance):
+    LIBRARY = fmi2.FMU2Model
+
+    def _update_discrete_states(self) -> tuple:
+        return self.fmi.newDiscreteStates()
+
+
+class Fmi3ModelExchange(_ModelExchange, Fmi3Instance):
+    LIBRARY = fmi3.FMU3Model
+    INSTANTIATE = "fmi3InstantiateModelExchange"
+
+    def _instantiate(self) -> None:
+        self.fmi.instantiate(logMessage=self._log)
+        self._log_warnings()
+
+    def _update_discrete_states(self) -> tuple:
+        return self.fmi.updateDiscreteStates()

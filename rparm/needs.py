@@ -1,0 +1,130 @@
+"""The commands: what each is for, where its code is, and what has to be there before it runs.
+
+`run.sh` asks this file before there is an environment: `python3 -P rparm/needs.py ARGUMENT ...`.
+So it imports the standard library only.
+"""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command of `rparm` or `run.sh`."""
+
+    text: str  # for help
+    module: str  # of rparm.commands
+    extra: str = ""  # of the distribution, that has its packages
+    lock: str = ""  # requirements/LOCK.txt, which setup.sh installs beside run.txt
+    target: str = "all"  # of CMake, that is built before; empty: nothing
+
+
+COMMANDS = {
+    "run": Command("simulate scenarios, check them, write a report; the default", "run"),
+    "new": Command("write a scenario to start from", "files"),
+    "build": Command("make FMUs of a file with equations", "files"),
+    "new-model": Command("write a file with equations to start from", "files", target=""),
+    "list": Command("name the scenarios", "files", target=""),
+    "system": Command("run systems in Ecos, check them, write a report", "system", "system"),
+    "coupling": Command(
+        "study how far co-simulation of a system is from its exact solution", "system", "system"
+    ),
+    "linearize": Command(
+        "find an equilibrium, a linear model, margins, the largest step",
+        "linearize", "control", "control",
+    ),
+    "identify": Command(
+        "find parameters that fit logs of a machine", "identify", "control", "control"
+    ),
+    "campaign": Command(
+        "run a scenario or a system many times, over parameters",
+        "campaign", "campaign", "campaign",
+    ),
+    "federation": Command(
+        "run a system with each FMU in its own process, coupled by HELICS",
+        "federation", "federation", "federation",
+    ),
+    "federate": Command(
+        "step one component in a federation of another machine",
+        "federation", "federation", "federation", target="",
+    ),
+    "prove": Command("bound the errors of runs and references by theorem", "prove"),
+    "playground": Command(
+        "say where the page with the plant is, for a browser",
+        "files", lock="release", target="playground",
+    ),
+    "fmu": Command("copy an FMU, for another tool", "files"),
+    "completion": Command(
+        "print what makes a shell complete these commands", "completion", target=""
+    ),
+}  # fmt: skip
+DEFAULT = "run"  # what names and options without a command are for
+COMMON = ("--json", "--quiet")  # may stand in front of the command
+HELP = ("help", "--help", "-h")
+VERSION = "--version"
+
+NO_READER = 141  # 128 + SIGPIPE, which not every system has
+EXIT_CODES = (
+    "exit codes: 0 all well, 1 a result is bad, 2 wrong use or failure, 130 Ctrl-C,\n"
+    f"{NO_READER} whoever read the output has left, as head does"
+)
+OVERVIEW = f"""usage: {{program}} [COMMAND] [OPTION ...]
+       {{program}} help COMMAND
+
+Simulates scenarios on co-simulation FMUs and checks them against references.
+
+commands:
+{{commands}}
+
+options of all commands:
+  --json        print one JSON document, and all else on standard error
+  --quiet       print the last line only, and what is wrong
+  --output DIR  write into this folder
+  --open        then show what was written in a browser
+
+{{program}} {VERSION} prints the version.
+{EXIT_CODES}"""
+
+
+def overview(program: str) -> str:
+    """Return the help on everything: the commands in a line each."""
+    width = max(map(len, COMMANDS))
+    lines = (f"  {name:<{width}}  {command.text}" for name, command in COMMANDS.items())
+    return OVERVIEW.format(program=program, commands="\n".join(lines))
+
+
+def is_scenario(name: str, models: Path) -> bool:
+    """Return whether it is an option, a file, or the name of a scenario: `run` takes these."""
+    files = models.glob("*/scenarios/*.toml")
+    return name.startswith("-") or name.lower().endswith(".toml") or name in {x.stem for x in files}
+
+
+def plan(arguments: Sequence[str], models: Path) -> list[str]:
+    """Return the words that run.sh reads.
+
+    They are the lock to install ("-": none), the target to build ("-": none), "yes" or "no" for
+    --quiet and for --json, and the command to put in front of the arguments ("-": none). The target
+    "overview" asks for the help on everything.
+    """
+    end = arguments.index("--") if "--" in arguments else len(arguments)
+    options = arguments[:end]
+    first, *rest = [x for x in options if x not in COMMON] or [""]
+    lock, target = "", ""
+    if first in HELP:
+        target = "" if rest or "--json" in options else "overview"
+    elif first in COMMANDS or not first or is_scenario(first, models):
+        known = COMMANDS.get(first or DEFAULT, COMMANDS[DEFAULT])
+        is_list = first in ("--list", VERSION) or (first == DEFAULT and "--list" in rest)
+        if not (is_list or {"--help", "-h"} & set(rest)):
+            lock, target = known.lock, known.target
+    flags = ["yes" if option in options else "no" for option in ("--quiet", "--json")]
+    return [lock or "-", target or "-", *flags, "-" if first else DEFAULT]
+
+
+if __name__ == "__main__":
+    words = plan(sys.argv[1:], Path(__file__).parents[1] / "models")
+    print(*words)
+    if "overview" in words:
+        print(overview("./run.sh"))

@@ -1,1 +1,0 @@
-"""What commands print: tables, progress, and documents for programs."""

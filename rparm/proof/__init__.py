@@ -1,1 +1,0 @@
-"""Intervals that contain the exact motion, and the proven errors of runs."""

@@ -1,1 +1,0 @@
-"""Scenarios: read and checked against the models they are of."""

@@ -1,1 +1,0 @@
-"""Systems of FMUs as SSPs: read, checked, run in Ecos, compared with their references."""

@@ -1,0 +1,232 @@
+"""Runs of a system's variants compared with references; what study.py in its folder must define."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, cast
+
+import numpy as np
+
+from rparm import files, project
+from rparm.errors import UserError
+from rparm.files import is_file
+from rparm.runs import comparison
+from rparm.runs.comparison import Compared, Summed
+from rparm.systems import ecos
+from rparm.systems.ssp import Ssp
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+BOUND = 1e-7  # on the relative error of every variable
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """Reference of one variant, at some of the communication points."""
+
+    path: Path
+    steps: np.ndarray  # (rows,) the step after which each row is read, 0: the start
+    columns: dict[str, np.ndarray]  # (rows,) by component.variable
+    summed: Summed
+
+    def scale(self, name: str) -> float:
+        """What an error of the variable is divided by, in its unit."""
+        return comparison.error_scale(self.columns, name, self.summed)
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome(Compared):
+    """A run of one variant, and how far it is from its reference."""
+
+    variant: str
+    steps: int
+    run: ecos.Run
+    errors: dict[str, float]  # largest of each variable, relative
+
+    @property
+    def passed(self) -> bool:
+        return self.error <= BOUND
+
+    def column(self, name: str) -> np.ndarray:
+        """Values of one variable, (rows,)."""
+        return self.run.values[:, self.run.names.index(name)]
+
+
+def recorded(ssp: Ssp) -> list[str]:
+    """All Real outputs of all components, then the continuous states that are no outputs."""
+    outputs, states = [], []
+    for component, model in ssp.models.items():
+        outputs += [f"{component}.{name}" for name in model.real_outputs]
+        states += [f"{component}.{name}" for name in model.states]
+    return list(dict.fromkeys((*outputs, *states)))
+
+
+def discrete(ssp: Ssp) -> list[str]:
+    """All Integer and Boolean outputs of all components; references may have them or not."""
+    return [
+        f"{component}.{variable.name}"
+        for component, model in ssp.models.items()
+        for variable in model.variables.values()
+        if variable.causality == "output" and variable.type in ("Integer", "Boolean")
+    ]
+
+
+def simulate(
+    ssp: Ssp,
+    variant: str,
+    expected: Reference,
+    engine: Callable[[Ssp, str, Sequence[str]], ecos.Run] = ecos.run,
+) -> Outcome:
+    """Run a variant and compare it; UserError if a component or the engine fails."""
+    run = engine(ssp, variant, [*recorded(ssp), *discrete(ssp)])
+    errors = {}
+    for name, values in expected.columns.items():
+        actual = run.values[expected.steps, run.names.index(name)]
+        errors[name] = float(np.abs(actual - values).max()) / expected.scale(name)
+    return Outcome(variant, ssp.system.steps, run, errors)
+
+
+def reference_names(system: Path) -> list[str]:
+    """Variants that the folder of a system has references of."""
+    folder = project.references(system)
+    return sorted(path.name for path in folder.glob("*") if path.is_dir())
+
+
+def load_reference(
+    ssp: Ssp, variant: str, system: Path, experiment: tuple[float, float, float]
+) -> Reference:
+    """Read and check the reference of a variant of the system in a folder.
+
+    References are for `experiment`: start, stop and step in s. UserError if the file is missing,
+    damaged, or not of this system; names the line and the command that makes references.
+    """
+    _check_experiment(ssp, experiment)
+    path = project.variant_reference_file(system, variant)
+    wrong = comparison.reference_failure(path, system, variant)
+    (_, *names), table = files.read_trajectory(path, wrong)
+    known = recorded(ssp)
+    possible = {*known, *discrete(ssp)}
+    for name in names:
+        if name not in possible or names.count(name) > 1:
+            raise wrong(f"column {name!r} is unknown or there twice", 1)
+    for name in known:
+        if name not in names:
+            raise wrong(f"has no column {name!r}", 1)
+    steps = _steps(ssp, table[:, 0], wrong)
+    values = dict(zip(names, table[:, 1:].T, strict=True))
+    return Reference(path, steps, values, comparison.read_summed(system))
+
+
+def _steps(ssp: Ssp, times: np.ndarray, wrong: files.Failure) -> np.ndarray:
+    """Numbers of the communication points at `times`, (rows,)."""
+    system = ssp.system
+    steps = np.rint((times - system.start) / system.step).astype(int)
+    off = np.abs(times - (system.start + steps * system.step)) > 1e-6 * system.step
+    off |= (steps < 0) | (steps > system.steps) | (np.diff(steps, prepend=-1) <= 0)
+    if off.any():
+        row = int(np.flatnonzero(off)[0])
+        raise wrong(f"no communication point: {float(times[row])!r} s", row + 2)
+    if steps[-1] != system.steps:
+        raise wrong(f"ends before {system.stop!r} s", len(steps) + 1)
+    return steps
+
+
+def _check_experiment(ssp: Ssp, experiment: tuple[float, float, float]) -> None:
+    """Check that the references are those of the system's times."""
+    system = ssp.system
+    if not np.allclose((system.start, system.stop, system.step), experiment, rtol=1e-9, atol=0.0):
+        start, stop, step = experiment
+        raise UserError(
+            f"{ssp.path}: runs from {system.start!r} to {system.stop!r} s in steps of "
+            f"{system.step!r} s; the references are for {start!r} to {stop!r} s in steps of "
+            f"{step!r} s"
+        )
+
+
+# ---- study.py of a system ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A number that a run is measured by, for the tables."""
+
+    name: str
+    unit: str
+    meaning: str  # explains it on the page, after its name and a colon
+    value: Callable[[Outcome], float]
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """Variables of one unit to draw together, each ``component.variable``."""
+
+    title: str
+    curves: Sequence[str]
+    references: Mapping[str, str] = field(default_factory=dict)  # what a curve should follow
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Where a system rests, to find its largest stable steps; names are ``component.variable``."""
+
+    variant: str
+    moved: Sequence[str]  # states to begin a little off
+    signals: Sequence[str]  # that show whether the deviation dies out
+    values: Mapping[str, float] = field(default_factory=dict)  # besides those of the variant
+    without: Sequence[str] = ()  # components to take as ideal
+    sequence: Sequence[str] = ()  # order of stepping; default: that of the SSP
+
+
+class Study(Protocol):
+    """The module study.py of a system's folder."""
+
+    EXPERIMENT: tuple[float, float, float]  # start, stop and step in s that the references are for
+    MEASURES: Sequence[Measure]
+    DIAGRAMS: Sequence[Diagram]  # of the page of a variant
+
+    def figure(self, ssp: Ssp, outcome: Outcome) -> "Figure":
+        """Picture of a run of one variant, for READMEs."""
+        ...
+
+
+class CouplingStudy(Study, Protocol):
+    """The module of a system that has a study of what the coupling costs."""
+
+    COUPLING_PICTURE: str  # file name of what it draws
+
+    def study_coupling(self, ssp: Path, report: Path) -> dict[str, dict[str, object]]:
+        """Print tables, write the picture; numbers by part, whether all is well is ``passed``."""
+        ...
+
+
+def load_study(folder: Path) -> Study:
+    """The module of a system's folder; UserError if there is none."""
+    file = folder / f"{project.STUDY}.py"
+    if not is_file(file):
+        raise UserError(
+            f"{file}: no such file, rparm/systems/comparison.py says what belongs in it"
+        )
+    return cast(Study, import_module(f"rparm.models.{folder.name}.{project.STUDY}"))
+
+
+def coupling_study() -> tuple[Path, CouplingStudy]:
+    """Folder and module of the one system that has a study of its coupling; else UserError."""
+    found = _studies_with("study_coupling")
+    if len(found) != 1:
+        names = ", ".join(folder.name for folder in found) or "none"
+        raise UserError(f"expected one system with a study of its coupling, found {names}")
+    (folder, known), *_ = found.items()
+    return folder, cast(CouplingStudy, known)
+
+
+def rests() -> dict[Path, Rest]:
+    """Where systems rest, by folder, of those that define ``REST``."""
+    return {folder: cast(Rest, known.REST) for folder, known in _studies_with("REST").items()}
+
+
+def _studies_with(name: str) -> dict[Path, Any]:
+    """Modules of systems that have this name, by folder."""
+    loaded = {folder: load_study(folder) for folder in project.systems().values()}
+    return {folder: known for folder, known in loaded.items() if hasattr(known, name)}

@@ -1,0 +1,295 @@
+"""Runs a system in Ecos, in a child process.
+
+Ecos continues when a component fails, says so in its log only at level debug, and leaves its
+temporary files behind. So the run is a child process whose log is read and whose temporary folder
+is removed: `python -m rparm.systems.ecos FOLDER` is that child.
+"""
+
+import ctypes
+import json
+import os
+import platform
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from importlib.metadata import PackageNotFoundError, files
+from importlib.util import find_spec
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rparm import project
+from rparm.errors import StoppedError, UserError, one_line
+from rparm.interruption import run_group, temporary_folder
+
+if TYPE_CHECKING:
+    from rparm.systems.ssp import Ssp
+
+PLAN, ROWS, DONE, LOG = "plan.json", "rows.npy", "done.json", "ecos.log"
+# of an instance: [path of its FMU] fmi2Status text, [its name] Status text in FMI 3.0
+MESSAGE = re.compile(
+    r"(\[(?P<fmu>[^\]]*\.fmu)\] fmi2|\[debug\] \[(?P<component>[^\]]*)\] )"
+    r"(?P<status>OK|Warning|Discard|Error|Fatal) (?P<text>.*)"
+)
+BAD = ("Discard", "Error", "Fatal")
+# what FMUs say of their solver at the end of a run, and how a table calls it
+STATISTICS = {
+    "solver_steps": "solver steps",
+    "solver_rhs_evaluations": "evaluations",
+    "solver_restarts": "restarts",
+    "solver_failed_steps": "failed steps",
+    "effective_relative_tolerance": "effective tolerance",
+}
+READERS = {"Real": "get_real", "Integer": "get_integer", "Boolean": "get_bool"}  # of Ecos, by type
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Results of Ecos: row i holds the values read after step i."""
+
+    names: tuple[str, ...]  # component.variable
+    times: np.ndarray  # (rows,) s
+    values: np.ndarray  # (rows, len(names)) in the variables' units; Booleans are 0 or 1
+    wall_time: float  # s, of the steps with the reading
+    messages: tuple[str, ...]  # warnings of the components
+    # those of STATISTICS that components have, by component.variable
+    statistics: Mapping[str, float] = field(default_factory=dict)
+
+
+def absent() -> str:
+    """Why Ecos cannot run here, or nothing."""
+    if find_spec("ecospy") is None:
+        return "ecospy is not installed"
+    here = sys.platform, platform.machine().lower()
+    if here not in (("linux", "x86_64"), ("win32", "amd64")):
+        return "ecospy has libraries for Linux and Windows on x86-64 only"
+    return ""
+
+
+def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
+    """Run a system from its start to its stop time with one of its parameter sets.
+
+    Reads the Real, Integer or Boolean variables ``component.variable``. UserError if a component
+    fails or gives a value that is not finite (the text names component, variable and time), or if
+    Ecos itself fails. After the start it is a `StoppedError`.
+    """
+    system = ssp.system
+    if variant not in system.parameters:
+        raise UserError(f"{ssp.path}: has no parameter set {variant!r}")
+    _check_parameters(ssp, variant)
+    statistics = said_at_end(ssp)
+    with temporary_folder() as folder:
+        plan = {
+            "ssp": str(_as_ecos_opens(ssp.path.resolve(), folder)),
+            "variant": variant if system.has_sets else None,
+            "variables": _to_read(ssp, names),
+            "statistics": _to_read(ssp, statistics),
+            "start": system.start,
+            "step": system.step,
+            "steps": system.steps,
+        }
+        (folder / PLAN).write_text(json.dumps(plan), encoding="utf-8", newline="\n")
+        code = _start(folder)
+        log = (folder / LOG).read_text(encoding="utf-8", errors="replace")
+        if code != 0:
+            last = next((line for line in reversed(log.splitlines()) if line.strip()), "no output")
+            raise UserError(f"{ssp.path}: {variant}: Ecos failed (exit code {code}): {last}")
+        values = np.load(folder / ROWS)
+        done = json.loads((folder / DONE).read_text(encoding="utf-8"))
+    times = system.start + system.step * np.arange(len(values))
+    messages = [match for match in map(MESSAGE.search, log.splitlines()) if match]
+    warnings = [f"{_sender(ssp, m)}: {m['text']}" for m in messages if m["status"] not in BAD]
+    result = Run(
+        tuple(names),
+        times,
+        values,
+        done["wall_time"],
+        tuple(dict.fromkeys(warnings)),
+        dict(zip(statistics, done["statistics"], strict=True)),
+    )
+    try:
+        _check_values(ssp, variant, names, times, values)
+        _check_messages(ssp, variant, times, messages)
+    except UserError as error:  # what was read after the last step is not to be trusted
+        before = replace(result, times=times[:-1], values=values[:-1], statistics={})
+        raise StoppedError(str(error), before if len(times) > 1 else None) from None
+    return result
+
+
+def said_at_end(ssp: "Ssp") -> list[str]:
+    """What the components have of STATISTICS, as ``component.variable``."""
+    return [
+        f"{component}.{name}"
+        for component, model in ssp.models.items()
+        for name in STATISTICS
+        if name in model.variables
+    ]
+
+
+def _check_messages(
+    ssp: "Ssp", variant: str, times: np.ndarray, messages: Sequence[re.Match[str]]
+) -> None:
+    """Refuse a run in which a component has failed, or that Ecos has stopped."""
+    for match in messages:
+        if match["status"] in BAD:
+            where = f"{variant}: component {_sender(ssp, match)}"
+            when = "in initialization" if len(times) == 1 else f"by t = {times[-1]:.6g} s"
+            raise UserError(f"{where} failed {when} ({match['status'].lower()}): {match['text']}")
+    if len(times) != ssp.system.steps + 1:
+        raise UserError(f"{ssp.path}: {variant}: Ecos stopped at t = {times[-1]:.6g} s")
+
+
+def _to_read(ssp: "Ssp", names: Sequence[str]) -> list[tuple[str, str]]:
+    """Names of variables as Ecos has them, each after the name of its reader."""
+    return [(READERS[ssp.variable(name).type], name.replace(".", "::", 1)) for name in names]
+
+
+def _check_parameters(ssp: "Ssp", variant: str) -> None:
+    """Refuse what Ecos would leave out with a warning in its log only: Enumerations."""
+    for component, values in ssp.system.parameters[variant].items():
+        model = ssp.models[component]
+        for name in values:
+            if model.variables[name].type == "Enumeration":
+                raise UserError(
+                    f"{ssp.path}: parameter set {variant!r}: component {component!r}: {name!r} is "
+                    "an Enumeration, which Ecos does not set"
+                )
+
+
+def _as_ecos_opens(path: Path, folder: Path) -> Path:
+    """The file, or a copy of it in a folder: Ecos opens no name that is not UTF-8."""
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        return Path(shutil.copy(path, folder / "system.ssp"))
+    return path
+
+
+def _start(folder: Path) -> int:
+    """Run the child; its exit code."""
+    temporary = dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(folder))  # the last two: on Windows
+    environment = project.child_environment() | temporary | {"PYTHONUNBUFFERED": "1"}
+    if os.name == "posix" and shutil.which("unzip") is None:
+        environment["PATH"] = f"{_unzip(folder)}:{environment.get('PATH', os.defpath)}"
+    with (folder / LOG).open("wb") as log:
+        return run_group(
+            [sys.executable, "-P", "-m", "rparm.systems.ecos", str(folder)],
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            env=environment,
+        ).returncode
+
+
+def _unzip(folder: Path) -> Path:
+    """A folder with a command that does what Ecos wants of unzip: unzip -o ARCHIVE -d FOLDER."""
+    command = folder / "programs" / "unzip"
+    command.parent.mkdir()
+    python, extract = shlex.quote(sys.executable), "import sys, zipfile as z; "
+    extract += "z.ZipFile(sys.argv[1]).extractall(sys.argv[2])"
+    command.write_text(
+        f'#!/bin/sh\nexec {python} -I -c "{extract}" "$2" "$4"\n', encoding="utf-8", newline="\n"
+    )
+    command.chmod(0o755)
+    return command.parent
+
+
+def _sender(ssp: "Ssp", message: re.Match[str]) -> str:
+    """Name of the component that a message is of."""
+    component = message["component"]
+    return repr(component) if component is not None else _components(ssp, message["fmu"])
+
+
+def _components(ssp: "Ssp", fmu: str) -> str:
+    """Name of the component whose FMU it is: of FMI 2.0, Ecos's log names only the FMU."""
+    fmu = fmu.replace("\\", "/")  # a path of Windows
+    names = [c.name for c in ssp.system.components if fmu.endswith("/" + c.source)]
+    return " or ".join(map(repr, names)) or repr(PurePosixPath(fmu).name)
+
+
+def _check_values(
+    ssp: "Ssp", variant: str, names: Sequence[str], times: np.ndarray, values: np.ndarray
+) -> None:
+    """UserError if a value is not finite: it names the component that the first of them is from.
+
+    `values` are (times, names); each name is component.variable.
+    """
+    bad_rows = np.flatnonzero(~np.isfinite(values).all(axis=1))
+    if not len(bad_rows):
+        return
+    row = bad_rows[0]
+    bad = [name for name, value in zip(names, values[row], strict=True) if not np.isfinite(value)]
+    # a component passes on a bad input in the same step
+    victims = {
+        connection.end_component
+        for connection in ssp.system.connections
+        if f"{connection.start_component}.{connection.start_connector}" in bad
+    }
+    sources = [name for name in bad if name.partition(".")[0] not in victims]
+    component, _, variable = (sources or bad)[0].partition(".")
+    value = values[row, list(names).index(f"{component}.{variable}")]
+    raise UserError(
+        f"{variant}: component {component!r}: {variable!r} is {value} at t = {times[row]:.6g} s"
+    )
+
+
+# ---- the child
+def _child(folder: Path) -> None:
+    """Run the plan of the folder, until a value is not finite or a component has complained."""
+    _load_tbb()
+    try:
+        from ecospy import EcosLib, EcosSimulation
+    except (ImportError, OSError) as error:
+        sys.exit(f"ecospy cannot be loaded: {one_line(error)}")
+
+    plan = json.loads((folder / PLAN).read_text(encoding="utf-8"))
+    steps = plan["steps"]
+    EcosLib.set_log_level("debug")
+    rows = np.empty((steps + 1, len(plan["variables"])))
+    flush = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None).fflush
+    seen = 0
+
+    def go_on(row: int) -> bool:
+        nonlocal seen
+        rows[row] = [read(name) for read, name in readers]
+        flush(None)
+        if os.fstat(1).st_size != seen:  # the log has grown, which is rare
+            log = (folder / LOG).read_text(encoding="utf-8", errors="replace")
+            seen = os.fstat(1).st_size
+            if any(match["status"] in BAD for match in MESSAGE.finditer(log)):
+                return False
+        return bool(np.isfinite(rows[row]).all())
+
+    with EcosSimulation(step_size=plan["step"], ssp_path=plan["ssp"]) as simulation:
+        if not simulation.init(start_time=plan["start"], parameter_set=plan["variant"]):
+            raise RuntimeError(EcosLib.get_last_error())
+        readers = [(getattr(simulation, reader), name) for reader, name in plan["variables"]]
+        row, begin = 0, time.perf_counter()
+        while go_on(row) and row < steps:
+            simulation.step()
+            row += 1
+        wall_time = time.perf_counter() - begin
+        statistics = [getattr(simulation, reader)(name) for reader, name in plan["statistics"]]
+        simulation.terminate()
+    np.save(folder / ROWS, rows[: row + 1])
+    done = json.dumps({"wall_time": wall_time, "statistics": statistics})
+    (folder / DONE).write_text(done, encoding="utf-8", newline="\n")
+
+
+def _load_tbb() -> None:
+    """Load the library that Ecos links, where it is a package of Python and not of the system."""
+    with suppress(PackageNotFoundError):
+        for file in files("tbb") or ():
+            if file.name in ("libtbb.so.12", "tbb12.dll"):
+                ctypes.CDLL(str(file.locate()), mode=ctypes.RTLD_GLOBAL)
+
+
+if __name__ == "__main__":
+    _child(Path(sys.argv[1]))

@@ -1,0 +1,505 @@
+"""A master that steps connected FMUs.
+
+Every component is an instance of an FMU; connections lead from Real outputs to Real inputs, or from
+Boolean outputs to Boolean inputs. Other inputs keep their values from before initialization. In
+Jacobi order all components make a step, then all outputs are read; each step takes its inputs from
+what was read at its beginning. In Gauss-Seidel order the components step one after the other, and
+each takes the newest outputs: those of the end of the step from components before it, those of its
+beginning from itself and the components behind it.
+
+Inputs keep their values over a step, a zero-order hold ("held"), or are straight lines through the
+value of their source at the time at which it was read, with its slope there: in Jacobi order they
+extrapolate from the beginning of the step, in Gauss-Seidel order those from components before it
+meet value and slope at the end of the step. FMI 3.0 knows slopes of inputs only within a step: at
+the start, those of outputs miss what they owe to the slopes of inputs.
+
+A Boolean that has changed in a step is passed on at the end of the step, in both orders. Then all
+values jump to what follows from it at this time, as at the start.
+"""
+
+import time
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack
+from ctypes import Array, c_double, sizeof
+
+import numpy as np
+from fmpy.fmi1 import FMICallException
+
+from rparm.errors import UserError, placed
+from rparm.fmi.fmi_instance import Instance, Reals, UnpackedFmu
+from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.model import INPUTS, Value
+from rparm.systems.ecos import Run, said_at_end
+from rparm.systems.ssp import Connection, Ssp
+
+ORDERS = ("jacobi", "gauss_seidel")
+INPUT_MODES = ("held", "extrapolated")
+
+
+# ---- Components ----------------------------------------------------------------------------------
+
+
+class ConnectedInstance:
+    """An instance, its place among the system's values, and the sources of its inputs.
+
+    Of `values` and their derivatives with respect to time, `slopes`, those from `first` on belong
+    to its outputs, of which some are `feeding` inputs. Each input has a source, an index among
+    them, which steps `ahead` of this component or not.
+    """
+
+    def __init__(
+        self,
+        instance: Instance,
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        first: int,
+        feeding: Collection[str],
+        sources: Sequence[int],
+        ahead: Sequence[bool],
+        values: Array,
+        slopes: np.ndarray,
+    ) -> None:
+        self.instance = instance
+        self.sources = np.array(sources, dtype=int)
+        self.ahead = np.array(ahead, dtype=bool)
+        memory = (c_double * len(outputs)).from_buffer(values, first * sizeof(c_double))
+        self.outputs = instance.reals(outputs, memory)
+        self.inputs = instance.reals(inputs)
+        self._lines = instance.input_polynomials(inputs, 1)
+        connected = [i for i, name in enumerate(outputs) if name in feeding]
+        self._output_slopes = instance.output_derivatives([outputs[i] for i in connected], 1)
+        self._slopes = slopes
+        self._slope_indices = first + np.array(connected, dtype=int)
+
+    @property
+    def name(self) -> str:
+        return self.instance.name
+
+    def begin(self, start: float, stop: float | None, parameters: Mapping[str, Value]) -> None:
+        for name in self.inputs.names:
+            if name in parameters:
+                raise UserError(f"{self.name}.{name}: is fed by a connection, which says its value")
+        begin_instance(self.instance, start, stop, parameters)
+
+    def set_inputs(self, values: np.ndarray) -> None:
+        """Set the inputs, (inputs,), in their units."""
+        self.inputs.view[:] = values
+        self.inputs.set()
+
+    def set_lines(self, values: np.ndarray, slopes: np.ndarray) -> None:
+        """Set the inputs and their derivatives with respect to time, (inputs,) each."""
+        self._lines.view[:] = values, slopes
+        self._lines.set()
+
+    def read(self) -> None:
+        self.outputs.get()
+
+    def read_slopes(self) -> None:
+        self._output_slopes.get()
+        self._slopes[self._slope_indices] = self._output_slopes.view
+
+
+def begin_instance(
+    instance: Instance, start: float, stop: float | None, parameters: Mapping[str, Value]
+) -> None:
+    instance.set_up(start, stop)
+    for name, value in parameters.items():
+        instance.set(name, start_value(instance.fmu, instance.name, name, value))
+    instance.enter_initialization()
+
+
+def check_finite(component: str, outputs: Reals, when: str) -> None:
+    bad = np.flatnonzero(~np.isfinite(outputs.view))
+    if len(bad):
+        name, value = f"{component}.{outputs.names[bad[0]]}", outputs.view[bad[0]]
+        raise UserError(f"{name} is {value} {when}: a finite value is expected")
+
+
+def start_value(fmu: UnpackedFmu, component: str, name: str, value: Value) -> Value:
+    """Value to set before initialization, an item as its number; UserError if it cannot be set."""
+    variable = fmu.model.variables.get(name)
+    if variable is None or not (variable.can_start or variable.is_a(INPUTS)):
+        raise UserError(f"{component}: {fmu.path} has no parameter {name!r}")
+    is_item = variable.type == "Enumeration" and isinstance(value, str)
+    if not is_item and variable.type != "Boolean":
+        return value
+    with placed(f"{component}.{name}"):
+        return variable.checked(value)
+
+
+# ---- The master ----------------------------------------------------------------------------------
+
+
+class Snapshot(AbstractContextManager["Snapshot"]):
+    """The state of a whole system at a communication point; a context manager that frees it."""
+
+    def __init__(self, master: "Master") -> None:
+        self._master = master
+        for component in master.components.values():
+            fmu = component.instance.fmu
+            if not fmu.model.saves_states:
+                raise UserError(f"{component.name}: {fmu.path} has no FMU state to go back to")
+        self._states = [
+            component.instance.saved_state() for component in master.components.values()
+        ]
+
+    def __exit__(self, *_: object) -> None:
+        for state in self._states:
+            state.free()
+
+    def take(self) -> None:
+        """Keep the present state, in place of the one kept before."""
+        master = self._master
+        for component, state in zip(master.components.values(), self._states, strict=True):
+            with component.instance.explained(self._when()):
+                state.take()
+        self._kept = master.time, master.values.copy(), master.slopes.copy()
+
+    def restore(self) -> None:
+        """Bring the system back to the state kept, as often as wanted."""
+        master = self._master
+        for component, state in zip(master.components.values(), self._states, strict=True):
+            with component.instance.explained(self._when()):
+                state.restore()
+        master.time, master.values[:], master.slopes[:] = self._kept
+
+    def _when(self) -> str:
+        return f"at the communication point t = {self._master.time!r} s"
+
+
+class Master(AbstractContextManager["Master"]):
+    """A system of connected components; a context manager that frees their instances.
+
+    In Gauss-Seidel order the components step in the order of `fmus`. After each step all Real
+    outputs are read, and the Real variables `also`, pairs of component and variable. UserError if
+    names are unknown, an input has several connections, or an FMU cannot do what is asked.
+
+    Attributes
+    ----------
+    names : tuple of str
+        "component.variable" of all that is read, by component, outputs first.
+    values : ndarray, shape (len(names),)
+        As read right after the last step, before inputs are set for the next one; where a Boolean
+        has changed, after all that follows from it.
+    slopes : ndarray, shape (len(names),)
+        Their derivatives with respect to time; only those that are connected, and only if
+        `inputs` is "extrapolated".
+    time : float
+        s.
+    do_steps : int
+        Steps of components so far, rolled back ones included.
+    """
+
+    def __init__(
+        self,
+        fmus: Mapping[str, Fmu],
+        connections: Iterable[Connection],
+        order: str = "jacobi",
+        inputs: str = "held",
+        also: Sequence[tuple[str, str]] = (),
+    ) -> None:
+        if order not in ORDERS or inputs not in INPUT_MODES:
+            raise UserError(f"expected an order of {ORDERS} and inputs of {INPUT_MODES}")
+        self.extrapolates = inputs == "extrapolated"
+        self.jacobi = order == "jacobi"
+        self.time, self.do_steps = 0.0, 0
+        self._switches, real = _split(fmus, connections, self.extrapolates)
+        for component, name in also:
+            _find(fmus, component, name, None)
+        self._stack = ExitStack()
+        try:
+            instances = {}
+            for name, fmu in fmus.items():
+                fed = [c.end_connector for c in real if c.end_component == name]
+                instance = fmu.instance(name, fed if self.extrapolates else ())
+                instances[name] = self._stack.enter_context(instance)
+        except BaseException:
+            self._stack.close()
+            raise
+        self._connect(instances, real, also)
+
+    def __exit__(self, *error: object) -> None:
+        self._stack.__exit__(*error)
+
+    def _connect(
+        self,
+        instances: Mapping[str, Instance],
+        connections: Sequence[Connection],
+        also: Sequence[tuple[str, str]],
+    ) -> None:
+        """Lay out the system's values, and find the source of each input among them."""
+        # what is read, by component
+        outputs = {}
+        for name, instance in instances.items():
+            further = [variable for component, variable in also if component == name]
+            outputs[name] = list(dict.fromkeys([*instance.fmu.model.real_outputs, *further]))
+
+        # where it is among the system's values
+        keys = [(name, output) for name, read in outputs.items() for output in read]
+        index = {key: i for i, key in enumerate(keys)}
+        self.names = tuple(f"{component}.{name}" for component, name in keys)
+        memory = (c_double * max(len(keys), 1))()
+        self.values = np.frombuffer(memory)[: len(keys)]
+        self.slopes = np.zeros(len(keys))
+
+        # the components with their sources
+        self.components: dict[str, ConnectedInstance] = {}
+        first = 0
+        for name, instance in instances.items():
+            incoming = [c for c in connections if c.end_component == name]
+            feeding = {c.start_connector for c in connections if c.start_component == name}
+            self.components[name] = ConnectedInstance(
+                instance,
+                inputs=[c.end_connector for c in incoming],
+                outputs=outputs[name],
+                first=first,
+                feeding=feeding,
+                sources=[index[c.start_component, c.start_connector] for c in incoming],
+                ahead=[c.start_component in self.components and not self.jacobi for c in incoming],
+                values=memory,
+                slopes=self.slopes,
+            )
+            first += len(outputs[name])
+
+    # ---- Initialization --------------------------------------------------------------------------
+
+    def initialize(
+        self,
+        start: float,
+        stop: float | None = None,
+        parameters: Mapping[str, Mapping[str, Value]] | None = None,
+    ) -> None:
+        """To the first communication point, with consistent outputs there; times in s."""
+        parameters = parameters or {}
+        for name in parameters:
+            if name not in self.components:
+                raise UserError(
+                    f"{name}: no such component (there are: {', '.join(self.components)})"
+                )
+        self.time = start
+        for component in self.components.values():
+            component.begin(start, stop, parameters.get(component.name, {}))
+        self._propagate(self._read_early, "in initialization")
+        for component in self.components.values():
+            component.instance.exit_initialization()
+        if self.extrapolates:
+            self._propagate_slopes()
+
+    def _propagate(self, read: Callable[[ConnectedInstance], object], when: str) -> None:
+        """Set inputs until no output follows any more: along direct feedthrough, once each."""
+        before = np.full(len(self.names), np.nan)
+        for _ in range(len(self.components) + 2):
+            switched = self._transfer_switches()
+            for component in self.components.values():
+                read(component)
+            changing = np.flatnonzero(before != self.values)
+            if not (len(changing) or switched):
+                return
+            before = self.values.copy()
+            for component in self.components.values():
+                with component.instance.explained(when):
+                    component.set_inputs(self.values[component.sources])
+        names = ", ".join([*(self.names[i] for i in changing), *switched])
+        raise UserError(f"the connections form an algebraic loop: {names}")
+
+    def _transfer_switches(self) -> list[str]:
+        """Set the Boolean inputs whose sources have another value; which these are."""
+        changed = []
+        for c in self._switches:
+            source = self.components[c.start_component].instance
+            target = self.components[c.end_component].instance
+            value = source.boolean(c.start_connector)
+            if value != target.boolean(c.end_connector):
+                target.set(c.end_connector, value)
+                changed.append(f"{c.end_component}.{c.end_connector}")
+        return changed
+
+    def _read_early(self, component: ConnectedInstance) -> None:
+        with component.instance.explained_early():
+            component.read()
+        check_finite(component.name, component.outputs, "in initialization")
+
+    def _propagate_slopes(self) -> None:
+        """Slopes at one time: once per component, since those of inputs show in outputs'."""
+        when = f"for slopes at t = {self.time!r} s"
+        for _ in self.components:
+            for component in self.components.values():
+                with component.instance.explained(when):
+                    component.read_slopes()
+            for component in self.components.values():
+                with component.instance.explained(when):
+                    component.set_lines(
+                        self.values[component.sources], self.slopes[component.sources]
+                    )
+        for component in self.components.values():
+            with component.instance.explained(when):
+                component.read_slopes()
+
+    # ---- Steps -----------------------------------------------------------------------------------
+
+    def advance(self, end: float) -> None:
+        """One step to the time `end`, s."""
+        length = end - self.time
+        components = list(self.components.values())
+        groups = [components] if self.jacobi else [[component] for component in components]
+        for group in groups:
+            for component in group:
+                try:
+                    self._set_inputs(component, length)
+                    component.instance.do_step(self.time, length, goes_back=True)
+                except FMICallException as error:
+                    when = f"in the step from t = {self.time!r} s"
+                    raise component.instance.failure(error, when) from error
+                self.do_steps += 1
+            for component in group:
+                self._read(component, end)
+        self.time = end
+        if self._transfer_switches():
+            self._propagate(lambda component: self._read(component, end), f"at t = {end!r} s")
+            if self.extrapolates:
+                self._propagate_slopes()
+
+    def _set_inputs(self, component: ConnectedInstance, length: float) -> None:
+        """Inputs at the beginning of the step, of sources ahead and of others."""
+        values = self.values[component.sources]
+        if self.extrapolates:
+            slopes = self.slopes[component.sources]
+            component.set_lines(values - length * component.ahead * slopes, slopes)
+        else:
+            component.set_inputs(values)
+
+    def _read(self, component: ConnectedInstance, end: float) -> None:
+        try:
+            component.read()
+            if self.extrapolates:
+                component.read_slopes()
+        except FMICallException as error:
+            raise component.instance.failure(error, f"at t = {end!r} s") from error
+        check_finite(component.name, component.outputs, f"at t = {end!r} s")
+
+    def run(
+        self, times: Sequence[float], progress: Callable[[int], object] = lambda _: None
+    ) -> np.ndarray:
+        """Steps from the present time, times[0]; rows (times, names) of what is read after each."""
+        rows = np.empty((len(times), len(self.names)))
+        rows[0] = self.values
+        for i, end in enumerate(np.asarray(times)[1:].tolist(), start=1):
+            self.advance(end)
+            rows[i] = self.values
+            if i % 100 == 0:
+                progress(100)
+        return rows
+
+
+def _find(fmus: Mapping[str, Fmu], component: str, name: str, causality: str | None) -> None:
+    if component not in fmus:
+        raise UserError(f"{component}: no such component (there are: {', '.join(fmus)})")
+    variable = fmus[component].model.variables.get(name)
+    fits = variable is not None and variable.type == "Real"
+    if not fits or causality not in (None, variable.causality):
+        kind = f"Real {causality}" if causality else "Real variable"
+        raise UserError(f"{component}: {fmus[component].path} has no {kind} {name!r}")
+
+
+def _split(
+    fmus: Mapping[str, Fmu], connections: Iterable[Connection], sloped: bool
+) -> tuple[list[Connection], list[Connection]]:
+    """Connections of Booleans, and of Reals; no input has two."""
+    switches: list[Connection] = []
+    reals: list[Connection] = []
+    seen = set()
+    for c in connections:
+        end = c.end_component, c.end_connector
+        if _is_switch(fmus, c.start_component, c.start_connector, "output"):
+            switches.append(c)
+            if not _is_switch(fmus, *end, "input"):
+                raise UserError(f"{c}: a Boolean feeds a Boolean input only")
+        else:
+            reals.append(c)
+            _find(fmus, c.start_component, c.start_connector, "output")
+            _find(fmus, *end, "input")
+        if end in seen:
+            raise UserError(f"{'.'.join(end)}: is connected more than once")
+        seen.add(end)
+    for c in reals if sloped else ():
+        source, target = fmus[c.start_component], fmus[c.end_component]
+        if not source.model.gives_output_derivatives:
+            raise UserError(f"{c.start_component}: {source.path} has no output derivatives")
+        if not target.model.interpolates_inputs:
+            raise UserError(f"{c.end_component}: {target.path} does not interpolate inputs")
+    return switches, reals
+
+
+def _is_switch(fmus: Mapping[str, Fmu], component: str, name: str, causality: str) -> bool:
+    variable = fmus[component].model.variables.get(name) if component in fmus else None
+    return variable is not None and (variable.type, variable.causality) == ("Boolean", causality)
+
+
+# ---- A variant -----------------------------------------------------------------------------------
+
+
+def run_in_master(ssp: Ssp, variant: str, names: Sequence[str]) -> Run:
+    """Run a system in Jacobi order with one of its parameter sets; read what Ecos would read.
+
+    That is the values of the Real, Integer or Boolean variables ``component.variable`` at a
+    communication point after the inputs of the next step have been set. UserError if a component
+    fails, or gives a value that is not finite.
+    """
+    system = ssp.system
+    times = system.times
+    rows = np.empty((len(times), len(names)))
+    with ssp.unpacked_fmus() as fmus, Master(fmus, system.connections) as master:
+        master.initialize(times[0], times[-1], system.parameter_sets[variant])
+        readers = [_RowReader(ssp, c, names) for c in master.components.values()]
+        begin = time.perf_counter()
+        for row, end in enumerate(times.tolist()):
+            if row:
+                master.advance(end)
+            for reader in readers:
+                with reader.component.instance.explained(f"at t = {end!r} s"):
+                    reader.component.set_inputs(master.values[reader.component.sources])
+                    reader.read(rows[row])
+        wall_time = time.perf_counter() - begin
+        messages = [
+            f"{component.name!r}: {text}"
+            for component in master.components.values()
+            for text in component.instance.messages
+        ]
+        said = {name: _value_at_end(master, ssp, name) for name in said_at_end(ssp)}
+    return Run(tuple(names), times, rows, wall_time, tuple(dict.fromkeys(messages)), said)
+
+
+def _value_at_end(master: Master, ssp: Ssp, name: str) -> float:
+    component, _, variable = name.partition(".")
+    row = np.empty(1)
+    _RowReader(ssp, master.components[component], [name]).read(row)
+    return float(row[0])
+
+
+class _RowReader:
+    """Reads the wanted variables of one component into a row of the system's."""
+
+    def __init__(self, ssp: Ssp, component: ConnectedInstance, names: Sequence[str]) -> None:
+        self.component = component
+        instance = component.instance
+        own: dict[str, int] = {}
+        for column, name in enumerate(names):
+            owner, _, variable = name.partition(".")
+            if owner == component.name:
+                own[variable] = column
+        variables = ssp.models[component.name].variables
+        real = [name for name in own if variables[name].type == "Real"]
+        self._reals = instance.reals(real)
+        self._real_columns = [own[name] for name in real]
+        self._others: list[tuple[int, Callable[[str], int | None], str]] = []
+        for name in own.keys() - set(real):
+            boolean = variables[name].type == "Boolean"
+            self._others.append(
+                (own[name], instance.boolean if boolean else instance.integer, name)
+            )
+
+    def read(self, row: np.ndarray) -> None:
+        self._reals.get()
+        row[self._real_columns] = self._reals.view
+        for column, read, name in self._others:
+            row[column] = read(name)
