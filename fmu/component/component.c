@@ -77,7 +77,7 @@ static void send_text(struct component *component, enum component_status status,
     component->is_logging = false;
 }
 
-bool component_is_logging(struct component *component, const char *call) {
+bool component_refuse_in_logger(struct component *component, const char *call) {
     if (component->is_logging) {
         component->call_in_logger = call;
     }
@@ -177,7 +177,7 @@ enum component_status component_failure(struct component *component, enum status
 }
 
 enum component_status component_fail(struct component *component, const char *format, ...) {
-    if (component_is_logging(component, "a call")) {
+    if (component_refuse_in_logger(component, "a call")) {
         return COMPONENT_ERROR;
     }
     char raw[LOG_TEXT_SIZE];
@@ -234,7 +234,7 @@ bool component_enter(struct component *component, unsigned call) {
         return false;
     }
     const struct call_rule *rule = &component->adapter->rules[call];
-    if (component_is_logging(component, rule->name)) {
+    if (component_refuse_in_logger(component, rule->name)) {
         return false;
     }
     if (component->is_logged[LOG_ALL]) {
@@ -261,8 +261,8 @@ bool component_refuse_arrays(struct component *component, unsigned call, size_t 
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-bool component_may_begin(const char *name, const char *token_name, const char *token,
-                         const char *expected, char text[LOG_TEXT_SIZE]) {
+bool component_check_token(const char *name, const char *token_name, const char *token,
+                           const char *expected, char text[LOG_TEXT_SIZE]) {
     if (name == NULL || name[0] == '\0') {
         (void)snprintf(text, LOG_TEXT_SIZE,
                        "the instance name is missing: a name that is not empty is expected");

@@ -75,8 +75,8 @@ struct adapter {
 
     /* In intermediate update mode: whether these values may be read or set; if not, it fails as
      * component_fail. NULL: the version has no such mode. */
-    bool (*may_access)(struct component *component, unsigned call, bool setting,
-                       const unsigned references[], size_t count);
+    bool (*check_access)(struct component *component, unsigned call, bool setting,
+                         const unsigned references[], size_t count);
 
     /* Sends a finished text to the importer. */
     void (*send)(const struct component *component, enum component_status status,
@@ -100,9 +100,9 @@ struct component {
 /* True if there may be an instance with this name and this token (that of the model description:
  * expected), which the version calls token_name. Otherwise text says why not. */
 MUST_CHECK NONNULL_ARGUMENTS(2, 4,
-                             5) bool component_may_begin(const char *name, const char *token_name,
-                                                         const char *token, const char *expected,
-                                                         char text[LOG_TEXT_SIZE]);
+                             5) bool component_check_token(const char *name, const char *token_name,
+                                                           const char *token, const char *expected,
+                                                           char text[LOG_TEXT_SIZE]);
 
 /* component: zeroed; adapter must outlive it. On failure nothing has to be freed. */
 MUST_CHECK NONNULL enum component_status component_begin(struct component *component,
@@ -120,17 +120,16 @@ MUST_CHECK bool component_enter(struct component *component, unsigned call);
 
 /* True if the call comes from inside the importer's logger. It is refused and changes nothing: the
  * instance is in the middle of another call. A message says so after that of the logger. */
-MUST_CHECK NONNULL bool component_is_logging(struct component *component, const char *call);
+MUST_CHECK NONNULL bool component_refuse_in_logger(struct component *component, const char *call);
 
 /* Reports what is wrong with the arrays as component_fail does; always false. */
 NONNULL bool component_refuse_arrays(struct component *component, unsigned call, size_t count);
 
 /* True if count values may be accessed: neither array is NULL, unless count is 0. Otherwise it
  * fails as component_fail. */
-MUST_CHECK NONNULL_ARGUMENTS(1) static inline bool component_has_arrays(struct component *component,
-                                                                        unsigned call, size_t count,
-                                                                        const void *references,
-                                                                        const void *values) {
+MUST_CHECK NONNULL_ARGUMENTS(1) static inline bool component_check_arrays(
+    struct component *component, unsigned call, size_t count, const void *references,
+    const void *values) {
     return count == 0 || (references != NULL && values != NULL) ||
            component_refuse_arrays(component, call, count);
 }

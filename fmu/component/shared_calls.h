@@ -7,7 +7,7 @@
 #include "continuous_states.h"
 #include "values.h"
 
-/* ---- Modes ----------------------------------------------------------------------------------- */
+/* ---- Modes ---------------------------------------------------------------------------------- */
 
 /* How a component goes from one FMI state to the next. */
 
@@ -70,7 +70,7 @@ enum component_status access_get_adjoint_derivative(struct component *component,
                                                     const unsigned knowns[], size_t known_count,
                                                     const double seed[], double result[]);
 
-/* ---- Time and continuous states -------------------------------------------------------------- */
+/* ---- Time and continuous states ------------------------------------------------------------- */
 
 enum component_status continuous_set_time(struct component *component, unsigned call, double time);
 
@@ -93,7 +93,7 @@ enum component_status continuous_complete_step(struct component *component, unsi
                                                const void *enters, const void *terminates,
                                                bool *is_event);
 
-/* ---- FMU state -------------------------------------------------------------------------------
+/* ---- FMU state ------------------------------------------------------------------------------
  * A snapshot of the instance, which carries the kind and the FMI state of its component. */
 
 /* *fmu_state NULL: a new one; otherwise that one is overwritten. */

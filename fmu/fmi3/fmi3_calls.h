@@ -93,7 +93,7 @@ enum fmi3_call { FMI3_CALL_LIST(FMI3_CALL_CODE) FMI3_CALL_COUNT };
 
 extern const struct call_rule fmi3_call_rules[FMI3_CALL_COUNT];
 
-/* ---- Component ------------------------------------------------------------------------------- */
+/* ---- Component ------------------------------------------------------------------------------ */
 
 struct fmi3_component {
     struct component base;         /* first */
@@ -122,12 +122,12 @@ static inline fmi3Status fmi3_status(enum component_status status) {
 }
 
 /* Whether the number of values is the one expected; if not, fails as component_fail. */
-bool fmi3_has_count(struct component *component, enum fmi3_call call, size_t count,
-                    size_t expected);
+bool fmi3_check_count(struct component *component, enum fmi3_call call, size_t count,
+                      size_t expected);
 
 /* Whether the variables may be read or set in intermediate update mode; if not, fails as
  * component_fail. Other modes are not checked here. */
-bool fmi3_may_access(struct component *component, unsigned call, bool setting,
-                     const fmi3ValueReference references[], size_t count);
+bool fmi3_check_access(struct component *component, unsigned call, bool setting,
+                       const fmi3ValueReference references[], size_t count);
 
 #endif

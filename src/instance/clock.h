@@ -23,9 +23,9 @@ static inline struct clock_time clock_two_sum(double x, double y) {
     return (struct clock_time){.s = s, .rest = (x - x_part) + (y - y_part)};
 }
 
-/* time + duration */
-static inline struct clock_time clock_add(struct clock_time time, double duration) {
-    const struct clock_time sum = clock_two_sum(time.s, duration);
+/* time + elapsed (s) */
+static inline struct clock_time clock_add(struct clock_time time, double elapsed) {
+    const struct clock_time sum = clock_two_sum(time.s, elapsed);
     return clock_two_sum(sum.s, sum.rest + time.rest);
 }
 
@@ -50,9 +50,10 @@ static inline double clock_rounding(double size) {
 }
 
 /* How far the communication point of a master may be from the time of the instance for a step of
- * length h > 0 to be followed: min(1e-9 max(size, h), h / 100), and never less than clock_rounding.
+ * size step_size > 0 to be followed: min(1e-9 max(size, step_size), step_size / 100), and never
+ * less than clock_rounding.
  */
-double clock_slack(double size, double h);
+double clock_slack(double size, double step_size);
 
 /* By how much a step adds to the drift of a master: the mismatch that was accepted at its beginning
  * or, where the master hides it, what a sum of times is rounded by. */
@@ -60,10 +61,11 @@ static inline double clock_step_drift(double size, double mismatch) {
     return fmax(fabs(mismatch), 0.5 * clock_spacing(size));
 }
 
-/* How far a time event may be from the end of a step of length h > 0 to be there: the drift, summed
- * over all steps, up to h / 100, and never less than clock_rounding. So a master that adds up its
- * steps meets each event where it means to, and for one with exact times no event comes early. */
-double clock_tick_slack(double size, double h, double drift);
+/* How far a time event may be from the end of a step of size step_size > 0 to be there: the drift,
+ * summed over all steps, up to step_size / 100, and never less than clock_rounding. So a master
+ * that adds up its steps meets each event where it means to, and for one with exact times no event
+ * comes early. */
+double clock_tick_slack(double size, double step_size, double drift);
 
 /* ---- Polynomials ----------------------------------------------------------------------------
  * An input over a step: a Taylor polynomial of degree 3 from the beginning of the step. */
@@ -93,10 +95,10 @@ static inline bool polynomials_move(const struct polynomial polynomials[], size_
 /* Value at time t (s) after the origin. */
 double polynomial_value(const struct polynomial *polynomial, double t);
 
-/* The polynomial with values[k] at k h / (POLYNOMIAL_NODES - 1), h > 0 (s). With equal values, all
- * its derivatives are 0. */
+/* The polynomial with values[k] at k step_size / (POLYNOMIAL_NODES - 1), step_size > 0 (s). With
+ * equal values, all its derivatives are 0. */
 enum { POLYNOMIAL_NODES = POLYNOMIAL_DEGREE + 1 };
-struct polynomial polynomial_through(const double values[POLYNOMIAL_NODES], double h);
+struct polynomial polynomial_through(const double values[POLYNOMIAL_NODES], double step_size);
 
 /* The same polynomial with its origin moved by t (s). */
 struct polynomial polynomial_shifted(const struct polynomial *polynomial, double t);

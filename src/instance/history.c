@@ -4,10 +4,11 @@
 #include "state.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <string.h>
 
-/* ---- The initial value problem --------------------------------------------------------------- */
+/* ---- The initial value problem -------------------------------------------------------------- */
 
 _Static_assert((int)SERIES_INPUT_LENGTH == (int)POLYNOMIAL_DEGREE + 1,
                "the series of an input is its polynomial");
@@ -107,7 +108,23 @@ enum status instance_series(double t, double time_scale, int first, int last,
     return instance->model->series->extend(&origin, first, last, rows);
 }
 
-/* ---- Continuing ------------------------------------------------------------------------------ */
+/* ---- Continuing ----------------------------------------------------------------------------- */
+
+/* True if there can be state events with the parameters that the integrator runs with. */
+static bool is_searched(const struct instance *instance) {
+    const struct model_events *events = instance->model->events;
+    return events != NULL && events->are_possible != NULL &&
+           events->are_possible(instance->memory.restart_values);
+}
+
+/* Returns the indicators of the present modes, for the integrator; NULL: no events can be. */
+static const struct indicator *describe_indicators(struct instance *instance) {
+    if (!is_searched(instance)) {
+        return NULL;
+    }
+    instance->model->events->describe(instance->memory.restart_values, instance->indicators);
+    return instance->indicators;
+}
 
 /* Whether the motion to target is the one of the integrator's history. It depends only on the
  * values set now and those that the integrator runs with, not on how often or in what order they
@@ -122,15 +139,16 @@ static bool continues(const struct instance *instance, double target) {
     return state->has_history && target <= state->horizon && instance_values_are_active(instance);
 }
 
-int64_t instance_longest_history(const struct instance *instance) {
-    return integrator_longest_history(instance->configured.method, instance_is_searched(instance));
+/* Returns integrator_longest_history of the method, in the present modes. */
+static int64_t longest_history(const struct instance *instance) {
+    return integrator_longest_history(instance->configured.method, is_searched(instance));
 }
 
 /* The target needs one more internal step than a history may have. */
 static bool history_is_full(const struct instance *instance, double target) {
     const struct instance_state *state = &instance->state;
     const int64_t steps = state->statistics.steps - state->steps_before_restart;
-    return target > state->passed_time && steps >= instance_longest_history(instance);
+    return target > state->passed_time && steps >= longest_history(instance);
 }
 
 enum continuation instance_continuation(const struct instance *instance, double target) {
@@ -153,13 +171,12 @@ void instance_update_next_step(struct instance *instance) {
 
 static struct integrator_start start_of(struct instance *instance) {
     const struct instance_state *state = &instance->state;
-    return (struct integrator_start){.origin = state->restart_time.s,
-                                     .horizon = state->horizon,
-                                     .first_step = state->restart_step,
-                                     .continues = state->restart_continues,
-                                     .indicators = instance->model->events != NULL
-                                                       ? instance_describe_indicators(instance)
-                                                       : NULL};
+    return (struct integrator_start){
+        .origin = state->restart_time.s,
+        .horizon = state->horizon,
+        .first_step = state->restart_step,
+        .continues = state->restart_continues,
+        .indicators = instance->model->events != NULL ? describe_indicators(instance) : NULL};
 }
 
 /* What the integrator runs with from now on: inputs or states. A loop, because they are few. */
@@ -176,7 +193,8 @@ static void activate_bytes(struct instance *instance, struct range range) {
            range.size);
 }
 
-void instance_end_history(struct instance *instance) {
+/* Ends the history: times since the restart count from the present time on. */
+static void end_history(struct instance *instance) {
     instance->state.restart_time = instance->state.time;
     instance->state.has_history = false;
     instance->history_is_lost = false;
@@ -193,6 +211,8 @@ double instance_horizon(const struct instance_state *state, struct clock_time re
                                                : INFINITY;
 }
 
+/* From the present time on the integrator runs with the values that are set now, and with these
+ * polynomials of time as inputs, at least up to the time end. Ends the history. */
 static inline void activate_values(struct instance *instance, struct clock_time end,
                                    const struct polynomial inputs[], bool has_new_parameters) {
     struct instance_memory *memory = &instance->memory;
@@ -216,12 +236,7 @@ static inline void activate_values(struct instance *instance, struct clock_time 
     const double target = clock_difference(end, state->time);
     state->horizon = instance_horizon(state, state->time, target, instance->inputs_move);
     state->first_time = target;
-    instance_end_history(instance); // until the first advance has succeeded
-}
-
-void instance_activate_values(struct instance *instance, struct clock_time end,
-                              const struct polynomial inputs[]) {
-    activate_values(instance, end, inputs, !instance_parameters_are_active(instance));
+    end_history(instance); // until the first advance has succeeded
 }
 
 static enum status restart(struct instance *instance, struct clock_time end,
@@ -289,4 +304,57 @@ enum status instance_prepare_history(struct instance *instance, struct clock_tim
         return restart(instance, end, continuation);
     }
     return STATUS_OK;
+}
+
+enum status instance_rest(struct instance *instance, struct clock_time end, struct clock_time until,
+                          bool meets_time_event, enum continuation continuation) {
+    struct instance_state *state = &instance->state;
+    const struct polynomial *inputs = continuation == CONTINUE_AFTER_EVENT
+                                          ? instance->memory.current_inputs
+                                          : instance->memory.next_inputs;
+    // constant inputs end no mode; the active values matter only after an event
+    const bool searches =
+        !instance->inputs_are_held && polynomials_move(inputs, count_of(instance->model->inputs));
+    if (searches || meets_time_event) {
+        activate_values(instance, end, inputs, !instance_parameters_are_active(instance));
+    } else {
+        end_history(instance);
+    }
+    const struct integrator_start start = {
+        .indicators = searches ? describe_indicators(instance) : NULL,
+    };
+    state->next_step = 0.0;
+    return integrator_rest(instance->integrator,
+                           doubles_of(instance->memory.values, instance->model->states), &start,
+                           clock_difference(until, state->restart_time), &state->latest_time);
+}
+
+/* ---- After a part of a step ----------------------------------------------------------------- */
+
+static int saturated(int64_t count) {
+    return count > INT_MAX ? INT_MAX : (int)count;
+}
+
+void instance_write_statistics(const struct integrator_statistics *statistics,
+                               struct instance_values *own) {
+    own->solver_steps = saturated(statistics->steps);
+    own->solver_rhs_evaluations = saturated(statistics->rhs_evaluations);
+    own->solver_restarts = saturated(statistics->restarts);
+    own->solver_failed_steps = saturated(statistics->failed_steps);
+    own->solver_last_step = statistics->last_step;
+    own->solver_last_order = statistics->last_order;
+}
+
+void instance_note_part(struct instance *instance, enum status status, bool is_whole) {
+    struct instance_state *state = &instance->state;
+    if (status != STATUS_OK) {
+        instance_set_clock(instance, clock_add(state->restart_time, state->latest_time));
+    }
+    state->has_history = status == STATUS_OK && is_whole && longest_history(instance) > 0;
+    state->passed_time = integrator_passed_time(instance->integrator);
+    if (!state->has_history) {
+        state->next_step = status == STATUS_OK ? integrator_next_step(instance->integrator) : 0.0;
+    }
+    integrator_get_statistics(instance->integrator, &state->statistics);
+    instance_write_statistics(&state->statistics, &state->own);
 }

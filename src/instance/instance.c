@@ -125,8 +125,8 @@ static bool setup_events(struct instance *instance) {
         instance->triggered == NULL || instance->initial_values == NULL) {
         return false;
     }
-    instance->tolerances = instance->absolute_tolerances + state_count;
-    instance->du = instance->tolerances + state_count;
+    instance->event_tolerances = instance->absolute_tolerances + state_count;
+    instance->du = instance->event_tolerances + state_count;
     instance->z = instance->du + count_of(model->inputs);
     instance->ode.indicator_count = model->events->indicator_count;
     instance->ode.indicators = instance_indicators;

@@ -7,36 +7,19 @@
 #include <math.h>
 #include <string.h>
 
-double instance_next_time(const struct instance *instance) {
-    const struct model_events *events = instance->model->events;
-    return events != NULL && events->next_time != NULL ? events->next_time(instance->memory.values)
-                                                       : INFINITY;
-}
-
-bool instance_is_at_rest(const struct instance *instance) {
-    const struct model_events *events = instance->model->events;
-    return events != NULL && events->is_at_rest != NULL &&
-           events->is_at_rest(instance->memory.values);
-}
-
-const struct indicator *instance_describe_indicators(struct instance *instance) {
-    if (!instance_is_searched(instance)) {
-        return NULL;
-    }
-    instance->model->events->describe(instance->memory.restart_values, instance->indicators);
-    return instance->indicators;
-}
-
-double instance_nominal(const struct instance *instance, size_t state) {
+/* Returns the nominal value of a state, in its unit. */
+static double nominal_of(const struct instance *instance, size_t state) {
     const double relative = instance->state.own.effective_relative_tolerance;
     return instance->absolute_tolerances[state] / (INSTANCE_ABSOLUTE_FRACTION * relative);
 }
 
-void instance_write_location_errors(const struct instance *instance, double errors[]) {
+/* Writes how far each state may be from its limit where an integrator outside stops, in its unit.
+ */
+static void write_location_errors(const struct instance *instance, double errors[]) {
     const struct range states = instance->model->states;
     const double *x = doubles_of(instance->memory.values, states);
     for (size_t i = 0; i < count_of(states); i++) {
-        errors[i] = 2e-10 * (instance_nominal(instance, i) + fabs(x[i]));
+        errors[i] = 2e-10 * (nominal_of(instance, i) + fabs(x[i]));
     }
 }
 
@@ -47,9 +30,9 @@ static void write_tolerances(struct instance *instance) {
     const double *x = doubles_of(instance->memory.values, states);
     const bool is_located_outside =
         instance->is_integrated_outside && instance->model->events->errors != NULL;
-    double *tolerances = instance->tolerances;
+    double *tolerances = instance->event_tolerances;
     if (is_located_outside) {
-        instance_write_location_errors(instance, tolerances);
+        write_location_errors(instance, tolerances);
     }
     for (size_t i = 0; i < count_of(states); i++) {
         const double allowed = instance->absolute_tolerances[i] +
@@ -88,7 +71,7 @@ static enum status update(struct instance *instance, const bool *triggered) {
         .is_timed = is_timed(instance, triggered),
         .du = instance->du,
         .du_is_known = !instance->is_integrated_outside,
-        .tolerance = instance->tolerances,
+        .tolerance = instance->event_tolerances,
         .max_events = instance->state.own.max_events,
         .reason = reason,
         .reason_size = sizeof reason,
@@ -150,7 +133,7 @@ enum status instance_count_event(struct instance *instance, const bool triggered
     return STATUS_OK;
 }
 
-/* ---- The event at which a step has ended ----------------------------------------------------- */
+/* ---- The event at which a step has ended ---------------------------------------------------- */
 
 void instance_leave_event(struct instance *instance, const bool triggered[],
                           struct clock_time end) {
@@ -211,14 +194,14 @@ struct clock_time instance_resumed_end(const struct instance *instance, struct c
     return fabs(difference) <= rounding ? state->cut_end : end;
 }
 
-/* ---- Events for an integrator outside -------------------------------------------------------- */
+/* ---- Events for an integrator outside ------------------------------------------------------- */
 
 /* Of the size of an indicator: how far from its root integrators stop. */
 static const double near_root = 1e-10;
 
 /* The size of an indicator of a state. */
 static double size_of(const struct instance *instance, const struct indicator *indicator) {
-    return fabs(indicator->factor) * instance_nominal(instance, indicator->state) +
+    return fabs(indicator->factor) * nominal_of(instance, indicator->state) +
            fabs(indicator->offset);
 }
 
@@ -232,7 +215,7 @@ static void write_bands(struct instance *instance, double bands[]) {
     events->describe(instance->memory.values, instance->indicators);
     if (events->errors != NULL) {
         double *errors = doubles_of(instance->first_derivatives, instance->model->states);
-        instance_write_location_errors(instance, errors);
+        write_location_errors(instance, errors);
         events->errors(instance->memory.values, instance->state.time.s, errors, 1e-12, bands);
     }
     for (size_t i = 0; i < events->indicator_count; i++) {
@@ -240,7 +223,7 @@ static void write_bands(struct instance *instance, double bands[]) {
         if (indicator->kind == INDICATOR_UNUSED) {
             bands[i] = 0.0;
         } else if (indicator->kind == INDICATOR_OF_STATE) {
-            const double nominal = instance_nominal(instance, indicator->state);
+            const double nominal = nominal_of(instance, indicator->state);
             bands[i] = 1e-12 * fabs(indicator->factor) * nominal + 1e-14 * fabs(indicator->offset);
         } else if (events->errors == NULL) {
             bands[i] = 2.0 * near_root + 1e-9 * fabs(indicator->offset);

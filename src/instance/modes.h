@@ -5,34 +5,10 @@
 
 #include "state.h"
 
-/* There can be state events with the parameters that the integrator runs with. Inline, as it is
- * part of each step of models without events too. */
-static inline bool instance_is_searched(const struct instance *instance) {
-    const struct model_events *events = instance->model->events;
-    return events != NULL && events->are_possible != NULL &&
-           events->are_possible(instance->memory.restart_values);
-}
-
-/* Time of the next time event, s; INFINITY: there is none. */
-NONNULL double instance_next_time(const struct instance *instance);
-
-/* No state moves in the present modes. */
-NONNULL bool instance_is_at_rest(const struct instance *instance);
-
-/* Of a state, in its unit. */
-NONNULL double instance_nominal(const struct instance *instance, size_t state);
-
-/* Writes how far each state may be from its limit where an integrator outside stops, in its unit.
- */
-NONNULL void instance_write_location_errors(const struct instance *instance, double errors[]);
-
 /* Updates modes, states and discrete states after a change of inputs and parameters and, where
  * `triggered` is not NULL, after the event at the current time. */
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_update_modes(struct instance *instance, const bool *triggered);
-
-/* The indicators of the present modes, for the integrator; NULL: no events can be. */
-MUST_CHECK NONNULL const struct indicator *instance_describe_indicators(struct instance *instance);
 
 /* Events in one communication step so far. */
 struct event_counts {
@@ -45,7 +21,7 @@ MUST_CHECK NONNULL enum status instance_count_event(struct instance *instance,
                                                     const bool triggered[],
                                                     struct event_counts *in_step);
 
-/* ---- The event at which a step has ended -----------------------------------------------------
+/* ---- The event at which a step has ended ----------------------------------------------------
  * Whether it is handled, and how the motion continues from there as if the step had not ended. */
 
 /* A step that would have lasted until `end` ends at the present time, where these indicators fall
@@ -70,7 +46,7 @@ NONNULL bool instance_is_unchanged(const struct instance *instance);
 NONNULL struct clock_time instance_resumed_end(const struct instance *instance,
                                                struct clock_time end);
 
-/* ---- Events for an integrator outside -------------------------------------------------------- */
+/* ---- Events for an integrator outside ------------------------------------------------------- */
 
 /* Adds a small distance to the calculated indicators, so that none is 0 where a mode begins. */
 NONNULL void instance_add_bands(struct instance *instance);

@@ -15,8 +15,8 @@ struct named_value {
     bool is_possible;
 };
 
-static bool are_possible(const struct instance *instance, const struct named_value values[],
-                         size_t count) {
+static bool check_all(const struct instance *instance, const struct named_value values[],
+                      size_t count) {
     for (size_t i = 0; i < count; i++) {
         if (!values[i].is_possible) {
             message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
@@ -44,8 +44,7 @@ static bool is_rest_of(struct clock_time time) {
 }
 
 /* Time, phase and the settings of the integrator. */
-static bool has_possible_settings(const struct instance *instance,
-                                  const struct instance_state *state) {
+static bool check_settings(const struct instance *instance, const struct instance_state *state) {
     const struct instance_values *own = &state->own;
     const int phase = (int)state->phase;
     // an integrator outside may go back, before the start too
@@ -71,12 +70,11 @@ static bool has_possible_settings(const struct instance *instance,
              (!instance_has_integrator(instance) ||
               integrator_is_possible((enum integrator_method)own->solver_method, &instance->ode))},
     };
-    return are_possible(instance, values, COUNT(values)) &&
+    return check_all(instance, values, COUNT(values)) &&
            instance_check_experiment(instance, &state->experiment) == STATUS_OK;
 }
 
-static bool has_possible_statistics(const struct instance *instance,
-                                    const struct instance_state *state) {
+static bool check_statistics(const struct instance *instance, const struct instance_state *state) {
     const struct integrator_statistics *totals = &state->statistics;
     const struct named_value values[] = {
         {"solver_steps", (double)totals->steps, is_count(totals->steps)},
@@ -88,12 +86,11 @@ static bool has_possible_statistics(const struct instance *instance,
         {"the steps before the restart", (double)state->steps_before_restart,
          state->steps_before_restart >= 0 && state->steps_before_restart <= totals->steps},
     };
-    return are_possible(instance, values, COUNT(values));
+    return check_all(instance, values, COUNT(values));
 }
 
 /* What a replay of the integrator's history needs. */
-static bool has_possible_history(const struct instance *instance,
-                                 const struct instance_state *state) {
+static bool check_history(const struct instance *instance, const struct instance_state *state) {
     const int64_t steps = state->statistics.steps - state->steps_before_restart;
     const int64_t most_steps =
         integrator_longest_history((enum integrator_method)state->own.solver_method,
@@ -115,15 +112,15 @@ static bool has_possible_history(const struct instance *instance,
         {"passed_time", state->passed_time, !exists || state->passed_time >= state->first_time},
         {"horizon", state->horizon, !exists || state->horizon >= state->latest_time},
     };
-    return are_possible(instance, values, COUNT(values));
+    return check_all(instance, values, COUNT(values));
 }
 
-static bool are_finite_inputs(const struct instance *instance, const char *name,
-                              const struct polynomial *inputs) {
+static bool check_inputs(const struct instance *instance, const char *name,
+                         const struct polynomial *inputs) {
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
         for (int k = 0; k <= POLYNOMIAL_DEGREE; k++) {
             const struct named_value value = {name, inputs[i].d[k], isfinite(inputs[i].d[k])};
-            if (!are_possible(instance, &value, 1)) {
+            if (!check_all(instance, &value, 1)) {
                 return false;
             }
         }
@@ -133,7 +130,7 @@ static bool are_finite_inputs(const struct instance *instance, const char *name,
 
 /* Parameters, inputs and states that could have been set, and modes and discrete states within
  * their limits. */
-static bool are_within_limits(const struct instance *instance, const char *values) {
+static bool check_limits(const struct instance *instance, const char *values) {
     const struct message_sink quiet = {0};
     for (size_t i = 0; i < instance->description->variable_count; i++) {
         const struct variable *variable = &instance->description->variables[i];
@@ -146,7 +143,7 @@ static bool are_within_limits(const struct instance *instance, const char *value
             variable->type == VARIABLE_FLOAT64 ? *(const double *)field : *(const int *)field;
         const struct named_value value = {
             variable->name, number, variable_check_value(variable, number, &quiet) == STATUS_OK};
-        if (!are_possible(instance, &value, 1)) {
+        if (!check_all(instance, &value, 1)) {
             return false;
         }
     }
@@ -154,12 +151,12 @@ static bool are_within_limits(const struct instance *instance, const char *value
 }
 
 /* Discrete states that are no variables. */
-static bool are_finite_kept(const struct instance *instance, const char *values) {
+static bool check_kept(const struct instance *instance, const char *values) {
     const struct range kept = events_of(instance->model).discrete_states;
     for (size_t i = 0; i < count_of(kept); i++) {
         const double state = ((const double *)(const void *)(values + kept.offset))[i];
         const struct named_value value = {"a discrete state", state, isfinite(state)};
-        if (!are_possible(instance, &value, 1)) {
+        if (!check_all(instance, &value, 1)) {
             return false;
         }
     }
@@ -183,8 +180,8 @@ static bool are_zeros(const char *values, struct range range) {
 
 /* Modes of values, which may have been set since the last event, and those that the integrator runs
  * with. They are equal while the history lasts: an event would have ended it. */
-static bool has_possible_modes(const struct instance *instance, const struct instance_state *state,
-                               const char *values, const char *restart_values) {
+static bool check_modes(const struct instance *instance, const struct instance_state *state,
+                        const char *values, const char *restart_values) {
     const struct model_events *events = instance->model->events;
     if (events == NULL) {
         return true;
@@ -205,8 +202,8 @@ static bool has_possible_modes(const struct instance *instance, const struct ins
 
 /* Steps handle time events as they come: none is earlier than the present time by more than
  * rounding. An importer that integrates outside may skip one. */
-static bool has_possible_next_time(const struct instance *instance,
-                                   const struct instance_state *state, const char *values) {
+static bool check_next_time(const struct instance *instance, const struct instance_state *state,
+                            const char *values) {
     const struct model_events *events = instance->model->events;
     if (events == NULL || events->next_time == NULL || state->phase < PHASE_STEPPING ||
         instance->is_integrated_outside) {
@@ -217,17 +214,17 @@ static bool has_possible_next_time(const struct instance *instance,
     const struct named_value value = {"the time of the next event", time,
                                       time >=
                                           state->time.s - (state->drift + clock_rounding(size))};
-    return are_possible(instance, &value, 1);
+    return check_all(instance, &value, 1);
 }
 
 /* A value structure that the instance can have. */
-static bool is_possible_structure(const struct instance *instance, const char *values) {
-    return are_within_limits(instance, values) && are_finite_kept(instance, values);
+static bool check_structure(const struct instance *instance, const char *values) {
+    return check_limits(instance, values) && check_kept(instance, values);
 }
 
 /* An unhandled event is one of an indicator or of the time. */
-static bool is_possible_event_point(const struct instance *instance,
-                                    const struct instance_state *state, const bool unhandled[]) {
+static bool check_event_point(const struct instance *instance, const struct instance_state *state,
+                              const bool unhandled[]) {
     int count = 0;
     for (size_t i = 0; i < instance_event_size(instance->model) / sizeof *unhandled; i++) {
         count += unhandled[i];
@@ -245,10 +242,10 @@ static bool is_possible_event_point(const struct instance *instance,
          is_rest_of(end) && (state->event_point == NO_EVENT || instance->is_integrated_outside ||
                              clock_difference(end, state->time) >= -clock_spacing(state->time.s))},
     };
-    return are_possible(instance, values, COUNT(values));
+    return check_all(instance, values, COUNT(values));
 }
 
-/* ---- What is stored twice -------------------------------------------------------------------- */
+/* ---- What is stored twice ------------------------------------------------------------------- */
 
 /* A value by its name, and what the rest of the state says that it is. */
 struct twin {
@@ -257,7 +254,7 @@ struct twin {
     double expected;
 };
 
-static bool do_agree(const struct instance *instance, const struct twin twins[], size_t count) {
+static bool check_twins(const struct instance *instance, const struct twin twins[], size_t count) {
     for (size_t i = 0; i < count; i++) {
         if (twins[i].value != twins[i].expected) {
             message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
@@ -271,8 +268,7 @@ static bool do_agree(const struct instance *instance, const struct twin twins[],
 }
 
 /* Variables of the instance follow from its clock, its settings and the integrator's totals. */
-static bool has_true_variables(const struct instance *instance,
-                               const struct instance_state *state) {
+static bool check_variables(const struct instance *instance, const struct instance_state *state) {
     const struct instance_values *own = &state->own;
     struct instance_values counted = {0};
     instance_write_statistics(&state->statistics, &counted);
@@ -287,11 +283,11 @@ static bool has_true_variables(const struct instance *instance,
         {"solver_last_step", own->solver_last_step, counted.solver_last_step},
         {"solver_last_order", own->solver_last_order, counted.solver_last_order},
     };
-    return do_agree(instance, twins, COUNT(twins));
+    return check_twins(instance, twins, COUNT(twins));
 }
 
 /* The start is the one of the experiment; nothing has been counted before it. */
-static bool has_true_start(const struct instance *instance, const struct instance_state *state) {
+static bool check_start(const struct instance *instance, const struct instance_state *state) {
     const struct instance_values *own = &state->own;
     const bool has_started = state->phase >= PHASE_STEPPING;
     const bool knows_start = state->phase >= PHASE_INITIALIZATION;
@@ -318,17 +314,17 @@ static bool has_true_start(const struct instance *instance, const struct instanc
         {"stop_time_defined", state->experiment.stop_time_defined, false},
         {"tolerance_defined", state->experiment.tolerance_defined, false},
     };
-    return (has_started || do_agree(instance, of_start, COUNT(of_start))) &&
-           (own->event_count > 0 || do_agree(instance, of_events, COUNT(of_events))) &&
+    return (has_started || check_twins(instance, of_start, COUNT(of_start))) &&
+           (own->event_count > 0 || check_twins(instance, of_events, COUNT(of_events))) &&
            (state->phase == PHASE_INSTANTIATED || is_foreign ||
-            do_agree(instance, of_experiment, COUNT(of_experiment))) &&
+            check_twins(instance, of_experiment, COUNT(of_experiment))) &&
            (state->experiment_defined ||
-            do_agree(instance, of_no_experiment, COUNT(of_no_experiment)));
+            check_twins(instance, of_no_experiment, COUNT(of_no_experiment)));
 }
 
 /* The integrator's history ends at the present time, and its horizon follows from the inputs. */
-static bool has_true_history(const struct instance *instance, const struct instance_state *state,
-                             const struct polynomial active_inputs[]) {
+static bool check_history_twins(const struct instance *instance, const struct instance_state *state,
+                                const struct polynomial active_inputs[]) {
     const struct twin twins[] = {
         {"latest_time", state->latest_time, clock_difference(state->time, state->restart_time)},
         {"horizon", state->horizon,
@@ -336,14 +332,14 @@ static bool has_true_history(const struct instance *instance, const struct insta
                           polynomials_move(active_inputs, count_of(instance->model->inputs)))},
         {"event_point", state->event_point, NO_EVENT},
     };
-    return !state->has_history || do_agree(instance, twins, COUNT(twins));
+    return !state->has_history || check_twins(instance, twins, COUNT(twins));
 }
 
 /* Inputs at the current time are among the values, too; fixed parameters also among those that the
  * integrator runs with. */
-static bool has_true_values(const struct instance *instance, const struct instance_state *state,
-                            const char *values, const char *restart_values,
-                            const struct polynomial current[]) {
+static bool check_value_twins(const struct instance *instance, const struct instance_state *state,
+                              const char *values, const char *restart_values,
+                              const struct polynomial current[]) {
     for (size_t i = 0; i < instance->description->variable_count; i++) {
         const struct variable *variable = &instance->description->variables[i];
         const bool is_real = variable->type == VARIABLE_FLOAT64;
@@ -380,19 +376,19 @@ enum status instance_check_plausible(const struct instance *instance,
 
     // derivatives of inputs at the current time are not checked: they may have overflowed
     const bool is_plausible =
-        has_possible_settings(instance, state) && has_possible_statistics(instance, state) &&
-        has_possible_history(instance, state) &&
-        are_finite_inputs(instance, "an input", (const void *)next_inputs) &&
-        are_finite_inputs(instance, "an input since the restart", (const void *)active_inputs) &&
-        is_possible_structure(instance, values) &&
-        (!state->has_history || is_possible_structure(instance, restart_values)) &&
-        has_possible_modes(instance, state, values, restart_values) &&
-        has_possible_next_time(instance, state, values) &&
-        is_possible_event_point(
+        check_settings(instance, state) && check_statistics(instance, state) &&
+        check_history(instance, state) &&
+        check_inputs(instance, "an input", (const void *)next_inputs) &&
+        check_inputs(instance, "an input since the restart", (const void *)active_inputs) &&
+        check_structure(instance, values) &&
+        (!state->has_history || check_structure(instance, restart_values)) &&
+        check_modes(instance, state, values, restart_values) &&
+        check_next_time(instance, state, values) &&
+        check_event_point(
             instance, state,
             (const void *)(block + ((const char *)memory->unhandled - memory->block))) &&
-        has_true_variables(instance, state) && has_true_start(instance, state) &&
-        has_true_history(instance, state, (const void *)active_inputs) &&
-        has_true_values(instance, state, values, restart_values, (const void *)current);
+        check_variables(instance, state) && check_start(instance, state) &&
+        check_history_twins(instance, state, (const void *)active_inputs) &&
+        check_value_twins(instance, state, values, restart_values, (const void *)current);
     return is_plausible ? STATUS_OK : STATUS_INVALID_ARGUMENT;
 }

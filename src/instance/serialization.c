@@ -168,7 +168,7 @@ static void codec_bool(struct codec *codec, const char *name, bool *value) {
     *value = transfer_integer(codec, name, *value, 0, 1) != 0;
 }
 
-/* ---- The state ------------------------------------------------------------------------------- */
+/* ---- The state ------------------------------------------------------------------------------ */
 
 static void transfer_experiment(struct codec *codec, struct instance_experiment *experiment) {
     codec_real(codec, &experiment->start_time);
@@ -302,7 +302,7 @@ static void transfer_state(struct codec *codec, const struct instance *instance,
     }
 }
 
-/* ---- Interface ------------------------------------------------------------------------------- */
+/* ---- Interface ------------------------------------------------------------------------------ */
 
 size_t instance_serialized_size(const struct instance *instance) {
     // counting writes nothing, so that any state serves

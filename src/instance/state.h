@@ -109,7 +109,7 @@ struct instance {
     struct ode ode;
     double *absolute_tolerances;  /* one per state, as the integrator has them; NULL: the model has
                                      no events */
-    double *tolerances;           /* one per state, at its value at the last event */
+    double *event_tolerances;     /* one per state, at its value at the last event */
     struct indicator *indicators; /* one per indicator, since the last restart */
     double *du;                   /* derivative of each input by the time */
     double *z;                    /* three per indicator */
@@ -163,12 +163,19 @@ static inline struct model_events events_of(const struct model *model) {
     return model->events != NULL ? *model->events : (struct model_events){0};
 }
 
+/* Time of the next time event, s; INFINITY: there is none. */
+static inline double instance_next_time(const struct instance *instance) {
+    const struct model_events *events = instance->model->events;
+    return events != NULL && events->next_time != NULL ? events->next_time(instance->memory.values)
+                                                       : INFINITY;
+}
+
 /* Bytes of the array triggered of struct instance. */
 static inline size_t instance_event_size(const struct model *model) {
     return model->events != NULL ? (model->events->indicator_count + 1) * sizeof(bool) : 0;
 }
 
-/* ---- Values that the integrator runs with ---------------------------------------------------- */
+/* ---- Values that the integrator runs with --------------------------------------------------- */
 
 /* The inputs of the next step are constant and equal to the active ones. Polynomials need no
  * comparison: the horizon of the integrator ends with the step that they are for. */
@@ -202,7 +209,7 @@ static inline bool instance_values_are_active(const struct instance *instance) {
     return instance_inputs_are_active(instance) && instance_parameters_are_active(instance);
 }
 
-/* ---- Places of values ------------------------------------------------------------------------ */
+/* ---- Places of values ----------------------------------------------------------------------- */
 
 /* Says in a message why there is no variable with this reference and type; NULL. */
 NONNULL const struct variable *instance_refuse_reference(const struct instance *instance,
@@ -271,10 +278,6 @@ static inline void instance_set_clock(struct instance *instance, struct clock_ti
     instance->state.own.time = time.s;
     instance->outputs_are_valid = false;
 }
-
-/* Writes the variables that show totals of the integrator. */
-NONNULL void instance_write_statistics(const struct integrator_statistics *statistics,
-                                       struct instance_values *own);
 
 /* Returns STATUS_NOT_FINITE, with a message that `what` cannot be computed. */
 NONNULL enum status instance_not_finite(const struct instance *instance, const char *what);

@@ -4,13 +4,13 @@
 
 #include "snapshot.h"
 
-/* Steps from communication_point to communication_point + step (s) with constant inputs (zero-order
- * hold), or polynomials where derivatives were set.
- * STATUS_INVALID_TIME: step not > 0, communication_point not where the instance is (clock_slack),
- * or the end past the stop time. If the integration ends early (severity discard), instance_time is
- * the time it reached, and the states are those of that time. */
+/* Steps from communication_point to communication_point + step_size (s) with constant inputs
+ * (zero-order hold), or polynomials where derivatives were set. STATUS_INVALID_TIME: step_size not
+ * > 0, communication_point not where the instance is (clock_slack), or the end past the stop time.
+ * If the integration ends early (severity discard), instance_time is the time it reached, and the
+ * states are those of that time. */
 MUST_CHECK NONNULL enum status instance_do_step(struct instance *instance,
-                                                double communication_point, double step);
+                                                double communication_point, double step_size);
 
 /* What a step does at an event. An event at its beginning is always handled, so that every step
  * makes progress. */
@@ -44,7 +44,7 @@ struct step_options {
 
 /* As instance_do_step; instance_time says where the step has ended. */
 MUST_CHECK NONNULL enum status instance_do_step_with(struct instance *instance,
-                                                     double communication_point, double step,
+                                                     double communication_point, double step_size,
                                                      const struct step_options *options);
 
 /* The last step passed an event, or left it. */

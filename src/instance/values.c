@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-/* ---- Calculated values ----------------------------------------------------------------------- */
+/* ---- Calculated values ---------------------------------------------------------------------- */
 
 /* Calculates all from parameters, inputs, states and modes. */
 static enum status calculate(struct instance *instance) {
@@ -55,7 +55,7 @@ enum status instance_update_outputs(struct instance *instance) {
     return status;
 }
 
-/* ---- Values by reference --------------------------------------------------------------------- */
+/* ---- Values by reference -------------------------------------------------------------------- */
 
 /* What the elements of an array are, and which variables it is for. */
 #define ARRAY_OF(name, constant, element) ARRAY_OF_##constant,

@@ -120,7 +120,7 @@ static inline enum status variable_check_value(const struct variable *variable, 
 
 const char *variable_type_name(enum variable_type type);
 
-/* ---- Values of the instance ------------------------------------------------------------------ */
+/* ---- Values of the instance ----------------------------------------------------------------- */
 
 /* Values of the variables with owner = "instance" (time_variable.toml, solver_variables.toml).
  */

@@ -178,7 +178,7 @@ static void add_work(struct integrator *integrator, const struct method_work *wo
 }
 
 /* A point that an internal step has passed already takes no more than a polynomial. */
-static bool can_interpolate(struct integrator *integrator, double t) {
+static bool write_interpolated(struct integrator *integrator, double t) {
     const struct method *method = integrator->method;
     return integrator->internal_end >= t && method->interpolate != NULL &&
            method->interpolate(integrator->memory, t, integrator->x) &&
@@ -224,7 +224,7 @@ static void copy_state(const struct integrator *integrator, double x[]) {
 }
 
 static bool interpolate(struct integrator *integrator, double t, double x[]) {
-    if (!can_interpolate(integrator, t)) {
+    if (!write_interpolated(integrator, t)) {
         return false;
     }
     accept(integrator, t);

@@ -7,10 +7,12 @@
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-bool location_create(const struct ode *ode, const double tolerances[], struct location *location) {
+bool location_create(const struct ode *ode, const double absolute_tolerances[],
+                     struct location *location) {
     const size_t states = ode->state_count;
     const size_t count = ode->indicator_count;
-    *location = (struct location){.ode = ode, .tolerances = tolerances, .time = INFINITY};
+    *location =
+        (struct location){.ode = ode, .absolute_tolerances = absolute_tolerances, .time = INFINITY};
     if (count == 0) {
         return true;
     }
@@ -130,7 +132,8 @@ enum status location_restart(struct location *location, const struct indicator *
             const double z = at_state(indicator, x);
             const bool is_sure = indicator->rises || z > 0.0;
             location->is_armed[i] = is_sure && (z > rounding || (rounding == 0.0 && z >= 0.0));
-            const double miss = fabs(indicator->factor) * location->tolerances[indicator->state];
+            const double miss =
+                fabs(indicator->factor) * location->absolute_tolerances[indicator->state];
             location->noise[i] = is_sure ? rounding : larger(rounding, miss);
             const double size = fabs(indicator->offset) + fabs(z - indicator->offset);
             location->touch[i] = 8.0 * DBL_EPSILON * size;

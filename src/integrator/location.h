@@ -30,14 +30,14 @@ struct location {
     const struct ode *ode;
     size_t *used; /* those of them that are not INDICATOR_UNUSED */
     size_t used_count;
-    const double *tolerances; /* absolute ones, of the states */
-    bool *has_row;            /* by indicator: step.indicator_row has it; else it is interpolated */
-    bool *is_armed;           /* by indicator: it has been above 0 since the restart */
-    double *noise;            /* by indicator of a state: one that is 0 at the restart
-                                 may have either sign as long as it is within this */
-    double *touch;            /* by indicator, as in struct fall */
-    double *rounding;         /* by indicator, at the restart; 0: not known */
-    bool *triggered;          /* by indicator: it is at 0 at `time` */
+    const double *absolute_tolerances; /* of the states */
+    bool *has_row;    /* by indicator: step.indicator_row has it; else it is interpolated */
+    bool *is_armed;   /* by indicator: it has been above 0 since the restart */
+    double *noise;    /* by indicator of a state: one that is 0 at the restart
+                         may have either sign as long as it is within this */
+    double *touch;    /* by indicator, as in struct fall */
+    double *rounding; /* by indicator, at the restart; 0: not known */
+    bool *triggered;  /* by indicator: it is at 0 at `time` */
     struct step_polynomial step;         /* the last one; methods write it */
     double (*rows)[SERIES_LENGTH];       /* by state: room for its rows */
     double *x;                           /* at one point */
@@ -48,9 +48,9 @@ struct location {
     double (*samples)[CHEBYSHEV_LENGTH]; /* by indicator */
 };
 
-/* False where memory is short: then nothing has to be freed. tolerances: absolute ones of the
+/* False where memory is short: then nothing has to be freed. absolute_tolerances: of the
  * states, which must stay. */
-MUST_CHECK NONNULL bool location_create(const struct ode *ode, const double tolerances[],
+MUST_CHECK NONNULL bool location_create(const struct ode *ode, const double absolute_tolerances[],
                                         struct location *location);
 NONNULL void location_destroy(struct location *location);
 
@@ -96,7 +96,7 @@ NONNULL void location_lead_from_restart(struct location *location);
 /* Writes the states at s of location->step, 0 to 1 from its begin on. */
 NONNULL void location_write_states(const struct location *location, double s, double x[]);
 
-/* ---- Falls ----------------------------------------------------------------------------------- */
+/* ---- Falls ---------------------------------------------------------------------------------- */
 
 struct fall {
     double error;    /* of p */

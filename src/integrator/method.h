@@ -5,7 +5,7 @@
 
 #include "location.h"
 
-/* ---- The problem ----------------------------------------------------------------------------- */
+/* ---- The problem ---------------------------------------------------------------------------- */
 
 /* The ode with its settings, the limits since the last restart, and a count of evaluations. Times
  * in s since the restart. */
@@ -26,7 +26,7 @@ struct problem {
 };
 
 /* Whether the observer ends the advance at t, the end of an internal step, where the state is x. */
-static inline bool problem_ends_at(const struct problem *problem, double t, const double x[]) {
+static inline bool problem_ask_observer(const struct problem *problem, double t, const double x[]) {
     return problem->observer(problem->observer_context, t, x);
 }
 
@@ -82,7 +82,7 @@ static inline bool problem_is_stuck(const struct problem *problem) {
     return problem->failed_at >= problem->reached;
 }
 
-/* ---- The method ------------------------------------------------------------------------------ */
+/* ---- The method ----------------------------------------------------------------------------- */
 
 /* What an advance did. */
 struct method_work {
@@ -125,7 +125,7 @@ struct method {
 
     /* Integrates from problem->reached, where the state is begin_x, to t in max_steps internal
      * steps at most. Writes the last valid time to *stopped_at, also on failure, and the state
-     * there to x. Where problem->observer is not NULL, asks it (problem_ends_at) about each
+     * there to x. Where problem->observer is not NULL, asks it (problem_ask_observer) about each
      * internal step that ends between problem->reached and t. Where problem->location is active,
      * searches each internal step, and ends at an event up to t. */
     enum status (*advance)(void *memory, double t, int64_t max_steps, const double begin_x[],

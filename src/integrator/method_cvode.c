@@ -145,7 +145,7 @@ static enum status configure(void *memory) {
     return sundials_status(base->problem, flag);
 }
 
-/* ---- First step -------------------------------------------------------------------------------
+/* ---- First step -----------------------------------------------------------------------------
  * Length of the first internal step, which is of order 1: a fraction of the length at which its
  * error would be the tolerance. s; 0: unknown. */
 
@@ -338,7 +338,7 @@ static int integrate_watched(struct cvode *cvode, double t, int64_t max_steps, d
         }
         if (flag >= 0 && problem->observer != NULL && internal < t && internal > watched) {
             watched = internal;
-            *is_cut_short = problem_ends_at(problem, internal, x);
+            *is_cut_short = problem_ask_observer(problem, internal, x);
         }
     }
     return flag;

@@ -88,7 +88,7 @@ static int observe(sunrealtype t, N_Vector x, void *user_data) {
         erk->is_cut_short = erk->search_status != STATUS_OK || problem->location.time <= erk->end;
     }
     if (!erk->is_cut_short && problem->observer != NULL && t < erk->end) {
-        erk->is_cut_short = problem_ends_at(problem, t, small_vector_data(x));
+        erk->is_cut_short = problem_ask_observer(problem, t, small_vector_data(x));
     }
     if (erk->is_cut_short) {
         memcpy(erk->cut_x, small_vector_data(x), problem->ode.state_count * sizeof(double));

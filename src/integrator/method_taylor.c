@@ -315,7 +315,7 @@ static enum status take_steps(struct taylor *taylor, double t, int64_t max_steps
         }
         *stopped_at = end;
         is_long = is_long && is_searched;
-        if (end < t && problem->observer != NULL && problem_ends_at(problem, end, x)) {
+        if (end < t && problem->observer != NULL && problem_ask_observer(problem, end, x)) {
             work->is_cut_short = true;
             break;
         }

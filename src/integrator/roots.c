@@ -7,7 +7,7 @@
 
 NO_FUSED_OPERATIONS
 
-/* ---- Values of a polynomial ------------------------------------------------------------------ */
+/* ---- Values of a polynomial ----------------------------------------------------------------- */
 
 /* x = high + low, of 26 digits each, so that products of such parts are exact (Dekker). */
 struct halves {
@@ -43,7 +43,7 @@ double horner_compensated(const double c[], int degree, double s) {
     return fabs(corrected) > 0x1p-94 * size ? corrected : 0.0;
 }
 
-/* ---- Chebyshev interpolation ----------------------------------------------------------------- */
+/* ---- Chebyshev interpolation ---------------------------------------------------------------- */
 
 enum { LAST = CHEBYSHEV_LENGTH - 1 };
 
@@ -130,7 +130,7 @@ double chebyshev_interpolate(int count, const double values[], double c[]) {
     return larger(fabs(coefficients[last]), fabs(coefficients[last - 1]));
 }
 
-/* ---- Polynomials ----------------------------------------------------------------------------- */
+/* ---- Polynomials ---------------------------------------------------------------------------- */
 
 /* A polynomial that is above 0 right behind s = 0: its first coefficient that is not 0 is above it.
  */

@@ -27,7 +27,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* ---- Values of a polynomial, with their rounding --------------------------------------------- */
+/* ---- Values of a polynomial, with their rounding -------------------------------------------- */
 
 struct horner_value {
     double value;
@@ -55,7 +55,7 @@ NONNULL static inline struct horner_value horner(const double c[], int degree, d
  * 2^-94 times the sum of |c[k]| s^k. 0 <= s <= 1, degree < 32, coefficients below 2^990. */
 NONNULL double horner_compensated(const double c[], int degree, double s);
 
-/* ---- Interpolation at Chebyshev points ------------------------------------------------------- */
+/* ---- Interpolation at Chebyshev points ------------------------------------------------------ */
 
 /* Values at most. With more, powers of s lose too many digits: interpolate the halves of the step
  * instead. */
@@ -72,7 +72,7 @@ double chebyshev_point(int count, int k);
  * within the rounding of the values are left out: powers of s would make them larger. */
 MUST_CHECK NONNULL double chebyshev_interpolate(int count, const double values[], double c[]);
 
-/* ---- Roots ----------------------------------------------------------------------------------- */
+/* ---- Roots ---------------------------------------------------------------------------------- */
 
 /* Coefficients at most, and more than there can be roots. */
 enum { ROOTS_LENGTH = 32 };

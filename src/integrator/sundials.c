@@ -4,6 +4,7 @@
 
 #include <arkode/arkode.h>
 #include <cvode/cvode.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -152,6 +153,14 @@ void sundials_destroy(void *memory) {
         SUNContext_Free(&sundials->context);
     }
     workspace_free(sundials);
+}
+
+int sundials_callback_flag(enum status status) {
+    return status == STATUS_OK ? 0 : 1;
+}
+
+long sundials_steps(int64_t count) {
+    return count < LONG_MAX ? (long)count : LONG_MAX;
 }
 
 int sundials_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data) {

@@ -5,7 +5,6 @@
 #include "method.h"
 #include "small_vector.h"
 
-#include <limits.h>
 #include <sundials/sundials_context.h>
 
 /* The first member of each method's memory, and the user data of its solver. */
@@ -39,15 +38,11 @@ void sundials_text(int error_code, const char *module, const char *function, cha
 /* The right-hand side as SUNDIALS calls it; user data: struct sundials. */
 int sundials_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data);
 
-/* Return value of a callback: 1, a smaller step is tried, where the evaluation failed. */
-static inline int sundials_callback_flag(enum status status) {
-    return status == STATUS_OK ? 0 : 1;
-}
+/* Returns the value of a callback: 1, a smaller step is tried, where the evaluation failed. */
+int sundials_callback_flag(enum status status);
 
-/* A number of steps as SUNDIALS takes it: in a long, which has 32 bits on some platforms. */
-static inline long sundials_steps(int64_t count) {
-    return count < LONG_MAX ? (long)count : LONG_MAX;
-}
+/* Converts a number of steps to a long, which has 32 bits on some platforms. */
+long sundials_steps(int64_t count);
 
 /* x may be the vector's own array. */
 NONNULL void sundials_set_state(struct sundials *sundials, const double x[]);

@@ -15,7 +15,7 @@ struct range {
     size_t size;   /* bytes */
 };
 
-/* ---- Events ----------------------------------------------------------------------------------
+/* ---- Events ---------------------------------------------------------------------------------
  * Modes of a model, and the events at which they change. A model without modes has none of this.
  *
  * Between two events the modes stay as they are, and the right-hand side is smooth. An indicator is
@@ -108,7 +108,7 @@ struct model_events {
     enum status (*update)(void *values, const struct event *event);
 };
 
-/* ---- Taylor series --------------------------------------------------------------------------- */
+/* ---- Taylor series -------------------------------------------------------------------------- */
 
 /* Coefficients of a row: orders 0 to SERIES_LENGTH - 1. */
 enum { SERIES_LENGTH = 32 };
@@ -143,7 +143,7 @@ struct series {
                           double rows[][SERIES_LENGTH]);
 };
 
-/* ---- The model ------------------------------------------------------------------------------- */
+/* ---- The model ------------------------------------------------------------------------------ */
 
 struct model {
     size_t values_size;       /* bytes of the value structure */

@@ -62,7 +62,7 @@ static bool is_sure(const struct compared *compared) {
 /* Lets relations follow from their distances; at its limit a relation keeps its mode, as does one
  * that has turned. True: some have changed. is_exact: distances are what they are to the last bit.
  */
-static bool settle(const struct call *call, bool is_exact) {
+static bool update_modes(const struct call *call, bool is_exact) {
     const struct relation *relation = call->model->relation;
     struct compared *compared = call->room.compared;
     bool changes = false;
@@ -79,13 +79,14 @@ static bool settle(const struct call *call, bool is_exact) {
 }
 
 /* Modes may depend on each other, in a circle even: then the last ones stay. */
-static void settle_all(const struct call *call, bool is_exact) {
-    for (int count = 0; count <= call->model->relation_count && settle(call, is_exact); count++) {
+static void update_modes_until_stable(const struct call *call, bool is_exact) {
+    for (int count = 0; count <= call->model->relation_count && update_modes(call, is_exact);
+         count++) {
     }
 }
 
-/* Lets relations follow from the values, whatever their modes were. */
-static void follow(const struct call *call, bool only_of_inputs) {
+/* Writes the modes that follow from the values, whatever their modes were. */
+static void set_modes_from_values(const struct call *call, bool only_of_inputs) {
     const struct relations *model = call->model;
     const struct compared *compared = call->room.compared;
     compare(call, call->room.zeros, call->room.compared);
@@ -95,7 +96,7 @@ static void follow(const struct call *call, bool only_of_inputs) {
         }
     }
     if (!only_of_inputs) {
-        settle_all(call, true);
+        update_modes_until_stable(call, true);
     }
 }
 
@@ -107,7 +108,7 @@ const void *relations_followed(const struct relations *model, struct relations_r
     }
     memcpy(copy, values, model->values_size);
     const struct call call = call_of(model, room, copy, t, room.zeros);
-    follow(&call, is_begun);
+    set_modes_from_values(&call, is_begun);
     return copy;
 }
 
@@ -134,7 +135,7 @@ static double signed_slope(const struct compared *compared, int holds) {
  * How inputs move may not be known, but it is part of the slopes before the change and after it.
  *
  * call->room.before: the relations before the change. */
-static void turn(const struct call *call) {
+static void switch_fallen(const struct call *call) {
     const struct relations *model = call->model;
     const struct compared *before = call->room.before;
     struct compared *after = call->room.compared;
@@ -157,7 +158,7 @@ static void turn(const struct call *call) {
 }
 
 /* Runs the events that have become due, in their order; false: there was none. */
-static bool fire(const struct call *call) {
+static bool run_due_events(const struct call *call) {
     const struct relations *model = call->model;
     int *due = call->room.due;
     bool fires = false;
@@ -166,9 +167,9 @@ static bool fire(const struct call *call) {
         if (due[i] && !call->active[i]) {
             compare(call, call->room.tolerance, call->room.before);
             model->change(call->values, call->t, i, call->room.tolerance);
-            settle_all(call, false);
-            turn(call);
-            settle_all(call, false);
+            update_modes_until_stable(call, false);
+            switch_fallen(call);
+            update_modes_until_stable(call, false);
             memset(call->room.turned, 0, (size_t)model->relation_count * sizeof *call->room.turned);
             call->active[i] = 1;
             fires = true;
@@ -206,7 +207,7 @@ static void pass(const struct call *call, const struct event *event) {
             call->holds[k] ^= falls || joins(&room.compared[k], call->holds[k]);
         }
     }
-    settle_all(call, false);
+    update_modes_until_stable(call, false);
 }
 
 enum status relations_update(const struct relations *model, struct relations_room room,
@@ -216,7 +217,7 @@ enum status relations_update(const struct relations *model, struct relations_roo
     double *tolerance = room.tolerance;
     const int was_begun = *call.is_begun;
     if (!was_begun) {
-        follow(&call, false);
+        set_modes_from_values(&call, false);
         *call.is_begun = 1;
     }
     for (int i = 0; i < model->state_count; i++) {
@@ -227,7 +228,7 @@ enum status relations_update(const struct relations *model, struct relations_roo
         pass(&call, event);
     }
     for (int count = 0; count <= event->max_events; count++) {
-        if (!fire(&call)) {
+        if (!run_due_events(&call)) {
             return STATUS_OK;
         }
     }

@@ -40,7 +40,7 @@ enum severity status_severity(enum status status);
 /* Static text, never NULL. */
 const char *status_text(enum status status);
 
-/* ---- Messages -------------------------------------------------------------------------------- */
+/* ---- Messages ------------------------------------------------------------------------------- */
 
 /* text: finished, one line, valid during the call only. */
 typedef void message_function(void *context, enum status status, const char *text);
