@@ -25,7 +25,7 @@ static bool continues_character(char c) {
     return ((unsigned char)c & 0xc0) == 0x80;
 }
 
-/* Length of a text in UTF-8 without a last character that has been cut. */
+/* Returns the length of a text in UTF-8 without a last character that has been cut. */
 static size_t whole_length(const char *text, size_t length) {
     size_t begin = length;
     while (begin > 0 && continues_character(text[begin - 1])) {
@@ -67,7 +67,7 @@ static void send_text(struct component *component, enum component_status status,
     component->is_logging = true;
     component->call_in_logger = NULL;
     send_one(component, status, category, raw);
-    if (component->call_in_logger != NULL) { // once: the logger may do it each time
+    if (component->call_in_logger != NULL) { // once, because the logger may do it each time
         char refusal[LOG_TEXT_SIZE];
         (void)snprintf(refusal, sizeof refusal,
                        "%s is refused inside the logger: the instance is in the middle of a call",
@@ -97,7 +97,7 @@ void component_log(struct component *component, enum component_status status,
     send_text(component, status, category, raw);
 }
 
-/* logAll stands for all of them; false if the name is unknown. */
+/* Sets a category, or all of them by the name logAll. Returns false if the name is unknown. */
 static bool set_logged(struct component *component, const char *name, bool on) {
     const bool all = strcmp(name, category_names[LOG_ALL]) == 0;
     bool found = false;

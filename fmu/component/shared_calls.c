@@ -7,7 +7,7 @@
 #include "snapshot.h"
 #include "values.h"
 
-/* The component is in this state where the instance has succeeded. */
+/* Enters this state if the instance has succeeded. */
 static enum component_status go_to(struct component *component, enum fmi_state state,
                                    enum status status) {
     if (status == STATUS_OK) {
@@ -272,7 +272,7 @@ enum component_status continuous_complete_step(struct component *component, unsi
 
 /* ---- FMU state ------------------------------------------------------------------------------ */
 
-/* A saved state carries the FMI state and the kind of its instance, and its version of FMI. */
+/* Tag of a saved state: the FMI state and kind of its instance, and its version of FMI. */
 enum {
     TAG_STATE_MASK = 0xffff,
     TAG_KIND_SHIFT = 16,
@@ -290,8 +290,8 @@ static unsigned version_in(unsigned tag) {
     return (tag >> TAG_VERSION_SHIFT) + TAG_VERSION_0;
 }
 
-/* FMI states that a component of this kind can be in while its instance is in a phase; each of them
- * may also be after an error. */
+/* Returns the FMI states that a component of this kind can be in while its instance is in a phase;
+ * each of them is also possible after an error. */
 static unsigned states_of(enum fmi_kind kind, enum phase phase) {
     const bool steps = kind != KIND_MODEL_EXCHANGE;
     switch (phase) {
@@ -310,7 +310,7 @@ static unsigned states_of(enum fmi_kind kind, enum phase phase) {
     return 0;
 }
 
-/* The FMI state of a snapshot, if a component like this one can be in it; otherwise 0. */
+/* Returns the FMI state of a snapshot, if a component like this one can be in it; otherwise 0. */
 static unsigned state_in(const struct component *component, unsigned tag, enum phase phase) {
     const struct adapter *adapter = component->adapter;
     const unsigned state = tag & TAG_STATE_MASK;

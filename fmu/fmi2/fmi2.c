@@ -44,7 +44,7 @@ static const struct call_rule fmi2_call_rules[FMI2_CALL_COUNT] = {
 /* The structure that an fmi2Component points to. */
 struct fmi2_component {
     struct component base;     /* first */
-    fmi2CallbackLogger logger; /* NULL: no log */
+    fmi2CallbackLogger logger; /* NULL for no log */
     fmi2ComponentEnvironment environment;
     char name[];
 };

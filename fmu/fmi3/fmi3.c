@@ -26,7 +26,7 @@ static void send_text(const struct component *component, enum component_status s
     }
 }
 
-/* With logging off, errors alone are sent. */
+/* Categories that are sent with logging off. */
 #define ERRORS (1u << LOG_STATUS_ERROR | 1u << LOG_STATUS_FATAL)
 
 static const struct adapter adapter = {
@@ -55,7 +55,7 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, siz
 
 /* ---- Intermediate updates ------------------------------------------------------------------- */
 
-/* What the importer has asked for. */
+/* The importer's answer to an intermediate update. */
 struct answer {
     fmi3Boolean returns_early;
     fmi3Float64 early_time;
@@ -75,7 +75,7 @@ static enum status update(struct fmi3_component *component, double time, bool ca
     return base->has_failed_inside ? STATUS_INVALID_ARGUMENT : STATUS_OK;
 }
 
-/* Before the step: the importer sets the inputs at this time. */
+/* Lets the importer set the inputs at this time, before the step. */
 static enum status ask_inputs(void *component_pointer, double time) {
     struct fmi3_component *component = component_pointer;
     struct answer answer;
@@ -84,7 +84,7 @@ static enum status ask_inputs(void *component_pointer, double time) {
     return update(component, time, false, &answer);
 }
 
-/* After an internal step: the importer gets outputs, and may ask for the end of the step. */
+/* Lets the importer get outputs after an internal step; it may ask for the end of the step. */
 static enum status accept(void *component_pointer, double time, double *end) {
     struct fmi3_component *component = component_pointer;
     const bool can_return_early = component->early_return_allowed && time < *end;
@@ -115,7 +115,7 @@ static enum status prepare_steps(struct fmi3_component *component) {
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-/* Where texts go while there is no instance. */
+/* Receiver of texts while there is no instance. */
 struct receiver {
     fmi3LogMessageCallback logger;
     fmi3InstanceEnvironment environment;
@@ -179,7 +179,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
     return created;
 }
 
-/* Continuous inputs and outputs: those with intermediateUpdate in modelDescription.xml. */
+/* True for continuous inputs and outputs, which have intermediateUpdate in modelDescription.xml. */
 static bool has_intermediate_update(const struct variable *variable) {
     return variable->type == VARIABLE_FLOAT64 && variable->owner == VARIABLE_OF_MODEL &&
            variable->variability == VARIABILITY_CONTINUOUS &&
@@ -281,7 +281,7 @@ fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
     return fmi3_status(mode_enter_event(instance, CALL_fmi3EnterEventMode));
 }
 
-/* One update settles all modes. Another one is needed only if the importer has passed several time
+/* One update decides all modes. Another one is needed only if the importer has passed several time
  * events. */
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
                                     fmi3Boolean *terminateSimulation,
@@ -320,7 +320,7 @@ fmi3Status fmi3Reset(fmi3Instance instance) {
 
 /* ---- Values --------------------------------------------------------------------------------- */
 
-/* Of one type; `access` reads or sets the values. */
+/* Defines the function for one type; `access` reads or sets the values. */
 #define FUNCTION(name, element, access)                                                            \
     fmi3Status name(fmi3Instance instance, const fmi3ValueReference valueReferences[],             \
                     size_t nValueReferences, element values[], size_t nValues) {                   \
@@ -331,7 +331,7 @@ fmi3Status fmi3Reset(fmi3Instance instance) {
         return fmi3_status(access);                                                                \
     }
 
-/* Types that variables have, and their names in shared_calls.h. */
+/* Defines the functions for types that variables have; type: its name in shared_calls.h. */
 #define OF_VARIABLES(Type, type)                                                                   \
     FUNCTION(fmi3Get##Type, fmi3##Type,                                                            \
              access_get_##type(instance, call, valueReferences, nValueReferences, values))         \
@@ -342,7 +342,7 @@ OF_VARIABLES(Int32, int32)
 OF_VARIABLES(Int64, enumeration)
 OF_VARIABLES(Boolean, bool)
 
-/* Types that no variable has. */
+/* Accesses a type that no variable has. */
 static enum component_status none(struct component *component, enum fmi3_call call, bool setting,
                                   const char *type, const fmi3ValueReference references[],
                                   size_t count, const void *values) {

@@ -65,7 +65,7 @@ bool fmi3_check_access(struct component *component, unsigned call, bool setting,
  * Every FMU exports them, but modelDescription.xml declares nothing that they serve: clocks,
  * configuration mode, dependencies at run time, Scheduled Execution. */
 
-/* A call of the table that this FMU does not support: an error that says why. */
+/* Fails with an error that says why the FMU does not support a call. */
 static fmi3Status unsupported(fmi3Instance instance, enum fmi3_call call, const char *reason) {
     struct component *component = instance;
     if (!component_enter(component, call)) {

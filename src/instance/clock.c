@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-/* Of a step: what a master may call rounding at most. */
+/* Largest part of a step that counts as a master's rounding. */
 static const double largest_part = 0.01;
 
 double clock_slack(double size, double step_size) {

@@ -20,8 +20,8 @@ static void evaluate_inputs(const struct instance *instance, double t) {
     }
 }
 
-/* Writes the values of inputs after a restart: constant ones are evaluated once, not at every call;
- * moves: not all are constant. */
+/* Writes the values of inputs after a restart: constant ones are evaluated once, not at every call.
+ * moves: some inputs are not constant. */
 static void prepare_inputs(struct instance *instance, bool moves) {
     const bool had_moved = instance->inputs_move;
     instance->inputs_move = moves;
@@ -29,7 +29,7 @@ static void prepare_inputs(struct instance *instance, bool moves) {
         const struct polynomial *input = &instance->memory.active_inputs[i];
         double *series = instance->input_series[i];
         instance->u[i] = input->d[0];
-        series[0] = input->d[0]; // all there is, unless inputs move
+        series[0] = input->d[0]; // the only coefficient, unless inputs move
         for (int k = 1; had_moved && k <= POLYNOMIAL_DEGREE; k++) {
             series[k] = 0.0;
         }
@@ -80,7 +80,7 @@ void instance_reach(const double x[], double reach[], void *instance_pointer) {
     instance->model->events->reach(instance->memory.restart_values, x, reach);
 }
 
-/* Coefficients of the inputs at t, for the time scale time_scale. */
+/* Writes the coefficients of the inputs at t, for the time scale time_scale. */
 static void expand_inputs(const struct instance *instance, double t, double time_scale) {
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
         double *coefficients = instance->input_series[i];
@@ -117,7 +117,7 @@ static bool is_searched(const struct instance *instance) {
            events->are_possible(instance->memory.restart_values);
 }
 
-/* Returns the indicators of the present modes, for the integrator; NULL: no events can be. */
+/* Returns the indicators of the current modes, for the integrator; NULL if no event is possible. */
 static const struct indicator *describe_indicators(struct instance *instance) {
     if (!is_searched(instance)) {
         return NULL;
@@ -126,25 +126,24 @@ static const struct indicator *describe_indicators(struct instance *instance) {
     return instance->indicators;
 }
 
-/* Whether the motion to target is the one of the integrator's history. It depends only on the
- * values set now and those that the integrator runs with, not on how often or in what order they
- * were set.
+/* True if the motion to target is the one of the integrator's history. This depends only on the
+ * values set now and the integrator's, not on how often or in what order they were set.
  *
- * Any change of an input restarts it. Measured with inputs sampled from sines every 1 ms, going on
- * with CVODE's history over a jump has 450 times the error of a restart and is slower where jumps
- * are 4e-4 of the input, has 40 times the error at 4e-6 and 4 times at 4e-8. It gains only below
- * 1e-9, and rollback would have to replay every jump. */
+ * Any change of an input restarts it. Measured with inputs sampled from sines every 1 ms,
+ * continuing CVODE's history over a jump has 450 times the error of a restart and is slower if
+ * jumps are 4e-4 of the input, has 40 times the error at 4e-6 and 4 times at 4e-8. It gains only
+ * below 1e-9, and rollback would have to replay every jump. */
 static bool continues(const struct instance *instance, double target) {
     const struct instance_state *state = &instance->state;
     return state->has_history && target <= state->horizon && instance_values_are_active(instance);
 }
 
-/* Returns integrator_longest_history of the method, in the present modes. */
+/* Returns integrator_longest_history of the method, in the current modes. */
 static int64_t longest_history(const struct instance *instance) {
     return integrator_longest_history(instance->configured.method, is_searched(instance));
 }
 
-/* The target needs one more internal step than a history may have. */
+/* True if the target needs one more internal step than a history may have. */
 static bool history_is_full(const struct instance *instance, double target) {
     const struct instance_state *state = &instance->state;
     const int64_t steps = state->statistics.steps - state->steps_before_restart;
@@ -179,7 +178,8 @@ static struct integrator_start start_of(struct instance *instance) {
         .indicators = instance->model->events != NULL ? describe_indicators(instance) : NULL};
 }
 
-/* What the integrator runs with from now on: inputs or states. A loop, because they are few. */
+/* Makes the integrator run with the inputs or states that are set now. A loop, because they are
+ * few. */
 static void activate(struct instance *instance, struct range range) {
     const double *from = doubles_of(instance->memory.values, range);
     double *to = doubles_of(instance->memory.restart_values, range);
@@ -193,7 +193,7 @@ static void activate_bytes(struct instance *instance, struct range range) {
            range.size);
 }
 
-/* Ends the history: times since the restart count from the present time on. */
+/* Ends the history: times since the restart count from the current time on. */
 static void end_history(struct instance *instance) {
     instance->state.restart_time = instance->state.time;
     instance->state.has_history = false;
@@ -211,8 +211,8 @@ double instance_horizon(const struct instance_state *state, struct clock_time re
                                                : INFINITY;
 }
 
-/* From the present time on the integrator runs with the values that are set now, and with these
- * polynomials of time as inputs, at least up to the time end. Ends the history. */
+/* Makes the integrator run, from the current time on, with the values that are set now, and with
+ * these polynomials of time as inputs, at least up to the time end. Ends the history. */
 static inline void activate_values(struct instance *instance, struct clock_time end,
                                    const struct polynomial inputs[], bool has_new_parameters) {
     struct instance_memory *memory = &instance->memory;
@@ -254,7 +254,7 @@ static enum status restart(struct instance *instance, struct clock_time end,
     activate_values(instance, end, is_event ? memory->current_inputs : memory->next_inputs,
                     has_new_parameters);
 
-    // note what a replay needs
+    // note the restart for a replay
     state->steps_before_restart = state->statistics.steps;
     state->restart_step = state->next_step;
     state->restart_continues = continuation != CONTINUE_AFTER_CHANGE;
@@ -263,7 +263,7 @@ static enum status restart(struct instance *instance, struct clock_time end,
                               doubles_of(memory->restart_values, instance->model->states), &start);
 }
 
-/* In the number of internal steps that the state gives. A forged state fails here. */
+/* Replays the number of internal steps that the state gives. A forged state fails here. */
 enum status instance_replay_history(struct instance *instance) {
     const struct instance_state *state = &instance->state;
     const struct range states = instance->model->states;

@@ -1,12 +1,12 @@
-/* The integrator's history of internal steps: when it may continue from it, how a restored instance
- * gets it back, and the initial value problem that it calls: the model with the parameters of the
- * last restart, and the inputs as polynomials since then. */
+/* History of the integrator's internal steps: when it may continue, how a restored instance gets
+ * its history back, and the initial value problem: the model with the parameters of the last
+ * restart, and the inputs as polynomials since then. */
 #ifndef HISTORY_H
 #define HISTORY_H
 
 #include "state.h"
 
-/* How the integrator continues. */
+/* Way in which the integrator continues. */
 enum continuation {
     CONTINUE_NOW,           /* from its history */
     CONTINUE_AFTER_REPLAY,  /* from its history, which a restored instance repeats first */
@@ -15,12 +15,12 @@ enum continuation {
     CONTINUE_AFTER_EVENT,   /* with a restart, in the modes after an event */
 };
 
-/* target: s since the restart. */
+/* Returns how the integrator continues to target (s since the restart). */
 MUST_CHECK NONNULL enum continuation instance_continuation(const struct instance *instance,
                                                            double target);
 
-/* How far from a restart the integrator may go, s: to target where inputs move, otherwise to the
- * stop time. */
+/* Returns how far from a restart the integrator may go, s: to target if inputs move, otherwise to
+ * the stop time. */
 NONNULL double instance_horizon(const struct instance_state *state, struct clock_time restart,
                                 double target, bool inputs_move);
 
@@ -30,13 +30,13 @@ MUST_CHECK NONNULL enum status instance_prepare_history(struct instance *instanc
                                                         struct clock_time end,
                                                         enum continuation continuation);
 
-/* Lets the time pass to `until` in modes in which no state moves, or to an earlier event of an
- * input, and ends the history. end: the end of the step; meets_time_event: at `until`. */
+/* Lets the time pass to `until`, or to an earlier event of an input, in modes in which no state
+ * moves, and ends the history. end: the end of the step; meets_time_event: at `until`. */
 MUST_CHECK NONNULL enum status instance_rest(struct instance *instance, struct clock_time end,
                                              struct clock_time until, bool meets_time_event,
                                              enum continuation continuation);
 
-/* Notes where a part of a step has ended, and whether the next one can continue from there.
+/* Notes where a part of a step has ended, and whether the next part can continue from there.
  * is_whole: the part went to the end that it was begun with; others cannot be replayed. */
 NONNULL void instance_note_part(struct instance *instance, enum status status, bool is_whole);
 
@@ -53,7 +53,7 @@ NONNULL void instance_update_next_step(struct instance *instance);
 
 /* ---- The initial value problem -------------------------------------------------------------- */
 
-/* context: the instance. t: s since the restart. */
+/* Evaluate the initial value problem. context: the instance. t: s since the restart. */
 ode_rhs instance_rhs;
 ode_jacobian instance_jacobian;
 ode_series instance_series;

@@ -8,7 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-/* A value by its name, and whether an instance can have it. */
+/* A value with its name, and whether an instance can have it. */
 struct named_value {
     const char *name;
     double value;
@@ -31,19 +31,19 @@ static bool check_all(const struct instance *instance, const struct named_value 
 #define COUNT(array) (sizeof(array) / sizeof(array)[0])
 
 static bool is_count(int64_t value) {
-    return value >= 0 && value <= INT64_MAX / 2; // can be counted on from without overflow
+    return value >= 0 && value <= INT64_MAX / 2; // counting on will not overflow
 }
 
 static bool is_step(double value) {
     return value >= 0.0 && isfinite(value);
 }
 
-/* s is the whole time, rounded. */
+/* True if s is the whole time, rounded. */
 static bool is_rest_of(struct clock_time time) {
     return clock_two_sum(time.s, time.rest).s == time.s;
 }
 
-/* Time, phase and the settings of the integrator. */
+/* Checks time, phase and the settings of the integrator. */
 static bool check_settings(const struct instance *instance, const struct instance_state *state) {
     const struct instance_values *own = &state->own;
     const int phase = (int)state->phase;
@@ -89,7 +89,7 @@ static bool check_statistics(const struct instance *instance, const struct insta
     return check_all(instance, values, COUNT(values));
 }
 
-/* What a replay of the integrator's history needs. */
+/* Checks the values for a replay of the integrator's history. */
 static bool check_history(const struct instance *instance, const struct instance_state *state) {
     const int64_t steps = state->statistics.steps - state->steps_before_restart;
     const int64_t most_steps =
@@ -128,8 +128,8 @@ static bool check_inputs(const struct instance *instance, const char *name,
     return true;
 }
 
-/* Parameters, inputs and states that could have been set, and modes and discrete states within
- * their limits. */
+/* Checks that parameters, inputs and states could have been set, and that modes and discrete states
+ * are within their limits. */
 static bool check_limits(const struct instance *instance, const char *values) {
     const struct message_sink quiet = {0};
     for (size_t i = 0; i < instance->description->variable_count; i++) {
@@ -150,7 +150,7 @@ static bool check_limits(const struct instance *instance, const char *values) {
     return true;
 }
 
-/* Discrete states that are no variables. */
+/* Checks that discrete states are finite, also those that are no variables. */
 static bool check_kept(const struct instance *instance, const char *values) {
     const struct range kept = events_of(instance->model).discrete_states;
     for (size_t i = 0; i < count_of(kept); i++) {
@@ -178,8 +178,8 @@ static bool are_zeros(const char *values, struct range range) {
     return true;
 }
 
-/* Modes of values, which may have been set since the last event, and those that the integrator runs
- * with. They are equal while the history lasts: an event would have ended it. */
+/* Checks the modes of values, which may have been set since the last event, and the integrator's
+ * modes. They are equal while the history lasts: an event would have ended it. */
 static bool check_modes(const struct instance *instance, const struct instance_state *state,
                         const char *values, const char *restart_values) {
     const struct model_events *events = instance->model->events;
@@ -200,8 +200,8 @@ static bool check_modes(const struct instance *instance, const struct instance_s
     return true;
 }
 
-/* Steps handle time events as they come: none is earlier than the present time by more than
- * rounding. An importer that integrates outside may skip one. */
+/* Checks the next time event. Steps handle time events as they come: none is earlier than the
+ * current time by more than rounding. An importer that integrates outside may skip one. */
 static bool check_next_time(const struct instance *instance, const struct instance_state *state,
                             const char *values) {
     const struct model_events *events = instance->model->events;
@@ -217,12 +217,13 @@ static bool check_next_time(const struct instance *instance, const struct instan
     return check_all(instance, &value, 1);
 }
 
-/* A value structure that the instance can have. */
+/* Checks that the instance can have a value structure. */
 static bool check_structure(const struct instance *instance, const char *values) {
     return check_limits(instance, values) && check_kept(instance, values);
 }
 
-/* An unhandled event is one of an indicator or of the time. */
+/* Checks the event at which the last step ended: an unhandled event has an indicator or the time as
+ * its cause. */
 static bool check_event_point(const struct instance *instance, const struct instance_state *state,
                               const bool unhandled[]) {
     int count = 0;
@@ -245,9 +246,10 @@ static bool check_event_point(const struct instance *instance, const struct inst
     return check_all(instance, values, COUNT(values));
 }
 
-/* ---- What is stored twice ------------------------------------------------------------------- */
+/* ---- Values stored twice ----------------------------------------------------------------------
+ */
 
-/* A value by its name, and what the rest of the state says that it is. */
+/* A value with its name, and the value that follows from the rest of the state. */
 struct twin {
     const char *name;
     double value;
@@ -267,7 +269,8 @@ static bool check_twins(const struct instance *instance, const struct twin twins
     return true;
 }
 
-/* Variables of the instance follow from its clock, its settings and the integrator's totals. */
+/* Checks the instance's variables, which follow from its clock, its settings and the integrator's
+ * totals. */
 static bool check_variables(const struct instance *instance, const struct instance_state *state) {
     const struct instance_values *own = &state->own;
     struct instance_values counted = {0};
@@ -286,12 +289,12 @@ static bool check_variables(const struct instance *instance, const struct instan
     return check_twins(instance, twins, COUNT(twins));
 }
 
-/* The start is the one of the experiment; nothing has been counted before it. */
+/* Checks that the start is the experiment's, and that nothing has been counted before it. */
 static bool check_start(const struct instance *instance, const struct instance_state *state) {
     const struct instance_values *own = &state->own;
     const bool has_started = state->phase >= PHASE_STEPPING;
     const bool knows_start = state->phase >= PHASE_INITIALIZATION;
-    // of the other kind: the adapter says so
+    // of the other kind: the adapter refuses it
     const bool is_foreign =
         state->phase == PHASE_CONTINUOUS_TIME && !instance->is_integrated_outside;
     const double start = state->experiment.start_time;
@@ -322,7 +325,8 @@ static bool check_start(const struct instance *instance, const struct instance_s
             check_twins(instance, of_no_experiment, COUNT(of_no_experiment)));
 }
 
-/* The integrator's history ends at the present time, and its horizon follows from the inputs. */
+/* Checks that the integrator's history ends at the current time, and that its horizon follows from
+ * the inputs. */
 static bool check_history_twins(const struct instance *instance, const struct instance_state *state,
                                 const struct polynomial active_inputs[]) {
     const struct twin twins[] = {
@@ -335,8 +339,8 @@ static bool check_history_twins(const struct instance *instance, const struct in
     return !state->has_history || check_twins(instance, twins, COUNT(twins));
 }
 
-/* Inputs at the current time are among the values, too; fixed parameters also among those that the
- * integrator runs with. */
+/* Checks values that are stored twice: inputs at the current time are among the values, too, fixed
+ * parameters also among the integrator's. */
 static bool check_value_twins(const struct instance *instance, const struct instance_state *state,
                               const char *values, const char *restart_values,
                               const struct polynomial current[]) {
@@ -366,7 +370,7 @@ static bool check_value_twins(const struct instance *instance, const struct inst
 
 enum status instance_check_plausible(const struct instance *instance,
                                      const struct instance_state *state, const char *block) {
-    // offsets are those in the instance's own block
+    // offsets in the instance's own block
     const struct instance_memory *memory = &instance->memory;
     const char *values = block + (memory->values - memory->block);
     const char *restart_values = block + (memory->restart_values - memory->block);

@@ -13,25 +13,26 @@ struct step {
     struct instance *instance;
     const struct step_options *options;
     struct clock_time begin;
-    struct clock_time end;          /* where it will end; may become earlier */
-    struct clock_time until;        /* end of its present part: the same, or a time event before */
-    bool meets_time_event;          /* at the end of its present part */
-    double drift;                   /* s: of the communication points, up to its beginning */
-    bool is_early;                  /* end has become earlier */
-    bool is_over;                   /* the step ends where it is */
-    struct instance_snapshot *kept; /* the instance before the step; NULL: not needed so far */
-    enum status answer;             /* of options->accept */
-    struct event_counts events;     /* so far */
-    int64_t steps_before;           /* internal ones, since initialization */
+    struct clock_time end;   /* end of the step, which may become earlier */
+    struct clock_time until; /* end of its current part: the same, or a time event before */
+    bool meets_time_event;   /* true if a time event is at the end of the current part */
+    double drift;            /* drift of the communication points up to the begin of the step, s */
+    bool is_early;           /* true if `end` has become earlier */
+    bool is_over;            /* true if the step ends where it is */
+    struct instance_snapshot *kept; /* the instance before the step; NULL if not needed so far */
+    enum status answer;             /* last status of options->accept */
+    struct event_counts events;     /* events so far */
+    int64_t steps_before; /* internal steps from initialization to the begin of the step */
 };
 
 /* ---- Times ---------------------------------------------------------------------------------- */
 
-/* s: integrators go beyond the end of a step, by up to 1e4 times its length. With times that then
- * overflow cvode_bdf would try the same step without end. */
+/* Latest time, s. Integrators go beyond the end of a step, by up to 1e4 times its length. With
+ * times that then overflow cvode_bdf would try the same step without end. */
 static const double latest_time = 1e300;
 
-/* mismatch (s): of communication_point from the time of the instance. */
+/* Refuses times that do not fit. mismatch: distance of communication_point from the time of the
+ * instance, s. */
 static enum status refuse_times(const struct instance *instance, double communication_point,
                                 double step_size, double mismatch) {
     const struct instance_experiment *experiment = &instance->state.experiment;
@@ -87,7 +88,7 @@ static void set_part(struct step *step) {
     }
 }
 
-/* Internal steps that the step may still take. */
+/* Returns the number of internal steps that the step may still take. */
 static int64_t steps_left(const struct step *step) {
     const struct instance_state *state = &step->instance->state;
     return state->own.max_internal_steps - (state->statistics.steps - step->steps_before);
@@ -120,8 +121,8 @@ static void evaluate_inputs(struct instance *instance, double elapsed) {
     }
 }
 
-/* After a step that has asked for inputs: they keep the value given for its end or, where the step
- * ended earlier, the value there. */
+/* Sets the inputs after a step that has asked for them: they keep the value given for its end or,
+ * if the step ended earlier, the value there. */
 static void keep_last_nodes(const struct step *step) {
     struct instance *instance = step->instance;
     const struct instance_memory *memory = &instance->memory;
@@ -196,7 +197,7 @@ static enum status ask_inputs(const struct step *step, double communication_poin
     return set_polynomials(instance, clock_difference(step->end, step->begin));
 }
 
-/* Inputs at the end of a step. Their derivatives applied to it only. */
+/* Sets the inputs to their values at the end of a step. Their derivatives applied to it only. */
 static void end_inputs(const struct step *step) {
     struct instance *instance = step->instance;
     const double elapsed = clock_difference(instance->state.time, step->begin);
@@ -218,7 +219,8 @@ static void end_inputs(const struct step *step) {
 
 /* ---- Parts without an event ----------------------------------------------------------------- */
 
-/* Reports the time of the instance to options->accept; true: the step will end earlier. */
+/* Reports the time of the instance to options->accept. Returns true if the step will end earlier.
+ */
 static bool report(struct step *step) {
     const double now = step->instance->state.time.s;
     double end = step->end.s;
@@ -236,7 +238,7 @@ static bool report(struct step *step) {
     return false;
 }
 
-/* An integrator_observer. */
+/* Observes an internal step: an integrator_observer. */
 static bool observe(void *step_pointer, double t, const double x[]) {
     struct step *step = step_pointer;
     struct instance *instance = step->instance;
@@ -251,7 +253,7 @@ static bool is_at_event(const struct instance *instance) {
     return instance->model->events != NULL && integrator_event(instance->integrator) != NULL;
 }
 
-/* To step->until, which may become earlier on the way. */
+/* Advances to step->until, which may become earlier on the way. */
 static enum status advance(struct step *step) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
@@ -273,7 +275,7 @@ static enum status advance(struct step *step) {
         if (!(state->latest_time < target)) {
             break;
         }
-        // to the new end; the step that the observer cut short counts
+        // to the new end; the internal step that the observer cut short counts
         integrator_get_statistics(instance->integrator, &state->statistics);
     }
     if (step->options->accept != NULL) {
@@ -298,7 +300,7 @@ static enum status move(struct step *step, enum continuation continuation) {
 
 /* ---- Events --------------------------------------------------------------------------------- */
 
-/* The instance goes to the time of an event and handles it, or the step ends there. */
+/* Moves the instance to the time of an event and handles it, unless the step ends there. */
 static enum status meet_event(struct step *step, struct clock_time time) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
@@ -325,7 +327,7 @@ static enum status meet_event(struct step *step, struct clock_time time) {
     return status;
 }
 
-/* The modes at the beginning of a step, and how the integrator continues from there. */
+/* Decides the modes at the beginning of a step, and how the integrator continues from there. */
 static enum status begin_modes(struct step *step, enum continuation *continuation) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
@@ -366,7 +368,7 @@ static enum status move_part(struct step *step, enum continuation continuation) 
                                                                          : move(step, continuation);
 }
 
-/* Writes the event to which the last part has come, and its time; false: there is none. */
+/* Writes the event at which the last part ended, and its time. Returns false if there is none. */
 static bool find_event(const struct step *step, bool has_moved, struct clock_time *time) {
     const struct instance *instance = step->instance;
     const size_t count = instance->model->events->indicator_count;
@@ -386,7 +388,7 @@ static bool find_event(const struct step *step, bool has_moved, struct clock_tim
     return true;
 }
 
-/* At the end of the step, and no other time event is there. */
+/* True at the end of the step, if no other time event is there. */
 static bool is_done(const struct step *step) {
     return !(clock_difference(step->end, step->instance->state.time) > 0.0) &&
            (step->options->at_event != EVENTS_PASSED || !step->meets_time_event);
@@ -425,7 +427,7 @@ static void keep(struct step *step) {
     }
 }
 
-/* The instance is at the time where the step has ended. */
+/* Sets the instance to the time at which the step has ended. */
 static void end_at(const struct step *step, struct clock_time time) {
     instance_set_clock(step->instance, time);
     if (!step->instance->inputs_are_held) {
@@ -433,8 +435,8 @@ static void end_at(const struct step *step, struct clock_time time) {
     }
 }
 
-/* To a point that an internal step may have passed already: then nothing can fail, and nothing is
- * counted. Otherwise false. */
+/* Goes to a point that an internal step has passed already: then nothing can fail, and nothing is
+ * counted. Returns false if no step has. */
 static bool interpolate(const struct step *step, double target) {
     struct instance *instance = step->instance;
     if (!integrator_interpolate(instance->integrator, target,
@@ -463,7 +465,7 @@ static enum status integrate(struct step *step) {
     return status;
 }
 
-/* The same for a model without states. */
+/* Lets the time pass for a model without states. */
 static enum status pass_time(struct step *step) {
     enum status status = check_inputs(step);
     if (status != STATUS_OK) {

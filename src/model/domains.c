@@ -26,8 +26,8 @@ static void complete(double value[], const double other[], size_t count) {
     }
 }
 
-/* Lets the modes of room.values follow from its states and inputs; false: `values` has the same. A
- * relation that is not defined keeps its mode. */
+/* Updates the modes of room.values by its states and inputs; a relation that is not defined keeps
+ * its mode. Returns false if `values` has the same modes. */
 static bool update_modes(const struct domains *model, struct domains_room room, const void *values,
                          double t) {
     int *holds = modes_in(model, room.values);
@@ -49,7 +49,7 @@ static bool update_modes(const struct domains *model, struct domains_room room, 
     return memcmp(holds, modes_of(model, values), size) != 0;
 }
 
-/* As update_modes, of values with these states and inputs. */
+/* Calls update_modes for values with these states and inputs. */
 static bool update_modes_at(const struct domains *model, struct domains_room room,
                             const void *values, double t, const double x[], const double u[]) {
     memcpy(room.values, values, model->values_size);
@@ -76,8 +76,8 @@ enum status domains_jacobian(const struct domains *model, struct domains_room ro
                                                          : STATUS_OK;
 }
 
-/* Replaces indicators that are not finite by the ones of room.values, `other`, with signs for the
- * modes in values. */
+/* Replaces indicators that are not finite by the indicators of room.values, `other`, with signs for
+ * the modes in values. */
 static void complete_indicators(const struct domains *model, struct domains_room room,
                                 const void *values, double z[], const double other[]) {
     for (int k = 0; k < model->relation_count; k++) {
@@ -139,7 +139,7 @@ enum status domains_propagate(const struct domains *model, struct domains_room r
     return status;
 }
 
-/* Indicators that change their signs with the modes keep the signs of `values`. */
+/* Gives indicators whose signs change with the modes the signs of `values`. */
 static void keep_signs(const struct domains *model, struct domains_room room, const void *values,
                        int first, int last, double row[][SERIES_LENGTH]) {
     for (int k = 0; k < model->relation_count; k++) {
