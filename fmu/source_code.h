@@ -1,5 +1,6 @@
-/* In front of every file of a source-code FMU (source_code.py): what options of the compiler do in
- * the project's build. The headers of the system come first: they keep their own symbols. */
+/* Stands in front of every file of a source-code FMU (source_code.py), in place of options of the
+ * compiler in the project's build. The headers of the system come first: they keep their own
+ * symbols. */
 #ifndef SOURCE_CODE_H
 #define SOURCE_CODE_H
 

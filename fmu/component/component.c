@@ -25,7 +25,7 @@ static bool continues_character(char c) {
     return ((unsigned char)c & 0xc0) == 0x80;
 }
 
-/* Length of a text in UTF-8 without a last character that has been cut. */
+/* Returns the length of a text in UTF-8 without a last character that has been cut. */
 static size_t whole_length(const char *text, size_t length) {
     size_t begin = length;
     while (begin > 0 && continues_character(text[begin - 1])) {
@@ -67,7 +67,7 @@ static void send_text(struct component *component, enum component_status status,
     component->is_logging = true;
     component->call_in_logger = NULL;
     send_one(component, status, category, raw);
-    if (component->call_in_logger != NULL) { // once: the logger may do it each time
+    if (component->call_in_logger != NULL) { // once, because the logger may do it each time
         char refusal[LOG_TEXT_SIZE];
         (void)snprintf(refusal, sizeof refusal,
                        "%s is refused inside the logger: the instance is in the middle of a call",
@@ -77,7 +77,7 @@ static void send_text(struct component *component, enum component_status status,
     component->is_logging = false;
 }
 
-bool component_is_logging(struct component *component, const char *call) {
+bool component_refuse_in_logger(struct component *component, const char *call) {
     if (component->is_logging) {
         component->call_in_logger = call;
     }
@@ -97,7 +97,7 @@ void component_log(struct component *component, enum component_status status,
     send_text(component, status, category, raw);
 }
 
-/* logAll stands for all of them; false if the name is unknown. */
+/* Sets a category, or all of them by the name logAll. Returns false if the name is unknown. */
 static bool set_logged(struct component *component, const char *name, bool on) {
     const bool all = strcmp(name, category_names[LOG_ALL]) == 0;
     bool found = false;
@@ -177,7 +177,7 @@ enum component_status component_failure(struct component *component, enum status
 }
 
 enum component_status component_fail(struct component *component, const char *format, ...) {
-    if (component_is_logging(component, "a call")) {
+    if (component_refuse_in_logger(component, "a call")) {
         return COMPONENT_ERROR;
     }
     char raw[LOG_TEXT_SIZE];
@@ -234,7 +234,7 @@ bool component_enter(struct component *component, unsigned call) {
         return false;
     }
     const struct call_rule *rule = &component->adapter->rules[call];
-    if (component_is_logging(component, rule->name)) {
+    if (component_refuse_in_logger(component, rule->name)) {
         return false;
     }
     if (component->is_logged[LOG_ALL]) {
@@ -261,8 +261,8 @@ bool component_refuse_arrays(struct component *component, unsigned call, size_t 
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-bool component_may_begin(const char *name, const char *token_name, const char *token,
-                         const char *expected, char text[LOG_TEXT_SIZE]) {
+bool component_check_token(const char *name, const char *token_name, const char *token,
+                           const char *expected, char text[LOG_TEXT_SIZE]) {
     if (name == NULL || name[0] == '\0') {
         (void)snprintf(text, LOG_TEXT_SIZE,
                        "the instance name is missing: a name that is not empty is expected");

@@ -1,6 +1,6 @@
-/* What all versions of FMI share of an instance: its state, its kind, its log and the rules of its
- * calls. Knows no version: the adapter of one gives a struct adapter, makes its own structure begin
- * with a struct component, and converts status and types. */
+/* The part of an FMI instance that all versions share: its state, its kind, its log and the rules
+ * of its calls. It knows no version: each adapter gives a struct adapter, makes its own structure
+ * begin with a struct component, and converts status and types. */
 #ifndef COMPONENT_H
 #define COMPONENT_H
 
@@ -27,18 +27,18 @@ enum fmi_state {
 enum fmi_kind {
     KIND_MODEL_EXCHANGE = 1 << 0,
     KIND_CO_SIMULATION = 1 << 1,
-    KIND_CO_SIMULATION_WITH_EVENTS = 1 << 2, /* the importer handles events, in event mode */
+    KIND_CO_SIMULATION_WITH_EVENTS = 1 << 2, /* the importer handles events in event mode */
 };
 
-/* In which state an instance of which kind may call a function. Each FMI version has a table of
- * these rules in its own folder. */
+/* Rule of a call: the kinds and states of an instance that allow it. Each FMI version has a table
+ * of these rules in its own folder. */
 struct call_rule {
     const char *name;
     unsigned kinds;  /* bits of enum fmi_kind */
     unsigned states; /* bits of enum fmi_state */
 };
 
-/* The numbers are those of fmi2Status and fmi3Status. */
+/* Status of a call, with the numbers of fmi2Status and fmi3Status. */
 enum component_status {
     COMPONENT_OK = 0,
     COMPONENT_WARNING = 1,
@@ -54,7 +54,7 @@ enum log_category {
     LOG_STATUS_DISCARD,
     LOG_STATUS_ERROR,
     LOG_STATUS_FATAL,
-    LOG_ALL, /* also of calls, for which the standard has no category */
+    LOG_ALL, /* also for calls, for which the standard has no category */
     LOG_CATEGORY_COUNT,
 };
 
@@ -62,21 +62,22 @@ enum { LOG_TEXT_SIZE = 1024 };
 
 struct component;
 
-/* What a version of FMI decides. Categories are bits of 1 << enum log_category. */
+/* Decisions of a version of FMI. Categories are bits of 1 << enum log_category. */
 struct adapter {
     unsigned version;              /* 2 for FMI 2.0 */
     const struct call_rule *rules; /* by the version's own numbers of calls */
-    unsigned states;               /* bits of enum fmi_state: those that the version has */
-    enum fmi_state after_error;    /* the state that an error leads to */
-    unsigned always_logged;        /* categories sent by an instance made with logging off, too */
-    unsigned never_silent;         /* categories that component_set_logging cannot switch off */
-    enum known_kinds knowns;       /* of directional and adjoint derivatives */
-    const char *doubled;           /* characters of a text that stand for themselves only twice */
+    unsigned states;               /* states of the version, as bits of enum fmi_state */
+    enum fmi_state after_error;    /* state after an error */
+    unsigned
+        always_logged; /* categories that an instance sends although it was made with logging off */
+    unsigned never_silent;   /* categories that component_set_logging cannot switch off */
+    enum known_kinds knowns; /* knowns of directional and adjoint derivatives */
+    const char *doubled;     /* characters that must be doubled to stand for themselves in a text */
 
-    /* In intermediate update mode: whether these values may be read or set; if not, it fails as
-     * component_fail. NULL: the version has no such mode. */
-    bool (*may_access)(struct component *component, unsigned call, bool setting,
-                       const unsigned references[], size_t count);
+    /* Returns true if these values may be read or set in intermediate update mode; otherwise fails
+     * as component_fail. NULL if the version has no such mode. */
+    bool (*check_access)(struct component *component, unsigned call, bool setting,
+                         const unsigned references[], size_t count);
 
     /* Sends a finished text to the importer. */
     void (*send)(const struct component *component, enum component_status status,
@@ -88,54 +89,56 @@ struct component {
     struct instance *instance;
     enum fmi_state state;
     enum fmi_kind kind;
-    bool has_failed_inside; /* an error in intermediate update mode, which leads to the state after
-                               errors when the step returns: until then nothing may free it */
-    bool is_logging;        /* the importer's logger is running, inside another call */
-    const char *call_in_logger; /* a call that came from there; NULL: none */
+    /* True after an error in intermediate update mode, which leads to the state after errors when
+     * the step returns: until then nothing may free it. */
+    bool has_failed_inside;
+    bool is_logging; /* true while the importer's logger is running, inside another call */
+    const char *call_in_logger; /* a call from inside the logger; NULL if there is none */
     bool is_logged[LOG_CATEGORY_COUNT];
 };
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-/* True if there may be an instance with this name and this token (that of the model description:
- * expected), which the version calls token_name. Otherwise text says why not. */
+/* Returns true if the name and the token are right; expected: the token of the model description;
+ * token_name: its name in this version. Otherwise writes a text that says why not. */
 MUST_CHECK NONNULL_ARGUMENTS(2, 4,
-                             5) bool component_may_begin(const char *name, const char *token_name,
-                                                         const char *token, const char *expected,
-                                                         char text[LOG_TEXT_SIZE]);
+                             5) bool component_check_token(const char *name, const char *token_name,
+                                                           const char *token, const char *expected,
+                                                           char text[LOG_TEXT_SIZE]);
 
-/* component: zeroed; adapter must outlive it. On failure nothing has to be freed. */
+/* Begins a component, which must be zeroed; adapter must outlive it. On failure nothing has to be
+ * freed. */
 MUST_CHECK NONNULL enum component_status component_begin(struct component *component,
                                                          const struct adapter *adapter,
                                                          enum fmi_kind kind, bool logging_on);
 
-/* Frees what component_begin allocated. */
+/* Frees the memory that component_begin allocated. */
 NONNULL void component_end(struct component *component);
 
 /* ---- Calls ---------------------------------------------------------------------------------- */
 
-/* True if the call may run: the component is not NULL, of the right kind and in a state that the
- * rule allows. Otherwise it fails as component_fail. */
+/* Begins a call. Returns true if it may run: the component is not NULL, of the right kind and in a
+ * state that the rule allows. Otherwise fails as component_fail. */
 MUST_CHECK bool component_enter(struct component *component, unsigned call);
 
-/* True if the call comes from inside the importer's logger. It is refused and changes nothing: the
- * instance is in the middle of another call. A message says so after that of the logger. */
-MUST_CHECK NONNULL bool component_is_logging(struct component *component, const char *call);
+/* Refuses a call from inside the importer's logger, while the instance is in the middle of another
+ * call; it changes nothing. A message says so after the logger's own. Returns true if it has
+ * refused the call. */
+MUST_CHECK NONNULL bool component_refuse_in_logger(struct component *component, const char *call);
 
-/* Reports what is wrong with the arrays as component_fail does; always false. */
+/* Reports NULL in place of an array as component_fail does. Returns false. */
 NONNULL bool component_refuse_arrays(struct component *component, unsigned call, size_t count);
 
-/* True if count values may be accessed: neither array is NULL, unless count is 0. Otherwise it
+/* Returns true if count values may be accessed: neither array is NULL, unless count is 0. Otherwise
  * fails as component_fail. */
-MUST_CHECK NONNULL_ARGUMENTS(1) static inline bool component_has_arrays(struct component *component,
-                                                                        unsigned call, size_t count,
-                                                                        const void *references,
-                                                                        const void *values) {
+MUST_CHECK NONNULL_ARGUMENTS(1) static inline bool component_check_arrays(
+    struct component *component, unsigned call, size_t count, const void *references,
+    const void *values) {
     return count == 0 || (references != NULL && values != NULL) ||
            component_refuse_arrays(component, call, count);
 }
 
-/* As component_result, for a status other than STATUS_OK. */
+/* Does the same as component_result for a status other than STATUS_OK. */
 NONNULL enum component_status component_failure(struct component *component, enum status status);
 
 /* Converts a status of the instance, which has sent its message. An error leads to the state after
@@ -145,12 +148,12 @@ NONNULL static inline enum component_status component_result(struct component *c
     return status == STATUS_OK ? COMPONENT_OK : component_failure(component, status);
 }
 
-/* An error that the adapter finds: logs it, leads to where component_result does, returns
- * COMPONENT_ERROR. Inside the importer's logger it changes nothing. */
+/* Fails with an error that the adapter finds: logs it, goes to the same state as component_result,
+ * returns COMPONENT_ERROR. Inside the importer's logger it changes nothing. */
 NONNULL PRINTF_FORMAT(2, 3) enum component_status
     component_fail(struct component *component, const char *format, ...);
 
-/* "Co-Simulation" or "Model Exchange"; kinds: bits of enum fmi_kind. */
+/* Returns "Co-Simulation" or "Model Exchange"; kinds: bits of enum fmi_kind. */
 const char *component_kind_name(unsigned kinds);
 
 /* ---- Log ------------------------------------------------------------------------------------ */
@@ -161,14 +164,16 @@ NONNULL PRINTF_FORMAT(4, 5) void component_log(struct component *component,
 
 const char *component_category_name(enum log_category category);
 
-/* Sets which categories are sent: with no names all of them; otherwise `on` adds to none, off takes
- * away. Fails as component_fail, with nothing changed, at a name that is NULL or unknown. */
+/* Sets which categories are sent: all of them if there are no names; otherwise on sends exactly
+ * these, off removes them. Fails as component_fail, with nothing changed, at a name that is NULL or
+ * unknown. */
 NONNULL_ARGUMENTS(1)
 enum component_status component_set_logging(struct component *component, bool on, size_t count,
                                             const char *const names[]);
 
 /* Makes a text harmless that importers search for references to variables, or pass to printf:
- * doubles what means something to them. Line ends become blanks, other control characters '?'. */
+ * doubles characters with a meaning there. Line ends become blanks, other control characters '?'.
+ */
 NONNULL void component_make_harmless(const struct adapter *adapter, const char *text,
                                      char out[LOG_TEXT_SIZE]);
 

@@ -1,4 +1,4 @@
-/* The model description of this FMU; defined by the generated variables.c. */
+/* Model description of this FMU; defined by the generated variables.c. */
 #ifndef MODEL_DESCRIPTION_H
 #define MODEL_DESCRIPTION_H
 
@@ -6,7 +6,7 @@
 
 extern const struct model_description model_description;
 
-/* The instantiation token of FMI 3.0; FMI 2.0 has the GUID of the description. */
+/* Instantiation token of FMI 3.0; FMI 2.0 has the GUID of the description. */
 extern const char model_token_fmi3[];
 
 #endif

@@ -7,7 +7,7 @@
 #include "snapshot.h"
 #include "values.h"
 
-/* The component is in this state where the instance has succeeded. */
+/* Enters this state if the instance has succeeded. */
 static enum component_status go_to(struct component *component, enum fmi_state state,
                                    enum status status) {
     if (status == STATUS_OK) {
@@ -111,9 +111,9 @@ enum component_status mode_reset(struct component *component, unsigned call) {
     enum component_status access(struct component *component, unsigned call,                       \
                                  const unsigned references[], size_t count, element values[]) {    \
         if (!component_enter(component, call) ||                                                   \
-            !component_has_arrays(component, call, count, references, values) ||                   \
+            !component_check_arrays(component, call, count, references, values) ||                 \
             (component->state == STATE_INTERMEDIATE_UPDATE &&                                      \
-             !component->adapter->may_access(component, call, setting, references, count))) {      \
+             !component->adapter->check_access(component, call, setting, references, count))) {    \
             return COMPONENT_ERROR;                                                                \
         }                                                                                          \
         return component_result(component,                                                         \
@@ -129,7 +129,7 @@ VALUE_TYPE_LIST(GET_AND_SET)
 enum component_status access_none(struct component *component, unsigned call, const char *type,
                                   const unsigned references[], size_t count, const void *values) {
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, count, references, values)) {
+        !component_check_arrays(component, call, count, references, values)) {
         return COMPONENT_ERROR;
     }
     if (count > 0) {
@@ -147,8 +147,8 @@ enum component_status access_set_input_derivatives(struct component *component, 
                                                    const unsigned references[], size_t count,
                                                    const int orders[], const double values[]) {
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, count, references, values) ||
-        !component_has_arrays(component, call, count, orders, orders)) {
+        !component_check_arrays(component, call, count, references, values) ||
+        !component_check_arrays(component, call, count, orders, orders)) {
         return COMPONENT_ERROR;
     }
     return component_result(component, instance_set_input_derivatives(
@@ -159,8 +159,8 @@ enum component_status access_get_output_derivatives(struct component *component,
                                                     const unsigned references[], size_t count,
                                                     const int orders[], double values[]) {
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, count, references, values) ||
-        !component_has_arrays(component, call, count, orders, orders)) {
+        !component_check_arrays(component, call, count, references, values) ||
+        !component_check_arrays(component, call, count, orders, orders)) {
         return COMPONENT_ERROR;
     }
     return component_result(component, instance_get_output_derivatives(
@@ -173,8 +173,8 @@ enum component_status access_get_directional_derivative(struct component *compon
                                                         const unsigned knowns[], size_t known_count,
                                                         const double seed[], double result[]) {
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, unknown_count, unknowns, result) ||
-        !component_has_arrays(component, call, known_count, knowns, seed)) {
+        !component_check_arrays(component, call, unknown_count, unknowns, result) ||
+        !component_check_arrays(component, call, known_count, knowns, seed)) {
         return COMPONENT_ERROR;
     }
     return component_result(component,
@@ -188,8 +188,8 @@ enum component_status access_get_adjoint_derivative(struct component *component,
                                                     const unsigned knowns[], size_t known_count,
                                                     const double seed[], double result[]) {
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, unknown_count, unknowns, seed) ||
-        !component_has_arrays(component, call, known_count, knowns, result)) {
+        !component_check_arrays(component, call, unknown_count, unknowns, seed) ||
+        !component_check_arrays(component, call, known_count, knowns, result)) {
         return COMPONENT_ERROR;
     }
     return component_result(
@@ -198,7 +198,7 @@ enum component_status access_get_adjoint_derivative(struct component *component,
                                         unknown_count, knowns, known_count, seed, result));
 }
 
-/* ---- Time and continuous states -------------------------------------------------------------- */
+/* ---- Time and continuous states ------------------------------------------------------------- */
 
 enum component_status continuous_set_time(struct component *component, unsigned call, double time) {
     if (!component_enter(component, call)) {
@@ -209,7 +209,8 @@ enum component_status continuous_set_time(struct component *component, unsigned 
 
 enum component_status continuous_set_states(struct component *component, unsigned call,
                                             const double x[], size_t count) {
-    if (!component_enter(component, call) || !component_has_arrays(component, call, count, x, x)) {
+    if (!component_enter(component, call) ||
+        !component_check_arrays(component, call, count, x, x)) {
         return COMPONENT_ERROR;
     }
     return component_result(component, instance_set_states(component->instance, x, count));
@@ -217,7 +218,8 @@ enum component_status continuous_set_states(struct component *component, unsigne
 
 enum component_status continuous_get_states(struct component *component, unsigned call, double x[],
                                             size_t count) {
-    if (!component_enter(component, call) || !component_has_arrays(component, call, count, x, x)) {
+    if (!component_enter(component, call) ||
+        !component_check_arrays(component, call, count, x, x)) {
         return COMPONENT_ERROR;
     }
     return component_result(component, instance_get_states(component->instance, x, count));
@@ -226,7 +228,7 @@ enum component_status continuous_get_states(struct component *component, unsigne
 enum component_status continuous_get_derivatives(struct component *component, unsigned call,
                                                  double dx[], size_t count) {
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, count, dx, dx)) {
+        !component_check_arrays(component, call, count, dx, dx)) {
         return COMPONENT_ERROR;
     }
     return component_result(component, instance_get_derivatives(component->instance, dx, count));
@@ -235,7 +237,7 @@ enum component_status continuous_get_derivatives(struct component *component, un
 enum component_status continuous_get_nominals(struct component *component, unsigned call,
                                               double nominals[], size_t count) {
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, count, nominals, nominals)) {
+        !component_check_arrays(component, call, count, nominals, nominals)) {
         return COMPONENT_ERROR;
     }
     return component_result(component, instance_get_nominals(component->instance, nominals, count));
@@ -245,7 +247,7 @@ enum component_status continuous_get_indicators(struct component *component, uns
                                                 double indicators[], size_t count) {
     const size_t expected = model_description.indicator_count;
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, count, indicators, indicators)) {
+        !component_check_arrays(component, call, count, indicators, indicators)) {
         return COMPONENT_ERROR;
     }
     if (count != expected) {
@@ -261,16 +263,16 @@ enum component_status continuous_complete_step(struct component *component, unsi
                                                const void *enters, const void *terminates,
                                                bool *is_event) {
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, 1, enters, terminates)) {
+        !component_check_arrays(component, call, 1, enters, terminates)) {
         return COMPONENT_ERROR;
     }
     *is_event = instance_complete_step(component->instance);
     return COMPONENT_OK;
 }
 
-/* ---- FMU state ------------------------------------------------------------------------------- */
+/* ---- FMU state ------------------------------------------------------------------------------ */
 
-/* A saved state carries the FMI state and the kind of its instance, and its version of FMI. */
+/* Tag of a saved state: the FMI state and kind of its instance, and its version of FMI. */
 enum {
     TAG_STATE_MASK = 0xffff,
     TAG_KIND_SHIFT = 16,
@@ -288,8 +290,8 @@ static unsigned version_in(unsigned tag) {
     return (tag >> TAG_VERSION_SHIFT) + TAG_VERSION_0;
 }
 
-/* FMI states that a component of this kind can be in while its instance is in a phase; each of them
- * may also be after an error. */
+/* Returns the FMI states that a component of this kind can be in while its instance is in a phase;
+ * each of them is also possible after an error. */
 static unsigned states_of(enum fmi_kind kind, enum phase phase) {
     const bool steps = kind != KIND_MODEL_EXCHANGE;
     switch (phase) {
@@ -308,7 +310,7 @@ static unsigned states_of(enum fmi_kind kind, enum phase phase) {
     return 0;
 }
 
-/* The FMI state of a snapshot, if a component like this one can be in it; otherwise 0. */
+/* Returns the FMI state of a snapshot, if a component like this one can be in it; otherwise 0. */
 static unsigned state_in(const struct component *component, unsigned tag, enum phase phase) {
     const struct adapter *adapter = component->adapter;
     const unsigned state = tag & TAG_STATE_MASK;
@@ -334,7 +336,7 @@ static enum component_status refuse_kind(struct component *component, unsigned c
 
 enum component_status fmu_state_save(struct component *component, unsigned call, void **fmu_state) {
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, 1, fmu_state, fmu_state)) {
+        !component_check_arrays(component, call, 1, fmu_state, fmu_state)) {
         return COMPONENT_ERROR;
     }
     struct instance_snapshot *snapshot = *fmu_state;
@@ -346,7 +348,7 @@ enum component_status fmu_state_save(struct component *component, unsigned call,
 enum component_status fmu_state_restore(struct component *component, unsigned call,
                                         void *fmu_state) {
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, 1, fmu_state, fmu_state)) {
+        !component_check_arrays(component, call, 1, fmu_state, fmu_state)) {
         return COMPONENT_ERROR;
     }
     unsigned tag = 0;
@@ -382,7 +384,7 @@ enum component_status fmu_state_free(struct component *component, unsigned call,
 enum component_status fmu_state_size(struct component *component, unsigned call, void *fmu_state,
                                      size_t *size) {
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, 1, fmu_state, size)) {
+        !component_check_arrays(component, call, 1, fmu_state, size)) {
         return COMPONENT_ERROR;
     }
     unsigned tag = 0;
@@ -397,7 +399,7 @@ enum component_status fmu_state_size(struct component *component, unsigned call,
 enum component_status fmu_state_serialize(struct component *component, unsigned call,
                                           void *fmu_state, unsigned char bytes[], size_t size) {
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, 1, fmu_state, bytes)) {
+        !component_check_arrays(component, call, 1, fmu_state, bytes)) {
         return COMPONENT_ERROR;
     }
     return component_result(component,
@@ -408,7 +410,7 @@ enum component_status fmu_state_deserialize(struct component *component, unsigne
                                             const unsigned char bytes[], size_t size,
                                             void **fmu_state) {
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, 1, bytes, fmu_state)) {
+        !component_check_arrays(component, call, 1, bytes, fmu_state)) {
         return COMPONENT_ERROR;
     }
     struct instance_snapshot *snapshot = NULL;

@@ -7,18 +7,18 @@
 #include "continuous_states.h"
 #include "values.h"
 
-/* ---- Modes ----------------------------------------------------------------------------------- */
+/* ---- Modes ---------------------------------------------------------------------------------- */
 
-/* How a component goes from one FMI state to the next. */
+/* How a component changes from one FMI state to the next. */
 
 enum component_status mode_setup_experiment(struct component *component, unsigned call,
                                             const struct instance_experiment *experiment);
 
-/* experiment: NULL where it was set up before. */
+/* Enters initialization mode. experiment: NULL if it was set up before. */
 enum component_status mode_enter_initialization(struct component *component, unsigned call,
                                                 const struct instance_experiment *experiment);
 
-/* Into event mode; into step mode if the importer does not handle events. */
+/* Exits into event mode, or into step mode if the importer does not handle events. */
 enum component_status mode_exit_initialization(struct component *component, unsigned call);
 
 enum component_status mode_enter_event(struct component *component, unsigned call);
@@ -28,7 +28,7 @@ enum component_status mode_update_discrete_states(struct component *component,
 enum component_status mode_enter_step(struct component *component, unsigned call);
 enum component_status mode_terminate(struct component *component, unsigned call);
 
-/* As after instantiation. */
+/* Resets the component to its state after instantiation. */
 enum component_status mode_reset(struct component *component, unsigned call);
 
 /* ---- Values --------------------------------------------------------------------------------- */
@@ -44,7 +44,7 @@ enum component_status mode_reset(struct component *component, unsigned call);
 VALUE_TYPE_LIST(ACCESS)
 #undef ACCESS
 
-/* For a type that no variable has: succeeds only if no value is asked for. */
+/* Accesses a type that no variable has: succeeds only if no value is asked for. */
 enum component_status access_none(struct component *component, unsigned call, const char *type,
                                   const unsigned references[], size_t count, const void *values);
 
@@ -57,20 +57,20 @@ enum component_status access_get_output_derivatives(struct component *component,
                                                     const unsigned references[], size_t count,
                                                     const int orders[], double values[]);
 
-/* Derivatives J of unknowns with respect to knowns: J seed, one value per unknown. */
+/* Writes J seed, one value per unknown. J: derivatives of unknowns with respect to knowns. */
 enum component_status access_get_directional_derivative(struct component *component, unsigned call,
                                                         const unsigned unknowns[],
                                                         size_t unknown_count,
                                                         const unsigned knowns[], size_t known_count,
                                                         const double seed[], double result[]);
 
-/* seed^T J, one value per known. */
+/* Writes seed^T J, one value per known. */
 enum component_status access_get_adjoint_derivative(struct component *component, unsigned call,
                                                     const unsigned unknowns[], size_t unknown_count,
                                                     const unsigned knowns[], size_t known_count,
                                                     const double seed[], double result[]);
 
-/* ---- Time and continuous states -------------------------------------------------------------- */
+/* ---- Time and continuous states ------------------------------------------------------------- */
 
 enum component_status continuous_set_time(struct component *component, unsigned call, double time);
 
@@ -83,27 +83,27 @@ enum component_status continuous_get_derivatives(struct component *component, un
 enum component_status continuous_get_nominals(struct component *component, unsigned call,
                                               double nominals[], size_t count);
 
-/* The variables that are the event indicators. */
+/* Reads the variables that are the event indicators. */
 enum component_status continuous_get_indicators(struct component *component, unsigned call,
                                                 double indicators[], size_t count);
 
-/* Ends a step of the integrator; enters, terminates: where the caller's answers go. Writes whether
- * event mode is needed. */
+/* Ends a step of the integrator and writes whether event mode is needed. enters, terminates: the
+ * caller's pointers for its answers. */
 enum component_status continuous_complete_step(struct component *component, unsigned call,
                                                const void *enters, const void *terminates,
                                                bool *is_event);
 
-/* ---- FMU state -------------------------------------------------------------------------------
+/* ---- FMU state ------------------------------------------------------------------------------
  * A snapshot of the instance, which carries the kind and the FMI state of its component. */
 
-/* *fmu_state NULL: a new one; otherwise that one is overwritten. */
+/* Saves to a new FMU state if *fmu_state is NULL, otherwise over that one. */
 enum component_status fmu_state_save(struct component *component, unsigned call, void **fmu_state);
 
-/* The saved state stays valid. The component is then in the FMI state that was saved. */
+/* Restores the component, also its FMI state. The saved state stays valid. */
 enum component_status fmu_state_restore(struct component *component, unsigned call,
                                         void *fmu_state);
 
-/* NULL and a pointer to NULL are allowed; *fmu_state becomes NULL. */
+/* Frees *fmu_state and sets it to NULL; NULL and a pointer to NULL are allowed. */
 enum component_status fmu_state_free(struct component *component, unsigned call, void **fmu_state);
 
 enum component_status fmu_state_size(struct component *component, unsigned call, void *fmu_state,
@@ -112,7 +112,7 @@ enum component_status fmu_state_size(struct component *component, unsigned call,
 enum component_status fmu_state_serialize(struct component *component, unsigned call,
                                           void *fmu_state, unsigned char bytes[], size_t size);
 
-/* *fmu_state becomes a new one. */
+/* Makes a new FMU state from bytes. */
 enum component_status fmu_state_deserialize(struct component *component, unsigned call,
                                             const unsigned char bytes[], size_t size,
                                             void **fmu_state);

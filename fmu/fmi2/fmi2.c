@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- Rules of calls -------------------------------------------------------------------------- */
+/* ---- Rules of calls ------------------------------------------------------------------------- */
 
 #define FMI2_CALL_CODE(name, kinds, states) CALL_fmi2##name,
 enum fmi2_call { FMI2_FUNCTION_LIST(FMI2_CALL_CODE) FMI2_CALL_COUNT };
@@ -39,12 +39,12 @@ enum fmi2_call { FMI2_FUNCTION_LIST(FMI2_CALL_CODE) FMI2_CALL_COUNT };
 static const struct call_rule fmi2_call_rules[FMI2_CALL_COUNT] = {
     FMI2_FUNCTION_LIST(FMI2_CALL_RULE)};
 
-/* ---- Component ------------------------------------------------------------------------------- */
+/* ---- Component ------------------------------------------------------------------------------ */
 
 /* The structure that an fmi2Component points to. */
 struct fmi2_component {
     struct component base;     /* first */
-    fmi2CallbackLogger logger; /* NULL: no log */
+    fmi2CallbackLogger logger; /* NULL for no log */
     fmi2ComponentEnvironment environment;
     char name[];
 };
@@ -62,7 +62,7 @@ static inline fmi2Status fmi2_result(struct component *component, enum status st
     return fmi2_status(component_result(component, status));
 }
 
-/* ---- Versions, life and logging -------------------------------------------------------------- */
+/* ---- Versions, life and logging ------------------------------------------------------------- */
 
 const char *fmi2GetTypesPlatform(void) {
     return fmi2TypesPlatform;
@@ -110,10 +110,10 @@ static void refuse_instance(const fmi2CallbackFunctions *functions, fmi2String n
                       component_category_name(LOG_STATUS_ERROR), text);
 }
 
-static bool may_instantiate(fmi2String name, fmi2Type type, fmi2String guid,
-                            const fmi2CallbackFunctions *functions) {
+static bool check_instantiation(fmi2String name, fmi2Type type, fmi2String guid,
+                                const fmi2CallbackFunctions *functions) {
     char text[LOG_TEXT_SIZE];
-    if (!component_may_begin(name, "GUID", guid, model_description.guid, text)) {
+    if (!component_check_token(name, "GUID", guid, model_description.guid, text)) {
         refuse_instance(functions, name, "%s", text);
         return false;
     }
@@ -131,7 +131,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
                               fmi2String fmuResourceLocation,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible,
                               fmi2Boolean loggingOn) {
-    if (!may_instantiate(instanceName, fmuType, fmuGUID, functions)) {
+    if (!check_instantiation(instanceName, fmuType, fmuGUID, functions)) {
         return NULL;
     }
     const enum fmi_kind kind =
@@ -154,7 +154,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
 }
 
 void fmi2FreeInstance(fmi2Component c) {
-    if (c != NULL && !component_is_logging(c, "fmi2FreeInstance")) {
+    if (c != NULL && !component_refuse_in_logger(c, "fmi2FreeInstance")) {
         component_log(c, COMPONENT_OK, LOG_ALL, "fmi2FreeInstance");
         component_end(c);
         free(c);
@@ -166,7 +166,7 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nC
     const enum fmi2_call call = CALL_fmi2SetDebugLogging;
     struct component *component = c;
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, nCategories, categories, categories)) {
+        !component_check_arrays(component, call, nCategories, categories, categories)) {
         return fmi2Error;
     }
     return fmi2_status(
@@ -201,7 +201,7 @@ fmi2Status fmi2Reset(fmi2Component c) {
     return fmi2_status(mode_reset(c, CALL_fmi2Reset));
 }
 
-/* ---- Values ---------------------------------------------------------------------------------- */
+/* ---- Values --------------------------------------------------------------------------------- */
 
 #define ACCESS(Verb, verb, Type, type, element)                                                    \
     fmi2Status fmi2##Verb##Type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,        \
@@ -225,7 +225,7 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     return fmi2_status(access_none(c, CALL_fmi2SetString, "String", vr, nvr, value));
 }
 
-/* ---- FMU state ------------------------------------------------------------------------------- */
+/* ---- FMU state ------------------------------------------------------------------------------ */
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
     return fmi2_status(fmu_state_save(c, CALL_fmi2GetFMUstate, FMUstate));
@@ -255,7 +255,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
         c, CALL_fmi2DeSerializeFMUstate, (const unsigned char *)serializedState, size, FMUstate));
 }
 
-/* ---- Directional derivatives ----------------------------------------------------------------- */
+/* ---- Directional derivatives ---------------------------------------------------------------- */
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[],
                                         size_t nUnknown, const fmi2ValueReference vKnown_ref[],
@@ -266,7 +266,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                                          dvKnown, dvUnknown));
 }
 
-/* ---- Model Exchange: modes (section 3.2) ----------------------------------------------------- */
+/* ---- Model Exchange: modes (section 3.2) ---------------------------------------------------- */
 
 fmi2Status fmi2EnterEventMode(fmi2Component c) {
     return fmi2_status(mode_enter_event(c, CALL_fmi2EnterEventMode));
@@ -276,7 +276,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo) 
     const enum fmi2_call call = CALL_fmi2NewDiscreteStates;
     struct component *component = c;
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, 1, fmi2eventInfo, fmi2eventInfo)) {
+        !component_check_arrays(component, call, 1, fmi2eventInfo, fmi2eventInfo)) {
         return fmi2Error;
     }
     struct discrete_update update;
@@ -311,7 +311,7 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
     return fmi2_status(status);
 }
 
-/* ---- Model Exchange: time and states --------------------------------------------------------- */
+/* ---- Model Exchange: time and states -------------------------------------------------------- */
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
     return fmi2_status(continuous_set_time(c, CALL_fmi2SetTime, time));
@@ -339,7 +339,7 @@ fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal
         continuous_get_nominals(c, CALL_fmi2GetNominalsOfContinuousStates, x_nominal, nx));
 }
 
-/* ---- Co-Simulation: derivatives of inputs and outputs (section 4.2) -------------------------- */
+/* ---- Co-Simulation: derivatives of inputs and outputs (section 4.2) ------------------------- */
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[]) {
@@ -353,7 +353,7 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
         access_get_output_derivatives(c, CALL_fmi2GetRealOutputDerivatives, vr, nvr, order, value));
 }
 
-/* ---- Co-Simulation: steps -------------------------------------------------------------------- */
+/* ---- Co-Simulation: steps ------------------------------------------------------------------- */
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
                       fmi2Real communicationStepSize,
@@ -376,15 +376,15 @@ fmi2Status fmi2CancelStep(fmi2Component c) {
     return component_enter(c, CALL_fmi2CancelStep) ? fmi2OK : fmi2Error;
 }
 
-/* ---- Co-Simulation: status ------------------------------------------------------------------- */
+/* ---- Co-Simulation: status ------------------------------------------------------------------ */
 
-static bool may_ask(struct component *component, enum fmi2_call call, const void *value) {
+static bool begin_query(struct component *component, enum fmi2_call call, const void *value) {
     return component_enter(component, call) &&
-           component_has_arrays(component, call, 1, value, value);
+           component_check_arrays(component, call, 1, value, value);
 }
 
 static fmi2Status no_status(struct component *component, enum fmi2_call call, const void *value) {
-    if (!may_ask(component, call, value)) {
+    if (!begin_query(component, call, value)) {
         return fmi2Error;
     }
     component_log(component, COMPONENT_DISCARD, LOG_STATUS_DISCARD,
@@ -402,7 +402,7 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *
     if (s != fmi2LastSuccessfulTime) {
         return no_status(component, CALL_fmi2GetRealStatus, value);
     }
-    if (!may_ask(component, CALL_fmi2GetRealStatus, value)) {
+    if (!begin_query(component, CALL_fmi2GetRealStatus, value)) {
         return fmi2Error;
     }
     *value = instance_time(component->instance);
@@ -417,7 +417,7 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boo
     if (s != fmi2Terminated) {
         return no_status(c, CALL_fmi2GetBooleanStatus, value);
     }
-    if (!may_ask(c, CALL_fmi2GetBooleanStatus, value)) {
+    if (!begin_query(c, CALL_fmi2GetBooleanStatus, value)) {
         return fmi2Error;
     }
     *value = fmi2False; // the FMU never ends a simulation by itself

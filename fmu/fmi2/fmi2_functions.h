@@ -1,12 +1,12 @@
-/* Every function of fmi2Functions.h without its prefix, and in which kind and state of an instance
- * it may be called: the tables of section 3.2.3 (Model Exchange) and section 4.2.4 (Co-Simulation)
- * of the specification, as data. Functions that need no instance, and FreeInstance, are always
- * allowed. Derivatives and nominal values can also be read in initialization mode: they are known
- * there, and FMI 3.0 allows it. */
+/* Rules of the calls of FMI 2.0: every function of fmi2Functions.h without its prefix, with the
+ * kinds and states of an instance in which it may be called: the tables of section 3.2.3 (Model
+ * Exchange) and section 4.2.4 (Co-Simulation) of the specification, as data. Functions that need no
+ * instance, and FreeInstance, are always allowed. Derivatives and nominal values can also be read
+ * in initialization mode: they are known there, and FMI 3.0 allows it. */
 #ifndef FMI2_FUNCTIONS_H
 #define FMI2_FUNCTIONS_H
 
-/* X(name, kinds, states), by the names of fmi2.c */
+/* X(name, kinds, states), in the names of fmi2.c */
 #define FMI2_FUNCTION_LIST(X)                                                                      \
     X(GetTypesPlatform, ANY_KIND, ANY_STATE)                                                       \
     X(GetVersion, ANY_KIND, ANY_STATE)                                                             \

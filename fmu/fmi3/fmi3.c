@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- Version and logging --------------------------------------------------------------------- */
+/* ---- Version and logging -------------------------------------------------------------------- */
 
 const char *fmi3GetVersion(void) {
     return fmi3Version;
@@ -26,7 +26,7 @@ static void send_text(const struct component *component, enum component_status s
     }
 }
 
-/* With logging off, errors alone are sent. */
+/* Categories that are sent with logging off. */
 #define ERRORS (1u << LOG_STATUS_ERROR | 1u << LOG_STATUS_FATAL)
 
 static const struct adapter adapter = {
@@ -38,7 +38,7 @@ static const struct adapter adapter = {
     .never_silent = ERRORS,
     .knowns = KNOWN_ARGUMENTS,
     .doubled = "#", // references to variables: the text is no format
-    .may_access = fmi3_may_access,
+    .check_access = fmi3_check_access,
     .send = send_text,
 };
 
@@ -47,15 +47,15 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, siz
     const enum fmi3_call call = CALL_fmi3SetDebugLogging;
     struct component *component = instance;
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, nCategories, categories, categories)) {
+        !component_check_arrays(component, call, nCategories, categories, categories)) {
         return fmi3Error;
     }
     return fmi3_status(component_set_logging(component, loggingOn, nCategories, categories));
 }
 
-/* ---- Intermediate updates -------------------------------------------------------------------- */
+/* ---- Intermediate updates ------------------------------------------------------------------- */
 
-/* What the importer has asked for. */
+/* The importer's answer to an intermediate update. */
 struct answer {
     fmi3Boolean returns_early;
     fmi3Float64 early_time;
@@ -75,7 +75,7 @@ static enum status update(struct fmi3_component *component, double time, bool ca
     return base->has_failed_inside ? STATUS_INVALID_ARGUMENT : STATUS_OK;
 }
 
-/* Before the step: the importer sets the inputs at this time. */
+/* Lets the importer set the inputs at this time, before the step. */
 static enum status ask_inputs(void *component_pointer, double time) {
     struct fmi3_component *component = component_pointer;
     struct answer answer;
@@ -84,7 +84,7 @@ static enum status ask_inputs(void *component_pointer, double time) {
     return update(component, time, false, &answer);
 }
 
-/* After an internal step: the importer gets outputs, and may ask for the end of the step. */
+/* Lets the importer get outputs after an internal step; it may ask for the end of the step. */
 static enum status accept(void *component_pointer, double time, double *end) {
     struct fmi3_component *component = component_pointer;
     const bool can_return_early = component->early_return_allowed && time < *end;
@@ -113,9 +113,9 @@ static enum status prepare_steps(struct fmi3_component *component) {
     return instance_save(component->base.instance, 0, &component->options.undo);
 }
 
-/* ---- Life ------------------------------------------------------------------------------------ */
+/* ---- Life ----------------------------------------------------------------------------------- */
 
-/* Where texts go while there is no instance. */
+/* Receiver of texts while there is no instance. */
 struct receiver {
     fmi3LogMessageCallback logger;
     fmi3InstanceEnvironment environment;
@@ -141,7 +141,7 @@ static struct fmi3_component *instantiate(const char *call, fmi3String name, fmi
                                           enum fmi_kind kind, bool logging_on,
                                           const struct receiver *receiver) {
     char text[LOG_TEXT_SIZE];
-    if (!component_may_begin(name, "instantiation token", token, model_token_fmi3, text)) {
+    if (!component_check_token(name, "instantiation token", token, model_token_fmi3, text)) {
         return refuse_instance(receiver, "%s", text);
     }
     struct fmi3_component *created =
@@ -179,7 +179,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
     return created;
 }
 
-/* Continuous inputs and outputs: those with intermediateUpdate in modelDescription.xml. */
+/* True for continuous inputs and outputs, which have intermediateUpdate in modelDescription.xml. */
 static bool has_intermediate_update(const struct variable *variable) {
     return variable->type == VARIABLE_FLOAT64 && variable->owner == VARIABLE_OF_MODEL &&
            variable->variability == VARIABILITY_CONTINUOUS &&
@@ -245,7 +245,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(
 
 void fmi3FreeInstance(fmi3Instance instance) {
     struct fmi3_component *component = instance;
-    if (component == NULL || component_is_logging(&component->base, "fmi3FreeInstance")) {
+    if (component == NULL || component_refuse_in_logger(&component->base, "fmi3FreeInstance")) {
         return;
     }
     if (component->base.state == STATE_INTERMEDIATE_UPDATE) {
@@ -257,7 +257,7 @@ void fmi3FreeInstance(fmi3Instance instance) {
     free_component(component);
 }
 
-/* ---- Modes ----------------------------------------------------------------------------------- */
+/* ---- Modes ---------------------------------------------------------------------------------- */
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined,
                                        fmi3Float64 tolerance, fmi3Float64 startTime,
@@ -281,7 +281,7 @@ fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
     return fmi3_status(mode_enter_event(instance, CALL_fmi3EnterEventMode));
 }
 
-/* One update settles all modes. Another one is needed only if the importer has passed several time
+/* One update decides all modes. Another one is needed only if the importer has passed several time
  * events. */
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
                                     fmi3Boolean *terminateSimulation,
@@ -291,10 +291,11 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     const enum fmi3_call call = CALL_fmi3UpdateDiscreteStates;
     struct component *component = instance;
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, 1, discreteStatesNeedUpdate, terminateSimulation) ||
-        !component_has_arrays(component, call, 1, nominalsOfContinuousStatesChanged,
-                              valuesOfContinuousStatesChanged) ||
-        !component_has_arrays(component, call, 1, nextEventTimeDefined, nextEventTime)) {
+        !component_check_arrays(component, call, 1, discreteStatesNeedUpdate,
+                                terminateSimulation) ||
+        !component_check_arrays(component, call, 1, nominalsOfContinuousStatesChanged,
+                                valuesOfContinuousStatesChanged) ||
+        !component_check_arrays(component, call, 1, nextEventTimeDefined, nextEventTime)) {
         return fmi3Error;
     }
     struct discrete_update update;
@@ -317,20 +318,20 @@ fmi3Status fmi3Reset(fmi3Instance instance) {
     return fmi3_status(mode_reset(instance, CALL_fmi3Reset));
 }
 
-/* ---- Values ---------------------------------------------------------------------------------- */
+/* ---- Values --------------------------------------------------------------------------------- */
 
-/* Of one type; `access` reads or sets the values. */
+/* Defines the function for one type; `access` reads or sets the values. */
 #define FUNCTION(name, element, access)                                                            \
     fmi3Status name(fmi3Instance instance, const fmi3ValueReference valueReferences[],             \
                     size_t nValueReferences, element values[], size_t nValues) {                   \
         const enum fmi3_call call = CALL_##name;                                                   \
-        if (!fmi3_has_count(instance, call, nValues, nValueReferences)) {                          \
+        if (!fmi3_check_count(instance, call, nValues, nValueReferences)) {                        \
             return fmi3Error;                                                                      \
         }                                                                                          \
         return fmi3_status(access);                                                                \
     }
 
-/* Types that variables have, and their names in shared_calls.h. */
+/* Defines the functions for types that variables have; type: its name in shared_calls.h. */
 #define OF_VARIABLES(Type, type)                                                                   \
     FUNCTION(fmi3Get##Type, fmi3##Type,                                                            \
              access_get_##type(instance, call, valueReferences, nValueReferences, values))         \
@@ -341,11 +342,11 @@ OF_VARIABLES(Int32, int32)
 OF_VARIABLES(Int64, enumeration)
 OF_VARIABLES(Boolean, bool)
 
-/* Types that no variable has. */
+/* Accesses a type that no variable has. */
 static enum component_status none(struct component *component, enum fmi3_call call, bool setting,
                                   const char *type, const fmi3ValueReference references[],
                                   size_t count, const void *values) {
-    return fmi3_may_access(component, call, setting, references, count)
+    return fmi3_check_access(component, call, setting, references, count)
                ? access_none(component, call, type, references, count, values)
                : COMPONENT_ERROR;
 }
@@ -368,7 +369,7 @@ fmi3Status fmi3GetBinary(fmi3Instance instance, const fmi3ValueReference valueRe
                          size_t nValueReferences, size_t valueSizes[], fmi3Binary values[],
                          size_t nValues) {
     const enum fmi3_call call = CALL_fmi3GetBinary;
-    if (!fmi3_has_count(instance, call, nValues, nValueReferences)) {
+    if (!fmi3_check_count(instance, call, nValues, nValueReferences)) {
         return fmi3Error;
     }
     return fmi3_status(
@@ -379,14 +380,14 @@ fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueRe
                          size_t nValueReferences, const size_t valueSizes[],
                          const fmi3Binary values[], size_t nValues) {
     const enum fmi3_call call = CALL_fmi3SetBinary;
-    if (!fmi3_has_count(instance, call, nValues, nValueReferences)) {
+    if (!fmi3_check_count(instance, call, nValues, nValueReferences)) {
         return fmi3Error;
     }
     return fmi3_status(
         none(instance, call, true, "Binary", valueReferences, nValueReferences, values));
 }
 
-/* ---- FMU state ------------------------------------------------------------------------------- */
+/* ---- FMU state ------------------------------------------------------------------------------ */
 
 fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
     return fmi3_status(fmu_state_save(instance, CALL_fmi3GetFMUState, FMUState));
@@ -416,15 +417,15 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte seriali
                                              serializedState, size, FMUState));
 }
 
-/* ---- Derivatives with respect to other variables --------------------------------------------- */
+/* ---- Derivatives with respect to other variables -------------------------------------------- */
 
 fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[],
                                         size_t nUnknowns, const fmi3ValueReference knowns[],
                                         size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
                                         fmi3Float64 sensitivity[], size_t nSensitivity) {
     const enum fmi3_call call = CALL_fmi3GetDirectionalDerivative;
-    if (!fmi3_has_count(instance, call, nSeed, nKnowns) ||
-        !fmi3_has_count(instance, call, nSensitivity, nUnknowns)) {
+    if (!fmi3_check_count(instance, call, nSeed, nKnowns) ||
+        !fmi3_check_count(instance, call, nSensitivity, nUnknowns)) {
         return fmi3Error;
     }
     return fmi3_status(access_get_directional_derivative(instance, call, unknowns, nUnknowns,
@@ -436,15 +437,15 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
                                     size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
                                     fmi3Float64 sensitivity[], size_t nSensitivity) {
     const enum fmi3_call call = CALL_fmi3GetAdjointDerivative;
-    if (!fmi3_has_count(instance, call, nSeed, nUnknowns) ||
-        !fmi3_has_count(instance, call, nSensitivity, nKnowns)) {
+    if (!fmi3_check_count(instance, call, nSeed, nUnknowns) ||
+        !fmi3_check_count(instance, call, nSensitivity, nKnowns)) {
         return fmi3Error;
     }
     return fmi3_status(access_get_adjoint_derivative(instance, call, unknowns, nUnknowns, knowns,
                                                      nKnowns, seed, sensitivity));
 }
 
-/* ---- Co-Simulation (section 4.2) ------------------------------------------------------------- */
+/* ---- Co-Simulation (section 4.2) ------------------------------------------------------------ */
 
 fmi3Status fmi3EnterStepMode(fmi3Instance instance) {
     return fmi3_status(mode_enter_step(instance, CALL_fmi3EnterStepMode));
@@ -455,8 +456,8 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance,
                                     size_t nValueReferences, const fmi3Int32 orders[],
                                     fmi3Float64 values[], size_t nValues) {
     const enum fmi3_call call = CALL_fmi3GetOutputDerivatives;
-    if (!fmi3_has_count(instance, call, nValues, nValueReferences) ||
-        !fmi3_may_access(instance, call, false, valueReferences, nValueReferences)) {
+    if (!fmi3_check_count(instance, call, nValues, nValueReferences) ||
+        !fmi3_check_access(instance, call, false, valueReferences, nValueReferences)) {
         return fmi3Error;
     }
     return fmi3_status(access_get_output_derivatives(instance, call, valueReferences,
@@ -472,8 +473,8 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     const enum fmi3_call call = CALL_fmi3DoStep;
     struct component *base = instance;
     if (!component_enter(base, call) ||
-        !component_has_arrays(base, call, 1, eventHandlingNeeded, terminateSimulation) ||
-        !component_has_arrays(base, call, 1, earlyReturn, lastSuccessfulTime)) {
+        !component_check_arrays(base, call, 1, eventHandlingNeeded, terminateSimulation) ||
+        !component_check_arrays(base, call, 1, earlyReturn, lastSuccessfulTime)) {
         return fmi3Error;
     }
     const struct fmi3_component *component = instance;
@@ -489,7 +490,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     return fmi3_status(component_result(base, status));
 }
 
-/* ---- Model Exchange: modes (section 3.2) ----------------------------------------------------- */
+/* ---- Model Exchange: modes (section 3.2) ---------------------------------------------------- */
 
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance) {
     return fmi3_status(mode_enter_continuous_time(instance, CALL_fmi3EnterContinuousTimeMode));
@@ -509,7 +510,7 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance,
     return fmi3_status(status);
 }
 
-/* ---- Model Exchange: time and states --------------------------------------------------------- */
+/* ---- Model Exchange: time and states -------------------------------------------------------- */
 
 fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time) {
     return fmi3_status(continuous_set_time(instance, CALL_fmi3SetTime, time));
@@ -545,13 +546,13 @@ fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndica
                                                  eventIndicators, nEventIndicators));
 }
 
-/* ---- Model Exchange: numbers ----------------------------------------------------------------- */
+/* ---- Model Exchange: numbers ---------------------------------------------------------------- */
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators) {
     const enum fmi3_call call = CALL_fmi3GetNumberOfEventIndicators;
     struct component *component = instance;
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, 1, nEventIndicators, nEventIndicators)) {
+        !component_check_arrays(component, call, 1, nEventIndicators, nEventIndicators)) {
         return fmi3Error;
     }
     *nEventIndicators = model_description.indicator_count;
@@ -562,7 +563,7 @@ fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nConti
     const enum fmi3_call call = CALL_fmi3GetNumberOfContinuousStates;
     struct component *component = instance;
     if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, 1, nContinuousStates, nContinuousStates)) {
+        !component_check_arrays(component, call, 1, nContinuousStates, nContinuousStates)) {
         return fmi3Error;
     }
     *nContinuousStates = instance_state_count(component->instance);

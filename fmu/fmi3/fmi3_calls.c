@@ -2,7 +2,7 @@
 
 #include "model_description.h"
 
-/* ---- Rules ----------------------------------------------------------------------------------- */
+/* ---- Rules ---------------------------------------------------------------------------------- */
 
 #define INSTANTIATED        STATE_INSTANTIATED
 #define INITIALIZATION      STATE_INITIALIZATION
@@ -23,10 +23,10 @@
 #define FMI3_CALL_RULE(name, kinds, states) [CALL_##name] = {#name, kinds, states},
 const struct call_rule fmi3_call_rules[FMI3_CALL_COUNT] = {FMI3_CALL_LIST(FMI3_CALL_RULE)};
 
-/* ---- Checks ---------------------------------------------------------------------------------- */
+/* ---- Checks --------------------------------------------------------------------------------- */
 
-bool fmi3_has_count(struct component *component, enum fmi3_call call, size_t count,
-                    size_t expected) {
+bool fmi3_check_count(struct component *component, enum fmi3_call call, size_t count,
+                      size_t expected) {
     if (component != NULL && count != expected) {
         component_fail(component, "%s: an array has %zu values: %zu are expected",
                        fmi3_call_rules[call].name, count, expected);
@@ -35,8 +35,8 @@ bool fmi3_has_count(struct component *component, enum fmi3_call call, size_t cou
     return true;
 }
 
-bool fmi3_may_access(struct component *component, unsigned call, bool setting,
-                     const fmi3ValueReference references[], size_t count) {
+bool fmi3_check_access(struct component *component, unsigned call, bool setting,
+                       const fmi3ValueReference references[], size_t count) {
     if (component == NULL || component->state != STATE_INTERMEDIATE_UPDATE) {
         return true;
     }
@@ -61,11 +61,11 @@ bool fmi3_may_access(struct component *component, unsigned call, bool setting,
     return true;
 }
 
-/* ---- Unsupported functions --------------------------------------------------------------------
+/* ---- Unsupported functions ------------------------------------------------------------------
  * Every FMU exports them, but modelDescription.xml declares nothing that they serve: clocks,
  * configuration mode, dependencies at run time, Scheduled Execution. */
 
-/* A call of the table that this FMU does not support: an error that says why. */
+/* Fails with an error that says why the FMU does not support a call. */
 static fmi3Status unsupported(fmi3Instance instance, enum fmi3_call call, const char *reason) {
     struct component *component = instance;
     if (!component_enter(component, call)) {
@@ -142,7 +142,7 @@ fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference 
     return unsupported(instance, CALL_fmi3ActivateModelPartition, no_clocks);
 }
 
-/* ---- Discrete states, structure -------------------------------------------------------------- */
+/* ---- Discrete states, structure ------------------------------------------------------------- */
 
 fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance) {
     return unsupported(instance, CALL_fmi3EvaluateDiscreteStates,

@@ -93,22 +93,22 @@ enum fmi3_call { FMI3_CALL_LIST(FMI3_CALL_CODE) FMI3_CALL_COUNT };
 
 extern const struct call_rule fmi3_call_rules[FMI3_CALL_COUNT];
 
-/* ---- Component ------------------------------------------------------------------------------- */
+/* ---- Component ------------------------------------------------------------------------------ */
 
 struct fmi3_component {
     struct component base;         /* first */
-    fmi3LogMessageCallback logger; /* NULL: no log */
+    fmi3LogMessageCallback logger; /* NULL for no log */
     fmi3InstanceEnvironment environment;
 
     /* Co-Simulation */
-    fmi3IntermediateUpdateCallback update; /* NULL: no intermediate updates */
+    fmi3IntermediateUpdateCallback update; /* NULL for no intermediate updates */
     bool early_return_allowed;
-    bool asks_inputs;            /* inputs are among the variables of intermediate updates */
-    bool can_set;                /* in intermediate update mode: inputs */
-    bool can_get;                /* in intermediate update mode */
-    struct step_options options; /* of every step */
-    bool is_intermediate[];      /* by row of the table of variables: it was named for intermediate
-                                    updates */
+    bool asks_inputs; /* true if inputs are among the variables of intermediate updates */
+    bool can_set;     /* true if inputs may be set in intermediate update mode */
+    bool can_get;     /* true if values may be read in intermediate update mode */
+    struct step_options options; /* options of every step */
+    bool is_intermediate[];      /* by row of the table of variables: true if it was named for
+                                    intermediate updates */
 };
 
 _Static_assert((int)COMPONENT_OK == fmi3OK && (int)COMPONENT_WARNING == fmi3Warning &&
@@ -121,13 +121,13 @@ static inline fmi3Status fmi3_status(enum component_status status) {
     return (fmi3Status)status;
 }
 
-/* Whether the number of values is the one expected; if not, fails as component_fail. */
-bool fmi3_has_count(struct component *component, enum fmi3_call call, size_t count,
-                    size_t expected);
+/* Returns true if the number of values is right; otherwise fails as component_fail. */
+bool fmi3_check_count(struct component *component, enum fmi3_call call, size_t count,
+                      size_t expected);
 
-/* Whether the variables may be read or set in intermediate update mode; if not, fails as
+/* Returns true if the variables may be read or set in intermediate update mode; otherwise fails as
  * component_fail. Other modes are not checked here. */
-bool fmi3_may_access(struct component *component, unsigned call, bool setting,
-                     const fmi3ValueReference references[], size_t count);
+bool fmi3_check_access(struct component *component, unsigned call, bool setting,
+                       const fmi3ValueReference references[], size_t count);
 
 #endif

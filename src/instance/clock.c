@@ -2,19 +2,19 @@
 
 #include <math.h>
 
-/* Of a step: what a master may call rounding at most. */
+/* Largest part of a step that counts as a master's rounding. */
 static const double largest_part = 0.01;
 
-double clock_slack(double size, double h) {
-    return fmax(fmin(1e-9 * fmax(size, h), largest_part * h), clock_rounding(size));
+double clock_slack(double size, double step_size) {
+    return fmax(fmin(1e-9 * fmax(size, step_size), largest_part * step_size), clock_rounding(size));
 }
 
-double clock_tick_slack(double size, double h, double drift) {
+double clock_tick_slack(double size, double step_size, double drift) {
     const double rounding = clock_rounding(size);
-    return fmax(fmin(drift + rounding, largest_part * h), rounding);
+    return fmax(fmin(drift + rounding, largest_part * step_size), rounding);
 }
 
-/* ---- Polynomials ----------------------------------------------------------------------------- */
+/* ---- Polynomials ---------------------------------------------------------------------------- */
 
 double polynomial_value(const struct polynomial *polynomial, double t) {
     const double *d = polynomial->d;
@@ -31,9 +31,9 @@ struct polynomial polynomial_shifted(const struct polynomial *polynomial, double
     }};
 }
 
-struct polynomial polynomial_through(const double values[POLYNOMIAL_NODES], double h) {
+struct polynomial polynomial_through(const double values[POLYNOMIAL_NODES], double step_size) {
     // Newton's forward differences, and their series for the derivatives at the first node
-    const double s = h / (POLYNOMIAL_NODES - 1);
+    const double s = step_size / (POLYNOMIAL_NODES - 1);
     const double first[] = {values[1] - values[0], values[2] - values[1], values[3] - values[2]};
     const double second[] = {first[1] - first[0], first[2] - first[1]};
     const double third = second[1] - second[0];

@@ -11,11 +11,12 @@
 #include <stddef.h>
 
 struct clock_time {
-    double s;    /* s: the time, rounded to double */
-    double rest; /* s: what the rounding left over */
+    double s;    /* time, rounded to double, s */
+    double rest; /* remainder of this rounding, s */
 };
 
-/* Exact sum of two doubles (Knuth, The Art of Computer Programming, vol. 2, section 4.2.2). */
+/* Returns the exact sum of two doubles (Knuth, The Art of Computer Programming, vol. 2,
+ * section 4.2.2). */
 static inline struct clock_time clock_two_sum(double x, double y) {
     const double s = x + y;
     const double y_part = s - x;
@@ -23,13 +24,13 @@ static inline struct clock_time clock_two_sum(double x, double y) {
     return (struct clock_time){.s = s, .rest = (x - x_part) + (y - y_part)};
 }
 
-/* time + duration */
-static inline struct clock_time clock_add(struct clock_time time, double duration) {
-    const struct clock_time sum = clock_two_sum(time.s, duration);
+/* Returns time + elapsed (s). */
+static inline struct clock_time clock_add(struct clock_time time, double elapsed) {
+    const struct clock_time sum = clock_two_sum(time.s, elapsed);
     return clock_two_sum(sum.s, sum.rest + time.rest);
 }
 
-/* later - earlier in s, rounded once. */
+/* Returns later - earlier in s, rounded once. */
 static inline double clock_difference(struct clock_time later, struct clock_time earlier) {
     const struct clock_time difference = clock_two_sum(later.s, -earlier.s);
     return difference.s + (difference.rest + (later.rest - earlier.rest));
@@ -37,51 +38,52 @@ static inline double clock_difference(struct clock_time later, struct clock_time
 
 /* ---- Rounding -------------------------------------------------------------------------------
  * In s. Times up to a given size (s, the largest magnitude among the start time and the times at
- * hand) are computed by different ways: products, sums, decimal numbers. */
+ * hand) are computed in different ways: products, sums, decimal numbers. */
 
-/* Of doubles, at most. */
+/* Returns the largest distance between neighbouring doubles. */
 static inline double clock_spacing(double size) {
     return DBL_EPSILON * fabs(size);
 }
 
-/* How far two doubles may be apart that stand for one time, each after a few operations. */
+/* Returns how far two doubles for the same time may be apart, each after a few operations. */
 static inline double clock_rounding(double size) {
     return 4.0 * clock_spacing(size);
 }
 
-/* How far the communication point of a master may be from the time of the instance for a step of
- * length h > 0 to be followed: min(1e-9 max(size, h), h / 100), and never less than clock_rounding.
- */
-double clock_slack(double size, double h);
+/* Returns how far the communication point of a master may be from the time of the instance at the
+ * begin of a step of step_size > 0: min(1e-9 max(size, step_size), step_size / 100), and never less
+ * than clock_rounding. */
+double clock_slack(double size, double step_size);
 
-/* By how much a step adds to the drift of a master: the mismatch that was accepted at its beginning
- * or, where the master hides it, what a sum of times is rounded by. */
+/* Returns by how much a step adds to the drift of a master: the mismatch that was accepted at its
+ * beginning or, if the master hides it, the rounding of a sum of times. */
 static inline double clock_step_drift(double size, double mismatch) {
     return fmax(fabs(mismatch), 0.5 * clock_spacing(size));
 }
 
-/* How far a time event may be from the end of a step of length h > 0 to be there: the drift, summed
- * over all steps, up to h / 100, and never less than clock_rounding. So a master that adds up its
- * steps meets each event where it means to, and for one with exact times no event comes early. */
-double clock_tick_slack(double size, double h, double drift);
+/* Returns how far a time event may be from the end of a step of step_size > 0 to happen there: the
+ * drift, summed over all steps, up to step_size / 100, and never less than clock_rounding. So a
+ * master that adds up its steps meets each event at the intended step, and with exact times no
+ * event comes early. */
+double clock_tick_slack(double size, double step_size, double drift);
 
 /* ---- Polynomials ----------------------------------------------------------------------------
  * An input over a step: a Taylor polynomial of degree 3 from the beginning of the step. */
 
 enum { POLYNOMIAL_DEGREE = 3 };
 
-/* d[k]: the k-th derivative at the origin, in the unit of the input over s^k. */
+/* A polynomial; d[k]: the k-th derivative at the origin, in the unit of the input over s^k. */
 struct polynomial {
     double d[POLYNOMIAL_DEGREE + 1];
 };
 
-/* It is not constant. */
+/* True if the polynomial is not constant. */
 static inline bool polynomial_moves(const struct polynomial *polynomial) {
     const double *d = polynomial->d;
-    return fabs(d[1]) + fabs(d[2]) + fabs(d[3]) != 0.0; // with one branch
+    return fabs(d[1]) + fabs(d[2]) + fabs(d[3]) != 0.0; // a sum has one branch
 }
 
-/* One of them is not constant. */
+/* True if one of the polynomials is not constant. */
 static inline bool polynomials_move(const struct polynomial polynomials[], size_t count) {
     bool found = false;
     for (size_t i = 0; i < count; i++) {
@@ -90,15 +92,15 @@ static inline bool polynomials_move(const struct polynomial polynomials[], size_
     return found;
 }
 
-/* Value at time t (s) after the origin. */
+/* Returns the value at time t (s) after the origin. */
 double polynomial_value(const struct polynomial *polynomial, double t);
 
-/* The polynomial with values[k] at k h / (POLYNOMIAL_NODES - 1), h > 0 (s). With equal values, all
- * its derivatives are 0. */
+/* Returns the polynomial with values[k] at k step_size / (POLYNOMIAL_NODES - 1), step_size > 0 (s).
+ * With equal values, all its derivatives are 0. */
 enum { POLYNOMIAL_NODES = POLYNOMIAL_DEGREE + 1 };
-struct polynomial polynomial_through(const double values[POLYNOMIAL_NODES], double h);
+struct polynomial polynomial_through(const double values[POLYNOMIAL_NODES], double step_size);
 
-/* The same polynomial with its origin moved by t (s). */
+/* Returns the same polynomial with its origin moved by t (s). */
 struct polynomial polynomial_shifted(const struct polynomial *polynomial, double t);
 
 #endif

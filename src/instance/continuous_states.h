@@ -4,28 +4,30 @@
 
 #include "variables.h"
 
-/* While the time is continuous only continuous inputs may be set. */
+/* Enters continuous time, in which only continuous inputs may be set. */
 MUST_CHECK NONNULL enum status instance_enter_continuous_time(struct instance *instance);
 NONNULL void instance_enter_event_mode(struct instance *instance);
 
-/* The integrator outside has ended a step; true: event mode is needed. */
+/* Ends a step of the integrator outside. Returns true if event mode is needed. */
 MUST_CHECK NONNULL bool instance_complete_step(struct instance *instance);
 
 struct discrete_update {
-    bool states_changed; /* states integrated outside have jumped */
-    bool is_incomplete;  /* integrated outside: the next time event is not later than now */
-    double next_time;    /* s: of the next time event; INFINITY: there is none */
+    bool states_changed; /* true if states that are integrated outside have jumped */
+    bool is_incomplete;  /* true with integration from outside if the next time event is not later
+                            than now */
+    double next_time;    /* time of the next time event, s; INFINITY if there is none */
 };
 
-/* In event mode: updates the modes for the values set and the event at the present time. That is
- * the one that a step has left unhandled; with integration from outside, a time event, or one where
- * an event indicator is near 0 and falls. */
+/* Updates the modes in event mode, for the values set and the event at the current time. This is
+ * the event that a step has left unhandled; with integration from outside, a time event, or an
+ * event whose indicator is near 0 and falls. */
 MUST_CHECK NONNULL enum status instance_update_discrete_states(struct instance *instance,
                                                                struct discrete_update *update);
 
 MUST_CHECK NONNULL enum status instance_set_time(struct instance *instance, double time);
 
-/* count must be instance_state_count; the arrays may be NULL where it is 0. All or nothing. */
+/* Access all states; count must be instance_state_count, the arrays may be NULL if it is 0. All or
+ * nothing. */
 NONNULL size_t instance_state_count(const struct instance *instance);
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_set_states(struct instance *instance, const double x[], size_t count);

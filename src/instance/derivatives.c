@@ -6,7 +6,8 @@
 #include <math.h>
 #include <string.h>
 
-/* The variable, or NULL with a message that says what it is needed for. */
+/* Returns the variable if it serves; otherwise NULL, with a message that says which kind is
+ * expected. */
 static const struct variable *
 find_as(const struct instance *instance, unsigned reference,
         bool (*serves)(const struct instance *, const struct variable *), const char *expected) {
@@ -78,7 +79,7 @@ enum status instance_set_input_derivatives(struct instance *instance, const unsi
         struct polynomial *next = &instance->memory.next_inputs[input];
         next->d[orders[i]] = values[i];
         instance->inputs_are_held = false;
-        // from now on outputs answer for the input of the next step, as after instance_set_real
+        // from now on outputs use the input of the next step, as after instance_set_real
         instance->memory.current_inputs[input] = *next;
         doubles_of(instance->memory.values, instance->model->inputs)[input] = next->d[0];
         instance->outputs_are_valid = false;
@@ -86,7 +87,8 @@ enum status instance_set_input_derivatives(struct instance *instance, const unsi
     return STATUS_OK;
 }
 
-/* Of all calculated values, into instance->first_derivatives and second, which may be NULL. */
+/* Writes the derivatives of all calculated values to instance->first_derivatives and second, which
+ * may be NULL. */
 static enum status propagate(struct instance *instance, double dt, char *second) {
     const double t = instance->state.time.s;
     const enum status status = instance->model->propagate(instance->memory.values, t, dt,
@@ -98,8 +100,8 @@ static enum status propagate(struct instance *instance, double dt, char *second)
     return status;
 }
 
-/* What is known of the derivatives of this order by time: those of the inputs, and of the states,
- * which a value structure of the order below has calculated. */
+/* Writes the known derivatives of this order by time: the inputs' and the states', which a value
+ * structure of the order below has calculated. */
 static void begin_by_time(const struct instance *instance, int order, char *below,
                           char *derivatives) {
     const struct model *model = instance->model;
@@ -111,8 +113,8 @@ static void begin_by_time(const struct instance *instance, int order, char *belo
     }
 }
 
-/* Derivatives along the motion, twice: those of the states are calculated values, whose own
- * derivatives are the states' next ones. */
+/* Derives twice along the motion: the states' derivatives are calculated values, whose own
+ * derivatives are the next ones of the states. */
 static enum status derive_by_time(struct instance *instance) {
     enum status status = instance_update_outputs(instance);
     if (status != STATUS_OK) {
@@ -127,8 +129,8 @@ static enum status derive_by_time(struct instance *instance) {
     return propagate(instance, 1.0, instance->second_derivatives);
 }
 
-/* The derivative of a variable, from a value structure of derivatives. It is 0 for variables of the
- * instance, such as counters, which are constant between events. */
+/* Returns the derivative of a variable, from a value structure of derivatives; 0 for variables of
+ * the instance, such as counters, which are constant between events. */
 static double derivative_in(const char *structure, const struct variable *variable) {
     return variable->owner == VARIABLE_OF_MODEL
                ? *(const double *)(const void *)(structure + variable->offset)
@@ -221,8 +223,8 @@ static double *double_in(char *structure, const struct variable *variable) {
     return (double *)(void *)(structure + variable->offset);
 }
 
-/* Of a value that is not finite there is no derivative. direction: what the derivative is taken
- * along, behind "by". */
+/* Checks that the value and its derivative are finite. direction: name of the direction of the
+ * derivative, for a message. */
 static enum status check_derivative(const struct instance *instance, const struct variable *unknown,
                                     const char *direction) {
     if (unknown->owner == VARIABLE_OF_MODEL &&
@@ -238,7 +240,7 @@ static enum status check_derivative(const struct instance *instance, const struc
     return STATUS_OK;
 }
 
-/* The variable that a direction is along, or what to say for several. */
+/* Returns the name of the variable that a direction is along, or a text for several. */
 static const char *direction_name(const struct instance *instance, const unsigned knowns[],
                                   size_t count, const double v[]) {
     const char *name = "nothing";
@@ -287,7 +289,7 @@ enum status instance_get_directional_derivative(struct instance *instance, enum 
     return status;
 }
 
-/* v^T times the column of J that belongs to a known. */
+/* Writes the product of v^T and the column of J of one known. */
 static enum status multiply_column(struct instance *instance, const unsigned unknowns[],
                                    size_t unknown_count, const struct variable *known,
                                    const double v[], double *product) {
@@ -318,7 +320,7 @@ enum status instance_get_adjoint_derivative(struct instance *instance, enum know
     if (status == STATUS_OK) {
         status = instance_update_outputs(instance);
     }
-    // nothing is written to result before all have succeeded
+    // nothing is written to result before all derivatives have succeeded
     double by_time = 0.0;
     for (size_t i = 0; status == STATUS_OK && i < known_count; i++) {
         const struct variable *known = variable_of(instance->description, knowns[i]);

@@ -4,10 +4,11 @@
 #include "state.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <string.h>
 
-/* ---- The initial value problem --------------------------------------------------------------- */
+/* ---- The initial value problem -------------------------------------------------------------- */
 
 _Static_assert((int)SERIES_INPUT_LENGTH == (int)POLYNOMIAL_DEGREE + 1,
                "the series of an input is its polynomial");
@@ -19,8 +20,8 @@ static void evaluate_inputs(const struct instance *instance, double t) {
     }
 }
 
-/* Writes the values of inputs after a restart: constant ones are evaluated once, not at every call;
- * moves: not all are constant. */
+/* Writes the values of inputs after a restart: constant ones are evaluated once, not at every call.
+ * moves: some inputs are not constant. */
 static void prepare_inputs(struct instance *instance, bool moves) {
     const bool had_moved = instance->inputs_move;
     instance->inputs_move = moves;
@@ -28,7 +29,7 @@ static void prepare_inputs(struct instance *instance, bool moves) {
         const struct polynomial *input = &instance->memory.active_inputs[i];
         double *series = instance->input_series[i];
         instance->u[i] = input->d[0];
-        series[0] = input->d[0]; // all there is, unless inputs move
+        series[0] = input->d[0]; // the only coefficient, unless inputs move
         for (int k = 1; had_moved && k <= POLYNOMIAL_DEGREE; k++) {
             series[k] = 0.0;
         }
@@ -79,7 +80,7 @@ void instance_reach(const double x[], double reach[], void *instance_pointer) {
     instance->model->events->reach(instance->memory.restart_values, x, reach);
 }
 
-/* Coefficients of the inputs at t, for the time scale time_scale. */
+/* Writes the coefficients of the inputs at t, for the time scale time_scale. */
 static void expand_inputs(const struct instance *instance, double t, double time_scale) {
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
         double *coefficients = instance->input_series[i];
@@ -107,30 +108,46 @@ enum status instance_series(double t, double time_scale, int first, int last,
     return instance->model->series->extend(&origin, first, last, rows);
 }
 
-/* ---- Continuing ------------------------------------------------------------------------------ */
+/* ---- Continuing ----------------------------------------------------------------------------- */
 
-/* Whether the motion to target is the one of the integrator's history. It depends only on the
- * values set now and those that the integrator runs with, not on how often or in what order they
- * were set.
+/* True if there can be state events with the parameters that the integrator runs with. */
+static bool is_searched(const struct instance *instance) {
+    const struct model_events *events = instance->model->events;
+    return events != NULL && events->are_possible != NULL &&
+           events->are_possible(instance->memory.restart_values);
+}
+
+/* Returns the indicators of the current modes, for the integrator; NULL if no event is possible. */
+static const struct indicator *describe_indicators(struct instance *instance) {
+    if (!is_searched(instance)) {
+        return NULL;
+    }
+    instance->model->events->describe(instance->memory.restart_values, instance->indicators);
+    return instance->indicators;
+}
+
+/* True if the motion to target is the one of the integrator's history. This depends only on the
+ * values set now and the integrator's, not on how often or in what order they were set.
  *
- * Any change of an input restarts it. Measured with inputs sampled from sines every 1 ms, going on
- * with CVODE's history over a jump has 450 times the error of a restart and is slower where jumps
- * are 4e-4 of the input, has 40 times the error at 4e-6 and 4 times at 4e-8. It gains only below
- * 1e-9, and rollback would have to replay every jump. */
+ * Any change of an input restarts it. Measured with inputs sampled from sines every 1 ms,
+ * continuing CVODE's history over a jump has 450 times the error of a restart and is slower if
+ * jumps are 4e-4 of the input, has 40 times the error at 4e-6 and 4 times at 4e-8. It gains only
+ * below 1e-9, and rollback would have to replay every jump. */
 static bool continues(const struct instance *instance, double target) {
     const struct instance_state *state = &instance->state;
     return state->has_history && target <= state->horizon && instance_values_are_active(instance);
 }
 
-int64_t instance_longest_history(const struct instance *instance) {
-    return integrator_longest_history(instance->configured.method, instance_is_searched(instance));
+/* Returns integrator_longest_history of the method, in the current modes. */
+static int64_t longest_history(const struct instance *instance) {
+    return integrator_longest_history(instance->configured.method, is_searched(instance));
 }
 
-/* The target needs one more internal step than a history may have. */
+/* True if the target needs one more internal step than a history may have. */
 static bool history_is_full(const struct instance *instance, double target) {
     const struct instance_state *state = &instance->state;
     const int64_t steps = state->statistics.steps - state->steps_before_restart;
-    return target > state->passed_time && steps >= instance_longest_history(instance);
+    return target > state->passed_time && steps >= longest_history(instance);
 }
 
 enum continuation instance_continuation(const struct instance *instance, double target) {
@@ -153,16 +170,16 @@ void instance_update_next_step(struct instance *instance) {
 
 static struct integrator_start start_of(struct instance *instance) {
     const struct instance_state *state = &instance->state;
-    return (struct integrator_start){.origin = state->restart_time.s,
-                                     .horizon = state->horizon,
-                                     .first_step = state->restart_step,
-                                     .continues = state->restart_continues,
-                                     .indicators = instance->model->events != NULL
-                                                       ? instance_describe_indicators(instance)
-                                                       : NULL};
+    return (struct integrator_start){
+        .origin = state->restart_time.s,
+        .horizon = state->horizon,
+        .first_step = state->restart_step,
+        .continues = state->restart_continues,
+        .indicators = instance->model->events != NULL ? describe_indicators(instance) : NULL};
 }
 
-/* What the integrator runs with from now on: inputs or states. A loop, because they are few. */
+/* Makes the integrator run with the inputs or states that are set now. A loop, because they are
+ * few. */
 static void activate(struct instance *instance, struct range range) {
     const double *from = doubles_of(instance->memory.values, range);
     double *to = doubles_of(instance->memory.restart_values, range);
@@ -176,7 +193,8 @@ static void activate_bytes(struct instance *instance, struct range range) {
            range.size);
 }
 
-void instance_end_history(struct instance *instance) {
+/* Ends the history: times since the restart count from the current time on. */
+static void end_history(struct instance *instance) {
     instance->state.restart_time = instance->state.time;
     instance->state.has_history = false;
     instance->history_is_lost = false;
@@ -193,6 +211,8 @@ double instance_horizon(const struct instance_state *state, struct clock_time re
                                                : INFINITY;
 }
 
+/* Makes the integrator run, from the current time on, with the values that are set now, and with
+ * these polynomials of time as inputs, at least up to the time end. Ends the history. */
 static inline void activate_values(struct instance *instance, struct clock_time end,
                                    const struct polynomial inputs[], bool has_new_parameters) {
     struct instance_memory *memory = &instance->memory;
@@ -216,12 +236,7 @@ static inline void activate_values(struct instance *instance, struct clock_time 
     const double target = clock_difference(end, state->time);
     state->horizon = instance_horizon(state, state->time, target, instance->inputs_move);
     state->first_time = target;
-    instance_end_history(instance); // until the first advance has succeeded
-}
-
-void instance_activate_values(struct instance *instance, struct clock_time end,
-                              const struct polynomial inputs[]) {
-    activate_values(instance, end, inputs, !instance_parameters_are_active(instance));
+    end_history(instance); // until the first advance has succeeded
 }
 
 static enum status restart(struct instance *instance, struct clock_time end,
@@ -239,7 +254,7 @@ static enum status restart(struct instance *instance, struct clock_time end,
     activate_values(instance, end, is_event ? memory->current_inputs : memory->next_inputs,
                     has_new_parameters);
 
-    // note what a replay needs
+    // note the restart for a replay
     state->steps_before_restart = state->statistics.steps;
     state->restart_step = state->next_step;
     state->restart_continues = continuation != CONTINUE_AFTER_CHANGE;
@@ -248,7 +263,7 @@ static enum status restart(struct instance *instance, struct clock_time end,
                               doubles_of(memory->restart_values, instance->model->states), &start);
 }
 
-/* In the number of internal steps that the state gives. A forged state fails here. */
+/* Replays the number of internal steps that the state gives. A forged state fails here. */
 enum status instance_replay_history(struct instance *instance) {
     const struct instance_state *state = &instance->state;
     const struct range states = instance->model->states;
@@ -289,4 +304,57 @@ enum status instance_prepare_history(struct instance *instance, struct clock_tim
         return restart(instance, end, continuation);
     }
     return STATUS_OK;
+}
+
+enum status instance_rest(struct instance *instance, struct clock_time end, struct clock_time until,
+                          bool meets_time_event, enum continuation continuation) {
+    struct instance_state *state = &instance->state;
+    const struct polynomial *inputs = continuation == CONTINUE_AFTER_EVENT
+                                          ? instance->memory.current_inputs
+                                          : instance->memory.next_inputs;
+    // constant inputs end no mode; the active values matter only after an event
+    const bool searches =
+        !instance->inputs_are_held && polynomials_move(inputs, count_of(instance->model->inputs));
+    if (searches || meets_time_event) {
+        activate_values(instance, end, inputs, !instance_parameters_are_active(instance));
+    } else {
+        end_history(instance);
+    }
+    const struct integrator_start start = {
+        .indicators = searches ? describe_indicators(instance) : NULL,
+    };
+    state->next_step = 0.0;
+    return integrator_rest(instance->integrator,
+                           doubles_of(instance->memory.values, instance->model->states), &start,
+                           clock_difference(until, state->restart_time), &state->latest_time);
+}
+
+/* ---- After a part of a step ----------------------------------------------------------------- */
+
+static int saturated(int64_t count) {
+    return count > INT_MAX ? INT_MAX : (int)count;
+}
+
+void instance_write_statistics(const struct integrator_statistics *statistics,
+                               struct instance_values *own) {
+    own->solver_steps = saturated(statistics->steps);
+    own->solver_rhs_evaluations = saturated(statistics->rhs_evaluations);
+    own->solver_restarts = saturated(statistics->restarts);
+    own->solver_failed_steps = saturated(statistics->failed_steps);
+    own->solver_last_step = statistics->last_step;
+    own->solver_last_order = statistics->last_order;
+}
+
+void instance_note_part(struct instance *instance, enum status status, bool is_whole) {
+    struct instance_state *state = &instance->state;
+    if (status != STATUS_OK) {
+        instance_set_clock(instance, clock_add(state->restart_time, state->latest_time));
+    }
+    state->has_history = status == STATUS_OK && is_whole && longest_history(instance) > 0;
+    state->passed_time = integrator_passed_time(instance->integrator);
+    if (!state->has_history) {
+        state->next_step = status == STATUS_OK ? integrator_next_step(instance->integrator) : 0.0;
+    }
+    integrator_get_statistics(instance->integrator, &state->statistics);
+    instance_write_statistics(&state->statistics, &state->own);
 }

@@ -1,12 +1,12 @@
-/* The integrator's history of internal steps: when it may continue from it, how a restored instance
- * gets it back, and the initial value problem that it calls: the model with the parameters of the
- * last restart, and the inputs as polynomials since then. */
+/* History of the integrator's internal steps: when it may continue, how a restored instance gets
+ * its history back, and the initial value problem: the model with the parameters of the last
+ * restart, and the inputs as polynomials since then. */
 #ifndef HISTORY_H
 #define HISTORY_H
 
 #include "state.h"
 
-/* How the integrator continues. */
+/* Way in which the integrator continues. */
 enum continuation {
     CONTINUE_NOW,           /* from its history */
     CONTINUE_AFTER_REPLAY,  /* from its history, which a restored instance repeats first */
@@ -15,25 +15,14 @@ enum continuation {
     CONTINUE_AFTER_EVENT,   /* with a restart, in the modes after an event */
 };
 
-/* target: s since the restart. */
+/* Returns how the integrator continues to target (s since the restart). */
 MUST_CHECK NONNULL enum continuation instance_continuation(const struct instance *instance,
                                                            double target);
 
-/* integrator_longest_history of the method, in the present modes. */
-NONNULL int64_t instance_longest_history(const struct instance *instance);
-
-/* From the present time on the integrator runs with the values that are set now, and with these
- * polynomials of time as inputs, at least up to the time end. Ends the history. */
-NONNULL void instance_activate_values(struct instance *instance, struct clock_time end,
-                                      const struct polynomial inputs[]);
-
-/* How far from a restart the integrator may go, s: to target where inputs move, otherwise to the
- * stop time. */
+/* Returns how far from a restart the integrator may go, s: to target if inputs move, otherwise to
+ * the stop time. */
 NONNULL double instance_horizon(const struct instance_state *state, struct clock_time restart,
                                 double target, bool inputs_move);
-
-/* Times since the restart count from the present time on. */
-NONNULL void instance_end_history(struct instance *instance);
 
 /* Prepares the integrator to advance to the time end: replays its history, restarts it, or does
  * nothing, as the continuation says. */
@@ -41,16 +30,30 @@ MUST_CHECK NONNULL enum status instance_prepare_history(struct instance *instanc
                                                         struct clock_time end,
                                                         enum continuation continuation);
 
+/* Lets the time pass to `until`, or to an earlier event of an input, in modes in which no state
+ * moves, and ends the history. end: the end of the step; meets_time_event: at `until`. */
+MUST_CHECK NONNULL enum status instance_rest(struct instance *instance, struct clock_time end,
+                                             struct clock_time until, bool meets_time_event,
+                                             enum continuation continuation);
+
+/* Notes where a part of a step has ended, and whether the next part can continue from there.
+ * is_whole: the part went to the end that it was begun with; others cannot be replayed. */
+NONNULL void instance_note_part(struct instance *instance, enum status status, bool is_whole);
+
 /* Repeats the internal steps since the restart, so that the integrator is where state says. A
  * restored instance does so at its next step, if that continues from there. */
 MUST_CHECK NONNULL enum status instance_replay_history(struct instance *instance);
 
+/* Writes the variables that show totals of the integrator. */
+NONNULL void instance_write_statistics(const struct integrator_statistics *statistics,
+                                       struct instance_values *own);
+
 /* Brings state.next_step up to date, which costs too much to be done after each step. */
 NONNULL void instance_update_next_step(struct instance *instance);
 
-/* ---- The initial value problem --------------------------------------------------------------- */
+/* ---- The initial value problem -------------------------------------------------------------- */
 
-/* context: the instance. t: s since the restart. */
+/* Evaluate the initial value problem. context: the instance. t: s since the restart. */
 ode_rhs instance_rhs;
 ode_jacobian instance_jacobian;
 ode_series instance_series;

@@ -12,13 +12,13 @@
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-/* Rounded up, so that what follows a value structure is aligned for any type. */
+/* Rounds the size up, so that data behind a value structure is aligned for any type. */
 static size_t aligned(size_t size) {
     const size_t alignment = _Alignof(max_align_t);
     return (size + alignment - 1) / alignment * alignment;
 }
 
-/* A step writes no parameters, but those of the restart. */
+/* Locates the parts that a step writes: no parameters, except the restart's. */
 static void locate_written(const struct model *model, struct instance_memory *memory) {
     const struct model_events events = events_of(model);
     const struct range ranges[] = {model->inputs, model->states, events.modes,
@@ -41,14 +41,15 @@ static bool lies_in(struct range range, const struct variable *variable) {
     return variable->offset >= range.offset && variable->offset - range.offset < range.size;
 }
 
-/* Only events write its value: a mode or a discrete state. */
+/* True if only events write the value: a mode or a discrete state. */
 static bool is_kept_by_events(const struct model *model, const struct variable *variable) {
     const struct model_events events = events_of(model);
     return variable->owner == VARIABLE_OF_MODEL &&
            (lies_in(events.modes, variable) || lies_in(events.discrete_states, variable));
 }
 
-/* Modes (ints) and discrete states (doubles) are calculated and discrete. */
+/* True if the variable is bound to a field of its own kind. Modes (ints) and discrete states
+ * (doubles) are calculated and discrete. */
 static bool is_bound_well(const struct model *model, const struct variable *variable) {
     const struct model_events events = events_of(model);
     const bool is_real = variable->type == VARIABLE_FLOAT64;
@@ -65,8 +66,8 @@ static bool is_bound_well(const struct model *model, const struct variable *vari
            (!lies_in(events.discrete_states, variable) || (can_be_kept && is_real));
 }
 
-/* Each variable is bound to a field of its own kind: a wrong binding compiles, but the value would
- * have no effect. */
+/* Checks that each variable is bound to a field of its own kind: a wrong binding compiles, but the
+ * value would have no effect. */
 static enum status check_bindings(const struct model_description *description,
                                   const struct message_sink *sink) {
     const size_t indicator_count = events_of(description->model).indicator_count;
@@ -94,7 +95,8 @@ static enum status check_bindings(const struct model_description *description,
     return STATUS_OK;
 }
 
-/* An input reads as the value set last, also after a step over which it moved. */
+/* Locates the values of all references. An input reads as the value set last, also after a step
+ * over which it moved. */
 static void locate_reals(struct instance *instance) {
     for (size_t i = 0; i < instance->description->variable_count; i++) {
         const struct variable *variable = &instance->description->variables[i];
@@ -125,8 +127,8 @@ static bool setup_events(struct instance *instance) {
         instance->triggered == NULL || instance->initial_values == NULL) {
         return false;
     }
-    instance->tolerances = instance->absolute_tolerances + state_count;
-    instance->du = instance->tolerances + state_count;
+    instance->event_tolerances = instance->absolute_tolerances + state_count;
+    instance->du = instance->event_tolerances + state_count;
     instance->z = instance->du + count_of(model->inputs);
     instance->ode.indicator_count = model->events->indicator_count;
     instance->ode.indicators = instance_indicators;

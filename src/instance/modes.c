@@ -7,49 +7,31 @@
 #include <math.h>
 #include <string.h>
 
-double instance_next_time(const struct instance *instance) {
-    const struct model_events *events = instance->model->events;
-    return events != NULL && events->next_time != NULL ? events->next_time(instance->memory.values)
-                                                       : INFINITY;
-}
-
-bool instance_is_at_rest(const struct instance *instance) {
-    const struct model_events *events = instance->model->events;
-    return events != NULL && events->is_at_rest != NULL &&
-           events->is_at_rest(instance->memory.values);
-}
-
-const struct indicator *instance_describe_indicators(struct instance *instance) {
-    if (!instance_is_searched(instance)) {
-        return NULL;
-    }
-    instance->model->events->describe(instance->memory.restart_values, instance->indicators);
-    return instance->indicators;
-}
-
-double instance_nominal(const struct instance *instance, size_t state) {
+/* Returns the nominal value of a state, in its unit. */
+static double nominal_of(const struct instance *instance, size_t state) {
     const double relative = instance->state.own.effective_relative_tolerance;
     return instance->absolute_tolerances[state] / (INSTANCE_ABSOLUTE_FRACTION * relative);
 }
 
-void instance_write_location_errors(const struct instance *instance, double errors[]) {
+/* Writes how far each state may be from its limit when an integrator outside stops, in its unit. */
+static void write_location_errors(const struct instance *instance, double errors[]) {
     const struct range states = instance->model->states;
     const double *x = doubles_of(instance->memory.values, states);
     for (size_t i = 0; i < count_of(states); i++) {
-        errors[i] = 2e-10 * (instance_nominal(instance, i) + fabs(x[i]));
+        errors[i] = 2e-10 * (nominal_of(instance, i) + fabs(x[i]));
     }
 }
 
-/* Error of each state at an event: what the integrator allows or, outside, twice the error of the
- * location, since indicators fall to 0 beyond their roots. */
+/* Writes the error of each state at an event: the integrator's tolerance or, outside, twice the
+ * error of the location, since indicators fall to 0 beyond their roots. */
 static void write_tolerances(struct instance *instance) {
     const struct range states = instance->model->states;
     const double *x = doubles_of(instance->memory.values, states);
     const bool is_located_outside =
         instance->is_integrated_outside && instance->model->events->errors != NULL;
-    double *tolerances = instance->tolerances;
+    double *tolerances = instance->event_tolerances;
     if (is_located_outside) {
-        instance_write_location_errors(instance, tolerances);
+        write_location_errors(instance, tolerances);
     }
     for (size_t i = 0; i < count_of(states); i++) {
         const double allowed = instance->absolute_tolerances[i] +
@@ -58,12 +40,13 @@ static void write_tolerances(struct instance *instance) {
     }
 }
 
-/* triggered, of struct instance, says that a time event has come. */
+/* True if triggered, as in struct instance, says that a time event has come. */
 static bool is_timed(const struct instance *instance, const bool *triggered) {
     return triggered != NULL && triggered[instance->model->events->indicator_count];
 }
 
-/* Time events must not follow each other at the same time without end. */
+/* Returns STATUS_OK if the next time event is later: time events must not follow each other at the
+ * same time without end. */
 static enum status check_next_time(const struct instance *instance, double passed) {
     const double next = instance_next_time(instance);
     if (next > passed) {
@@ -88,7 +71,7 @@ static enum status update(struct instance *instance, const bool *triggered) {
         .is_timed = is_timed(instance, triggered),
         .du = instance->du,
         .du_is_known = !instance->is_integrated_outside,
-        .tolerance = instance->tolerances,
+        .tolerance = instance->event_tolerances,
         .max_events = instance->state.own.max_events,
         .reason = reason,
         .reason_size = sizeof reason,
@@ -150,7 +133,7 @@ enum status instance_count_event(struct instance *instance, const bool triggered
     return STATUS_OK;
 }
 
-/* ---- The event at which a step has ended ----------------------------------------------------- */
+/* ---- The event at which a step has ended ---------------------------------------------------- */
 
 void instance_leave_event(struct instance *instance, const bool triggered[],
                           struct clock_time end) {
@@ -164,8 +147,8 @@ void instance_note_handled_event(struct instance *instance, struct clock_time en
     instance->state.cut_end = end;
 }
 
-/* After a change of inputs or parameters, forces may no longer trigger the event; states still do.
- */
+/* Forgets forces that had triggered the event: after a change of inputs or parameters they may no
+ * longer do so; states still do. */
 static void forget_unhandled_forces(struct instance *instance) {
     const struct model_events *events = instance->model->events;
     if (events->describe != NULL) {
@@ -211,28 +194,29 @@ struct clock_time instance_resumed_end(const struct instance *instance, struct c
     return fabs(difference) <= rounding ? state->cut_end : end;
 }
 
-/* ---- Events for an integrator outside -------------------------------------------------------- */
+/* ---- Events for an integrator outside ------------------------------------------------------- */
 
-/* Of the size of an indicator: how far from its root integrators stop. */
+/* Distance from its root at which integrators stop, relative to the size of the indicator. */
 static const double near_root = 1e-10;
 
-/* The size of an indicator of a state. */
+/* Returns the size of an indicator of a state. */
 static double size_of(const struct instance *instance, const struct indicator *indicator) {
-    return fabs(indicator->factor) * instance_nominal(instance, indicator->state) +
+    return fabs(indicator->factor) * nominal_of(instance, indicator->state) +
            fabs(indicator->offset);
 }
 
-/* Writes what is added to each indicator: it falls to 0 only this far beyond its root. A mode may
- * begin at the root, and integrators miss falls that begin at 0. For an indicator of a state: far
- * above the rounding of its two parts, which are the state's nominal value and the offset, and far
- * below the error of integrators. For one of the model: so large that the force is past its limit
- * wherever an integrator stops, however the inputs move. Writes the kinds of indicators, too. */
+/* Writes the band that is added to each indicator: it falls to 0 only this far beyond its root. A
+ * mode may begin at the root, and integrators miss falls that begin at 0. For an indicator of a
+ * state the band is far above the rounding of its two parts, the state's nominal value and the
+ * offset, and far below the error of integrators. For an indicator of the model it is so large that
+ * the force is past its limit wherever an integrator stops, however the inputs move. Writes the
+ * kinds of indicators, too. */
 static void write_bands(struct instance *instance, double bands[]) {
     const struct model_events *events = instance->model->events;
     events->describe(instance->memory.values, instance->indicators);
     if (events->errors != NULL) {
         double *errors = doubles_of(instance->first_derivatives, instance->model->states);
-        instance_write_location_errors(instance, errors);
+        write_location_errors(instance, errors);
         events->errors(instance->memory.values, instance->state.time.s, errors, 1e-12, bands);
     }
     for (size_t i = 0; i < events->indicator_count; i++) {
@@ -240,7 +224,7 @@ static void write_bands(struct instance *instance, double bands[]) {
         if (indicator->kind == INDICATOR_UNUSED) {
             bands[i] = 0.0;
         } else if (indicator->kind == INDICATOR_OF_STATE) {
-            const double nominal = instance_nominal(instance, indicator->state);
+            const double nominal = nominal_of(instance, indicator->state);
             bands[i] = 1e-12 * fabs(indicator->factor) * nominal + 1e-14 * fabs(indicator->offset);
         } else if (events->errors == NULL) {
             bands[i] = 2.0 * near_root + 1e-9 * fabs(indicator->offset);
@@ -260,7 +244,7 @@ void instance_add_bands(struct instance *instance) {
     }
 }
 
-/* s: the slope of an indicator is its difference over this time. */
+/* Time over which an indicator's slope is measured, s. */
 static const double slope_time = 1e-7;
 
 /* An indicator that has come to 0. */
@@ -270,14 +254,16 @@ struct arrival {
     double band;
 };
 
-/* It falls. Where a mode has just begun at 0, rounding may let it fall, but not past the band. */
+/* True if the indicator falls. If a mode has just begun at 0, rounding may let it fall, but not
+ * past the band. */
 static bool has_state_fallen(const struct arrival *at, double size) {
     const double ahead = at->z + slope_time * at->slope;
     return at->z <= near_root * size && ahead <= at->z && ahead + at->band <= 0.0;
 }
 
-/* It is below 0. How inputs move is not known, so that it may fall though it seems to rise; but one
- * that rises since the last event, from not far below 0, has not fallen. since: s. */
+/* True if the indicator is below 0 and has fallen. The motion of inputs is not known, so that it
+ * may fall though it seems to rise; but an indicator that rises since the last event, from not far
+ * below 0, has not fallen. since: s. */
 static bool has_model_fallen(const struct arrival *at, double since) {
     const bool has_risen = at->slope > 0.0 && at->z - at->slope * since > -4.0 * at->band;
     return at->z < 0.0 && !has_risen;
@@ -291,8 +277,8 @@ static enum status evaluate(struct instance *instance, double t, const double x[
     return model->events->indicators(instance->memory.values, t, x, u, z);
 }
 
-/* Writes all indicators now and, along the motion that begins here while the inputs stay, after
- * each slope_time: at so many points, 3 at most. */
+/* Writes all indicators at `points` points, 3 at most: now and after each slope_time along the
+ * motion that begins here while the inputs stay. */
 static enum status look_ahead(struct instance *instance, size_t points) {
     const struct model *model = instance->model;
     const double *u = doubles_of(instance->memory.values, model->inputs);
@@ -358,7 +344,8 @@ void instance_forget_unhandled(struct instance *instance) {
     instance->state.event_point = NO_EVENT;
 }
 
-/* Some indicator is below 0: else no event can have been missed, which is so after most steps. */
+/* True if some indicator is below 0: otherwise no event can have been missed, as after most steps.
+ */
 static bool is_any_below(struct instance *instance) {
     const double *x = doubles_of(instance->memory.values, instance->model->states);
     bool is_below = false;
@@ -376,7 +363,7 @@ bool instance_has_missed_event(struct instance *instance) {
         find_triggered(instance, instance->triggered, &is_any) != STATUS_OK) {
         return false;
     }
-    // one that only comes to 0 will be seen
+    // an indicator that only comes to 0 will be seen
     bool is_missed = false;
     for (size_t i = 0; is_any && i < instance->model->events->indicator_count; i++) {
         is_missed |= instance->triggered[i] && instance->z[i] < 0.0;
@@ -384,7 +371,7 @@ bool instance_has_missed_event(struct instance *instance) {
     return is_missed;
 }
 
-/* Takes forces out of triggered that are not below 0 with the values set now. */
+/* Removes forces from triggered that are not below 0 with the values set now. */
 static enum status forget_past_forces(struct instance *instance, bool triggered[]) {
     if (!can_fire(instance)) {
         return STATUS_OK;
@@ -400,8 +387,8 @@ static enum status forget_past_forces(struct instance *instance, bool triggered[
     return STATUS_OK;
 }
 
-/* z: an indicator at three times in equal distances. It moves to 0 and turns before it comes there.
- */
+/* True if an indicator, with these values at three times in equal distances, moves to 0 and turns
+ * before it comes there. */
 static bool turns_before_zero(double z, double ahead, double far_ahead) {
     const double side = z < 0.0 ? -1.0 : 1.0;
     const double slope = side * (ahead - z);
@@ -409,8 +396,9 @@ static bool turns_before_zero(double z, double ahead, double far_ahead) {
     return slope < 0.0 && bend > 0.0 && side * z - slope * slope / (2.0 * bend) >= 0.0;
 }
 
-/* Where impacts follow each other ever faster, an event that leaves the state beyond its limit is
- * followed by a flight that ends before it. No further event would come. */
+/* Refuses events that cannot be seen. If impacts follow each other ever faster, an event that
+ * leaves the state beyond its limit is followed by a flight that ends before it. No further event
+ * would come. */
 static enum status refuse_unseen_events(struct instance *instance, const bool triggered[]) {
     const size_t count = instance->model->events->indicator_count;
     if (instance->model->events->errors == NULL || look_ahead(instance, 3) != STATUS_OK) {

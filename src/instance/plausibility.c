@@ -8,15 +8,15 @@
 #include <math.h>
 #include <string.h>
 
-/* A value by its name, and whether an instance can have it. */
+/* A value with its name, and whether an instance can have it. */
 struct named_value {
     const char *name;
     double value;
     bool is_possible;
 };
 
-static bool are_possible(const struct instance *instance, const struct named_value values[],
-                         size_t count) {
+static bool check_all(const struct instance *instance, const struct named_value values[],
+                      size_t count) {
     for (size_t i = 0; i < count; i++) {
         if (!values[i].is_possible) {
             message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
@@ -31,21 +31,20 @@ static bool are_possible(const struct instance *instance, const struct named_val
 #define COUNT(array) (sizeof(array) / sizeof(array)[0])
 
 static bool is_count(int64_t value) {
-    return value >= 0 && value <= INT64_MAX / 2; // can be counted on from without overflow
+    return value >= 0 && value <= INT64_MAX / 2; // counting on will not overflow
 }
 
 static bool is_step(double value) {
     return value >= 0.0 && isfinite(value);
 }
 
-/* s is the whole time, rounded. */
+/* True if s is the whole time, rounded. */
 static bool is_rest_of(struct clock_time time) {
     return clock_two_sum(time.s, time.rest).s == time.s;
 }
 
-/* Time, phase and the settings of the integrator. */
-static bool has_possible_settings(const struct instance *instance,
-                                  const struct instance_state *state) {
+/* Checks time, phase and the settings of the integrator. */
+static bool check_settings(const struct instance *instance, const struct instance_state *state) {
     const struct instance_values *own = &state->own;
     const int phase = (int)state->phase;
     // an integrator outside may go back, before the start too
@@ -71,12 +70,11 @@ static bool has_possible_settings(const struct instance *instance,
              (!instance_has_integrator(instance) ||
               integrator_is_possible((enum integrator_method)own->solver_method, &instance->ode))},
     };
-    return are_possible(instance, values, COUNT(values)) &&
+    return check_all(instance, values, COUNT(values)) &&
            instance_check_experiment(instance, &state->experiment) == STATUS_OK;
 }
 
-static bool has_possible_statistics(const struct instance *instance,
-                                    const struct instance_state *state) {
+static bool check_statistics(const struct instance *instance, const struct instance_state *state) {
     const struct integrator_statistics *totals = &state->statistics;
     const struct named_value values[] = {
         {"solver_steps", (double)totals->steps, is_count(totals->steps)},
@@ -88,12 +86,11 @@ static bool has_possible_statistics(const struct instance *instance,
         {"the steps before the restart", (double)state->steps_before_restart,
          state->steps_before_restart >= 0 && state->steps_before_restart <= totals->steps},
     };
-    return are_possible(instance, values, COUNT(values));
+    return check_all(instance, values, COUNT(values));
 }
 
-/* What a replay of the integrator's history needs. */
-static bool has_possible_history(const struct instance *instance,
-                                 const struct instance_state *state) {
+/* Checks the values for a replay of the integrator's history. */
+static bool check_history(const struct instance *instance, const struct instance_state *state) {
     const int64_t steps = state->statistics.steps - state->steps_before_restart;
     const int64_t most_steps =
         integrator_longest_history((enum integrator_method)state->own.solver_method,
@@ -115,15 +112,15 @@ static bool has_possible_history(const struct instance *instance,
         {"passed_time", state->passed_time, !exists || state->passed_time >= state->first_time},
         {"horizon", state->horizon, !exists || state->horizon >= state->latest_time},
     };
-    return are_possible(instance, values, COUNT(values));
+    return check_all(instance, values, COUNT(values));
 }
 
-static bool are_finite_inputs(const struct instance *instance, const char *name,
-                              const struct polynomial *inputs) {
+static bool check_inputs(const struct instance *instance, const char *name,
+                         const struct polynomial *inputs) {
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
         for (int k = 0; k <= POLYNOMIAL_DEGREE; k++) {
             const struct named_value value = {name, inputs[i].d[k], isfinite(inputs[i].d[k])};
-            if (!are_possible(instance, &value, 1)) {
+            if (!check_all(instance, &value, 1)) {
                 return false;
             }
         }
@@ -131,9 +128,9 @@ static bool are_finite_inputs(const struct instance *instance, const char *name,
     return true;
 }
 
-/* Parameters, inputs and states that could have been set, and modes and discrete states within
- * their limits. */
-static bool are_within_limits(const struct instance *instance, const char *values) {
+/* Checks that parameters, inputs and states could have been set, and that modes and discrete states
+ * are within their limits. */
+static bool check_limits(const struct instance *instance, const char *values) {
     const struct message_sink quiet = {0};
     for (size_t i = 0; i < instance->description->variable_count; i++) {
         const struct variable *variable = &instance->description->variables[i];
@@ -146,20 +143,20 @@ static bool are_within_limits(const struct instance *instance, const char *value
             variable->type == VARIABLE_FLOAT64 ? *(const double *)field : *(const int *)field;
         const struct named_value value = {
             variable->name, number, variable_check_value(variable, number, &quiet) == STATUS_OK};
-        if (!are_possible(instance, &value, 1)) {
+        if (!check_all(instance, &value, 1)) {
             return false;
         }
     }
     return true;
 }
 
-/* Discrete states that are no variables. */
-static bool are_finite_kept(const struct instance *instance, const char *values) {
+/* Checks that discrete states are finite, also those that are no variables. */
+static bool check_kept(const struct instance *instance, const char *values) {
     const struct range kept = events_of(instance->model).discrete_states;
     for (size_t i = 0; i < count_of(kept); i++) {
         const double state = ((const double *)(const void *)(values + kept.offset))[i];
         const struct named_value value = {"a discrete state", state, isfinite(state)};
-        if (!are_possible(instance, &value, 1)) {
+        if (!check_all(instance, &value, 1)) {
             return false;
         }
     }
@@ -181,10 +178,10 @@ static bool are_zeros(const char *values, struct range range) {
     return true;
 }
 
-/* Modes of values, which may have been set since the last event, and those that the integrator runs
- * with. They are equal while the history lasts: an event would have ended it. */
-static bool has_possible_modes(const struct instance *instance, const struct instance_state *state,
-                               const char *values, const char *restart_values) {
+/* Checks the modes of values, which may have been set since the last event, and the integrator's
+ * modes. They are equal while the history lasts: an event would have ended it. */
+static bool check_modes(const struct instance *instance, const struct instance_state *state,
+                        const char *values, const char *restart_values) {
     const struct model_events *events = instance->model->events;
     if (events == NULL) {
         return true;
@@ -203,10 +200,10 @@ static bool has_possible_modes(const struct instance *instance, const struct ins
     return true;
 }
 
-/* Steps handle time events as they come: none is earlier than the present time by more than
- * rounding. An importer that integrates outside may skip one. */
-static bool has_possible_next_time(const struct instance *instance,
-                                   const struct instance_state *state, const char *values) {
+/* Checks the next time event. Steps handle time events as they come: none is earlier than the
+ * current time by more than rounding. An importer that integrates outside may skip one. */
+static bool check_next_time(const struct instance *instance, const struct instance_state *state,
+                            const char *values) {
     const struct model_events *events = instance->model->events;
     if (events == NULL || events->next_time == NULL || state->phase < PHASE_STEPPING ||
         instance->is_integrated_outside) {
@@ -217,17 +214,18 @@ static bool has_possible_next_time(const struct instance *instance,
     const struct named_value value = {"the time of the next event", time,
                                       time >=
                                           state->time.s - (state->drift + clock_rounding(size))};
-    return are_possible(instance, &value, 1);
+    return check_all(instance, &value, 1);
 }
 
-/* A value structure that the instance can have. */
-static bool is_possible_structure(const struct instance *instance, const char *values) {
-    return are_within_limits(instance, values) && are_finite_kept(instance, values);
+/* Checks that the instance can have a value structure. */
+static bool check_structure(const struct instance *instance, const char *values) {
+    return check_limits(instance, values) && check_kept(instance, values);
 }
 
-/* An unhandled event is one of an indicator or of the time. */
-static bool is_possible_event_point(const struct instance *instance,
-                                    const struct instance_state *state, const bool unhandled[]) {
+/* Checks the event at which the last step ended: an unhandled event has an indicator or the time as
+ * its cause. */
+static bool check_event_point(const struct instance *instance, const struct instance_state *state,
+                              const bool unhandled[]) {
     int count = 0;
     for (size_t i = 0; i < instance_event_size(instance->model) / sizeof *unhandled; i++) {
         count += unhandled[i];
@@ -245,19 +243,20 @@ static bool is_possible_event_point(const struct instance *instance,
          is_rest_of(end) && (state->event_point == NO_EVENT || instance->is_integrated_outside ||
                              clock_difference(end, state->time) >= -clock_spacing(state->time.s))},
     };
-    return are_possible(instance, values, COUNT(values));
+    return check_all(instance, values, COUNT(values));
 }
 
-/* ---- What is stored twice -------------------------------------------------------------------- */
+/* ---- Values stored twice ----------------------------------------------------------------------
+ */
 
-/* A value by its name, and what the rest of the state says that it is. */
+/* A value with its name, and the value that follows from the rest of the state. */
 struct twin {
     const char *name;
     double value;
     double expected;
 };
 
-static bool do_agree(const struct instance *instance, const struct twin twins[], size_t count) {
+static bool check_twins(const struct instance *instance, const struct twin twins[], size_t count) {
     for (size_t i = 0; i < count; i++) {
         if (twins[i].value != twins[i].expected) {
             message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
@@ -270,9 +269,9 @@ static bool do_agree(const struct instance *instance, const struct twin twins[],
     return true;
 }
 
-/* Variables of the instance follow from its clock, its settings and the integrator's totals. */
-static bool has_true_variables(const struct instance *instance,
-                               const struct instance_state *state) {
+/* Checks the instance's variables, which follow from its clock, its settings and the integrator's
+ * totals. */
+static bool check_variables(const struct instance *instance, const struct instance_state *state) {
     const struct instance_values *own = &state->own;
     struct instance_values counted = {0};
     instance_write_statistics(&state->statistics, &counted);
@@ -287,15 +286,15 @@ static bool has_true_variables(const struct instance *instance,
         {"solver_last_step", own->solver_last_step, counted.solver_last_step},
         {"solver_last_order", own->solver_last_order, counted.solver_last_order},
     };
-    return do_agree(instance, twins, COUNT(twins));
+    return check_twins(instance, twins, COUNT(twins));
 }
 
-/* The start is the one of the experiment; nothing has been counted before it. */
-static bool has_true_start(const struct instance *instance, const struct instance_state *state) {
+/* Checks that the start is the experiment's, and that nothing has been counted before it. */
+static bool check_start(const struct instance *instance, const struct instance_state *state) {
     const struct instance_values *own = &state->own;
     const bool has_started = state->phase >= PHASE_STEPPING;
     const bool knows_start = state->phase >= PHASE_INITIALIZATION;
-    // of the other kind: the adapter says so
+    // of the other kind: the adapter refuses it
     const bool is_foreign =
         state->phase == PHASE_CONTINUOUS_TIME && !instance->is_integrated_outside;
     const double start = state->experiment.start_time;
@@ -318,17 +317,18 @@ static bool has_true_start(const struct instance *instance, const struct instanc
         {"stop_time_defined", state->experiment.stop_time_defined, false},
         {"tolerance_defined", state->experiment.tolerance_defined, false},
     };
-    return (has_started || do_agree(instance, of_start, COUNT(of_start))) &&
-           (own->event_count > 0 || do_agree(instance, of_events, COUNT(of_events))) &&
+    return (has_started || check_twins(instance, of_start, COUNT(of_start))) &&
+           (own->event_count > 0 || check_twins(instance, of_events, COUNT(of_events))) &&
            (state->phase == PHASE_INSTANTIATED || is_foreign ||
-            do_agree(instance, of_experiment, COUNT(of_experiment))) &&
+            check_twins(instance, of_experiment, COUNT(of_experiment))) &&
            (state->experiment_defined ||
-            do_agree(instance, of_no_experiment, COUNT(of_no_experiment)));
+            check_twins(instance, of_no_experiment, COUNT(of_no_experiment)));
 }
 
-/* The integrator's history ends at the present time, and its horizon follows from the inputs. */
-static bool has_true_history(const struct instance *instance, const struct instance_state *state,
-                             const struct polynomial active_inputs[]) {
+/* Checks that the integrator's history ends at the current time, and that its horizon follows from
+ * the inputs. */
+static bool check_history_twins(const struct instance *instance, const struct instance_state *state,
+                                const struct polynomial active_inputs[]) {
     const struct twin twins[] = {
         {"latest_time", state->latest_time, clock_difference(state->time, state->restart_time)},
         {"horizon", state->horizon,
@@ -336,14 +336,14 @@ static bool has_true_history(const struct instance *instance, const struct insta
                           polynomials_move(active_inputs, count_of(instance->model->inputs)))},
         {"event_point", state->event_point, NO_EVENT},
     };
-    return !state->has_history || do_agree(instance, twins, COUNT(twins));
+    return !state->has_history || check_twins(instance, twins, COUNT(twins));
 }
 
-/* Inputs at the current time are among the values, too; fixed parameters also among those that the
- * integrator runs with. */
-static bool has_true_values(const struct instance *instance, const struct instance_state *state,
-                            const char *values, const char *restart_values,
-                            const struct polynomial current[]) {
+/* Checks values that are stored twice: inputs at the current time are among the values, too, fixed
+ * parameters also among the integrator's. */
+static bool check_value_twins(const struct instance *instance, const struct instance_state *state,
+                              const char *values, const char *restart_values,
+                              const struct polynomial current[]) {
     for (size_t i = 0; i < instance->description->variable_count; i++) {
         const struct variable *variable = &instance->description->variables[i];
         const bool is_real = variable->type == VARIABLE_FLOAT64;
@@ -370,7 +370,7 @@ static bool has_true_values(const struct instance *instance, const struct instan
 
 enum status instance_check_plausible(const struct instance *instance,
                                      const struct instance_state *state, const char *block) {
-    // offsets are those in the instance's own block
+    // offsets in the instance's own block
     const struct instance_memory *memory = &instance->memory;
     const char *values = block + (memory->values - memory->block);
     const char *restart_values = block + (memory->restart_values - memory->block);
@@ -380,19 +380,19 @@ enum status instance_check_plausible(const struct instance *instance,
 
     // derivatives of inputs at the current time are not checked: they may have overflowed
     const bool is_plausible =
-        has_possible_settings(instance, state) && has_possible_statistics(instance, state) &&
-        has_possible_history(instance, state) &&
-        are_finite_inputs(instance, "an input", (const void *)next_inputs) &&
-        are_finite_inputs(instance, "an input since the restart", (const void *)active_inputs) &&
-        is_possible_structure(instance, values) &&
-        (!state->has_history || is_possible_structure(instance, restart_values)) &&
-        has_possible_modes(instance, state, values, restart_values) &&
-        has_possible_next_time(instance, state, values) &&
-        is_possible_event_point(
+        check_settings(instance, state) && check_statistics(instance, state) &&
+        check_history(instance, state) &&
+        check_inputs(instance, "an input", (const void *)next_inputs) &&
+        check_inputs(instance, "an input since the restart", (const void *)active_inputs) &&
+        check_structure(instance, values) &&
+        (!state->has_history || check_structure(instance, restart_values)) &&
+        check_modes(instance, state, values, restart_values) &&
+        check_next_time(instance, state, values) &&
+        check_event_point(
             instance, state,
             (const void *)(block + ((const char *)memory->unhandled - memory->block))) &&
-        has_true_variables(instance, state) && has_true_start(instance, state) &&
-        has_true_history(instance, state, (const void *)active_inputs) &&
-        has_true_values(instance, state, values, restart_values, (const void *)current);
+        check_variables(instance, state) && check_start(instance, state) &&
+        check_history_twins(instance, state, (const void *)active_inputs) &&
+        check_value_twins(instance, state, values, restart_values, (const void *)current);
     return is_plausible ? STATUS_OK : STATUS_INVALID_ARGUMENT;
 }

@@ -1,13 +1,12 @@
-/* Whether an instance can be in a state that was read from bytes: a hash that fits does not prove
- * it.
+/* Refuses a state read from bytes that no instance can be in: a hash that fits does not prove it.
  */
 #ifndef PLAUSIBILITY_H
 #define PLAUSIBILITY_H
 
 #include "state.h"
 
-/* state and block (as instance_memory.block) as read. STATUS_INVALID_ARGUMENT, with a message that
- * names the value, if one of them is impossible. */
+/* Returns STATUS_OK if all values of state and block (like instance_memory.block) are possible;
+ * otherwise STATUS_INVALID_ARGUMENT, with a message that names the value. */
 MUST_CHECK NONNULL enum status instance_check_plausible(const struct instance *instance,
                                                         const struct instance_state *state,
                                                         const char *block);

@@ -13,16 +13,17 @@
 static const char magic[8] = {'C', 'O', 'S', 'I', 'M', 'S', 'T', 'A'};
 enum { FORMAT_VERSION = 2, HASH_SIZE = 8 };
 
-/* Reads, writes or counts the fields of a serialized state, by one sequence of calls for all three.
- */
+/* Reader, writer or counter of the fields of a serialized state, with one sequence of calls for all
+ * three. */
 struct codec {
     enum { CODEC_COUNTING, CODEC_WRITING, CODEC_READING } mode;
     unsigned char *to;         /* CODEC_WRITING */
     const unsigned char *from; /* CODEC_READING */
     size_t size;               /* bytes available */
     size_t at;                 /* bytes done */
-    bool is_cut_off;           /* there were too few bytes */
-    const char *bad_field; /* first one read with a value that its type does not have; or NULL */
+    bool is_cut_off;           /* true if there were too few bytes */
+    const char *bad_field; /* name of the first field with a value that its type does not have; NULL
+                              if there is none */
 };
 
 /* ---- Bytes ---------------------------------------------------------------------------------- */
@@ -52,7 +53,8 @@ static void transfer_number(struct codec *codec, uint64_t *number, size_t byte_c
     }
 }
 
-/* FNV-1a, 64 bit: G. Fowler, L. C. Noll, K.-P. Vo. Any change of one byte changes it. */
+/* Returns the hash FNV-1a, 64 bit (G. Fowler, L. C. Noll, K.-P. Vo). Any change of one byte changes
+ * it. */
 static uint64_t hash(const unsigned char *bytes, size_t count) {
     uint64_t value = 0xcbf29ce484222325u;
     for (size_t i = 0; i < count; i++) {
@@ -127,8 +129,8 @@ static const char *codec_check(struct codec *codec, const char *guid, size_t len
 }
 
 /* ---- Fields ---------------------------------------------------------------------------------
- * These read, write or count one field, 8 bytes. If the value read is none of the type, *value
- * stays and the field is the bad one, unless there is one already. name: static text. */
+ * These functions read, write or count one field, 8 bytes. If the value read is none of the type,
+ * *value stays and the field is the bad one, unless there is one already. name: static text. */
 
 static void codec_real(struct codec *codec, double *value) {
     uint64_t bits;
@@ -168,7 +170,7 @@ static void codec_bool(struct codec *codec, const char *name, bool *value) {
     *value = transfer_integer(codec, name, *value, 0, 1) != 0;
 }
 
-/* ---- The state ------------------------------------------------------------------------------- */
+/* ---- The state ------------------------------------------------------------------------------ */
 
 static void transfer_experiment(struct codec *codec, struct instance_experiment *experiment) {
     codec_real(codec, &experiment->start_time);
@@ -205,7 +207,7 @@ static void transfer_statistics(struct codec *codec, struct integrator_statistic
     codec_int(codec, "last_order", &statistics->last_order);
 }
 
-/* Values of the model that are not calculated: parameters, inputs and states. */
+/* Transfers the values of the model that are not calculated: parameters, inputs and states. */
 static void transfer_values(struct codec *codec, const struct model_description *description,
                             char *values) {
     for (size_t i = 0; i < description->variable_count; i++) {
@@ -222,7 +224,7 @@ static void transfer_values(struct codec *codec, const struct model_description 
     }
 }
 
-/* What events keep: modes and discrete states, declared as variables or not. */
+/* Transfers modes and discrete states, declared as variables or not. */
 static void transfer_kept(struct codec *codec, const struct model *model, char *values) {
     const struct model_events events = events_of(model);
     int *modes = ints_of(values, events.modes);
@@ -235,7 +237,7 @@ static void transfer_kept(struct codec *codec, const struct model *model, char *
     }
 }
 
-/* The event at which the last step ended. */
+/* Transfers the event at which the last step ended. */
 static void transfer_event_point(struct codec *codec, const struct model *model,
                                  struct instance_state *state, bool unhandled[]) {
     int event_point = (int)state->event_point;
@@ -257,13 +259,13 @@ static void transfer_polynomials(struct codec *codec, struct polynomial polynomi
     }
 }
 
-/* A value structure: all but what the outputs of the model calculate. */
+/* Transfers a value structure, except values that the outputs of the model calculate. */
 static void transfer_structure(struct codec *codec, const struct instance *instance, char *values) {
     transfer_values(codec, instance->description, values);
     transfer_kept(codec, instance->model, values);
 }
 
-/* All fields, in one order for reading, writing and counting. */
+/* Transfers all fields, in one order for reading, writing and counting. */
 static void transfer_state(struct codec *codec, const struct instance *instance, unsigned *tag,
                            struct instance_state *state, char *block) {
     const struct instance_memory *memory = &instance->memory;
@@ -302,10 +304,10 @@ static void transfer_state(struct codec *codec, const struct instance *instance,
     }
 }
 
-/* ---- Interface ------------------------------------------------------------------------------- */
+/* ---- Interface ------------------------------------------------------------------------------ */
 
 size_t instance_serialized_size(const struct instance *instance) {
-    // counting writes nothing, so that any state serves
+    // counting writes nothing, so that any state will do
     struct instance_state state = instance->state;
     unsigned tag = 0;
     struct codec codec = {.mode = CODEC_COUNTING};
@@ -346,7 +348,7 @@ enum status instance_deserialize(struct instance *instance, const unsigned char 
         return STATUS_INVALID_ARGUMENT;
     }
 
-    // over a copy of the instance: calculated values are not among the bytes
+    // read over a copy of the instance: calculated values are not among the bytes
     struct instance_snapshot *read = NULL;
     enum status status = instance_save(instance, 0, &read);
     if (status != STATUS_OK) {

@@ -12,16 +12,17 @@
 
 #include "snapshot.h"
 
-/* Bytes that instance_serialize writes. */
+/* Returns the number of bytes that instance_serialize writes. */
 NONNULL size_t instance_serialized_size(const struct instance *instance);
 
-/* bytes: size bytes, size at least instance_serialized_size. */
+/* Writes the snapshot to bytes; size must be at least instance_serialized_size. */
 MUST_CHECK NONNULL enum status instance_serialize(struct instance *instance,
                                                   struct instance_snapshot *snapshot,
                                                   unsigned char bytes[], size_t size);
 
-/* A new snapshot from what instance_serialize of any instance of the same model wrote. Bytes that
- * are damaged, foreign or impossible are refused with STATUS_INVALID_ARGUMENT and a message. */
+/* Makes a new snapshot from bytes that instance_serialize of any instance of the same model wrote.
+ * Bytes that are damaged, foreign or impossible are refused with STATUS_INVALID_ARGUMENT and a
+ * message. */
 MUST_CHECK NONNULL enum status instance_deserialize(struct instance *instance,
                                                     const unsigned char bytes[], size_t size,
                                                     struct instance_snapshot **snapshot);

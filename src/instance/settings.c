@@ -32,7 +32,7 @@ enum status instance_check_parameters(struct instance *instance) {
     if (instance->parameters_are_valid) {
         return STATUS_OK;
     }
-    char text[512]; // written where the parameters are refused
+    char text[512]; // written if the parameters are refused
     const enum status status =
         instance->model->check_parameters(instance->memory.values, text, sizeof text);
     if (status != STATUS_OK) {
@@ -42,7 +42,7 @@ enum status instance_check_parameters(struct instance *instance) {
     return status;
 }
 
-/* Absolute tolerance of each state, in its unit. */
+/* Writes the absolute tolerance of each state, in its unit. */
 static void write_absolute_tolerances(const struct instance *instance, double absolute[]) {
     const struct range states = instance->model->states;
     const double tolerance = instance->state.own.effective_relative_tolerance;
@@ -56,7 +56,7 @@ static void write_absolute_tolerances(const struct instance *instance, double ab
     }
 }
 
-/* The parameter wins over the experiment, which wins over the default. */
+/* The parameter takes precedence over the experiment, and this over the default. */
 double instance_tolerance(const struct instance *instance, const struct instance_state *state) {
     const enum integrator_method method = (enum integrator_method)state->own.solver_method;
     double tolerance = instance->description->default_tolerance;

@@ -7,7 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Searches from both ends: masters free in the order of saving or in the reverse one. */
+/* True if the snapshot belongs to the instance. Searches from both ends: masters free in the order
+ * of saving or in reverse. */
 static bool is_own(const struct instance *instance, const struct instance_snapshot *snapshot) {
     const struct instance_snapshot *from_newest = instance->newest;
     const struct instance_snapshot *from_oldest = instance->oldest;
@@ -72,7 +73,7 @@ enum status instance_save(struct instance *instance, unsigned tag,
     return STATUS_OK;
 }
 
-/* Prepares the instance to continue from what was written into its state and memory. */
+/* Prepares the instance to continue from its new state and memory. */
 static enum status resume(struct instance *instance) {
     instance->outputs_are_valid = false;
     instance->parameters_are_valid = false;
@@ -101,8 +102,8 @@ enum status instance_restore(struct instance *instance, const struct instance_sn
     return resume(instance);
 }
 
-/* What a step writes. Where inputs are held, it writes neither those of the next step nor the
- * current ones. */
+/* Copies the parts that a step writes. If inputs are held, it writes neither the next inputs nor
+ * the current ones. */
 static void copy_written(const struct instance_memory *memory, bool inputs_are_held, char *to,
                          const char *from) {
     const struct range restart = memory->written_at_restart;

@@ -1,11 +1,11 @@
 /* Snapshots of an instance: all that later results depend on.
  *
  * A restored instance gives the same bits as the saved one would have given. A snapshot is constant
- * in size and does not contain the integrator's own history: that follows from the last restart and
- * is replayed at the next step, if that step continues from it.
+ * in size and does not contain the integrator's own history, which follows from the last restart
+ * and is replayed at the next step, if that step continues from it.
  *
  * A snapshot belongs to its instance, which frees it at its own end at the latest. Functions refuse
- * one of another instance with STATUS_INVALID_ARGUMENT and a message. */
+ * a snapshot of another instance with STATUS_INVALID_ARGUMENT and a message. */
 #ifndef SNAPSHOT_H
 #define SNAPSHOT_H
 
@@ -13,26 +13,26 @@
 
 struct instance_snapshot;
 
-/* Saves the instance into *snapshot: a new one if that is NULL, otherwise over that one. tag: a
- * number that the caller wants back. */
+/* Saves the instance into *snapshot: a new one if it is NULL, otherwise over that one. tag: a
+ * number for the caller. */
 MUST_CHECK NONNULL enum status instance_save(struct instance *instance, unsigned tag,
                                              struct instance_snapshot **snapshot);
 
-/* The snapshot stays valid. */
+/* Restores the instance. The snapshot stays valid. */
 MUST_CHECK NONNULL enum status instance_restore(struct instance *instance,
                                                 const struct instance_snapshot *snapshot);
 
 /* Frees *snapshot and sets it to NULL. */
 NONNULL enum status instance_forget(struct instance *instance, struct instance_snapshot **snapshot);
 
-/* The tag that the snapshot was saved with, and the phase in which the instance was. */
+/* Reads the tag that the snapshot was saved with, and the phase of the instance then. */
 MUST_CHECK NONNULL enum status instance_snapshot_tag(const struct instance *instance,
                                                      const struct instance_snapshot *snapshot,
                                                      unsigned *tag, enum phase *phase);
 
 /* ---- Within the library --------------------------------------------------------------------- */
 
-/* STATUS_OK if the snapshot belongs to the instance; otherwise a message says so. */
+/* Returns STATUS_OK if the snapshot belongs to the instance; otherwise a message says so. */
 MUST_CHECK NONNULL enum status instance_check_own(const struct instance *instance,
                                                   const struct instance_snapshot *snapshot);
 

@@ -1,4 +1,4 @@
-/* What an instance consists of, where each value lies, and which values the integrator runs with.
+/* Structure of an instance: its parts, the places of its values, and the values of the integrator.
  * Private to this library. */
 #ifndef STATE_H
 #define STATE_H
@@ -10,77 +10,78 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Bounds of what the integrator can run at: below, rounding stops its error test from converging;
- * above, results have no digit left. */
+/* Bounds of the integrator's relative tolerance: below, rounding stops its error test from
+ * converging; above, results have no digit left. */
 #define INSTANCE_FINEST_TOLERANCE   1e-14
 #define INSTANCE_COARSEST_TOLERANCE 1e-2
 
-/* The experiment's tolerance is taken up to here: masters pass their own, made for coarser models
- * (Maestro's is 0.1), and results would lose their digits. */
+/* Largest tolerance that is taken from the experiment: masters pass their own, made for coarser
+ * models (Maestro's is 0.1), and results would lose their digits. */
 #define INSTANCE_COARSEST_EXPERIMENT_TOLERANCE 1e-4
 
 /* Whether a step has ended at an event and the instance is still there. */
 enum event_point {
     NO_EVENT,
-    EVENT_UNHANDLED, /* the modes are still those before it */
-    EVENT_HANDLED,   /* the modes are those after it */
+    EVENT_UNHANDLED, /* the modes have not been updated yet */
+    EVENT_HANDLED,   /* the modes have been updated */
 };
 
-/* With the values in struct instance_memory, all that later results depend on. A snapshot is a copy
- * of both. */
+/* State of an instance: with the values in struct instance_memory, all that later results depend
+ * on. A snapshot is a copy of both. */
 struct instance_state {
     enum phase phase;
     bool experiment_defined;
     struct instance_experiment experiment;
     struct instance_values own;
     struct clock_time time;
-    double drift; /* s: sum of clock_step_drift over all steps */
+    double drift; /* sum of clock_step_drift over all steps, s */
 
     /* The integrator's history, from which it continues while nothing changes. A replay needs only
-     * the restart and the first and the last advance since then (integrator_advance). */
+     * the restart and the first and the last advance since then (integrator_advance). Only
+     * history.c writes these fields. */
     bool has_history;
     struct clock_time restart_time;
-    double horizon;     /* s since the restart that the integrator may not pass */
+    double horizon;     /* time that the integrator may not pass, s since the restart */
     double first_time;  /* s since the restart */
     double latest_time; /* s since the restart */
-    double passed_time; /* s since the restart: where the last internal step ended */
+    double passed_time; /* end of the last internal step, s since the restart */
     struct integrator_statistics statistics;
-    int64_t steps_before_restart; /* internal steps */
-    double restart_step; /* s: first internal step of the last restart; 0: the method found one */
-    double next_step;    /* s: the same, for a restart now */
-    bool restart_continues; /* the last restart was on the solution before it */
+    int64_t steps_before_restart; /* internal steps before the restart */
+    double restart_step; /* first internal step of the last restart, s; 0 if the method found it */
+    double next_step;    /* first internal step of a restart now, s; 0 if the method finds it */
+    bool restart_continues; /* true if the last restart continued the solution before it */
 
     enum event_point event_point;
-    struct clock_time cut_end; /* where the step would have ended without that event */
+    struct clock_time cut_end; /* end of the step without that event */
 };
 
-/* Parts of one block of memory, of which a snapshot is a copy, in this order. */
+/* Parts of one block of memory, in this order; a snapshot copies the block. */
 struct instance_memory {
     struct polynomial *next_inputs; /* inputs of the next step: last value set, and derivatives */
     struct polynomial *current_inputs; /* inputs at the current time */
     struct polynomial *active_inputs;  /* inputs since the last restart */
-    bool *unhandled;      /* causes of the unhandled event, as triggered of struct instance */
-    char *restart_values; /* the value structure at the last restart: what the integrator runs
-                             with */
-    char *values;         /* the model's value structure, as set and read from outside; its
-                             inputs are those at the current time */
+    bool *unhandled;      /* causes of the unhandled event, like triggered of struct instance */
+    char *restart_values; /* value structure at the last restart, with which the integrator runs */
+    char *values; /* value structure of the model, as set and read from outside, with the inputs at
+                     the current time */
 
     char *block;
     size_t size; /* bytes */
-    /* Of the block: what a step writes, but the first two and what is calculated from the rest. */
+    /* Parts of the block that a step writes, besides the first two and calculated values. */
     struct range written_at_restart; /* active_inputs to restart_values */
-    struct range written;            /* of values */
+    struct range written;            /* part of values */
 };
 
-/* Of each value reference. */
+/* Place and kind of the value of a reference. */
 struct instance_real {
-    const double *value; /* NULL: it is no float64 */
-    bool is_calculated;  /* by the outputs of the model: it has to be brought up to date */
-    bool is_kept;        /* by events: in initialization mode it is calculated, too */
+    const double *value; /* NULL if it is no float64 */
+    bool is_calculated; /* true if the model's outputs calculate it: it has to be brought up to date
+                         */
+    bool is_kept;       /* true if events keep it: in initialization mode it is calculated, too */
 };
 
-/* What each step reads or writes stands first: of many instances stepped in turn, few lines of a
- * cache each are used. */
+/* The fields that each step reads or writes stand first: if many instances are stepped in turn, few
+ * lines of a cache are used for each. */
 struct instance {
     const struct model_description *description;
     const struct model *model;
@@ -89,45 +90,45 @@ struct instance {
     struct instance_real *reals; /* by value reference */
 
     bool is_integrated_outside;
-    bool states_are_settable;   /* in event mode, too */
-    bool step_met_event;        /* the last one */
-    bool outputs_are_valid;     /* the calculated values belong to the others */
-    bool parameters_are_valid;  /* they are consistent; false: not known */
-    bool parameters_are_active; /* as instance_parameters_are_active; false: not known */
-    bool history_is_lost;       /* the integrator is not where state says: replay first */
-    bool inputs_are_held;       /* those of the next step are constant, and current_inputs are the
-                                   same; false: not known */
-    bool inputs_move;           /* since the last restart; false: u has their constant values */
-    double *u;                  /* one value per input, as the right-hand side sees them */
+    bool states_are_settable;   /* true if states may be set in event mode, too */
+    bool step_met_event;        /* true if the last step met an event */
+    bool outputs_are_valid;     /* true if the calculated values belong to the others */
+    bool parameters_are_valid;  /* true if they are consistent, false if not known */
+    bool parameters_are_active; /* true if instance_parameters_are_active, false if not known */
+    bool history_is_lost;       /* true if the integrator is not where state says: replay first */
+    bool inputs_are_held;       /* true if the inputs of the next step are constant and equal to
+                                   current_inputs, false if not known */
+    bool inputs_move; /* true if inputs move since the last restart; if not, u has their values */
+    double *u;        /* one value per input, as the right-hand side sees them */
     double (*input_series)[SERIES_INPUT_LENGTH]; /* coefficients of each input */
-    struct integrator *integrator;               /* NULL: the model has no states */
-    struct integrator_settings configured; /* what the integrator was configured with, without the
-                                              tolerances of the states */
+    struct integrator *integrator;               /* NULL if the model has no states */
+    struct integrator_settings
+        configured; /* last settings of the integrator, without the tolerances of the states */
     struct instance_memory memory;
 
     struct message_sink sink;
     struct ode ode;
-    double *absolute_tolerances;  /* one per state, as the integrator has them; NULL: the model has
-                                     no events */
-    double *tolerances;           /* one per state, at its value at the last event */
+    double *absolute_tolerances; /* one per state, as the integrator has them; NULL if the model has
+                                    no events */
+    double *event_tolerances;    /* one per state, at its value at the last event */
     struct indicator *indicators; /* one per indicator, since the last restart */
     double *du;                   /* derivative of each input by the time */
     double *z;                    /* three per indicator */
-    bool *triggered;              /* one per indicator: it falls to 0; last: a time event */
-    double *nodes;           /* POLYNOMIAL_NODES values per input, of the step that asks for them */
+    bool *triggered; /* one per indicator: true if it falls to 0; the last: true at a time event */
+    double *nodes;   /* POLYNOMIAL_NODES values per input, of the step that asks for them */
     char *first_derivatives; /* value structures, along a curve (struct model) */
     char *second_derivatives;
-    char *initial_values; /* value structure, see values.c; NULL: the model has no events */
-    struct instance_snapshot *newest; /* snapshots that belong to the instance, a list */
+    char *initial_values; /* value structure, see values.c; NULL if the model has no events */
+    struct instance_snapshot *newest; /* list of the snapshots that belong to the instance */
     struct instance_snapshot *oldest;
 };
 
-/* A saved instance; snapshot.h. */
+/* A saved instance: snapshot.h. */
 struct instance_snapshot {
     struct instance_snapshot *newer;
     struct instance_snapshot *older;
     unsigned tag;
-    bool history_is_lost; /* of instance_keep, as the next one */
+    bool history_is_lost; /* of instance_keep, like the next field */
     bool inputs_are_held;
     struct instance_state state;
     max_align_t memory[]; /* copy of instance_memory.block */
@@ -137,41 +138,48 @@ static inline size_t count_of(struct range range) {
     return range.size / sizeof(double);
 }
 
-/* The instance integrates the states of its model itself. */
+/* True if the instance integrates the states of its model itself. */
 static inline bool instance_has_integrator(const struct instance *instance) {
     return instance->integrator != NULL && !instance->is_integrated_outside;
 }
 
-/* The largest magnitude (s) among the start time and t: times are rounded as numbers of this size.
- */
+/* Returns the largest magnitude (s) among the start time and t: times are rounded like numbers of
+ * this size. */
 static inline double instance_size_of_times(const struct instance *instance, double t) {
     return fmax(fabs(t), fabs(instance->state.experiment.start_time));
 }
 
-/* The doubles at a range of a value structure. */
+/* Returns the doubles at a range of a value structure. */
 static inline double *doubles_of(char *values, struct range range) {
     return (double *)(void *)(values + range.offset);
 }
 
-/* The ints at a range of a value structure. */
+/* Returns the ints at a range of a value structure. */
 static inline int *ints_of(char *values, struct range range) {
     return (int *)(void *)(values + range.offset);
 }
 
-/* Of a model without events: no indicators and empty ranges. */
+/* Returns the model's events; no indicators and empty ranges if it has none. */
 static inline struct model_events events_of(const struct model *model) {
     return model->events != NULL ? *model->events : (struct model_events){0};
 }
 
-/* Bytes of the array triggered of struct instance. */
+/* Returns the time of the next time event, s; INFINITY if there is none. */
+static inline double instance_next_time(const struct instance *instance) {
+    const struct model_events *events = instance->model->events;
+    return events != NULL && events->next_time != NULL ? events->next_time(instance->memory.values)
+                                                       : INFINITY;
+}
+
+/* Returns the bytes of the array triggered of struct instance. */
 static inline size_t instance_event_size(const struct model *model) {
     return model->events != NULL ? (model->events->indicator_count + 1) * sizeof(bool) : 0;
 }
 
-/* ---- Values that the integrator runs with ---------------------------------------------------- */
+/* ---- Values that the integrator runs with --------------------------------------------------- */
 
-/* The inputs of the next step are constant and equal to the active ones. Polynomials need no
- * comparison: the horizon of the integrator ends with the step that they are for. */
+/* True if the inputs of the next step are constant and equal to the active ones. Polynomials need
+ * no comparison: the integrator's horizon ends with their step. */
 static inline bool instance_inputs_are_active(const struct instance *instance) {
     const struct instance_memory *memory = &instance->memory;
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
@@ -190,7 +198,7 @@ static inline bool instance_range_is_active(const struct instance *instance, str
                   range.size) == 0;
 }
 
-/* The same for parameters and Boolean inputs. */
+/* True if the parameters and Boolean inputs are equal to the active ones. */
 static inline bool instance_parameters_are_active(const struct instance *instance) {
     const struct model_events *events = instance->model->events;
     return instance->parameters_are_active ||
@@ -202,15 +210,16 @@ static inline bool instance_values_are_active(const struct instance *instance) {
     return instance_inputs_are_active(instance) && instance_parameters_are_active(instance);
 }
 
-/* ---- Places of values ------------------------------------------------------------------------ */
+/* ---- Places of values ----------------------------------------------------------------------- */
 
-/* Says in a message why there is no variable with this reference and type; NULL. */
+/* Sends a message that says why there is no variable with this reference and type. Returns NULL. */
 NONNULL const struct variable *instance_refuse_reference(const struct instance *instance,
                                                          unsigned reference,
                                                          enum variable_type type);
 
-/* The variable with this reference and type; NULL, with a message, if there is none. These and
- * instance_write_field are inline: they run once or more for each value that is set or read. */
+/* Returns the variable with this reference and type; NULL, with a message, if there is none. This
+ * function and instance_write_field are inline: they run once or more for each value that is set or
+ * read. */
 static inline const struct variable *instance_find(const struct instance *instance,
                                                    unsigned reference, enum variable_type type) {
     const struct variable *variable = variable_find(instance->description, reference);
@@ -219,7 +228,7 @@ static inline const struct variable *instance_find(const struct instance *instan
                : instance_refuse_reference(instance, reference, type);
 }
 
-/* Location of a variable's value. */
+/* Returns the place of a variable's value. */
 static inline void *instance_field(struct instance *instance, const struct variable *variable) {
     char *structure = variable->owner == VARIABLE_OF_MODEL ? instance->memory.values
                                                            : (char *)(void *)&instance->state.own;
@@ -232,13 +241,14 @@ static inline bool instance_is_state(const struct instance *instance,
            variable->offset - instance->model->states.offset < instance->model->states.size;
 }
 
-/* Index of an input of type float64 among the inputs. */
+/* Returns the index of an input of type float64 among the inputs. */
 static inline size_t instance_input_index(const struct instance *instance,
                                           const struct variable *variable) {
     return (variable->offset - instance->model->inputs.offset) / sizeof(double);
 }
 
-/* Writes the value; that of an input of type float64 also into its polynomial of the next step. */
+/* Writes the value. The value of an input of type float64 also goes into its polynomial of the next
+ * step. */
 static inline void instance_write_field(struct instance *instance, const struct variable *variable,
                                         double value) {
     void *field = instance_field(instance, variable);
@@ -258,8 +268,8 @@ static inline void instance_write_field(struct instance *instance, const struct 
     }
 }
 
-/* Returns the value structure from which calculated values are read once they are up to date. In
- * initialization mode it is what the end of this mode will make of the values. */
+/* Returns the value structure with the calculated values, once they are up to date. In
+ * initialization mode these are the values after the end of this mode. */
 static inline char *instance_shown_values(const struct instance *instance) {
     const bool is_initializing = instance->state.phase == PHASE_INITIALIZATION;
     return is_initializing && instance->initial_values != NULL ? instance->initial_values
@@ -271,10 +281,6 @@ static inline void instance_set_clock(struct instance *instance, struct clock_ti
     instance->state.own.time = time.s;
     instance->outputs_are_valid = false;
 }
-
-/* Writes the variables that show totals of the integrator. */
-NONNULL void instance_write_statistics(const struct integrator_statistics *statistics,
-                                       struct instance_values *own);
 
 /* Returns STATUS_NOT_FINITE, with a message that `what` cannot be computed. */
 NONNULL enum status instance_not_finite(const struct instance *instance, const char *what);

@@ -13,53 +13,57 @@ struct step {
     struct instance *instance;
     const struct step_options *options;
     struct clock_time begin;
-    struct clock_time end;          /* where it will end; may become earlier */
-    struct clock_time until;        /* end of its present part: the same, or a time event before */
-    bool meets_time_event;          /* at the end of its present part */
-    double drift;                   /* s: of the communication points, up to its beginning */
-    bool is_early;                  /* end has become earlier */
-    bool is_over;                   /* the step ends where it is */
-    struct instance_snapshot *kept; /* the instance before the step; NULL: not needed so far */
-    enum status answer;             /* of options->accept */
-    struct event_counts events;     /* so far */
-    int64_t steps_before;           /* internal ones, since initialization */
+    struct clock_time end;   /* end of the step, which may become earlier */
+    struct clock_time until; /* end of its current part: the same, or a time event before */
+    bool meets_time_event;   /* true if a time event is at the end of the current part */
+    double drift;            /* drift of the communication points up to the begin of the step, s */
+    bool is_early;           /* true if `end` has become earlier */
+    bool is_over;            /* true if the step ends where it is */
+    struct instance_snapshot *kept; /* the instance before the step; NULL if not needed so far */
+    enum status answer;             /* last status of options->accept */
+    struct event_counts events;     /* events so far */
+    int64_t steps_before; /* internal steps from initialization to the begin of the step */
 };
 
 /* ---- Times ---------------------------------------------------------------------------------- */
 
-/* s: integrators go beyond the end of a step, by up to 1e4 times its length. With times that then
- * overflow cvode_bdf would try the same step without end. */
+/* Latest time, s. Integrators go beyond the end of a step, by up to 1e4 times its length. With
+ * times that then overflow cvode_bdf would try the same step without end. */
 static const double latest_time = 1e300;
 
-/* mismatch (s): of t from the time of the instance. */
-static enum status refuse_times(const struct instance *instance, double t, double h,
-                                double mismatch) {
+/* Refuses times that do not fit. mismatch: distance of communication_point from the time of the
+ * instance, s. */
+static enum status refuse_times(const struct instance *instance, double communication_point,
+                                double step_size, double mismatch) {
     const struct instance_experiment *experiment = &instance->state.experiment;
-    const double slack = clock_slack(instance_size_of_times(instance, t), h);
-    if (!(h > 0.0 && h <= latest_time && fabs(t) <= latest_time)) {
+    const double slack =
+        clock_slack(instance_size_of_times(instance, communication_point), step_size);
+    if (!(step_size > 0.0 && step_size <= latest_time &&
+          fabs(communication_point) <= latest_time)) {
         message_write(
             &instance->sink, STATUS_INVALID_TIME,
             "a step of %g s from t = %.17g is refused: a time up to %g s and a step above "
             "0 are expected",
-            h, t, latest_time);
+            step_size, communication_point, latest_time);
         return STATUS_INVALID_TIME;
     }
-    if (t + h == t) {
+    if (communication_point + step_size == communication_point) {
         message_write(&instance->sink, STATUS_INVALID_TIME,
-                      "a step of %g s from t = %.17g is refused: it does not change the time", h,
-                      t);
+                      "a step of %g s from t = %.17g is refused: it does not change the time",
+                      step_size, communication_point);
         return STATUS_INVALID_TIME;
     }
-    if (!(fabs(mismatch) <= slack && mismatch + h > 0.0)) {
+    if (!(fabs(mismatch) <= slack && mismatch + step_size > 0.0)) {
         message_write(&instance->sink, STATUS_INVALID_TIME,
-                      "a step from t = %.17g is refused: the instance is at t = %.17g", t,
-                      instance->state.time.s);
+                      "a step from t = %.17g is refused: the instance is at t = %.17g",
+                      communication_point, instance->state.time.s);
         return STATUS_INVALID_TIME;
     }
-    if (experiment->stop_time_defined && t + h - experiment->stop_time > slack) {
+    if (experiment->stop_time_defined &&
+        communication_point + step_size - experiment->stop_time > slack) {
         message_write(&instance->sink, STATUS_INVALID_TIME,
-                      "a step from t = %.17g to t = %.17g is refused: the stop time is %.17g", t,
-                      t + h, experiment->stop_time);
+                      "a step from t = %.17g to t = %.17g is refused: the stop time is %.17g",
+                      communication_point, communication_point + step_size, experiment->stop_time);
         return STATUS_INVALID_TIME;
     }
     return STATUS_OK;
@@ -84,7 +88,7 @@ static void set_part(struct step *step) {
     }
 }
 
-/* Internal steps that the step may still take. */
+/* Returns the number of internal steps that the step may still take. */
 static int64_t steps_left(const struct step *step) {
     const struct instance_state *state = &step->instance->state;
     return state->own.max_internal_steps - (state->statistics.steps - step->steps_before);
@@ -117,8 +121,8 @@ static void evaluate_inputs(struct instance *instance, double elapsed) {
     }
 }
 
-/* After a step that has asked for inputs: they keep the value given for its end or, where the step
- * ended earlier, the value there. */
+/* Sets the inputs after a step that has asked for them: they keep the value given for its end or,
+ * if the step ended earlier, the value there. */
 static void keep_last_nodes(const struct step *step) {
     struct instance *instance = step->instance;
     const struct instance_memory *memory = &instance->memory;
@@ -142,11 +146,11 @@ static bool is_finite(const struct polynomial *polynomial) {
  * step, which no integrator notices in a model without states. */
 static enum status check_inputs(const struct step *step) {
     const struct instance *instance = step->instance;
-    const double h = clock_difference(step->end, step->begin);
+    const double step_size = clock_difference(step->end, step->begin);
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
         const struct polynomial *input = &instance->memory.next_inputs[i];
         if (polynomial_moves(input)) {
-            const struct polynomial at_end = polynomial_shifted(input, h);
+            const struct polynomial at_end = polynomial_shifted(input, step_size);
             if (!is_finite(&at_end)) {
                 return instance_not_finite(instance, "an input at the end of the step");
             }
@@ -155,12 +159,12 @@ static enum status check_inputs(const struct step *step) {
     return STATUS_OK;
 }
 
-static enum status set_polynomials(struct instance *instance, double h) {
+static enum status set_polynomials(struct instance *instance, double step_size) {
     struct instance_memory *memory = &instance->memory;
     double *u = doubles_of(memory->values, instance->model->inputs);
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
         const struct polynomial input =
-            polynomial_through(instance->nodes + i * POLYNOMIAL_NODES, h);
+            polynomial_through(instance->nodes + i * POLYNOMIAL_NODES, step_size);
         if (!is_finite(&input)) {
             return instance_not_finite(instance, "a derivative of an input");
         }
@@ -174,11 +178,13 @@ static enum status set_polynomials(struct instance *instance, double h) {
 }
 
 /* Sets the inputs of the step to polynomials through the values that the importer gives. */
-static enum status ask_inputs(const struct step *step, double t, double h) {
+static enum status ask_inputs(const struct step *step, double communication_point,
+                              double step_size) {
     struct instance *instance = step->instance;
     for (int k = 0; k < POLYNOMIAL_NODES; k++) {
-        const double time =
-            k == POLYNOMIAL_NODES - 1 ? step->end.s : t + k * (h / (POLYNOMIAL_NODES - 1));
+        const double time = k == POLYNOMIAL_NODES - 1
+                                ? step->end.s
+                                : communication_point + k * (step_size / (POLYNOMIAL_NODES - 1));
         const enum status status = step->options->ask_inputs(step->options->context, time);
         if (status != STATUS_OK) {
             return status;
@@ -191,7 +197,7 @@ static enum status ask_inputs(const struct step *step, double t, double h) {
     return set_polynomials(instance, clock_difference(step->end, step->begin));
 }
 
-/* Inputs at the end of a step. Their derivatives applied to it only. */
+/* Sets the inputs to their values at the end of a step. Their derivatives applied to it only. */
 static void end_inputs(const struct step *step) {
     struct instance *instance = step->instance;
     const double elapsed = clock_difference(instance->state.time, step->begin);
@@ -213,7 +219,8 @@ static void end_inputs(const struct step *step) {
 
 /* ---- Parts without an event ----------------------------------------------------------------- */
 
-/* Reports the time of the instance to options->accept; true: the step will end earlier. */
+/* Reports the time of the instance to options->accept. Returns true if the step will end earlier.
+ */
 static bool report(struct step *step) {
     const double now = step->instance->state.time.s;
     double end = step->end.s;
@@ -231,7 +238,7 @@ static bool report(struct step *step) {
     return false;
 }
 
-/* An integrator_observer. */
+/* Observes an internal step: an integrator_observer. */
 static bool observe(void *step_pointer, double t, const double x[]) {
     struct step *step = step_pointer;
     struct instance *instance = step->instance;
@@ -246,7 +253,7 @@ static bool is_at_event(const struct instance *instance) {
     return instance->model->events != NULL && integrator_event(instance->integrator) != NULL;
 }
 
-/* To step->until, which may become earlier on the way. */
+/* Advances to step->until, which may become earlier on the way. */
 static enum status advance(struct step *step) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
@@ -268,7 +275,7 @@ static enum status advance(struct step *step) {
         if (!(state->latest_time < target)) {
             break;
         }
-        // to the new end; the step that the observer cut short counts
+        // to the new end; the internal step that the observer cut short counts
         integrator_get_statistics(instance->integrator, &state->statistics);
     }
     if (step->options->accept != NULL) {
@@ -280,55 +287,20 @@ static enum status advance(struct step *step) {
 /* Advances to step->until, or to an earlier state event. Both may become earlier on the way. */
 static enum status move(struct step *step, enum continuation continuation) {
     struct instance *instance = step->instance;
-    struct instance_state *state = &instance->state;
     enum status status = instance_prepare_history(instance, step->end, continuation);
     if (status != STATUS_OK) {
         return status;
     }
     status = advance(step);
-    if (status != STATUS_OK) {
-        instance_set_clock(instance, clock_add(state->restart_time, state->latest_time));
-    }
-
     // a step that ended early cannot be replayed: its end was not known when it began
-    const bool is_whole = !step->is_early && !step->meets_time_event && !is_at_event(instance);
-    state->has_history = status == STATUS_OK && is_whole && instance_longest_history(instance) > 0;
-    state->passed_time = integrator_passed_time(instance->integrator);
-    if (!state->has_history) {
-        state->next_step = status == STATUS_OK ? integrator_next_step(instance->integrator) : 0.0;
-    }
-    integrator_get_statistics(instance->integrator, &state->statistics);
-    instance_write_statistics(&state->statistics, &state->own);
+    instance_note_part(instance, status,
+                       !step->is_early && !step->meets_time_event && !is_at_event(instance));
     return status;
 }
 
 /* ---- Events --------------------------------------------------------------------------------- */
 
-/* As instance_move in modes in which no state moves: time passes until an input ends them. */
-static enum status rest(struct step *step, enum continuation continuation) {
-    struct instance *instance = step->instance;
-    struct instance_state *state = &instance->state;
-    const struct polynomial *inputs = continuation == CONTINUE_AFTER_EVENT
-                                          ? instance->memory.current_inputs
-                                          : instance->memory.next_inputs;
-    // constant inputs end no mode; the active values matter only after an event
-    const bool is_searched =
-        !instance->inputs_are_held && polynomials_move(inputs, count_of(instance->model->inputs));
-    if (is_searched || step->meets_time_event) {
-        instance_activate_values(instance, step->end, inputs);
-    } else {
-        instance_end_history(instance);
-    }
-    const struct integrator_start start = {
-        .indicators = is_searched ? instance_describe_indicators(instance) : NULL,
-    };
-    state->next_step = 0.0;
-    return integrator_rest(instance->integrator,
-                           doubles_of(instance->memory.values, instance->model->states), &start,
-                           clock_difference(step->until, state->restart_time), &state->latest_time);
-}
-
-/* The instance goes to the time of an event and handles it, or the step ends there. */
+/* Moves the instance to the time of an event and handles it, unless the step ends there. */
 static enum status meet_event(struct step *step, struct clock_time time) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
@@ -355,7 +327,7 @@ static enum status meet_event(struct step *step, struct clock_time time) {
     return status;
 }
 
-/* The modes at the beginning of a step, and how the integrator continues from there. */
+/* Decides the modes at the beginning of a step, and how the integrator continues from there. */
 static enum status begin_modes(struct step *step, enum continuation *continuation) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
@@ -375,20 +347,28 @@ static enum status begin_modes(struct step *step, enum continuation *continuatio
     return instance_update_modes(instance, NULL);
 }
 
-/* To the end of the present part of the step, or to a state event before it. */
+/* True if every state's derivative is 0 in the current modes. */
+static bool is_at_rest(const struct instance *instance) {
+    const struct model_events *events = instance->model->events;
+    return events != NULL && events->is_at_rest != NULL &&
+           events->is_at_rest(instance->memory.values);
+}
+
+/* Advances to the end of the current part of the step, or to an earlier state event. */
 static enum status move_part(struct step *step, enum continuation continuation) {
     struct instance *instance = step->instance;
     if (instance->integrator == NULL) {
         return STATUS_OK;
     }
-    if (instance_is_at_rest(instance)) {
-        return rest(step, continuation);
+    if (is_at_rest(instance)) {
+        return instance_rest(instance, step->end, step->until, step->meets_time_event,
+                             continuation);
     }
     return continuation == CONTINUE_AFTER_EVENT && steps_left(step) <= 0 ? STATUS_TOO_MANY_STEPS
                                                                          : move(step, continuation);
 }
 
-/* Writes the event to which the last part has come, and its time; false: there is none. */
+/* Writes the event at which the last part ended, and its time. Returns false if there is none. */
 static bool find_event(const struct step *step, bool has_moved, struct clock_time *time) {
     const struct instance *instance = step->instance;
     const size_t count = instance->model->events->indicator_count;
@@ -408,21 +388,18 @@ static bool find_event(const struct step *step, bool has_moved, struct clock_tim
     return true;
 }
 
-/* At the end of the step, and no other time event is there. */
-static bool is_done(struct step *step) {
-    if (clock_difference(step->end, step->instance->state.time) > 0.0) {
-        return false;
-    }
-    set_part(step);
-    return step->options->at_event != EVENTS_PASSED || !step->meets_time_event;
+/* True at the end of the step, if no other time event is there. */
+static bool is_done(const struct step *step) {
+    return !(clock_difference(step->end, step->instance->state.time) > 0.0) &&
+           (step->options->at_event != EVENTS_PASSED || !step->meets_time_event);
 }
 
 /* Advances to step->end over all events on the way. */
 static enum status move_over_events(struct step *step, enum continuation continuation) {
     struct instance *instance = step->instance;
     enum status status = begin_modes(step, &continuation);
+    set_part(step);
     while (status == STATUS_OK) {
-        set_part(step);
         const bool moves = clock_difference(step->until, instance->state.time) > 0.0;
         if (moves) {
             status = move_part(step, continuation);
@@ -432,6 +409,7 @@ static enum status move_over_events(struct step *step, enum continuation continu
             break;
         }
         status = meet_event(step, time);
+        set_part(step);
         if (is_done(step)) {
             break;
         }
@@ -449,16 +427,16 @@ static void keep(struct step *step) {
     }
 }
 
-/* The instance is at the time where the step has ended. */
-static void arrive(const struct step *step, struct clock_time time) {
+/* Sets the instance to the time at which the step has ended. */
+static void end_at(const struct step *step, struct clock_time time) {
     instance_set_clock(step->instance, time);
     if (!step->instance->inputs_are_held) {
         end_inputs(step);
     }
 }
 
-/* To a point that an internal step may have passed already: then nothing can fail, and nothing is
- * counted. Otherwise false. */
+/* Goes to a point that an internal step has passed already: then nothing can fail, and nothing is
+ * counted. Returns false if no step has. */
 static bool interpolate(const struct step *step, double target) {
     struct instance *instance = step->instance;
     if (!integrator_interpolate(instance->integrator, target,
@@ -466,7 +444,7 @@ static bool interpolate(const struct step *step, double target) {
         return false;
     }
     instance->state.latest_time = target;
-    arrive(step, step->end);
+    end_at(step, step->end);
     return true;
 }
 
@@ -483,11 +461,11 @@ static enum status integrate(struct step *step) {
     const enum status status = instance->model->events == NULL
                                    ? move(step, continuation)
                                    : move_over_events(step, continuation);
-    arrive(step, status == STATUS_OK ? step->end : state->time);
+    end_at(step, status == STATUS_OK ? step->end : state->time);
     return status;
 }
 
-/* The same for a model without states. */
+/* Lets the time pass for a model without states. */
 static enum status pass_time(struct step *step) {
     enum status status = check_inputs(step);
     if (status != STATUS_OK) {
@@ -497,17 +475,17 @@ static enum status pass_time(struct step *step) {
         keep(step);
         status = move_over_events(step, CONTINUE_AFTER_CHANGE);
     }
-    arrive(step, status == STATUS_OK ? step->end : step->instance->state.time);
+    end_at(step, status == STATUS_OK ? step->end : step->instance->state.time);
     return status;
 }
 
-static enum status do_step(struct step *step, double communication_point, double h) {
+static enum status do_step(struct step *step, double communication_point, double step_size) {
     struct instance *instance = step->instance;
     enum status status = STATUS_OK;
     if (step->options->ask_inputs != NULL) {
         instance->inputs_are_held = false;
         keep(step);
-        status = ask_inputs(step, communication_point, h);
+        status = ask_inputs(step, communication_point, step_size);
         if (status != STATUS_OK) {
             return status;
         }
@@ -566,9 +544,10 @@ enum status instance_do_step_with(struct instance *instance, double communicatio
     return status;
 }
 
-enum status instance_do_step(struct instance *instance, double communication_point, double step) {
+enum status instance_do_step(struct instance *instance, double communication_point,
+                             double step_size) {
     static const struct step_options none = {0};
-    return instance_do_step_with(instance, communication_point, step, &none);
+    return instance_do_step_with(instance, communication_point, step_size, &none);
 }
 
 bool instance_met_event(const struct instance *instance) {

@@ -7,9 +7,9 @@
 #include <math.h>
 #include <string.h>
 
-/* ---- Calculated values ----------------------------------------------------------------------- */
+/* ---- Calculated values ---------------------------------------------------------------------- */
 
-/* Calculates all from parameters, inputs, states and modes. */
+/* Calculates all values from parameters, inputs, states and modes. */
 static enum status calculate(struct instance *instance) {
     const enum status status =
         instance->model->outputs(instance->memory.values, instance->state.time.s);
@@ -23,8 +23,8 @@ static enum status calculate(struct instance *instance) {
     return status;
 }
 
-/* Writes initial_values: ends the initialization for a moment, without a message. Where it cannot
- * end, they are the present values. */
+/* Writes initial_values: ends the initialization for a moment, without a message. If it cannot end,
+ * they are the present values. */
 static void look_ahead(struct instance *instance) {
     const size_t size = instance->model->values_size;
     const struct message_sink sink = instance->sink;
@@ -55,17 +55,17 @@ enum status instance_update_outputs(struct instance *instance) {
     return status;
 }
 
-/* ---- Values by reference --------------------------------------------------------------------- */
+/* ---- Values by reference -------------------------------------------------------------------- */
 
-/* What the elements of an array are, and which variables it is for. */
+/* Type of the elements of an array, and of the variables that it is for. */
 #define ARRAY_OF(name, constant, element) ARRAY_OF_##constant,
 enum array { VALUE_TYPE_LIST(ARRAY_OF) };
 #undef ARRAY_OF
 
 _Static_assert(sizeof(bool) == 1, "a bool is read as a byte");
 
-/* Element i as a double: exact for every int, and for every int64_t that is an item of an
- * enumeration. A bool is read as a byte, so that one which is neither 0 nor 1 can be refused. */
+/* Returns element i as a double: exact for every int, and for every int64_t that is an item of an
+ * enumeration. A bool is read as a byte, so that any but 0 and 1 can be refused. */
 ALWAYS_INLINE double element(enum array array, const void *values, size_t i) {
     switch (array) {
     case ARRAY_OF_REAL:
@@ -79,7 +79,7 @@ ALWAYS_INLINE double element(enum array array, const void *values, size_t i) {
     }
 }
 
-/* The type that a variable must have; for ARRAY_OF_INTEGER either of the two. */
+/* Returns the type that a variable must have; for ARRAY_OF_INTEGER either of the two. */
 ALWAYS_INLINE enum variable_type type_for(const struct instance *instance, enum array array,
                                           unsigned reference) {
     const struct variable *variable;
@@ -161,9 +161,9 @@ ALWAYS_INLINE enum status set(struct instance *instance, enum array array,
     }
 VALUE_TYPE_LIST(INSTANCE_SET)
 
-/* Where calculated values are read. */
+/* Value structures from which values are read. */
 struct shown {
-    const char *values; /* of the instance */
+    const char *values; /* the instance's own */
     const char *from;   /* instance_shown_values */
 };
 
@@ -184,7 +184,7 @@ static inline double shown_real(const struct shown *shown, const struct instance
     return *(const double *)shown_at(shown, real, real->value);
 }
 
-/* Brings the value up to date. What events keep needs no calculation. */
+/* Brings the value up to date. Modes and discrete states need no calculation. */
 static enum status prepare(struct instance *instance, const struct instance_real *real) {
     if (real->is_kept) {
         look_ahead(instance);
@@ -220,7 +220,7 @@ enum status instance_get_real(struct instance *instance, const unsigned referenc
     return STATUS_OK;
 }
 
-/* Checks that all of them can be read, and brings them up to date. */
+/* Checks that all variables can be read, and brings their values up to date. */
 static enum status prepare_ints(struct instance *instance, enum array array,
                                 const unsigned references[], size_t count) {
     const struct shown shown = shown_in(instance);
@@ -245,7 +245,7 @@ static int read_int(struct instance *instance, unsigned reference) {
     return *(const int *)shown_at(&shown, &instance->reals[reference], field);
 }
 
-/* To a bool, the conversion of an int that is not 0 gives true. */
+/* In the conversion to bool an int that is not 0 gives true. */
 #define INSTANCE_GET(name, constant, element)                                                      \
     enum status instance_get_##name(struct instance *instance, const unsigned references[],        \
                                     size_t count, element values[]) {                              \

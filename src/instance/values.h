@@ -22,12 +22,12 @@
     X(boolean, BOOLEAN, int)                                                                       \
     X(bool, BOOL, bool)
 
-/* The same, and real: variables of type float64. */
+/* X for the same types and for real: variables of type float64. */
 #define VALUE_TYPE_LIST(X) X(real, REAL, double) INTEGER_TYPE_LIST(X)
 
-/* For each type of value, as instance_set_real and instance_get_real: set or read count values. The
- * arrays may be NULL where count is 0. A variable of another type is refused. A set value shows at
- * once in what is calculated from it. */
+/* For each type of value, such as instance_set_real and instance_get_real: set or read count
+ * values. The arrays may be NULL if count is 0. A variable of another type is refused. A set value
+ * shows at once in all values that are calculated from it. */
 #define INSTANCE_ACCESS(name, constant, element)                                                   \
     MUST_CHECK NONNULL_ARGUMENTS(1) enum status instance_set_##name(                               \
         struct instance *instance, const unsigned references[], size_t count,                      \
@@ -37,7 +37,7 @@
 VALUE_TYPE_LIST(INSTANCE_ACCESS)
 #undef INSTANCE_ACCESS
 
-/* Brings the calculated values up to date; a message says why that fails. */
+/* Brings the calculated values up to date; if that fails, a message says why. */
 MUST_CHECK NONNULL enum status instance_update_outputs(struct instance *instance);
 
 #endif

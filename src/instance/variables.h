@@ -1,6 +1,5 @@
-/* The table of variables that fmu/generate.py makes from variables.toml, what follows from a row of
- * it, and the values that belong to the instance. Terms as in section 2.2.7 of the FMI 2.0
- * specification. */
+/* Table of variables that fmu/generate.py makes from variables.toml, functions of its rows, and the
+ * values that belong to the instance. Terms as in section 2.2.7 of the FMI 2.0 specification. */
 #ifndef VARIABLES_H
 #define VARIABLES_H
 
@@ -15,11 +14,11 @@
 
 struct instance;
 
-/* All but float64 are kept as an int: an enumeration as 1 for its first item, a Boolean as 0 or 1.
- */
+/* Type of a variable. All but float64 are kept as an int: an enumeration as 1 for its first item, a
+ * Boolean as 0 or 1. */
 enum variable_type { VARIABLE_FLOAT64, VARIABLE_INT32, VARIABLE_ENUMERATION, VARIABLE_BOOLEAN };
 
-/* The structure that holds the value: the model's own or struct instance_values. */
+/* Structure that holds the value: the model's own or struct instance_values. */
 enum variable_owner { VARIABLE_OF_MODEL, VARIABLE_OF_INSTANCE };
 
 enum causality {
@@ -48,9 +47,9 @@ struct variable {
     enum causality causality;
     enum variability variability;
     enum initial initial;
-    double start;   /* 0: none */
-    double min;     /* -INFINITY: none */
-    double max;     /* INFINITY: none */
+    double start;   /* 0 if it has none */
+    double min;     /* -INFINITY without limit */
+    double max;     /* INFINITY without limit */
     double nominal; /* > 0 */
 };
 
@@ -58,18 +57,18 @@ struct variable {
 struct model_description {
     const char *name; /* model name and identifier */
     const char *guid;
-    double default_tolerance; /* relative, if neither experiment nor parameter gives one */
+    double default_tolerance; /* relative tolerance if neither experiment nor parameter gives one */
     const struct model *model;
     const struct variable *variables;
     size_t variable_count;
-    const short *row_of_reference; /* -1: no such reference */
-    unsigned reference_count;      /* entries of row_of_reference */
-    const unsigned *indicators;    /* references, in the order of the model; NULL: none */
+    const short *row_of_reference; /* row of each reference; -1 if no variable has it */
+    unsigned reference_count;      /* number of entries of row_of_reference */
+    const unsigned *indicators; /* references, in the order of the model; NULL if there are none */
     size_t indicator_count;
     bool has_time_events;
 };
 
-/* Phase in the life of an instance; it decides what may be set. */
+/* Phase in the life of an instance; it decides which variables may be set. */
 enum phase {
     PHASE_INSTANTIATED,
     PHASE_INITIALIZATION,
@@ -78,13 +77,13 @@ enum phase {
     PHASE_COUNT,
 };
 
-/* Of a reference that is known to exist. */
+/* Returns the variable with a reference that is known to exist. */
 static inline const struct variable *variable_of(const struct model_description *description,
                                                  unsigned reference) {
     return &description->variables[description->row_of_reference[reference]];
 }
 
-/* NULL where no variable has this reference. */
+/* Returns the variable with this reference; NULL if there is none. */
 static inline const struct variable *variable_find(const struct model_description *description,
                                                    unsigned reference) {
     if (reference >= description->reference_count || description->row_of_reference[reference] < 0) {
@@ -93,8 +92,8 @@ static inline const struct variable *variable_find(const struct model_descriptio
     return variable_of(description, reference);
 }
 
-/* Before and during initialization: start values and inputs; later: inputs and tunable parameters.
- */
+/* True if the variable may be set: before and during initialization start values and inputs; later
+ * inputs and tunable parameters. */
 static inline bool variable_is_settable(const struct variable *variable, enum phase phase) {
     if (variable->causality == CAUSALITY_INPUT) {
         return phase != PHASE_CONTINUOUS_TIME || variable->variability == VARIABILITY_CONTINUOUS;
@@ -106,12 +105,12 @@ static inline bool variable_is_settable(const struct variable *variable, enum ph
            variable->variability == VARIABILITY_TUNABLE;
 }
 
-/* Says through sink why a value is refused. */
+/* Sends a message that says why a value is refused, and returns the status. */
 enum status variable_refuse_value(const struct variable *variable, double value,
                                   const struct message_sink *sink);
 
-/* STATUS_OK, or why value is refused: not finite, or outside [min, max]. Inline: it runs for each
- * value that is set. */
+/* Returns STATUS_OK, or refuses a value that is not finite or outside [min, max]. Inline: it runs
+ * for each value that is set. */
 static inline enum status variable_check_value(const struct variable *variable, double value,
                                                const struct message_sink *sink) {
     const bool is_allowed = value >= variable->min && value <= variable->max && isfinite(value);
@@ -120,25 +119,25 @@ static inline enum status variable_check_value(const struct variable *variable, 
 
 const char *variable_type_name(enum variable_type type);
 
-/* ---- Values of the instance ------------------------------------------------------------------ */
+/* ---- Values of the instance ----------------------------------------------------------------- */
 
 /* Values of the variables with owner = "instance" (time_variable.toml, solver_variables.toml).
  */
 struct instance_values {
     double time;                         /* s */
     int solver_steps;                    /* internal steps since initialization */
-    int solver_rhs_evaluations;          /* the integrator's, since initialization */
-    double relative_tolerance;           /* 0: that of the experiment */
+    int solver_rhs_evaluations;          /* evaluations of the integrator since initialization */
+    double relative_tolerance;           /* 0 for the tolerance of the experiment */
     int max_internal_steps;              /* per communication step */
-    double effective_relative_tolerance; /* what the integrator runs at */
+    double effective_relative_tolerance; /* relative tolerance at which the integrator runs */
     int solver_restarts;                 /* since initialization */
-    double solver_last_step;             /* s: length of the last internal step */
+    double solver_last_step;             /* length of the last internal step, s */
     int solver_last_order;
     int solver_failed_steps; /* refused attempts since initialization */
     int solver_method;       /* an enum integrator_method */
-    double max_step;         /* s: of internal steps; 0: no limit */
+    double max_step;         /* longest internal step, s; 0 without limit */
     int event_count;         /* since initialization */
-    double last_event_time;  /* s; that of the start, before there has been one */
+    double last_event_time;  /* s; the start time before the first event */
     int max_events;          /* per communication step */
 };
 

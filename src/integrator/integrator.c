@@ -10,15 +10,15 @@
 struct integrator {
     struct problem problem;
     struct workspace workspace;  /* for the memory of the method */
-    const struct method *method; /* NULL: there is none */
+    const struct method *method; /* NULL if there is none */
     void *memory;                /* of the method */
-    double internal_end;         /* s since the restart: end of the last internal step */
+    double internal_end;         /* end of the last internal step, s since the restart */
     struct integrator_statistics statistics;
 
     /* one value per state each, parts of values */
     double *absolute_tolerances;
     double *reached_x; /* the state at problem.reached */
-    double *x;         /* where the method writes */
+    double *x;         /* room for the state that the method writes */
     double values[];
 };
 
@@ -46,7 +46,7 @@ bool integrator_is_possible(enum integrator_method method, const struct ode *ode
     return !methods[method]->needs_series || ode->series != NULL;
 }
 
-/* Room for any method. */
+/* Returns the largest memory size of all methods. */
 static size_t workspace_size(const struct ode *ode) {
     size_t largest = 0;
     for (int i = INTEGRATOR_NO_METHOD + 1; i < INTEGRATOR_METHODS; i++) {
@@ -100,7 +100,8 @@ void integrator_destroy(struct integrator *integrator) {
     free(integrator);
 }
 
-/* After a failure there is no method; the next call creates one. */
+/* Configures the method that is wanted, and creates it if it is another one than before. After a
+ * failure there is no method; the next call creates one. */
 static enum status configure(struct integrator *integrator, enum integrator_method wanted) {
     const struct method *method = methods[wanted];
     if (integrator->method != method) {
@@ -177,23 +178,23 @@ static void add_work(struct integrator *integrator, const struct method_work *wo
     integrator->internal_end = work->internal;
 }
 
-/* A point that an internal step has passed already takes no more than a polynomial. */
-static bool can_interpolate(struct integrator *integrator, double t) {
+/* Writes the state at t to integrator->x if an internal step has passed t already; false if not. */
+static bool write_interpolated(struct integrator *integrator, double t) {
     const struct method *method = integrator->method;
     return integrator->internal_end >= t && method->interpolate != NULL &&
            method->interpolate(integrator->memory, t, integrator->x) &&
            problem_are_finite(integrator->x, integrator->problem.ode.state_count);
 }
 
-/* The state in x can be used. With extreme values a solver reports success although its step has
- * underflowed to nothing, or its state is not finite. */
+/* True if the state in x can be used. With extreme values a solver reports success although its
+ * step has underflowed to nothing, or its state is not finite. */
 static bool has_reached(const struct integrator *integrator, double t) {
     // at a stop time the solver may be short of it by its own rounding
     return problem_are_finite(integrator->x, integrator->problem.ode.state_count) &&
            integrator->internal_end >= t * (1.0 - 1e-12);
 }
 
-/* x becomes the state reached. */
+/* Makes x the state reached. */
 static void accept(struct integrator *integrator, double t) {
     double *reached_x = integrator->x;
     integrator->x = integrator->reached_x;
@@ -224,7 +225,7 @@ static void copy_state(const struct integrator *integrator, double x[]) {
 }
 
 static bool interpolate(struct integrator *integrator, double t, double x[]) {
-    if (!can_interpolate(integrator, t)) {
+    if (!write_interpolated(integrator, t)) {
         return false;
     }
     accept(integrator, t);

@@ -7,10 +7,12 @@
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-bool location_create(const struct ode *ode, const double tolerances[], struct location *location) {
+bool location_create(const struct ode *ode, const double absolute_tolerances[],
+                     struct location *location) {
     const size_t states = ode->state_count;
     const size_t count = ode->indicator_count;
-    *location = (struct location){.ode = ode, .tolerances = tolerances, .time = INFINITY};
+    *location =
+        (struct location){.ode = ode, .absolute_tolerances = absolute_tolerances, .time = INFINITY};
     if (count == 0) {
         return true;
     }
@@ -54,7 +56,7 @@ void location_destroy(struct location *location) {
     *location = (struct location){.time = INFINITY};
 }
 
-/* fmax, without the call. */
+/* Returns the same as fmax, without the call. */
 static double larger(double x, double y) {
     return x > y ? x : y;
 }
@@ -63,7 +65,7 @@ static enum status evaluate(struct location *location, double t, const double x[
     return location->ode->indicators(t, x, location->z, location->ode->context);
 }
 
-/* Of INDICATOR_OF_STATE. */
+/* Returns the value of an INDICATOR_OF_STATE. */
 static double at_state(const struct indicator *indicator, const double x[]) {
     return indicator->offset + indicator->factor * x[indicator->state];
 }
@@ -79,7 +81,7 @@ static enum status evaluate_one(struct location *location, size_t i, double t, c
     return status;
 }
 
-/* The same for indicators of the model, whose noise follows from their limits so far. */
+/* Restarts the indicators of the model, whose noise follows from their limits so far. */
 static enum status restart_model(struct location *location, const double x[]) {
     const struct ode *ode = location->ode;
     const enum status status = evaluate(location, 0.0, x);
@@ -130,7 +132,8 @@ enum status location_restart(struct location *location, const struct indicator *
             const double z = at_state(indicator, x);
             const bool is_sure = indicator->rises || z > 0.0;
             location->is_armed[i] = is_sure && (z > rounding || (rounding == 0.0 && z >= 0.0));
-            const double miss = fabs(indicator->factor) * location->tolerances[indicator->state];
+            const double miss =
+                fabs(indicator->factor) * location->absolute_tolerances[indicator->state];
             location->noise[i] = is_sure ? rounding : larger(rounding, miss);
             const double size = fabs(indicator->offset) + fabs(z - indicator->offset);
             location->touch[i] = 8.0 * DBL_EPSILON * size;
@@ -141,7 +144,7 @@ enum status location_restart(struct location *location, const struct indicator *
 
 /* ---- Falls ---------------------------------------------------------------------------------- */
 
-/* The last fall to 0 up to this s; INFINITY: there is none. */
+/* Returns the last fall to 0 up to this s; INFINITY if there is none. */
 static double last_fall(const struct roots_polynomial *p, double s) {
     struct root roots[ROOTS_LENGTH];
     const int count = roots_find(p, roots);
@@ -152,7 +155,7 @@ static double last_fall(const struct roots_polynomial *p, double s) {
     return last;
 }
 
-/* The first fall to 0 behind this s; INFINITY: there is none. */
+/* Returns the first fall to 0 after this s; INFINITY if there is none. */
 static double fall_behind(const struct roots_polynomial *p, double s) {
     struct root roots[ROOTS_LENGTH];
     const int count = roots_find(p, roots);
@@ -164,7 +167,8 @@ static double fall_behind(const struct roots_polynomial *p, double s) {
     return INFINITY;
 }
 
-/* Between two roots, p is no farther from 0 than this or the rounding of its coefficients. */
+/* True if p, between two roots, is no farther from 0 than `touch` or the rounding of its
+ * coefficients. */
 static bool is_touch(const struct roots_polynomial *p, double begin, double end, double touch) {
     const double s = 0.5 * (begin + end);
     double value = 0.0;
@@ -176,7 +180,7 @@ static bool is_touch(const struct roots_polynomial *p, double begin, double end,
     return fabs(value) <= fmax(touch, 16.0 * DBL_EPSILON * size);
 }
 
-/* p ends at 0, up to `touch`, and hardly moves there. */
+/* True if p ends at 0, up to `touch`, and hardly moves there. */
 static bool is_touch_at_end(const struct roots_polynomial *p, double touch) {
     double value = p->c[0];
     double slope = 0.0;
@@ -187,8 +191,9 @@ static bool is_touch_at_end(const struct roots_polynomial *p, double touch) {
     return fabs(value) <= touch && fabs(slope) <= 0x1p10 * touch;
 }
 
-/* The first s at which p, of an armed indicator, falls to 0, or 1 if it ends there: a touch is no
- * fall. INFINITY: neither; where the step ends within a touch, the indicator is no longer armed. */
+/* Returns the first s at which p, of an armed indicator, falls to 0, or 1 if it ends there: a touch
+ * is no fall. INFINITY if there is neither; if the step ends within a touch, the indicator is no
+ * longer armed. */
 static double fall_or_end(const struct roots_polynomial *p, const struct fall *fall) {
     struct root roots[ROOTS_LENGTH];
     const int count = roots_find(p, roots);
@@ -209,7 +214,8 @@ static double fall_or_end(const struct roots_polynomial *p, const struct fall *f
     return INFINITY;
 }
 
-/* The first s at which p, below the level before, is above it; INFINITY: it stays below. */
+/* Returns the first s at which p, below the level before, is above it; INFINITY if it stays below.
+ */
 static double first_rise(const struct roots_polynomial *p, double level) {
     double c[ROOTS_LENGTH];
     c[0] = level - p->c[0];
@@ -220,7 +226,7 @@ static double first_rise(const struct roots_polynomial *p, double level) {
     return roots_first(&below);
 }
 
-/* The first s at which p is below the level; INFINITY: it stays above. */
+/* Returns the first s at which p is below the level; INFINITY if it stays above. */
 static double first_below(const struct roots_polynomial *p, double level) {
     double c[ROOTS_LENGTH];
     memcpy(c, p->c, ((size_t)p->degree + 1) * sizeof *c);
@@ -229,8 +235,8 @@ static double first_below(const struct roots_polynomial *p, double level) {
     return roots_first(&above);
 }
 
-/* p rises from the start on until it is above the noise: its slope is half the first one or more as
- * far as s = c1 / (2 sum of k |c_k|). False: that is not known. */
+/* True if p rises from the start on until it is above the noise: its slope is half the first one or
+ * more as far as s = c1 / (2 sum of k |c_k|). False if that is not known. */
 static bool rises_at_once(const struct roots_polynomial *p, double noise) {
     double bend = 0.0;
     for (int k = p->degree; k >= 2; k--) {
@@ -242,9 +248,9 @@ static bool rises_at_once(const struct roots_polynomial *p, double noise) {
     return slope > 0.0 && p->c[0] + margin * s * slope > noise;
 }
 
-/* The first fall of an indicator that is 0 at a restart and is to rise. As small as the noise it
- * may have either sign; it has fallen where it is below the noise, and did so where it was 0 last.
- */
+/* Returns the first fall of an indicator that is 0 at a restart and is to rise. As long as it is as
+ * small as the noise it may have either sign; it has fallen if it is below the noise, and did so
+ * when it was 0 last. */
 static double first_fall_from_zero(const struct roots_polynomial *p, double noise, bool *is_armed) {
     if (rises_at_once(p, noise)) {
         *is_armed = true;
@@ -259,7 +265,7 @@ static double first_fall_from_zero(const struct roots_polynomial *p, double nois
     return below == INFINITY ? INFINITY : fmin(below, last_fall(p, below));
 }
 
-/* p stays above 0 up to s, by the quick proof; from its start on, where it may be at a root. */
+/* True if p stays above 0 up to s, by the quick proof; p may begin at a root. */
 static bool is_above_until(const struct roots_polynomial *p, double s, double noise) {
     double c[ROOTS_LENGTH];
     double power = s;
@@ -272,7 +278,7 @@ static bool is_above_until(const struct roots_polynomial *p, double s, double no
 }
 
 /* An indicator that is below 0 at a restart has not fallen: the modes have just been found valid,
- * and one event would come again and again. */
+ * and the same event would come again and again. */
 double fall_first(const struct roots_polynomial *p, const struct fall *fall) {
     double *noise = fall->noise;
     const bool is_armed = *fall->is_armed;
@@ -282,12 +288,13 @@ double fall_first(const struct roots_polynomial *p, const struct fall *fall) {
     if (!is_armed) {
         double within = fmax(fall->error, *noise);
         if (fall->is_restart && p->c[0] <= -within) {
-            within -= (1.0 + 0x1p-10) * p->c[0]; // doubled, fall after fall would lead far below
+            within -=
+                (1.0 + 0x1p-10) * p->c[0]; // without doubling, fall after fall would lead far below
             *noise = within;
         }
         return first_fall_from_zero(p, within, fall->is_armed);
     }
-    // from below 0 it can only rise by the error of the polynomial
+    // from below 0 it only rises, by the error of the polynomial
     const bool rises = p->degree > 0 && p->c[0] <= 0.0 && p->c[1] > 0.0;
     if (rises) {
         return fall_behind(p, 0.0);
@@ -296,7 +303,8 @@ double fall_first(const struct roots_polynomial *p, const struct fall *fall) {
     return s > 0.0 && s <= 1.0 ? fall_or_end(p, fall) : s;
 }
 
-/* fall_first of indicator i; given: what does not follow from location. */
+/* Returns fall_first of indicator i; given: the fields of struct fall that do not follow from
+ * location. */
 static double first_fall(const struct location *location, size_t i,
                          const struct roots_polynomial *p, const struct fall *given) {
     struct fall fall = *given;
@@ -308,7 +316,7 @@ static double first_fall(const struct location *location, size_t i,
 
 /* ---- Indicators of states ------------------------------------------------------------------- */
 
-/* c(s) becomes c(s - 1). */
+/* Replaces c(s) by c(s - 1). */
 static void shift(double c[], int degree) {
     for (int i = 0; i < degree; i++) {
         for (int k = degree - 1; k >= i; k--) {
@@ -317,7 +325,7 @@ static void shift(double c[], int degree) {
     }
 }
 
-/* Coefficients of an indicator, but c[0], from those of its state; sign: of those of odd orders. */
+/* Writes an indicator's coefficients but c[0] from its state's; sign: factor of odd orders. */
 static void expand(const struct step_polynomial *step, const struct indicator *indicator,
                    double sign, double c[]) {
     const double *row = step->row[indicator->state];
@@ -326,7 +334,7 @@ static void expand(const struct step_polynomial *step, const struct indicator *i
     }
 }
 
-/* The state moves by less than the indicator is above 0, and above what counts as 0 at a restart.
+/* True if the state moves by less than the indicator is above 0 and above its noise at a restart.
  */
 static bool is_far_above(const struct step_polynomial *step, const struct indicator *indicator,
                          double value, double noise) {
@@ -382,7 +390,7 @@ void location_write_states(const struct location *location, double s, double x[]
 void location_lead_from_restart(struct location *location) {
     const struct step_polynomial *step = &location->step;
     for (size_t i = 0; i < location->ode->state_count; i++) {
-        double value = 0.0; // at -1
+        double value = 0.0; // value at s = -1
         for (int k = step->degree; k >= 0; k--) {
             value = step->row[i][k] - value;
         }
@@ -392,10 +400,10 @@ void location_lead_from_restart(struct location *location) {
 
 /* ---- Indicators of the model ---------------------------------------------------------------- */
 
-/* Of the values' scale: how well a polynomial must represent an indicator. */
+/* Largest error of a polynomial that represents an indicator, relative to the values' scale. */
 static const double representation = 1e-12;
 
-/* One whose polynomial is given. */
+/* Returns the first fall of an indicator of the model whose polynomial is given. */
 static double first_of_model(struct location *location, size_t i, double latest) {
     const struct step_polynomial *step = &location->step;
     const struct roots_polynomial p = {step->indicator_row[i], step->degree, -1.0};
@@ -409,7 +417,7 @@ static double first_of_model(struct location *location, size_t i, double latest)
                                      .is_restart = step->begin == 0.0});
 }
 
-/* Writes all indicators at s, of the whole step, to column k of samples. */
+/* Writes all indicators at s of the whole step to column k of samples. */
 static enum status sample(struct location *location, double s, int k) {
     const struct step_polynomial *step = &location->step;
     location_write_states(location, s, location->x);
@@ -425,10 +433,10 @@ static enum status sample(struct location *location, double s, int k) {
 struct piece {
     double begin; /* s */
     double length;
-    int count; /* points sampled */
+    int count; /* number of points sampled */
 };
 
-/* Samples between the points of the piece: 2 count - 1 points. */
+/* Samples between the points of the piece, which then has 2 count - 1 points. */
 static enum status sample_between(struct location *location, struct piece *piece) {
     const int count = 2 * piece->count - 1;
     for (size_t i = 0; i < location->ode->indicator_count; i++) {
@@ -465,7 +473,7 @@ static double largest(const double samples[], int count) {
     return scale;
 }
 
-/* Searches one indicator in a piece; false: the piece needs more points. */
+/* Searches one indicator in a piece. Returns false if the piece needs more points. */
 static bool search_piece(struct location *location, const struct piece *piece, size_t i,
                          bool is_last_try) {
     double c[ROOTS_LENGTH] = {0};
@@ -490,11 +498,10 @@ static bool search_piece(struct location *location, const struct piece *piece, s
     return true;
 }
 
-/* A step is divided in two until polynomials represent all indicators; the shortest piece is this
- * part of it. */
+/* Shortest piece of a step: a step is divided in two until polynomials represent all indicators. */
 static const double shortest_piece = 0x1p-10;
 
-/* Searches the indicators from the given one on. */
+/* Searches the indicators from number `from` on. */
 static enum status search_model_in(struct location *location, double begin, double length,
                                    size_t from) {
     struct piece piece;
@@ -521,7 +528,7 @@ static enum status search_model_in(struct location *location, double begin, doub
 
 /* ---- Steps ---------------------------------------------------------------------------------- */
 
-/* The last terms are small, and at the end of the step the sum has the value z. */
+/* True if the last terms are small and the sum has the value z at the end of the step. */
 static bool is_converged(const double c[], int degree, double z, double relative_tolerance) {
     double sum = 0.0;
     double size = 0.0;
@@ -550,13 +557,13 @@ void location_check_rows(struct location *location, const double x[], double rel
     }
 }
 
-/* Roots of several indicators within this part of a step are one event. */
+/* Part of a step within which roots of several indicators are one event. */
 static const double same_time = 4.0 * 0x1p-52;
 
 enum status location_search(struct location *location) {
     const struct step_polynomial *step = &location->step;
     bool needs_model = false;
-    double s = INFINITY; // of the first event so far: none behind it is located
+    double s = INFINITY; // first event so far: no later one is located
     for (size_t k = 0; k < location->used_count; k++) {
         const size_t i = location->used[k];
         const struct indicator *indicator = &location->indicators[i];
@@ -635,7 +642,7 @@ bool location_correction(struct location *location, double t, const double x[], 
         return false;
     }
     // over so small a part of the step the derivative of an indicator hardly changes; the part is
-    // longer where the difference is lost in rounding
+    // longer if the difference is lost in rounding
     double z_ahead = *z;
     double ahead = 0x1p-20 * (location->step.end - location->step.begin);
     for (int tries = 0; z_ahead == *z && tries < 4; tries++) {

@@ -1,11 +1,12 @@
-/* What the file of a method gives to integrator.c, and the initial value problem as a method sees
- * it. States are arrays here: the types of a solver library stay in the files that use it. */
+/* A method of integration: the functions that its file gives to integrator.c, and the initial value
+ * problem that it gets. States are arrays here: the types of a solver library stay in the files
+ * that use it. */
 #ifndef METHOD_H
 #define METHOD_H
 
 #include "location.h"
 
-/* ---- The problem ----------------------------------------------------------------------------- */
+/* ---- The problem ---------------------------------------------------------------------------- */
 
 /* The ode with its settings, the limits since the last restart, and a count of evaluations. Times
  * in s since the restart. */
@@ -13,24 +14,24 @@ struct problem {
     struct message_sink sink;
     struct ode ode;
     struct integrator_settings settings;
-    double origin;            /* time of the simulation at the restart, s: for messages only */
-    double horizon;           /* the right-hand side is not evaluated beyond */
-    double first_step;        /* length of the first internal step, s; 0: the method finds one */
-    bool continues;           /* as in struct integrator_start */
-    double reached;           /* where the last advance ended; 0 after a restart */
-    double failed_at;         /* last time at which the right-hand side failed; -INFINITY: none */
-    int64_t evaluation_count; /* calls of the right-hand side; series begun */
-    integrator_observer *observer; /* NULL: none */
+    double origin;     /* time of the simulation at the restart, s: for messages only */
+    double horizon;    /* time beyond which the right-hand side is not evaluated */
+    double first_step; /* length of the first internal step, s; 0 if the method finds one */
+    bool continues;    /* as in struct integrator_start */
+    double reached;    /* end of the last advance; 0 after a restart */
+    double failed_at; /* last time at which the right-hand side failed; -INFINITY if it never did */
+    int64_t evaluation_count;      /* calls of the right-hand side, or series begun */
+    integrator_observer *observer; /* NULL if there is none */
     void *observer_context;
     struct location location;
 };
 
-/* Whether the observer ends the advance at t, the end of an internal step, where the state is x. */
-static inline bool problem_ends_at(const struct problem *problem, double t, const double x[]) {
+/* Asks the observer whether the advance ends at t, the end of an internal step with the state x. */
+static inline bool problem_ask_observer(const struct problem *problem, double t, const double x[]) {
     return problem->observer(problem->observer_context, t, x);
 }
 
-/* All values are finite: 0 x is 0 for finite values only. */
+/* True if all values are finite: 0 x is 0 for finite values only. */
 static inline bool problem_are_finite(const double values[], size_t count) {
     double sum = 0.0;
     for (size_t i = 0; i < count; i++) {
@@ -39,8 +40,8 @@ static inline bool problem_are_finite(const double values[], size_t count) {
     return sum == 0.0;
 }
 
-/* Writes f(t, x) to dx; STATUS_NOT_FINITE if that fails or is not finite. Inline, as these calls
- * are most of a step. */
+/* Writes f(t, x) to dx. Returns STATUS_NOT_FINITE if that fails or is not finite. Inline, because
+ * these calls are most of a step. */
 static inline enum status problem_rhs(struct problem *problem, double t, const double x[],
                                       double dx[]) {
     const struct ode *ode = &problem->ode;
@@ -52,7 +53,7 @@ static inline enum status problem_rhs(struct problem *problem, double t, const d
     return STATUS_NOT_FINITE;
 }
 
-/* Writes the Jacobian as in ode.h; fails as problem_rhs. */
+/* Writes the Jacobian as in ode.h; fails like problem_rhs. */
 static inline enum status problem_jacobian(struct problem *problem, double t, const double x[],
                                            double J[]) {
     const struct ode *ode = &problem->ode;
@@ -64,8 +65,8 @@ static inline enum status problem_jacobian(struct problem *problem, double t, co
     return STATUS_NOT_FINITE;
 }
 
-/* Writes coefficients as in ode.h; the orders from 0 on count as an evaluation. Fails as
- * problem_rhs; whether they are finite is for the caller to see. */
+/* Writes coefficients as in ode.h; a series begun at order 0 counts as an evaluation. Fails like
+ * problem_rhs; the caller checks whether coefficients are finite. */
 static inline enum status problem_series(struct problem *problem, double t, double time_scale,
                                          int first, int last, double rows[][SERIES_LENGTH]) {
     const struct ode *ode = &problem->ode;
@@ -77,67 +78,67 @@ static inline enum status problem_series(struct problem *problem, double t, doub
     return STATUS_NOT_FINITE;
 }
 
-/* Stuck in front of a time at which the right-hand side cannot be evaluated. */
+/* True if the method is stuck in front of a time at which the right-hand side cannot be evaluated.
+ */
 static inline bool problem_is_stuck(const struct problem *problem) {
     return problem->failed_at >= problem->reached;
 }
 
-/* ---- The method ------------------------------------------------------------------------------ */
+/* ---- The method ----------------------------------------------------------------------------- */
 
-/* What an advance did. */
+/* Work and end of an advance. */
 struct method_work {
     int64_t steps;        /* internal steps */
     int64_t failed_steps; /* attempts that the method refused */
-    int last_order;       /* of the last internal step; 0: there was none */
-    double last_step;     /* its length, s */
-    double internal;      /* where it ended, s since the restart */
-    bool is_cut_short;    /* by an event or the observer */
+    int last_order;       /* order of the last internal step; 0 if there was none */
+    double last_step;     /* length of the last internal step, s */
+    double internal;      /* end of the last internal step, s since the restart */
+    bool is_cut_short;    /* true if an event or the observer ended the advance */
 };
 
 struct method {
-    /* As in the variable solver_method. */
+    /* Name, as in the variable solver_method. */
     const char *name;
 
-    /* The method runs at this fraction of the requested tolerance, because each restart adds an
+    /* Fraction of the requested tolerance at which the method runs, because each restart adds an
      * error and thousands of them add up. Larger: faster and less accurate. */
     double tolerance_fraction;
 
-    /* integrator_longest_history */
+    /* Results of integrator_longest_history. */
     int64_t longest_history;
     int64_t longest_history_with_events;
 
-    /* Needs the series of the ode. */
+    /* True if the method needs the series of the ode. */
     bool needs_series;
 
-    /* Bytes that create allocates at most. */
+    /* Returns the largest number of bytes that create allocates. */
     size_t (*memory_size)(const struct ode *ode);
 
-    /* Allocates all that the method needs; nothing is allocated later. problem outlives the memory.
+    /* Allocates all memory of the method; nothing is allocated later. problem outlives the memory.
      * On failure *memory is NULL. */
     enum status (*create)(struct problem *problem, void **memory);
     void (*destroy)(void *memory);
 
-    /* Takes over problem->settings. A restart follows. */
+    /* Applies problem->settings. A restart follows. */
     enum status (*configure)(void *memory);
 
-    /* Starts from x at time 0, with what stands in problem. */
+    /* Starts from x at time 0, with the values in problem. */
     enum status (*restart)(void *memory, const double x[]);
 
-    /* Integrates from problem->reached, where the state is begin_x, to t in max_steps internal
+    /* Integrates from problem->reached, with the state begin_x there, to t in max_steps internal
      * steps at most. Writes the last valid time to *stopped_at, also on failure, and the state
-     * there to x. Where problem->observer is not NULL, asks it (problem_ends_at) about each
-     * internal step that ends between problem->reached and t. Where problem->location is active,
-     * searches each internal step, and ends at an event up to t. */
+     * there to x. Asks problem->observer, unless NULL, by problem_ask_observer about each internal
+     * step that ends between problem->reached and t. If problem->location is active, searches each
+     * internal step, and ends at an event up to t. */
     enum status (*advance)(void *memory, double t, int64_t max_steps, const double begin_x[],
                            double *stopped_at, double x[], struct method_work *work);
 
-    /* Writes the state at t, which the last internal step has passed, to x; false: it cannot, an
-     * advance must. NULL with no history. */
+    /* Writes the state at t, which the last internal step has passed, to x. Returns false if it
+     * cannot, so that an advance must. NULL for a method without history. */
     bool (*interpolate)(void *memory, double t, double x[]);
 
-    /* Length of a first internal step after a restart from here, where the state is x, s; 0:
-     * unknown.
-     */
+    /* Returns the length of a first internal step after a restart here with the state x, s; 0 if
+     * unknown. */
     double (*next_step)(void *memory, const double x[]);
 };
 

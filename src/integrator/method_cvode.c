@@ -10,32 +10,33 @@
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 
-/* Error that Adams' corrector iteration may leave, over that of the error test. CVODE's own 0.1
+/* Error that Adams' corrector iteration may leave, relative to the error test. CVODE's own 0.1
  * costs a second evaluation of the right-hand side in most steps. Measured over steps of 1 ms, 10
  * ms and 2 s at tolerances from 2e-8 to 2e-14, 0.2 saves a sixth of the evaluations for the same
  * number of steps and the same error; 0.5 saves a quarter, but takes 30 % more steps and makes
- * three times the error where steps are long. */
+ * three times the error if steps are long. */
 static const double adams_iteration_error = 0.2;
 
-/* Growth of the step after the first one: after an event it does not outgrow the order
- * (first_step_fraction_after_event); else CVODE's own. */
+/* Largest growth of the step after the first one: after an event it does not outgrow the order
+ * (first_step_fraction_after_event); otherwise CVODE's own. */
 static const double growth_after_event = 10.0;
 static const double usual_growth = 1e4;
 
-/* s: the square of a length underflows in shorter first steps, and their number then depends on who
- * watches them. */
+/* Shortest first advance, s. The square of a length underflows in shorter first steps, and their
+ * number then depends on who watches them. */
 static const double shortest_first_advance = 1e-150;
 
 struct cvode {
     struct sundials base; /* first */
     void *solver;
     SUNNonlinearSolver nonlinear_solver;
-    SUNMatrix jacobian;                /* of BDF */
-    SUNLinearSolver linear_solver;     /* of BDF */
-    struct small_vector_terms columns; /* of the last internal step; count 0: not known */
-    enum status search_status;         /* of the last search for an event */
-    bool is_led;                /* the last internal step is location->step, led from the restart */
-    struct method_work counted; /* since the restart, up to the last advance */
+    SUNMatrix jacobian;            /* of BDF */
+    SUNLinearSolver linear_solver; /* of BDF */
+    struct small_vector_terms
+        columns; /* terms of the last internal step; count is 0 if they are not known */
+    enum status search_status; /* status of the last search for an event */
+    bool is_led; /* true if the last internal step is location->step, led from the restart */
+    struct method_work counted; /* work since the restart, up to the last advance */
 };
 
 /* ---- Life ----------------------------------------------------------------------------------- */
@@ -64,7 +65,7 @@ static void destroy(void *memory) {
     sundials_destroy(cvode);
 }
 
-/* What both methods need. */
+/* Creates the solver of either method. */
 static bool create_solver(struct cvode *cvode, int multistep_method) {
     struct sundials *base = &cvode->base;
     cvode->solver = CVodeCreate(multistep_method, base->context);
@@ -145,23 +146,24 @@ static enum status configure(void *memory) {
     return sundials_status(base->problem, flag);
 }
 
-/* ---- First step -------------------------------------------------------------------------------
+/* ---- First step -----------------------------------------------------------------------------
  * Length of the first internal step, which is of order 1: a fraction of the length at which its
- * error would be the tolerance. s; 0: unknown. */
+ * error would be the tolerance, s; 0 if unknown. */
 
-/* The first step after a restart is of order 1, over the step at which its error estimate would be
- * the tolerance. CVODE's own choice is 0.5 and takes two evaluations to find. The errors of first
- * steps all have the same sign and add up from restart to restart: measured over 2000 steps of 1
- * ms, the error of the trajectory at 0.1 is a third of that at 0.5, for as many internal steps. */
+/* Fraction after a restart. CVODE's own choice is 0.5 and takes two evaluations to find. The errors
+ * of first steps all have the same sign and add up from restart to restart: measured over 2000
+ * steps of 1 ms, the error of the trajectory at 0.1 is a third of the error at 0.5, for as many
+ * internal steps. */
 static const double first_step_fraction = 0.1;
 
-/* After an event errors add up in another way: each bounce adds to the error of the height, and the
- * last bounces are as low as the tolerance. So the first steps are short, and do not grow to the
- * tolerance before the order does: bouncing then rests 1.7e-7 s early, as its cut-off says, and not
- * 2.8e-7 s, for 5 % more time. */
+/* Fraction after an event. There errors add up in another way: each bounce adds to the error of the
+ * height, and the last bounces are as low as the tolerance. So the first steps are short, and do
+ * not grow to the tolerance before the order does: bouncing then rests 1.7e-7 s early, as its
+ * cut-off says, and not 2.8e-7 s, for 5 % more time. */
 static const double first_step_fraction_after_event = 0.003;
 
-/* The error of a first step of order 1 is about h^2 x'' / 2. */
+/* Returns the fraction of the length at which the error of a step of order 1, about h^2 x'' / 2, is
+ * the tolerance. */
 static double step_of_curvature(const struct problem *problem, double fraction, const double x[],
                                 const double ddx[]) {
     const double relative = problem->settings.relative_tolerance;
@@ -182,7 +184,7 @@ static double first_step_after_restart(const struct problem *problem, const doub
     return step_of_curvature(problem, first_step_fraction, x, ddx);
 }
 
-/* s: over this time x'' is taken. */
+/* Time over which x'' is measured, s. */
 static const double curvature_time = 1e-6;
 
 /* Returns the length after an event at the time 0 and the state x. Writes x'' to ddx; uses the room
@@ -209,12 +211,12 @@ static double first_step_after_event(struct problem *problem, const double x[], 
 
 /* ---- Integration ---------------------------------------------------------------------------- */
 
-/* After an event the first internal step does not depend on where the next requested time is. */
+/* True after an event: there the first internal step does not depend on the next requested time. */
 static bool does_not_depend_on_points(const struct problem *problem) {
     return problem->continues && location_is_active(&problem->location);
 }
 
-/* The length of a first step after an event, from its state, which is CVODE's; 0: unknown. */
+/* Returns the length of a first step after an event from CVODE's state, s; 0 if unknown. */
 static double step_after_event(struct cvode *cvode) {
     return first_step_after_event(cvode->base.problem, small_vector_data(cvode->base.x),
                                   small_vector_data(cvode->base.work));
@@ -238,10 +240,11 @@ static enum status restart(void *memory, const double x[]) {
     return sundials_status(problem, flag);
 }
 
-/* CVODE interpolates by combining the columns of its Nordsieck array, up to 13, which stay as they
- * are until the next internal step. It computes the powers of the time with a product for each
- * factor: most of the cost of a short communication step. So the columns are noted once per
- * internal step, and all points within the step come from Horner's scheme. */
+/* Writes the state at t within the last internal step. CVODE interpolates by combining the columns
+ * of its Nordsieck array, up to 13, which stay the same until the next internal step. It computes
+ * the powers of the time with a product for each factor: most of the cost of a short communication
+ * step. So the columns are noted once per internal step, and all points within the step come from
+ * Horner's scheme. */
 static void evaluate_history(struct cvode *cvode, double t, double x[]) {
     if (cvode->is_led) {
         const struct location *location = &cvode->base.problem->location;
@@ -294,13 +297,12 @@ static enum status search(struct cvode *cvode, double begin, double end) {
     return location_search(&problem->location);
 }
 
-/* A time to which CVODE's first step is looked for, s: it decides nothing but its longest length.
- */
+/* Returns the time to which CVODE looks for a first step, s. It only bounds the step's length. */
 static double longest_first_step(const struct problem *problem) {
     return fmin(problem->horizon, 1.0);
 }
 
-/* Takes the internal steps to t, which CVode in normal mode would take, one by one, searches each
+/* Takes the internal steps to t one by one, as CVode in normal mode would take them, searches each
  * and asks the observer about each that changes the time. */
 static int integrate_watched(struct cvode *cvode, double t, int64_t max_steps, double *stopped_at,
                              double x[], bool *is_cut_short) {
@@ -338,7 +340,7 @@ static int integrate_watched(struct cvode *cvode, double t, int64_t max_steps, d
         }
         if (flag >= 0 && problem->observer != NULL && internal < t && internal > watched) {
             watched = internal;
-            *is_cut_short = problem_ends_at(problem, internal, x);
+            *is_cut_short = problem_ask_observer(problem, internal, x);
         }
     }
     return flag;
@@ -356,7 +358,8 @@ static int integrate(struct cvode *cvode, double t, int64_t max_steps, double *s
                 : CVodeSetInitStep(cvode->solver, fmin(problem->first_step, t));
     }
     if (flag == CV_SUCCESS) {
-        // at every call: CVODE forgets a stop time that it has reached and keeps one over restarts
+        // set at every call: CVODE forgets a stop time that it has reached and keeps one over
+        // restarts
         flag = CVodeSetStopTime(cvode->solver, problem->horizon);
     }
     cvode->columns.count = 0;
@@ -369,7 +372,7 @@ static int integrate(struct cvode *cvode, double t, int64_t max_steps, double *s
     small_vector_note_terms(cvode->base.x, &cvode->columns);
     flag = CVode(cvode->solver, t, cvode->base.x, stopped_at, CV_NORMAL);
     small_vector_note_terms(cvode->base.x, NULL);
-    // as at all other points within the step: where the stops are does not matter
+    // as at all other points within the step, so that the places of stops do not matter
     if (flag == CV_SUCCESS && cvode->columns.count > 0) {
         evaluate_history(cvode, t, x);
     } else {
@@ -378,7 +381,7 @@ static int integrate(struct cvode *cvode, double t, int64_t max_steps, double *s
     return flag;
 }
 
-/* CVODE counts from the last restart on. */
+/* Measures the work since the last advance: CVODE counts from the last restart on. */
 static void measure_work(struct cvode *cvode, struct method_work *work) {
     struct method_work now = {0};
     long steps = 0;
@@ -422,7 +425,7 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
 static double next_step(void *memory, const double x[]) {
     const struct cvode *cvode = memory;
     const struct problem *problem = cvode->base.problem;
-    // after an event the motion is another one
+    // after an event the motion has changed
     if (cvode->counted.last_order < 2 || problem->location.time == problem->reached ||
         CVodeGetDky(cvode->solver, problem->reached, 2, cvode->base.work) != CV_SUCCESS) {
         return 0.0;
@@ -434,7 +437,7 @@ static double next_step(void *memory, const double x[]) {
  * 19 times that tolerance; at 1/100 it is 97 times, for 8 % fewer internal steps. */
 #define TOLERANCE_FRACTION 2e-3
 
-/* Longer: fewer restarts, slower rollback. */
+/* With a longer history there are fewer restarts and rollback is slower. */
 #define LONGEST_HISTORY 1000
 
 #define COMMON                                                                                     \

@@ -8,42 +8,43 @@
 #include <math.h>
 #include <string.h>
 
-/* Dormand-Prince 5(4). Of what else ERKStep offers, Cash-Karp 5(4) is 10 to 20 % faster and has 1.2
- * to 7 times the error; Fehlberg 8(7) is 1.3 to 1.6 times slower at steps of 1 and 10 ms, and fails
- * at tolerances below 1e-9 at steps of 0.1 s; Verner 6(5) has errors as of a lower order. */
+/* Dormand-Prince 5(4). Other tables of ERKStep: Cash-Karp 5(4) is 10 to 20 % faster and has 1.2 to
+ * 7 times the error; Fehlberg 8(7) is 1.3 to 1.6 times slower at steps of 1 and 10 ms, and fails at
+ * tolerances below 1e-9 at steps of 0.1 s; Verner 6(5) has the errors of a lower order. */
 static const ARKODE_ERKTableID table = ARKODE_DORMAND_PRINCE_7_4_5;
 static const int order = 5;
 
-/* Of the time of an event. */
+/* Largest numbers of steps in the search for the time of an event. */
 enum { MOST_CORRECTIONS = 20, MOST_DIVISIONS = 40 };
 
-/* s: ARKODE multiplies lengths of steps with each other, and with one that it keeps over a restart.
- * Where that underflows, what it does would depend on the step before. */
+/* Shortest advance, s. ARKODE multiplies lengths of steps with each other, and with a length that
+ * it keeps over a restart. If that underflows, its result would depend on the step before. */
 static const double shortest_advance = 1e-100;
 
 struct erk {
     struct sundials base; /* first */
     void *solver;
-    double next_step; /* s: first internal step of the next advance; 0: ARKODE finds one */
+    double next_step; /* first internal step of the next advance, s; 0 if ARKODE finds one */
 
     /* of the running advance */
     double end;        /* s since the restart */
-    double watched;    /* s since the restart: the last time that the observer was asked about */
-    bool is_cut_short; /* by an event in the step before that time, or by the observer there */
+    double watched;    /* last time that the observer was asked about, s since the restart */
+    bool is_cut_short; /* true if an event in the step before that time, or the observer there,
+                          ended the advance */
     double *cut_x;     /* the state there */
 
-    /* where events are looked for: the begin of the running internal step */
-    double step_begin; /* s since the restart; NaN: they are not */
+    /* begin of the running internal step, if events are searched */
+    double step_begin; /* s since the restart; NaN if they are not */
     double *step_x;    /* the state there */
-    double *step_dx;   /* and the right-hand side */
-    double *dx;        /* that of the end */
+    double *step_dx;   /* the right-hand side there */
+    double *dx;        /* the right-hand side at the end */
     enum status search_status;
 };
 
 /* ---- Observation ---------------------------------------------------------------------------- */
 
-/* Searches the step that has ended at t with the state x. Where it has no event, the next one
- * begins there. */
+/* Searches the step that has ended at t with the state x. If it has no event, the next step begins
+ * there. */
 static enum status search(struct erk *erk, double t, const double x[]) {
     struct problem *problem = erk->base.problem;
     const size_t n = problem->ode.state_count;
@@ -62,8 +63,8 @@ static enum status search(struct erk *erk, double t, const double x[]) {
     return status;
 }
 
-/* The right-hand side where events are looked for: at the begin of an internal step the search has
- * evaluated it. */
+/* Evaluates the right-hand side if events are searched: at the begin of an internal step the search
+ * has evaluated it already. */
 static int searched_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data) {
     const struct erk *erk = user_data;
     const size_t size = erk->base.problem->ode.state_count * sizeof(double);
@@ -74,8 +75,8 @@ static int searched_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data)
     return sundials_rhs(t, x, dx, user_data);
 }
 
-/* Called by ERKStep after each step that it accepts; ends the advance at an event or where the
- * observer says so. Times that come again, after a failure, are not reported twice. */
+/* Observes each step that ERKStep accepts; ends the advance at an event or if the observer says so.
+ * Times that come again after a failure are not reported twice. */
 static int observe(sunrealtype t, N_Vector x, void *user_data) {
     struct erk *erk = user_data;
     const struct problem *problem = erk->base.problem;
@@ -88,7 +89,7 @@ static int observe(sunrealtype t, N_Vector x, void *user_data) {
         erk->is_cut_short = erk->search_status != STATUS_OK || problem->location.time <= erk->end;
     }
     if (!erk->is_cut_short && problem->observer != NULL && t < erk->end) {
-        erk->is_cut_short = problem_ends_at(problem, t, small_vector_data(x));
+        erk->is_cut_short = problem_ask_observer(problem, t, small_vector_data(x));
     }
     if (erk->is_cut_short) {
         memcpy(erk->cut_x, small_vector_data(x), problem->ode.state_count * sizeof(double));
@@ -96,7 +97,8 @@ static int observe(sunrealtype t, N_Vector x, void *user_data) {
     return erk->is_cut_short ? 1 : 0;
 }
 
-/* Before an advance from the state begin_x to the time end, which writes the state to x. */
+/* Prepares observe for an advance from the state begin_x to the time end, which writes the state to
+ * x. */
 static int begin_watching(struct erk *erk, double end, const double begin_x[], double x[]) {
     struct problem *problem = erk->base.problem;
     const bool is_searched = location_is_active(&problem->location);
@@ -117,7 +119,7 @@ static int begin_watching(struct erk *erk, double end, const double begin_x[], d
     return ERKStepSetPostprocessStepFn(erk->solver, is_watched ? observe : NULL);
 }
 
-/* An advance that the observer ends is none that fails. */
+/* Sends a text of ERKStep, unless the observer has ended the advance: that is no failure. */
 static void report_text(int error_code, const char *module, const char *function, char *text,
                         void *erk_pointer) {
     const struct erk *erk = erk_pointer;
@@ -144,7 +146,7 @@ static bool create_solver(struct erk *erk) {
            ERKStepSetErrHandlerFn(erk->solver, report_text, base) == ARK_SUCCESS &&
            ERKStepSetUserData(erk->solver, base) == ARK_SUCCESS &&
            ERKStepSetTableNum(erk->solver, table) == ARK_SUCCESS &&
-           // steps end at the points asked for: no polynomial is needed, which saves an evaluation
+           // steps end at the requested points: no polynomial is needed, which saves an evaluation
            // each
            ERKStepSetInterpolantType(erk->solver, ARK_INTERP_LAGRANGE) == ARK_SUCCESS &&
            ERKStepSetInterpolantDegree(erk->solver, 0) == ARK_SUCCESS &&
@@ -196,7 +198,8 @@ static enum status restart(void *memory, const double x[]) {
     return STATUS_OK;
 }
 
-/* From the state in base.x at the time begin; first_step: s, 0: ARKODE finds one. */
+/* Starts ERKStep from the state in base.x at the time begin; first_step: s, 0 if ARKODE finds one.
+ */
 static int start(struct erk *erk, double begin, double end, double first_step) {
     const bool is_searched = location_is_active(&erk->base.problem->location);
     int flag =
@@ -207,7 +210,7 @@ static int start(struct erk *erk, double begin, double end, double first_step) {
     return flag == ARK_SUCCESS ? ERKStepSetStopTime(erk->solver, end) : flag;
 }
 
-/* ERKStep counts from its last start on. */
+/* Adds the work since ERKStep's last start, from which it counts. */
 static void add_work(const struct erk *erk, struct method_work *work) {
     long steps = 0;
     long failed_steps = 0;
@@ -223,9 +226,9 @@ static void add_work(const struct erk *erk, struct method_work *work) {
     }
 }
 
-/* Step by step, after ERKStep has failed: it gives up at the first right-hand side that cannot be
- * evaluated, and then reports the time of that evaluation, not the one of its last state. Here ever
- * shorter steps are tried. x: the last valid state. */
+/* Advances step by step after ERKStep has failed: it gives up at the first right-hand side that
+ * cannot be evaluated, and then reports the time of that evaluation instead of its last state's.
+ * Here ever shorter steps are tried. x: the last valid state. */
 static int advance_carefully(struct erk *erk, double begin, double end, int64_t max_steps,
                              const double begin_x[], double *stopped_at, double x[],
                              struct method_work *work) {
@@ -262,13 +265,14 @@ static int advance_carefully(struct erk *erk, double begin, double end, int64_t 
     return flag;
 }
 
-/* ARKODE refuses steps that change the time by hardly more than its rounding. */
+/* True if the step is too short for ARKODE, which refuses steps that change the time by hardly more
+ * than its rounding. */
 static bool is_too_close(double begin, double end) {
     return end - begin <= 8.0 * DBL_EPSILON * end;
 }
 
-/* From the begin of the step in which the event is to the time t. Writes the state to x and the
- * right-hand side to erk->dx. */
+/* Steps from the begin of the step that contains the event to the time t. Writes the state to x and
+ * the right-hand side to erk->dx. */
 static int step_to(struct erk *erk, double t, double x[]) {
     struct problem *problem = erk->base.problem;
     double reached;
@@ -286,15 +290,16 @@ static int step_to(struct erk *erk, double t, double x[]) {
     return problem_rhs(problem, t, x, erk->dx) == STATUS_OK ? ARK_SUCCESS : ARK_RHSFUNC_FAIL;
 }
 
-/* The polynomial of the search is less accurate than the step: Newton's method leads from its root
- * to the root of the steps which end there. The indicator may be 0 where the step begins, too: a
- * correction that leads out of where the fall must be divides this part in two. */
+/* Steps onto the event. The polynomial of the search is less accurate than the step: Newton's
+ * method leads from its root to the root of the steps that end there. The indicator may be 0 at the
+ * begin of the step, too: a correction that leads out of the part with the fall divides this part
+ * in two. */
 static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
     struct location *location = &erk->base.problem->location;
     double low = erk->step_begin;
     double high = erk->watched;
     const double slack = 0x1p-30 * (high - low); // far more than rounding
-    bool is_below = false;                       // at `high`
+    bool is_below = false;                       // true if the indicator is below 0 at `high`
     double t = location->time;
     int flag = ERKStepSetPostprocessStepFn(erk->solver, NULL);
     int corrections = 0;
@@ -393,8 +398,8 @@ static double next_step(void *memory, const double x[]) {
     return erk->next_step;
 }
 
-/* The largest power of ten at which the error, measured with steps of 1 ms to 2 s, is that of CVODE
- * or less (at one of 31 points a fifth more); with shorter steps it is that of rounding. */
+/* The largest power of ten at which the error, measured with steps of 1 ms to 2 s, is CVODE's or
+ * less (at one of 31 points a fifth more); with shorter steps it is the error of rounding. */
 #define TOLERANCE_FRACTION 1e-2
 
 const struct method integrator_erk = {

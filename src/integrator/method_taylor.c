@@ -1,12 +1,12 @@
 /* Steps by the Taylor series of the solution (taylor_series.h).
  *
- * The time scale of a series is the way to the requested time. Orders are added until the terms
- * one time scale ahead are within the tolerance; the step lands there, and the state is the sum of
- * the coefficients. Where the largest order is not enough, a step is as long as this order allows.
- * At its end the polynomial must fit the equations.
+ * The time scale of a series is the way to the requested time. Orders are added until the terms one
+ * time scale ahead are within the tolerance; the step lands there, and the state is the sum of the
+ * coefficients. If the largest order is not enough, a step is as long as this order allows. At its
+ * end the polynomial must fit the equations.
  *
- * Where a restart continues the same solution, its first step has the largest order and is as
- * long as this allows. The requested times in it are values of one polynomial. */
+ * If a restart continues the same solution, its first step has the largest order and is as long as
+ * this allows. The requested times in it are values of one polynomial. */
 #include "method.h"
 #include "taylor_series.h"
 #include "workspace.h"
@@ -16,23 +16,24 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Units of the longest step that goes past requested times: terms that are needed for one much
- * longer may have underflowed. */
+/* Largest length of a step that goes past requested times, in time scales: the terms of a much
+ * longer step may have underflowed. */
 static const double most_scales = 1000.0;
 
-/* The next time scale over the one before: where a term overflows, and in the step after that. */
+/* Ratio of the next time scale to the last one, if a term overflows, and in the step after that. */
 static const double shrinking = 0x1p-20;
 static const double growing = 16.0;
 
 struct taylor {
     struct taylor_series series;
-    bool is_searched;     /* for events, since the restart */
-    double longest_scale; /* s: of the next step of the running advance */
-    double last_length;   /* s: of the last step, or the one that a restart gave; 0: none */
-    double *end_x;        /* the state at the end of the last step */
-    double *end_dx;       /* the derivative of the polynomial there, by its argument */
-    double passed; /* s since the restart: where the step ended that goes past requested times;
-                      -INFINITY: there is none */
+    bool is_searched;     /* true if events are searched since the restart */
+    double longest_scale; /* largest time scale of the next step of the running advance, s */
+    double last_length; /* length of the last step, or the one given by a restart, s; 0 if there is
+                           none */
+    double *end_x;      /* the state at the end of the last step */
+    double *end_dx;     /* the derivative of the polynomial there, by its argument */
+    double passed; /* end of the step that goes past requested times, s since the restart; -INFINITY
+                      if there is none */
 };
 
 /* ---- Life ----------------------------------------------------------------------------------- */
@@ -113,7 +114,7 @@ static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
 
 /* ---- Steps ---------------------------------------------------------------------------------- */
 
-/* Longest step from the time t on, s. */
+/* Returns the longest step from the time t on, s. */
 static double longest_step(const struct problem *problem, double t) {
     const double max_step = problem->settings.max_step;
     const double left = problem->horizon - t;
@@ -127,8 +128,8 @@ static double longest_step_in_scales(const struct problem *problem, double t, do
 }
 
 /* Expands the solution about the state x at the time t (s since the restart). The time scale is
- * `length` (s), or shorter where terms overflow. is_long: for a step as long as the largest order
- * allows; otherwise for one of a time scale at most. */
+ * `length` (s), or shorter if terms overflow. is_long: for a step as long as the largest order
+ * allows; otherwise for a step of one time scale at most. */
 static enum status expand(struct taylor *taylor, double t, double length, bool is_long,
                           const double x[], struct method_work *work) {
     double time_scale = taylor->longest_scale < length ? taylor->longest_scale : length;
@@ -147,10 +148,12 @@ static enum status expand(struct taylor *taylor, double t, double length, bool i
     return STATUS_NOT_FINITE;
 }
 
-/* The shortest step that a way shortens, over the time since the restart. */
+/* Shortest step to which the reach of a state cuts a step, relative to the time since the restart.
+ */
 static const double resolution = 0x1p-40;
 
-/* A step (in time scales) in which no state moves farther from x, where it begins, than it may. */
+/* Returns a step (in time scales) in which no state moves farther from x, its begin, than it may.
+ */
 static double step_within_reach(struct taylor *taylor, const double x[], double step) {
     const struct taylor_series *series = &taylor->series;
     const struct ode *ode = &series->problem->ode;
@@ -180,11 +183,11 @@ static double step_within_reach(struct taylor *taylor, const double x[], double 
     return fmax(within, fmin(step, shortest));
 }
 
-/* s: where no step was before. */
+/* Length of a step without one before it, s. */
 static const double first_length = 1e-3;
 
-/* Length that a step from now towards t is expanded for, s. With events, long steps must not depend
- * on t: there it is the length of the step before. */
+/* Returns the length for which a step from `now` towards t is expanded, s. With events, long steps
+ * must not depend on t: then it is the length of the step before. */
 static double length_to_expand(const struct taylor *taylor, double now, double t, bool is_long) {
     const double longest = longest_step(taylor->series.problem, now);
     if (is_long && taylor->is_searched) {
@@ -196,7 +199,7 @@ static double length_to_expand(const struct taylor *taylor, double now, double t
     return parts > 1.0 ? (t - now) / ceil(parts) : t - now;
 }
 
-/* One internal step from the state x at the time now towards the time t. Writes where it ends to
+/* Takes one internal step from the state x at the time now towards the time t. Writes its end to
  * *end and the state there, or at t if that is earlier, to x. */
 static enum status take_step(struct taylor *taylor, double now, double t, bool is_long, double x[],
                              double *end, struct method_work *work) {
@@ -265,7 +268,8 @@ static enum status search(struct taylor *taylor, double end) {
     return location_search(location);
 }
 
-/* Where an advance begins, with the state there: with events, at the end of the last step. */
+/* Returns the begin of an advance and writes the state there: with events, it is the end of the
+ * last step. */
 static double begin_advance(struct taylor *taylor, const double begin_x[], double x[]) {
     const struct problem *problem = taylor->series.problem;
     const bool has_passed = taylor->is_searched && taylor->passed > problem->reached;
@@ -276,7 +280,7 @@ static double begin_advance(struct taylor *taylor, const double begin_x[], doubl
     return begin;
 }
 
-/* is_long: of the first step. */
+/* Takes steps until t or an event. is_long: of the first step. */
 static enum status take_steps(struct taylor *taylor, double t, int64_t max_steps, bool is_long,
                               const double begin_x[], double *stopped_at, double x[],
                               struct method_work *work) {
@@ -315,7 +319,7 @@ static enum status take_steps(struct taylor *taylor, double t, int64_t max_steps
         }
         *stopped_at = end;
         is_long = is_long && is_searched;
-        if (end < t && problem->observer != NULL && problem_ends_at(problem, end, x)) {
+        if (end < t && problem->observer != NULL && problem_ask_observer(problem, end, x)) {
             work->is_cut_short = true;
             break;
         }
@@ -329,7 +333,7 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
     struct taylor_series *series = &taylor->series;
     const struct problem *problem = series->problem;
     const bool is_long = problem->reached == 0.0 ? problem->continues : taylor->is_searched;
-    // only what goes past requested times, or is searched, is read later
+    // only a step that goes past requested times, or is searched, is read later
     const bool is_kept =
         is_long || taylor->is_searched || !taylor_series_has_few_rows(&problem->ode);
     double few_rows[TAYLOR_FEW_ROWS][SERIES_LENGTH];
@@ -351,8 +355,8 @@ static bool interpolate(void *memory, double t, double x[]) {
     return true;
 }
 
-/* The length of a step follows from the series. With events, it is expanded for what was left of
- * the last one. */
+/* Returns, if events are searched, the length of the last step's part up to here, for which the
+ * next step is expanded; otherwise 0, because the series gives the length. */
 static double next_step(void *memory, const double x[]) {
     const struct taylor *taylor = memory;
     const struct problem *problem = taylor->series.problem;
@@ -361,8 +365,8 @@ static double next_step(void *memory, const double x[]) {
 
 #define TOLERANCE_FRACTION 1e-1
 
-/* Events must not depend on the requested times, so that a long step begins where the last one
- * ended. As in method_cvode.c. */
+/* Events must not depend on the requested times, so that a long step begins at the end of the last
+ * one. As in method_cvode.c. */
 #define LONGEST_HISTORY_WITH_EVENTS 1000
 
 const struct method integrator_taylor = {

@@ -7,9 +7,9 @@
 
 NO_FUSED_OPERATIONS
 
-/* ---- Values of a polynomial ------------------------------------------------------------------ */
+/* ---- Values of a polynomial ----------------------------------------------------------------- */
 
-/* x = high + low, of 26 digits each, so that products of such parts are exact (Dekker). */
+/* Parts of x = high + low, of 26 digits each, so that products of such parts are exact (Dekker). */
 struct halves {
     double high;
     double low;
@@ -43,11 +43,11 @@ double horner_compensated(const double c[], int degree, double s) {
     return fabs(corrected) > 0x1p-94 * size ? corrected : 0.0;
 }
 
-/* ---- Chebyshev interpolation ----------------------------------------------------------------- */
+/* ---- Chebyshev interpolation ---------------------------------------------------------------- */
 
 enum { LAST = CHEBYSHEV_LENGTH - 1 };
 
-/* cos(k pi / 16). */
+/* Returns cos(k pi / 16). */
 static double cosine(unsigned k) {
     // clang-format off
     static const double table[2 * LAST] = {
@@ -68,7 +68,7 @@ double chebyshev_point(int count, int k) {
     return 0.5 - 0.5 * cosine((unsigned)(k * (LAST / (count - 1))));
 }
 
-/* Writes the coefficients of Chebyshev polynomials of 2 s - 1, for the values less the first one.
+/* Writes the coefficients of Chebyshev polynomials of 2 s - 1 for the values minus the first value.
  */
 static void transform(int count, const double values[], double coefficients[]) {
     const int last = count - 1;
@@ -87,8 +87,8 @@ static void transform(int count, const double values[], double coefficients[]) {
     }
 }
 
-/* Writes the powers of s in a Chebyshev polynomial, from those in the two before it:
- * T[i] = (4 s - 2) T[i - 1] - T[i - 2], T[1] = (2 s - 1) T[0]. They take their places. */
+/* Replaces `powers` by the powers of s in the next Chebyshev polynomial, and `before` by the old
+ * powers: T[i] = (4 s - 2) T[i - 1] - T[i - 2], T[1] = (2 s - 1) T[0]. */
 static void next_powers(int i, double powers[], double before[]) {
     const double factor = i == 1 ? 0.5 : 1.0;
     for (int k = i; k >= 0; k--) {
@@ -130,25 +130,25 @@ double chebyshev_interpolate(int count, const double values[], double c[]) {
     return larger(fabs(coefficients[last]), fabs(coefficients[last - 1]));
 }
 
-/* ---- Polynomials ----------------------------------------------------------------------------- */
+/* ---- Polynomials ---------------------------------------------------------------------------- */
 
-/* A polynomial that is above 0 right behind s = 0: its first coefficient that is not 0 is above it.
+/* A polynomial that is above 0 right after s = 0: its first coefficient that is not 0 is above it.
  */
 struct rising {
     double c[ROOTS_LENGTH];
     int degree;
 };
 
-/* A point between two of which a polynomial is monotone. */
+/* A point; between neighbouring points a polynomial is monotone. */
 struct node {
     double s;
     double value;
-    int sign;        /* of the value: -1, 0, 1 */
-    bool is_rounded; /* |value| is within the rounding of Horner's scheme */
+    int sign;        /* sign of the value: -1, 0, 1 */
+    bool is_rounded; /* true if |value| is within the rounding of Horner's scheme */
 };
 
 /* Writes p without its roots at s = 0, times a power of 2, so that products neither overflow nor
- * underflow, and times its sign behind s = 0, which is returned; 0: it is 0 or not finite. */
+ * underflow, and times its sign right after s = 0. Returns this sign; 0 if p is 0 or not finite. */
 static int prepare(const struct roots_polynomial *p, struct rising *rising) {
     double largest = 0.0;
     for (int k = 0; k <= p->degree; k++) {
@@ -202,12 +202,13 @@ static void differentiate(const struct rising *p, int order, struct rising *deri
 
 /* ---- How many roots ------------------------------------------------------------------------- */
 
-/* A polynomial a little below p and one a little above it, by more than all rounding here and in
- * Horner's scheme. Coefficients side by side: the processor adds both at once. */
+/* Indices of a polynomial a little below p and of one a little above, by more than all rounding
+ * here and in Horner's scheme. Their coefficients lie side by side: the processor adds both at
+ * once. */
 enum { BELOW, ABOVE, BOUNDS };
 
-/* Coefficients of s^k become those of s^k (1 - s)^(degree - k), which are x^degree p(1 / x) with
- * x + 1 for x. */
+/* Replaces coefficients of s^k by coefficients of s^k (1 - s)^(degree - k), which are the
+ * coefficients of x^degree p(1 / x) with x + 1 for x. */
 static void move_to_ends(double c[ROOTS_LENGTH][BOUNDS], int degree) {
     for (int i = 0; i < degree; i++) {
         double below = c[0][BELOW];
@@ -221,7 +222,7 @@ static void move_to_ends(double c[ROOTS_LENGTH][BOUNDS], int degree) {
     }
 }
 
-/* Writes both as coefficients of s^k (1 - s)^(degree - k). */
+/* Writes both bounds as coefficients of s^k (1 - s)^(degree - k). */
 static void bound(const struct rising *p, double bounds[ROOTS_LENGTH][BOUNDS]) {
     const double slack = 0x1p-45;
     for (int k = 0; k <= p->degree; k++) {
@@ -231,8 +232,8 @@ static void bound(const struct rising *p, double bounds[ROOTS_LENGTH][BOUNDS]) {
     move_to_ends(bounds, p->degree);
 }
 
-/* p is monotone on (0, 1]: the first coefficient behind c[0] outweighs, in the derivative, those of
- * the other sign. Writes the sign of the slope. False: that is not known. */
+/* True if p is monotone on (0, 1]: the first coefficient behind c[0] outweighs, in the derivative,
+ * all coefficients of the other sign. Writes the sign of the slope. False if that is not known. */
 static bool is_monotone(const struct rising *p, int *slope) {
     int first = 1;
     while (first < p->degree && p->c[first] == 0.0) {
@@ -248,8 +249,9 @@ static bool is_monotone(const struct rising *p, int *slope) {
     return first <= p->degree && (1.0 - slack) * first * fabs(p->c[first]) > against;
 }
 
-/* The most roots that p can have on (0, 1], by Descartes' rule where it is not monotone. 0 or 1: it
- * is else beyond its rounding, to which its value at 1 may be an exception; 2: two or more. */
+/* Returns the largest possible number of roots of p on (0, 1], by Descartes' rule if p is not
+ * monotone. With 0 or 1, p is otherwise beyond its rounding, except perhaps for its value at 1; 2
+ * stands for two or more. */
 static int most_roots(const struct rising *p) {
     int slope;
     if (is_monotone(p, &slope)) {
@@ -266,7 +268,7 @@ static int most_roots(const struct rising *p) {
     }
 
     int changes = 0;
-    int unknown = 0; // signs since the last one that is known
+    int unknown = 0; // number of signs since the last known sign
     int sign = 1;
     for (int k = positive; k <= p->degree; k++) {
         if (c[k][ABOVE] < 0.0 || c[k][BELOW] > 0.0) {
@@ -286,7 +288,7 @@ static int most_roots(const struct rising *p) {
 
 /* ---- Roots of monotone pieces --------------------------------------------------------------- */
 
-/* The order of doubles >= 0 is that of their bits. */
+/* Returns the bits of s: doubles >= 0 have the order of their bits. */
 static uint64_t bits_of(double s) {
     uint64_t bits;
     memcpy(&bits, &s, sizeof bits);
@@ -299,7 +301,7 @@ static double with_bits(uint64_t bits) {
     return s;
 }
 
-/* is_exact: the sign is that of exact arithmetic; else 0 within the rounding. */
+/* Evaluates p at s. is_exact: the sign is exact; otherwise it is 0 within the rounding. */
 static struct node node_at(const struct rising *p, double s, bool is_exact, double *slope) {
     const struct horner_value at = horner(p->c, p->degree, s);
     *slope = at.slope;
@@ -311,15 +313,16 @@ static struct node node_at(const struct rising *p, double s, bool is_exact, doub
     return node;
 }
 
-/* Between two doubles that are no neighbours. */
+/* Returns a double between two that are no neighbours. */
 static double middle(double low, double high) {
     const double s = low < 0.0625 * high ? 0.0625 * high : 0.5 * (low + high);
     return s > low && s < high ? s : with_bits((bits_of(low) + bits_of(high)) / 2);
 }
 
-/* Where p, monotone between two nodes of opposite sign, has no longer the sign of the lower one. By
- * Newton's method while its steps become shorter, else by bisection. Steps of few units in the last
- * place are lengthened to pass the root, so that it is soon between neighbours. */
+/* Returns the first s at which p, monotone between two nodes of opposite sign, no longer has the
+ * sign of the lower one. Uses Newton's method as long as its steps become shorter, otherwise
+ * bisection. Steps of few units in the last place are lengthened to pass the root, so that it is
+ * soon between neighbours. */
 static double crossing(const struct rising *p, struct node low, struct node high, bool is_exact) {
     double s = low.s + (high.s - low.s) * (low.value / (low.value - high.value));
     double step = high.s - low.s;
@@ -355,8 +358,8 @@ static double crossing(const struct rising *p, struct node low, struct node high
 
 /* ---- All pieces ----------------------------------------------------------------------------- */
 
-/* Replaces the count points at which the derivative changes its sign by those at which p does, or
- * is within its rounding, all of them inside (0, 1); returns how many. */
+/* Replaces the count points at which the derivative changes its sign by the points at which p does,
+ * or is within its rounding, all of them inside (0, 1). Returns their number. */
 static int replace_points(const struct rising *p, double points[ROOTS_LENGTH], int count) {
     struct node left = {0.0, p->c[0], 1, false};
     int found = 0;
@@ -379,7 +382,7 @@ static int replace_points(const struct rising *p, double points[ROOTS_LENGTH], i
     return found;
 }
 
-/* Writes points between which p is monotone, in their order inside (0, 1); returns how many. */
+/* Writes points between which p is monotone, in their order inside (0, 1). Returns their number. */
 static int find_extrema(const struct rising *p, double points[ROOTS_LENGTH]) {
     // up to the first derivative with one root at most
     struct rising derivative;
@@ -397,8 +400,8 @@ static int find_extrema(const struct rising *p, double points[ROOTS_LENGTH]) {
     return count;
 }
 
-/* Writes the first most roots (1 or ROOTS_LENGTH) of p, which is rising or, with the sign -1, the
- * opposite of it. */
+/* Writes the first `most` roots (1 or ROOTS_LENGTH) of p, which is rising or, if sign is -1, its
+ * opposite. Returns their number. */
 static int find(const struct rising *p, int sign, int most, struct root roots[ROOTS_LENGTH]) {
     double points[ROOTS_LENGTH];
     const int expected = most_roots(p);
@@ -411,7 +414,7 @@ static int find(const struct rising *p, int sign, int most, struct root roots[RO
 
     struct node left = {0.0, p->c[0], 1, false};
     int now = 1;          // the last sign that is not 0
-    bool is_open = false; // the last root may turn out to be one that crosses
+    bool is_open = false; // true if the last root may still turn out to be a crossing
     int found = 0;
     points[count] = 1.0;
     for (int i = 0; i <= count && (found < most || is_open); i++) {
@@ -456,7 +459,7 @@ double roots_search_first(const struct roots_polynomial *p) {
     return sign > 0 && find(&rising, 1, 1, roots) > 0 ? roots[0].s : INFINITY;
 }
 
-/* |p(s)| is within its rounding and that of s. */
+/* True if |p(s)| is within its rounding and the rounding of s. */
 static bool is_zero_at(const struct roots_polynomial *p, double s) {
     struct rising rising;
     if (prepare(p, &rising) == 0) {

@@ -2,7 +2,7 @@
  * p(s) = sum of c[k] s^k on (0, 1]. The step starts at s = 0 and ends at s = 1.
  *
  * Coefficients count as exact. Between neighbouring extrema, which are the roots of the derivative,
- * p has one root or none. The signs there are those of exact arithmetic, as far as |p| exceeds
+ * p has one root or none. The signs there are exact as far as |p| exceeds
  * 2^-94 size(s); size(s) = sum of |c[k]| s^k. With r(s) = (2 degree + 4) 2^-53 size(s), which
  * bounds the rounding of Horner's scheme, this is guaranteed:
  *
@@ -27,16 +27,17 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* ---- Values of a polynomial, with their rounding --------------------------------------------- */
+/* ---- Values of a polynomial, with their rounding -------------------------------------------- */
 
 struct horner_value {
     double value;
     double slope;
-    double rounding; /* bounds |value - p(s)|, also where each coefficient has been rounded once */
+    double rounding; /* bound of |value - p(s)|, also if each coefficient has been rounded once */
 };
 
-/* By Horner's scheme, for 0 <= s <= 1 and degree < 64. The rounding is (2 degree + 4) 2^-53 times
- * the sum of |c[k]| s^k (Higham, Accuracy and Stability of Numerical Algorithms, section 5.1). */
+/* Evaluates by Horner's scheme, for 0 <= s <= 1 and degree < 64. The rounding is (2 degree + 4)
+ * 2^-53 times the sum of |c[k]| s^k (Higham, Accuracy and Stability of Numerical Algorithms,
+ * section 5.1). */
 NONNULL static inline struct horner_value horner(const double c[], int degree, double s) {
     double value = c[degree];
     double slope = 0.0;
@@ -49,40 +50,41 @@ NONNULL static inline struct horner_value horner(const double c[], int degree, d
     return (struct horner_value){value, slope, (2 * degree + 4) * 0x1p-53 * size};
 }
 
-/* The value as if rounded once from twice the digits: the roundings of all products and sums are a
- * polynomial that corrects the first one (Graillat, Langlois and Louvet, Algorithms for accurate,
- * validated and fast polynomial evaluation, 2009). 0 where that is less than its error may be,
- * 2^-94 times the sum of |c[k]| s^k. 0 <= s <= 1, degree < 32, coefficients below 2^990. */
+/* Returns the value as if rounded once from twice the digits: the roundings of all products and
+ * sums are a polynomial that corrects the first value (Graillat, Langlois and Louvet, Algorithms
+ * for accurate, validated and fast polynomial evaluation, 2009). Returns 0 if the value is less
+ * than its possible error, 2^-94 times the sum of |c[k]| s^k. 0 <= s <= 1, degree < 32,
+ * coefficients below 2^990. */
 NONNULL double horner_compensated(const double c[], int degree, double s);
 
-/* ---- Interpolation at Chebyshev points ------------------------------------------------------- */
+/* ---- Interpolation at Chebyshev points ------------------------------------------------------ */
 
-/* Values at most. With more, powers of s lose too many digits: interpolate the halves of the step
- * instead. */
+/* Largest number of values. With more, powers of s lose too many digits: interpolate the halves of
+ * the step instead. */
 enum { CHEBYSHEV_LENGTH = 17 };
 
-/* Point k of count (3, 5, 9 or 17) in [0, 1], rising; the first is 0 and the last is 1. Point k of
- * count is point 2 k of 2 count - 1, where its value may be taken from. */
+/* Returns point k of count (3, 5, 9 or 17) in [0, 1], rising; the first is 0 and the last is 1.
+ * Point k of count is point 2 k of 2 count - 1, whose value it shares. */
 double chebyshev_point(int count, int k);
 
 /* Writes the coefficients c[k] of s^k of the polynomial through values[k] at chebyshev_point(count,
  * k), both count long; c[0] is values[0]. Returns the larger of the last two coefficients of its
  * Chebyshev polynomials, in the unit of the values: a smooth function differs from the polynomial
- * by as much, and by a tenth or a hundredth where the coefficients fall quickly. Coefficients
- * within the rounding of the values are left out: powers of s would make them larger. */
+ * by as much, and by a tenth or a hundredth if the coefficients fall quickly. Leaves out
+ * coefficients within the rounding of the values: powers of s would make them larger. */
 MUST_CHECK NONNULL double chebyshev_interpolate(int count, const double values[], double c[]);
 
-/* ---- Roots ----------------------------------------------------------------------------------- */
+/* ---- Roots ---------------------------------------------------------------------------------- */
 
-/* Coefficients at most, and more than there can be roots. */
+/* Largest number of coefficients, and more than there can be roots. */
 enum { ROOTS_LENGTH = 32 };
 
 struct roots_polynomial {
     const double *c; /* degree + 1 coefficients, in the unit of p */
     int degree;      /* 0 to ROOTS_LENGTH - 1 */
-    /* In the unit of p. >= 0: the first coefficients, as long as they are within it, count as 0: p
-     * starts at a root that has been dealt with. The next one is found however close it is. < 0: p
-     * does not start at such a root. */
+    /* In the unit of p. If >= 0: the first coefficients, as long as they are within it, count as 0,
+     * because p starts at a root that has been dealt with; the next root is found however close it
+     * is. If < 0: p does not start at such a root. */
     double noise;
 };
 
@@ -97,17 +99,17 @@ struct root {
     enum root_kind kind;
 };
 
-/* Writes all roots in their order and returns how many they are. */
+/* Writes all roots in their order and returns their number. */
 MUST_CHECK NONNULL int roots_find(const struct roots_polynomial *p,
                                   struct root roots[ROOTS_LENGTH]);
 
-/* roots_first without the quick proof. */
+/* Does the same as roots_first, without the quick proof. */
 MUST_CHECK NONNULL double roots_search_first(const struct roots_polynomial *p);
 
-/* True: p > r on (0, 1], because p(s) >= c0 + c1 s + d s^2 > 0, where d is c2 plus the negative
- * coefficients behind it. False: that is not known. */
+/* True if p > r on (0, 1], because p(s) >= c0 + c1 s + d s^2 > 0, where d is c2 plus the negative
+ * coefficients behind it. False if that is not known. */
 NONNULL static inline bool roots_is_above(const struct roots_polynomial *p) {
-    // more than the rounding here and that of Horner's scheme, as parts of each coefficient
+    // more than the rounding here and in Horner's scheme, as parts of each coefficient
     const double slack = 0x1p-45;
     const bool is_at_root = fabs(p->c[0]) <= p->noise;
     if (p->degree < (is_at_root ? 3 : 2)) {
@@ -133,14 +135,15 @@ NONNULL static inline bool roots_is_above(const struct roots_polynomial *p) {
     return is_above_at_ends && (c1 >= 0.0 || c1 + 2.0 * d <= 0.0 || 4.0 * c0 * d > c1 * c1);
 }
 
-/* The first s in (0, 1] at which p, above 0 before, is 0 or below, or touches 0. 0: p is below 0
- * right after the start, or 0 there with noise < 0. INFINITY: p stays above. */
+/* Returns the first s in (0, 1] at which p, above 0 before, is 0 or below, or touches 0. Returns 0
+ * if p is below 0 right after the start, or 0 there with noise < 0, and INFINITY if p stays above.
+ */
 MUST_CHECK NONNULL static inline double roots_first(const struct roots_polynomial *p) {
     return roots_is_above(p) ? INFINITY : roots_search_first(p);
 }
 
-/* The smallest roots_first of count polynomials. Writes which of them are 0 there: it is their own
- * roots_first, or |p| is within the rounding of its value and of s. */
+/* Returns the smallest roots_first of count polynomials. Writes which of them are 0 there: s is
+ * their own roots_first, or |p| is within the rounding of its value and of s. */
 MUST_CHECK NONNULL double roots_earliest(size_t count, const struct roots_polynomial p[],
                                          bool is_at_root[]);
 

@@ -12,7 +12,7 @@ struct small_vector {
     struct _generic_N_Vector base; /* first: the N_Vector */
     sunindextype length;
     // cppcheck-suppress unusedStructMember // it does not see through the casts below
-    struct small_vector_terms *terms; /* NULL: not noted */
+    struct small_vector_terms *terms; /* NULL if terms are not noted */
     double data[];
 };
 
@@ -133,7 +133,7 @@ ALWAYS_INLINE double minimum(sunindextype n, const double *x) {
     return smallest;
 }
 
-/* sqrt(sum (x w)^2 / n) */
+/* Returns sqrt(sum (x w)^2 / n). */
 ALWAYS_INLINE double weighted_norm(sunindextype n, const double *x, const double *w) {
     double sum = 0.0;
     for (sunindextype i = 0; i < n; i++) {
@@ -142,7 +142,8 @@ ALWAYS_INLINE double weighted_norm(sunindextype n, const double *x, const double
     return sqrt(sum / (double)n);
 }
 
-/* z = sum c[k] X[k]; z may be one of X. Element by element, so that sums stay in registers. */
+/* Writes z = sum c[k] X[k]; z may be one of X. Proceeds element by element, so that sums stay in
+ * registers. */
 ALWAYS_INLINE void linear_combination(sunindextype n, int count, const double *c, N_Vector *X,
                                       double *z) {
     if (n <= 4) {
@@ -200,7 +201,7 @@ void small_vector_polynomial(const struct small_vector_terms *terms, double s, s
     }
 }
 
-/* Z[k] = a[k] x + Y[k] */
+/* Writes Z[k] = a[k] x + Y[k]. */
 ALWAYS_INLINE void scale_add_multi(sunindextype n, int count, const double *a, const double *x,
                                    N_Vector *Y, N_Vector *Z) {
     for (int k = 0; k < count; k++) {
@@ -208,7 +209,7 @@ ALWAYS_INLINE void scale_add_multi(sunindextype n, int count, const double *a, c
     }
 }
 
-/* Z[k] = c[k] X[k] */
+/* Writes Z[k] = c[k] X[k]. */
 ALWAYS_INLINE void scale_vectors(sunindextype n, int count, const double *c, N_Vector *X,
                                  N_Vector *Z) {
     for (int k = 0; k < count; k++) {
@@ -216,7 +217,7 @@ ALWAYS_INLINE void scale_vectors(sunindextype n, int count, const double *c, N_V
     }
 }
 
-/* Z[k] = a X[k] + b Y[k] */
+/* Writes Z[k] = a X[k] + b Y[k]. */
 ALWAYS_INLINE void sum_vectors(sunindextype n, int count, double a, N_Vector *X, double b,
                                N_Vector *Y, N_Vector *Z) {
     for (int k = 0; k < count; k++) {
@@ -227,7 +228,7 @@ ALWAYS_INLINE void sum_vectors(sunindextype n, int count, double a, N_Vector *X,
 
 /* ---- Tables of operations ------------------------------------------------------------------- */
 
-/* Constant lengths, for which the compiler unrolls the loops. */
+/* Return constant lengths, for which the compiler unrolls the loops. */
 ALWAYS_INLINE sunindextype two(N_Vector x) {
     return 2;
 }
@@ -236,8 +237,8 @@ ALWAYS_INLINE sunindextype four(N_Vector x) {
     return 4;
 }
 
-/* The operations above as SUNDIALS calls them, for vectors x of length(x): two, four or length_of.
- */
+/* Defines the operations above as SUNDIALS calls them, for vectors x of length(x): two, four or
+ * length_of. */
 // clang-format off
 #define DEFINE_TABLE(name, length)                                                                 \
     static void name##_linear_sum(sunrealtype a, N_Vector x, sunrealtype b, N_Vector y,            \

@@ -4,14 +4,15 @@
 
 #include <arkode/arkode.h>
 #include <cvode/cvode.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* What cvode_bdf takes where pointers have 64 bits, measured, and 0.2 kB: 6.4 kB for 4 states, 187
- * kB for 100. It is the same number with every compiler and system, and less where pointers are
- * shorter; the other methods take at most five sixths of it. */
+/* Memory of cvode_bdf with pointers of 64 bits, measured, and 0.2 kB: 6.4 kB for 4 states, 187 kB
+ * for 100. The number is the same with every compiler and system, and less with shorter pointers;
+ * the other methods take at most five sixths of it. */
 size_t sundials_memory_size(const struct ode *ode) {
     const size_t state_count = ode->state_count;
     return 5376 + sizeof(double) * (25 * state_count + 2 * state_count * state_count);
@@ -66,8 +67,8 @@ enum status sundials_status(const struct problem *problem, int flag) {
     }
 }
 
-/* SUNDIALS says how long the step is at which it fails: 0, or not a number, where the norm of the
- * derivatives has overflowed. */
+/* Explains a text. SUNDIALS gives the length of the step at which it fails: 0, or not a number, if
+ * the norm of the derivatives has overflowed. */
 static const char *explained(const char *text) {
     static const char *const overflows[] = {"h = nan", "h = -nan", "hu = 0 and"};
     for (size_t i = 0; i < sizeof overflows / sizeof overflows[0]; i++) {
@@ -78,8 +79,8 @@ static const char *explained(const char *text) {
     return text;
 }
 
-/* Length of the name of a time, with what stands between it and its value, in front of text; 0:
- * there is none. */
+/* Returns the length of the name of a time in front of text, up to its value; 0 if there is none.
+ */
 static size_t time_name_length(const char *text) {
     static const char *const names[] = {"t = ", "tcur = ", "tout = ", "tstop = "};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
@@ -154,6 +155,14 @@ void sundials_destroy(void *memory) {
     workspace_free(sundials);
 }
 
+int sundials_callback_flag(enum status status) {
+    return status == STATUS_OK ? 0 : 1;
+}
+
+long sundials_steps(int64_t count) {
+    return count < LONG_MAX ? (long)count : LONG_MAX;
+}
+
 int sundials_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data) {
     const struct sundials *sundials = user_data;
     return sundials_callback_flag(
@@ -179,7 +188,7 @@ static enum status rest_jacobian(double t, const double x[], double J[], void *s
     return STATUS_OK;
 }
 
-/* Uses its own settings: with the user's it could take more steps than are spent here. */
+/* Uses its own settings: the user's could need more steps than are spent here. */
 enum status sundials_warm_up(void *memory) {
     struct sundials *sundials = memory;
     const struct method *method = sundials->method;

@@ -1,14 +1,13 @@
-/* What the methods of SUNDIALS share: its context, its vectors and its texts. */
+/* Context, vectors, texts and status that the methods of SUNDIALS share. */
 #ifndef SUNDIALS_H
 #define SUNDIALS_H
 
 #include "method.h"
 #include "small_vector.h"
 
-#include <limits.h>
 #include <sundials/sundials_context.h>
 
-/* The first member of each method's memory, and the user data of its solver. */
+/* First member of each method's memory, and user data of its solver. */
 struct sundials {
     struct problem *problem;
     const struct method *method;
@@ -18,43 +17,38 @@ struct sundials {
     N_Vector work;
 };
 
-/* Bytes for the context and the method that needs most, the one with matrices. */
+/* Returns the number of bytes for the context and the largest method, the one with matrices. */
 size_t sundials_memory_size(const struct ode *ode);
 
 /* Allocates memory of size bytes that begins with a struct sundials, with the context and the
- * vectors in it. NULL where memory is short. */
+ * vectors in it. Returns NULL if memory is short. */
 MUST_CHECK NONNULL void *sundials_create(size_t size, struct problem *problem,
                                          const struct method *method);
 
-/* Frees the memory itself too; the solver must be freed before. Half-built is allowed. */
+/* Frees the memory itself too; the solver must be freed before. A half-built one is allowed. */
 NONNULL void sundials_destroy(void *memory);
 
-/* The status of a flag that CVODE or ARKODE has returned: they use the same numbers. */
+/* Returns the status of a flag of CVODE or ARKODE: they use the same numbers. */
 MUST_CHECK NONNULL enum status sundials_status(const struct problem *problem, int flag);
 
 /* Receives the texts of a solver; user data: struct sundials. */
 void sundials_text(int error_code, const char *module, const char *function, char *text,
                    void *sundials_pointer);
 
-/* The right-hand side as SUNDIALS calls it; user data: struct sundials. */
+/* Evaluates the right-hand side for SUNDIALS; user data: struct sundials. */
 int sundials_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data);
 
-/* Return value of a callback: 1, a smaller step is tried, where the evaluation failed. */
-static inline int sundials_callback_flag(enum status status) {
-    return status == STATUS_OK ? 0 : 1;
-}
+/* Returns the flag of a callback: 1 if the evaluation failed, so that a smaller step is tried. */
+int sundials_callback_flag(enum status status);
 
-/* A number of steps as SUNDIALS takes it: in a long, which has 32 bits on some platforms. */
-static inline long sundials_steps(int64_t count) {
-    return count < LONG_MAX ? (long)count : LONG_MAX;
-}
+/* Converts a number of steps to a long, which has 32 bits on some platforms. */
+long sundials_steps(int64_t count);
 
-/* x may be the vector's own array. */
+/* Copy the state to or from the vector; x may be the vector's own array. */
 NONNULL void sundials_set_state(struct sundials *sundials, const double x[]);
 NONNULL void sundials_get_state(const struct sundials *sundials, double x[]);
 
-/* Integrates x' = 0 with the method of memory: solvers allocate what they need at their first step.
- */
+/* Integrates x' = 0 with the method of memory: solvers allocate memory at their first step. */
 MUST_CHECK NONNULL enum status sundials_warm_up(void *memory);
 
 #endif

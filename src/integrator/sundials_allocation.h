@@ -1,5 +1,5 @@
-/* In front of every file of SUNDIALS, by an option of the compiler (cmake/Sundials.cmake): what it
- * allocates comes from the workspace of the instance. Macros without arguments, because SUNDIALS
+/* Stands in front of every file of SUNDIALS, by an option of the compiler (cmake/Sundials.cmake):
+ * SUNDIALS allocates from the workspace of the instance. Macros without arguments, because SUNDIALS
  * has members named free. The headers of the system come first: they declare the true functions. */
 #ifndef SUNDIALS_ALLOCATION_H
 #define SUNDIALS_ALLOCATION_H

@@ -6,10 +6,11 @@
 #include <math.h>
 #include <string.h>
 
-/* The last coefficient of an input enters the states' two orders before. */
+/* Smallest order: the last coefficient of an input enters the states' coefficients two orders
+ * before. */
 enum { LEAST_ORDER = SERIES_INPUT_LENGTH + 1 };
 
-/* Of the length that the last terms allow (Jorba and Zou, section 3.2.1). */
+/* Part of the length that the last terms allow (Jorba and Zou, section 3.2.1). */
 static const double safety = 0.9;
 
 /* ---- Life ----------------------------------------------------------------------------------- */
@@ -37,8 +38,8 @@ void taylor_series_destroy(struct taylor_series *series) {
     workspace_free(series->weight);
 }
 
-/* Steps cost least near 1 - ln(tolerance) / 2 where all orders cost the same (Jorba and Zou,
- * section 3.2). The first ones, with their sine and cosine, cost as much as several others. */
+/* Steps cost least near the order 1 - ln(tolerance) / 2 if all orders cost the same (Jorba and Zou,
+ * section 3.2). The first orders, with their sine and cosine, cost as much as several others. */
 void taylor_series_configure(struct taylor_series *series) {
     const double e = 2.718281828459045;
     int order = 8; // at a tolerance of 1
@@ -75,7 +76,7 @@ enum status taylor_series_add_orders(struct taylor_series *series, int last) {
                           series->row);
 }
 
-/* Sum of the terms of an order, one time scale ahead, in tolerances of the states. */
+/* Returns the sum of the terms of an order, one time scale ahead, in tolerances of the states. */
 static double size_of_terms(const struct taylor_series *series, int order) {
     double size = 0.0;
     for (size_t i = 0; i < series->problem->ode.state_count; i++) {
@@ -84,28 +85,28 @@ static double size_of_terms(const struct taylor_series *series, int order) {
     return size;
 }
 
-/* Near log2 x, for x >= 0. */
+/* Returns a number near log2 x, for x >= 0. */
 static int exponent_of(double x) {
     uint64_t bits;
     memcpy(&bits, &x, sizeof bits);
     return (int)(bits >> 52) - 1023;
 }
 
-/* The step at whose end the terms of the orders last - 1 and last, which have these sizes one time
- * scale ahead, are within the tolerance; bound at most, NaN where a size is not finite. */
+/* Returns the step at whose end the terms of the orders last - 1 and last, which have these sizes
+ * one time scale ahead, are within the tolerance; bound at most, NaN if a size is not finite. */
 static double step_of_last_terms(const double size[2], int last, double bound) {
     if (!isfinite(size[0] + size[1])) {
         return NAN;
     }
-    // where log2 of the size over the order is larger
+    // the order with the larger log2 of the size over the order
     const bool is_last = exponent_of(size[1]) * (last - 1) > exponent_of(size[0]) * last;
     const int limiting = is_last ? last : last - 1;
     const double step = safety * pow(size[is_last ? 1 : 0], -1.0 / limiting);
     return step < bound ? step : bound;
 }
 
-/* Adds orders until the series has converged, or has its largest order. Odd ones: with steps of
- * even order the errors of a swing cancel, and cease to cancel at a smaller tolerance where some
+/* Adds orders until the series has converged, or has its largest order. Orders stay odd: with steps
+ * of even order the errors of a swing cancel, and cease to cancel at a smaller tolerance if some
  * steps have one order more. */
 static enum status find_order(struct taylor_series *series) {
     for (int order = LEAST_ORDER;; order += 2) {

@@ -1,4 +1,4 @@
-/* The Taylor series of the solution about the begin of a step: its orders, the step for which they
+/* Taylor series of the solution about the begin of a step: its orders, the step for which they
  * suffice, and its values (Jorba and Zou, A software package for the numerical integration of ODEs
  * by means of high-order Taylor methods, Experimental Mathematics 14, 2005).
  *
@@ -8,8 +8,8 @@
 
 #include "method.h"
 
-/* At most so many rows are on the stack where no later call reads them: there they are in a cache
- * although many instances are stepped in turn. */
+/* Largest number of rows that are on the stack if no later call reads them: there they are in a
+ * cache even if many instances are stepped in turn. */
 enum { TAYLOR_FEW_ROWS = 8 };
 
 static inline bool taylor_series_has_few_rows(const struct ode *ode) {
@@ -20,38 +20,38 @@ struct taylor_series {
     struct problem *problem;
     int largest_order;
     int order;
-    int expected_order;               /* which a step that lands is expanded to at first; its result
-                                         does not depend on it */
-    double begin;                     /* s since the restart */
-    double time_scale;                /* s */
-    double step;                      /* for which the series is good; NaN: a term is not finite */
+    int expected_order; /* order to which a step that lands is expanded at first; the result does
+                           not depend on it */
+    double begin;       /* s since the restart */
+    double time_scale;  /* s */
+    double step;        /* step for which the series is good; NaN if a term is not finite */
     double (*row)[SERIES_LENGTH];     /* the coefficients */
-    double (*end_row)[SERIES_LENGTH]; /* orders 0 and 1 at the end of a step; NULL: few rows */
-    double *weight;                   /* of each state: 1 over its tolerance */
+    double (*end_row)[SERIES_LENGTH]; /* orders 0 and 1 at the end of a step; NULL with few rows */
+    double *weight;                   /* 1 over the tolerance of each state */
 };
 
-/* Bytes that create allocates at most. */
+/* Returns the largest number of bytes that create allocates. */
 NONNULL size_t taylor_series_memory_size(const struct ode *ode);
 
-/* False where memory is short. Destroy it in either case. */
+/* Allocates the rows. Returns false if memory is short. Destroy it in either case. */
 MUST_CHECK NONNULL bool taylor_series_create(struct problem *problem, struct taylor_series *series);
 NONNULL void taylor_series_destroy(struct taylor_series *series);
 
-/* The largest order, from problem->settings. */
+/* Writes the largest order, from problem->settings. */
 NONNULL void taylor_series_configure(struct taylor_series *series);
 
-/* Expands the solution about the state x at the time t, and writes `step`. longest > 0: the step is
- * as long as the largest order allows, and as this at most. 0: orders are added until the terms one
- * time scale ahead are within the tolerance; the step is 1, or less where the largest order is not
- * enough. */
+/* Expands the solution about the state x at the time t, and writes `step`. If longest > 0, the step
+ * is as long as the largest order allows, and at most this long. If it is 0, orders are added until
+ * the terms one time scale ahead are within the tolerance; the step is 1, or less if the largest
+ * order is not enough. */
 MUST_CHECK NONNULL enum status taylor_series_expand(struct taylor_series *series, double t,
                                                     double time_scale, const double x[],
                                                     double longest);
 
-/* Goes on with the series, to the order last. */
+/* Continues the series to the order last. */
 MUST_CHECK NONNULL enum status taylor_series_add_orders(struct taylor_series *series, int last);
 
-/* As taylor_series_evaluate. n: the number of states. */
+/* Does the same as taylor_series_evaluate for n states. */
 ALWAYS_INLINE void taylor_series_evaluate_of(const struct taylor_series *series, double s, size_t n,
                                              double x[], double dx[]) {
     for (size_t i = 0; i < n; i++) {
@@ -72,8 +72,8 @@ ALWAYS_INLINE void taylor_series_evaluate_of(const struct taylor_series *series,
 
 /* Writes the state at s to x and, unless NULL, its derivative by s to dx.
  *
- * Where the number of states is a constant, and s = 1 is one, values stay in registers and the
- * products are left out: a quarter of a step of two joints. */
+ * If the number of states is a constant, and s = 1 too, values stay in registers and the products
+ * are left out: a quarter of a step of two joints. */
 static inline void taylor_series_evaluate(const struct taylor_series *series, double s, double x[],
                                           double dx[]) {
     double four_x[4];
@@ -100,11 +100,11 @@ static inline void taylor_series_evaluate(const struct taylor_series *series, do
     }
 }
 
-/* Writes the state at s to end_x, the derivative of the polynomial there, by s, to end_dx, and by
- * how much the polynomial misses the equations there: the difference of its derivative from theirs,
- * in tolerances per step. That is about the order of the first term left out times its size. Small
- * terms prove nothing, because orders of a series may vanish: a motion from rest can have the
- * orders 3, 4, 11, 12, 19 ... and none between. */
+/* Writes the state at s to end_x, the derivative of the polynomial there, by s, to end_dx, and the
+ * defect: how much this derivative differs from the equations' there, in tolerances per step. The
+ * defect is about the order of the first missing term times its size. Small terms prove nothing,
+ * because orders of a series may vanish: a motion from rest can have the orders 3, 4, 11, 12, 19
+ * ... and none between. */
 MUST_CHECK NONNULL enum status taylor_series_measure_defect(struct taylor_series *series, double s,
                                                             double end_x[], double end_dx[],
                                                             double *defect);

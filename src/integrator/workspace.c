@@ -13,23 +13,24 @@
  * unloading three FMUs they could not be loaded any more. No lock: a thread of high priority would
  * wait for one of low priority. */
 struct slot {
-    const void *_Atomic thread;  /* NULL: free */
-    struct workspace *workspace; /* that the thread entered last; of no concern to others */
+    const void *_Atomic thread; /* NULL if the slot is free */
+    struct workspace
+        *workspace; /* workspace that the thread entered last; of no concern to others */
 };
 
-/* More threads at once than this, each in the few microseconds of making or freeing a solver, have
- * to wait. */
+/* Number of slots. More threads at once, each in the few microseconds of making or freeing a
+ * solver, have to wait. */
 enum { SLOTS = 256 };
 
 static struct slot slots[SLOTS];
-static atomic_size_t used_slots; /* all from this one on were always free */
+static atomic_size_t used_slots; /* number of the first slots that were ever used */
 
-/* The address of errno differs between threads: it identifies a thread. */
+/* Returns the address of errno, which differs between threads. */
 static const void *this_thread(void) {
     return &errno;
 }
 
-/* NULL: this thread has entered none. */
+/* Returns the slot of this thread; NULL if it has entered no workspace. */
 static struct slot *own_slot(void) {
     const size_t count = atomic_load_explicit(&used_slots, memory_order_relaxed);
     for (size_t i = 0; i < count; i++) {
@@ -115,7 +116,7 @@ void *workspace_calloc(size_t items, size_t size) {
 void *workspace_realloc(void *memory, size_t size) {
     char *taken = workspace_malloc(size);
     if (taken != NULL && memory != NULL) {
-        // the old block was not longer than what lies between
+        // the old block was not longer than the bytes between
         const size_t between = (size_t)(taken - (char *)memory);
         memcpy(taken, memory, size < between ? size : between);
     }

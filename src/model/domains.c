@@ -26,10 +26,10 @@ static void complete(double value[], const double other[], size_t count) {
     }
 }
 
-/* Lets the modes of room.values follow from its states and inputs; false: `values` has the same. A
- * relation that is not defined keeps its mode. */
-static bool follow(const struct domains *model, struct domains_room room, const void *values,
-                   double t) {
+/* Updates the modes of room.values by its states and inputs; a relation that is not defined keeps
+ * its mode. Returns false if `values` has the same modes. */
+static bool update_modes(const struct domains *model, struct domains_room room, const void *values,
+                         double t) {
     int *holds = modes_in(model, room.values);
     bool changes = true;
     for (int count = 0; changes && count <= model->relation_count; count++) {
@@ -49,19 +49,19 @@ static bool follow(const struct domains *model, struct domains_room room, const 
     return memcmp(holds, modes_of(model, values), size) != 0;
 }
 
-/* As follow, of values with these states and inputs. */
-static bool follow_to(const struct domains *model, struct domains_room room, const void *values,
-                      double t, const double x[], const double u[]) {
+/* Calls update_modes for values with these states and inputs. */
+static bool update_modes_at(const struct domains *model, struct domains_room room,
+                            const void *values, double t, const double x[], const double u[]) {
     memcpy(room.values, values, model->values_size);
     memcpy(doubles_in(room.values, model->states), x, model->states.size);
     memcpy(doubles_in(room.values, model->inputs), u, model->inputs.size);
-    return follow(model, room, values, t);
+    return update_modes(model, room, values, t);
 }
 
 enum status domains_right_hand_side(const struct domains *model, struct domains_room room,
                                     const void *values, double t, const double x[],
                                     const double u[], double dx[]) {
-    if (!follow_to(model, room, values, t, x, u)) {
+    if (!update_modes_at(model, room, values, t, x, u)) {
         return STATUS_OK;
     }
     const enum status status = model->right_hand_side(room.values, t, x, u, room.result);
@@ -72,12 +72,12 @@ enum status domains_right_hand_side(const struct domains *model, struct domains_
 enum status domains_jacobian(const struct domains *model, struct domains_room room,
                              const void *values, double t, const double x[], const double u[],
                              double J[]) {
-    return follow_to(model, room, values, t, x, u) ? model->jacobian(room.values, t, x, u, J)
-                                                   : STATUS_OK;
+    return update_modes_at(model, room, values, t, x, u) ? model->jacobian(room.values, t, x, u, J)
+                                                         : STATUS_OK;
 }
 
-/* Replaces indicators that are not finite by the ones of room.values, `other`, with signs for the
- * modes in values. */
+/* Replaces indicators that are not finite by the indicators of room.values, `other`, with signs for
+ * the modes in values. */
 static void complete_indicators(const struct domains *model, struct domains_room room,
                                 const void *values, double z[], const double other[]) {
     for (int k = 0; k < model->relation_count; k++) {
@@ -94,7 +94,7 @@ static void complete_indicators(const struct domains *model, struct domains_room
 enum status domains_indicators(const struct domains *model, struct domains_room room,
                                const void *values, double t, const double x[], const double u[],
                                double z[]) {
-    if (!follow_to(model, room, values, t, x, u)) {
+    if (!update_modes_at(model, room, values, t, x, u)) {
         return STATUS_OK;
     }
     const enum status status = model->write_indicators(room.values, t, x, u, room.result);
@@ -110,7 +110,7 @@ static void complete_calculated(const struct domains *model, void *values, void 
 enum status domains_outputs(const struct domains *model, struct domains_room room, void *values,
                             double t) {
     memcpy(room.values, values, model->values_size);
-    if (!follow(model, room, values, t)) {
+    if (!update_modes(model, room, values, t)) {
         return STATUS_OK;
     }
     const enum status status = model->outputs(room.values, t);
@@ -123,7 +123,7 @@ enum status domains_outputs(const struct domains *model, struct domains_room roo
 enum status domains_propagate(const struct domains *model, struct domains_room room,
                               const void *values, double t, double dt, void *first, void *second) {
     memcpy(room.values, values, model->values_size);
-    if (!follow(model, room, values, t)) {
+    if (!update_modes(model, room, values, t)) {
         return STATUS_OK;
     }
     memcpy(room.first, first, model->values_size);
@@ -139,7 +139,7 @@ enum status domains_propagate(const struct domains *model, struct domains_room r
     return status;
 }
 
-/* Indicators that change their signs with the modes keep the signs of `values`. */
+/* Gives indicators whose signs change with the modes the signs of `values`. */
 static void keep_signs(const struct domains *model, struct domains_room room, const void *values,
                        int first, int last, double row[][SERIES_LENGTH]) {
     for (int k = 0; k < model->relation_count; k++) {
@@ -162,7 +162,7 @@ enum status domains_extend(const struct domains *model, struct domains_room room
     for (size_t i = 0; i < count_of(model->inputs); i++) {
         doubles_in(room.values, model->inputs)[i] = origin->inputs[i][0];
     }
-    (void)follow(model, room, origin->values, origin->t);
+    (void)update_modes(model, room, origin->values, origin->t);
     struct series_origin here = *origin;
     here.values = room.values;
     const enum status status = model->extend(&here, first, last, row);

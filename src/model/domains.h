@@ -1,9 +1,8 @@
-/* Models that are made from their equations (fmu/equations), beyond the events at which their
- * branches end.
+/* Values beyond an event, for models that are made from their equations (fmu/equations).
  *
- * Within a step modes stay as they are, and the right-hand side is smooth: a trial state, or the
- * end of a step in which an event will be located, may be beyond the event. What is not finite
- * there is evaluated in the modes that follow from the states: sqrt(h) if h > 0 else 0 is 0 where h
+ * Within a step modes stay the same, and the right-hand side is smooth: a trial state, or the end
+ * of a step in which an event will be located, may be beyond the event. Values that are not finite
+ * there are evaluated in the modes that follow from the states: sqrt(h) if h > 0 else 0 is 0 for h
  * < 0. */
 #ifndef DOMAINS_H
 #define DOMAINS_H
@@ -11,18 +10,19 @@
 #include "model.h"
 #include "relations.h"
 
-/* A model as it would be without this, and its values. */
+/* A model without this treatment of values that are not finite, and the places of its values. */
 struct domains {
     size_t values_size;
     struct range states;
     struct range inputs;
-    struct range calculated; /* double[]: all calculated fields but the indicators */
+    struct range calculated; /* double[]: all calculated fields except the indicators */
     struct range indicators; /* double[] */
     size_t modes;            /* offset of int[]: the mode of each relation */
     int relation_count;
     const struct relation *relation;
     const size_t *row_of_indicator;
-    size_t own_row; /* of the series: 1 in order 0 where it is not in the modes of its values */
+    size_t own_row; /* row of the series that is 1 in order 0 if it is not in the modes of its
+                       values */
     void (*write_distances)(const void *values, double t, double distance[]);
 
     /* as in struct model, struct model_events and struct series */
@@ -53,7 +53,7 @@ static inline bool domains_are_finite(const double value[], size_t count) {
     return sum == 0.0;
 }
 
-/* Whether all calculated fields are finite. */
+/* True if all calculated fields are finite. */
 static inline bool domains_are_calculated(const struct domains *model, const void *values) {
     const char *begin = values;
     return domains_are_finite((const double *)(const void *)(begin + model->calculated.offset),
@@ -62,7 +62,7 @@ static inline bool domains_are_calculated(const struct domains *model, const voi
                               model->indicators.size / sizeof(double));
 }
 
-/* Whether the states' coefficients of order 1 are finite, of a series from order 0 to last. */
+/* True if the states' coefficients of order 1 are finite, in a series from order 0 to last. */
 static inline bool domains_has_begun(const struct domains *model, int last,
                                      double row[][SERIES_LENGTH]) {
     double sum = 0.0;
@@ -72,7 +72,7 @@ static inline bool domains_has_begun(const struct domains *model, int last,
     return sum == 0.0;
 }
 
-/* After the function of this name, where not all results are finite: completes them. */
+/* Each of these completes the results of the function of its name, if some are not finite. */
 enum status domains_right_hand_side(const struct domains *model, struct domains_room room,
                                     const void *values, double t, const double x[],
                                     const double u[], double dx[]);
@@ -87,7 +87,7 @@ enum status domains_outputs(const struct domains *model, struct domains_room roo
 enum status domains_propagate(const struct domains *model, struct domains_room room,
                               const void *values, double t, double dt, void *first, void *second);
 
-/* extend, where domains_has_begun said no of the orders from 0 on. */
+/* Extends a series from order 0 on, if domains_has_begun is false. */
 enum status domains_extend(const struct domains *model, struct domains_room room,
                            const struct series_origin *origin, int first, int last,
                            double row[][SERIES_LENGTH]);

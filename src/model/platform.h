@@ -1,4 +1,4 @@
-/* What compilers and platforms call by different names: the only header that asks which one it is.
+/* Names that compilers and platforms spell differently: the only header that asks which one it is.
  * Attributes stand in front of the return type. */
 #ifndef PLATFORM_H
 #define PLATFORM_H
@@ -12,7 +12,8 @@
 /* The caller must look at the returned status. */
 #define MUST_CHECK __attribute__((warn_unused_result))
 
-/* No pointer argument may be NULL; with numbers: not these, counted from 1. */
+/* No pointer argument may be NULL; NONNULL_ARGUMENTS: these arguments, counted from 1, may not be
+ * NULL. */
 #define NONNULL                __attribute__((nonnull))
 #define NONNULL_ARGUMENTS(...) __attribute__((nonnull(__VA_ARGS__)))
 
@@ -25,18 +26,18 @@
 
 #define ALWAYS_INLINE static inline __attribute__((always_inline))
 
-/* In front of a loop: no iteration depends on another. */
+/* Stands in front of a loop in which no iteration depends on another. */
 #if defined(__clang__)
 #define INDEPENDENT_ITERATIONS _Pragma("clang loop vectorize(assume_safety)")
 #else
 #define INDEPENDENT_ITERATIONS _Pragma("GCC ivdep")
 #endif
 
-/* Of what follows no symbol leaves the shared object, unless it says so itself. */
+/* Hides all symbols below from the shared object's users, unless one says so itself. */
 #define HIDE_SYMBOLS _Pragma("GCC visibility push(hidden)")
 
-/* In what follows products are rounded before they are added. gcc 12 fuses them even so where it
- * vectorizes sums beside differences. */
+/* Rounds products below before they are added. gcc 12 fuses them nevertheless if it vectorizes sums
+ * beside differences. */
 #if defined(__clang__)
 #define NO_FUSED_OPERATIONS _Pragma("STDC FP_CONTRACT OFF")
 #else

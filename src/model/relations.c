@@ -4,17 +4,16 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Of a state's size: how far from its limit it may be where its event is located; and of the time.
- */
+/* Relative distance of a state from its limit where its event may be located; and of the time. */
 static const double location_error = 1e-11;
 static const double time_error = 1e-12;
 
-/* What is called on the way of one event: a model, its values, and memory. */
+/* Arguments of all functions during one event: a model, its values, and memory. */
 struct call {
     const struct relations *model;
     struct relations_room room;
     void *values;
-    int *is_begun, *holds, *active; /* its modes */
+    int *is_begun, *holds, *active; /* parts of its modes */
     double t;                       /* s */
     const double *du;               /* derivative of each input by the time */
     bool inputs_move;
@@ -36,10 +35,11 @@ static struct call call_of(const struct relations *model, struct relations_room 
                          t,     du,   inputs_move};
 }
 
-/* state_errors: of each state where it may have been located, in its unit. */
+/* Compares all relations. state_errors: how far from its limit each state may have been located, in
+ * its unit. */
 static void compare(const struct call *call, const double state_errors[],
                     struct compared compared[]) {
-    const double inputs = call->inputs_move ? time_error : 0.0; // those that are set are exact
+    const double inputs = call->inputs_move ? time_error : 0.0; // inputs that do not move are exact
     const struct given given = {state_errors, time_error, inputs, call->du};
     call->model->compare(call->values, call->t, &given, compared);
 }
@@ -48,21 +48,22 @@ static bool holds_at(const struct relation *relation, double distance) {
     return relation->includes_zero ? distance >= 0.0 : distance > 0.0;
 }
 
-/* The relation is at its limit, as far as is known. */
+/* True if the relation is at its limit, within its noise. */
 static bool is_near(const struct compared *compared) {
     return fabs(compared->distance) <= compared->noise;
 }
 
-/* The distance says which mode is right. One that no value needs may be nothing. */
+/* True if the distance tells which mode is right. Without a reader the distance may be NaN, and
+ * counts. */
 static bool is_sure(const struct compared *compared) {
     const double size = fabs(compared->distance);
     return compared->used ? size >= compared->noise : !(size < compared->noise);
 }
 
-/* Lets relations follow from their distances; at its limit a relation keeps its mode, as does one
- * that has turned. True: some have changed. is_exact: distances are what they are to the last bit.
- */
-static bool settle(const struct call *call, bool is_exact) {
+/* Updates the modes of relations by their distances. A relation at its limit keeps its mode, as
+ * does a turned one. Returns true if some have changed. is_exact: distances are exact to the last
+ * bit. */
+static bool update_modes(const struct call *call, bool is_exact) {
     const struct relation *relation = call->model->relation;
     struct compared *compared = call->room.compared;
     bool changes = false;
@@ -78,14 +79,16 @@ static bool settle(const struct call *call, bool is_exact) {
     return changes;
 }
 
-/* Modes may depend on each other, in a circle even: then the last ones stay. */
-static void settle_all(const struct call *call, bool is_exact) {
-    for (int count = 0; count <= call->model->relation_count && settle(call, is_exact); count++) {
+/* Repeats update_modes until no mode changes. Modes may depend on each other in a circle: then the
+ * last ones stay. */
+static void update_modes_until_stable(const struct call *call, bool is_exact) {
+    for (int count = 0; count <= call->model->relation_count && update_modes(call, is_exact);
+         count++) {
     }
 }
 
-/* Lets relations follow from the values, whatever their modes were. */
-static void follow(const struct call *call, bool only_of_inputs) {
+/* Writes the modes that follow from the values, whatever they were before. */
+static void set_modes_from_values(const struct call *call, bool only_of_inputs) {
     const struct relations *model = call->model;
     const struct compared *compared = call->room.compared;
     compare(call, call->room.zeros, call->room.compared);
@@ -95,7 +98,7 @@ static void follow(const struct call *call, bool only_of_inputs) {
         }
     }
     if (!only_of_inputs) {
-        settle_all(call, true);
+        update_modes_until_stable(call, true);
     }
 }
 
@@ -107,7 +110,7 @@ const void *relations_followed(const struct relations *model, struct relations_r
     }
     memcpy(copy, values, model->values_size);
     const struct call call = call_of(model, room, copy, t, room.zeros);
-    follow(&call, is_begun);
+    set_modes_from_values(&call, is_begun);
     return copy;
 }
 
@@ -124,17 +127,18 @@ double relations_next_time(const struct relations *model, struct relations_room 
     return next;
 }
 
-/* Slope of the distance with the sign of the mode. */
+/* Returns the slope of the distance with the sign of the mode. */
 static double signed_slope(const struct compared *compared, int holds) {
     return holds ? compared->slope : -compared->slope;
 }
 
-/* After a change: relations at their limits that it has made fall switch, or their next events
- * would be due at once; one that it has placed at its limit, at rest, holds if it includes zero.
- * How inputs move may not be known, but it is part of the slopes before the change and after it.
+/* Switches relations after an event has changed values: a relation at its limit that now falls
+ * switches, or its next event would be due at once; a relation that the event has placed at its
+ * limit, at rest, holds if it includes zero. The motion of inputs may not be known, but it is part
+ * of the slopes before and after the change.
  *
  * call->room.before: the relations before the change. */
-static void turn(const struct call *call) {
+static void switch_fallen(const struct call *call) {
     const struct relations *model = call->model;
     const struct compared *before = call->room.before;
     struct compared *after = call->room.compared;
@@ -156,8 +160,8 @@ static void turn(const struct call *call) {
     }
 }
 
-/* Runs the events that have become due, in their order; false: there was none. */
-static bool fire(const struct call *call) {
+/* Runs the events that have become due, in their order. Returns false if there was none. */
+static bool run_due_events(const struct call *call) {
     const struct relations *model = call->model;
     int *due = call->room.due;
     bool fires = false;
@@ -166,9 +170,9 @@ static bool fire(const struct call *call) {
         if (due[i] && !call->active[i]) {
             compare(call, call->room.tolerance, call->room.before);
             model->change(call->values, call->t, i, call->room.tolerance);
-            settle_all(call, false);
-            turn(call);
-            settle_all(call, false);
+            update_modes_until_stable(call, false);
+            switch_fallen(call);
+            update_modes_until_stable(call, false);
             memset(call->room.turned, 0, (size_t)model->relation_count * sizeof *call->room.turned);
             call->active[i] = 1;
             fires = true;
@@ -181,8 +185,8 @@ static bool fire(const struct call *call) {
     return fires;
 }
 
-/* Relations with the same limit switch at one event: those on it that are about to pass it, also
- * ones that no value needs yet. */
+/* True if a relation at its limit is about to pass it, so that it switches together with another
+ * relation of the same limit. It need not be read yet. */
 static bool joins(const struct compared *compared, int holds) {
     return is_near(compared) && signed_slope(compared, holds) < 0.0;
 }
@@ -190,7 +194,7 @@ static bool joins(const struct compared *compared, int holds) {
 static void pass(const struct call *call, const struct event *event) {
     const struct relations *model = call->model;
     const struct relations_room room = call->room;
-    const double next = relations_next_time(model, room, call->values); /* writes all times */
+    const double next = relations_next_time(model, room, call->values); /* also writes all times */
     const double passed = event->is_timed ? next : -INFINITY;
     compare(call, room.tolerance, room.compared);
     for (int k = 0; k < model->relation_count; k++) {
@@ -199,14 +203,14 @@ static void pass(const struct call *call, const struct event *event) {
             const bool is_past = call->t >= room.times[k] || room.times[k] <= passed;
             call->holds[k] = is_past == relation->rises;
         } else if (event->triggered != NULL) {
-            // where states are as close as their errors, an indicator may only seem to fall
+            // if a state is at its limit within its error, its indicator may only seem to fall
             const double slope = signed_slope(&room.compared[k], call->holds[k]);
             const bool falls =
                 event->triggered[relation->indicator] && !(event->du_is_known && slope > 0.0);
             call->holds[k] ^= falls || joins(&room.compared[k], call->holds[k]);
         }
     }
-    settle_all(call, false);
+    update_modes_until_stable(call, false);
 }
 
 enum status relations_update(const struct relations *model, struct relations_room room,
@@ -216,7 +220,7 @@ enum status relations_update(const struct relations *model, struct relations_roo
     double *tolerance = room.tolerance;
     const int was_begun = *call.is_begun;
     if (!was_begun) {
-        follow(&call, false);
+        set_modes_from_values(&call, false);
         *call.is_begun = 1;
     }
     for (int i = 0; i < model->state_count; i++) {
@@ -227,7 +231,7 @@ enum status relations_update(const struct relations *model, struct relations_roo
         pass(&call, event);
     }
     for (int count = 0; count <= event->max_events; count++) {
-        if (!fire(&call)) {
+        if (!run_due_events(&call)) {
             return STATUS_OK;
         }
     }

@@ -28,14 +28,14 @@ const char *status_text(enum status status) {
     return "unknown status";
 }
 
-/* ---- Messages -------------------------------------------------------------------------------- */
+/* ---- Messages ------------------------------------------------------------------------------- */
 
 static bool is_in_word(char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
 }
 
-/* Length of the word nan in front of text, with the sign and the kind that some platforms add; 0 if
- * it is not there. */
+/* Returns the length of the word nan in front of text, with the sign and the kind that some
+ * platforms add; 0 if it is not there. */
 static size_t nan_length(const char *text) {
     const size_t end = (size_t)(*text == '-') + strlen("nan");
     if (strncmp(text + (*text == '-'), "nan", strlen("nan")) != 0 || is_in_word(text[end])) {
@@ -45,7 +45,8 @@ static size_t nan_length(const char *text) {
     return kind_end != NULL ? (size_t)(kind_end - text) + 1 : end;
 }
 
-/* Length of the decimal fraction in front of text if it has more digits than 15; 0 if not. */
+/* Returns the length of the decimal fraction in front of text if it has more than 15 digits,
+ * otherwise 0. */
 static size_t long_fraction_length(const char *text) {
     const size_t whole = strspn(text, "0123456789");
     if (whole == 0 || text[whole] != '.') {
@@ -64,8 +65,8 @@ static size_t long_fraction_length(const char *text) {
 
 enum { SHORTER_SIZE = 32 };
 
-/* Writes the number in front of text with the fewest digits that are read as the same double. Its
- * length in text; 0, if it cannot be shorter or there is none. */
+/* Writes the number in front of text with the fewest digits that are read as the same double.
+ * Returns its length in text, or 0 if there is no number or it cannot become shorter. */
 static size_t shorten_number(const char *text, char shorter[SHORTER_SIZE]) {
     const size_t length = long_fraction_length(text);
     const double number = length > 0 ? strtod(text, NULL) : 0.0;
@@ -78,12 +79,12 @@ static size_t shorten_number(const char *text, char shorter[SHORTER_SIZE]) {
     return 0;
 }
 
-/* printf writes NaN as nan, -nan, nan(ind) or -nan(ind), depending on the platform, and with %.17g
- * 0.8 as 0.80000000000000004. */
+/* Writes numbers alike on every platform: printf writes NaN as nan, -nan, nan(ind) or -nan(ind),
+ * and 0.8 with %.17g as 0.80000000000000004. */
 static void simplify_numbers(char *text) {
     char *to = text;
     const char *from = text;
-    char last = ' '; // written
+    char last = ' '; // last character written
     while (*from != '\0') {
         char shorter[SHORTER_SIZE] = "nan";
         size_t length = is_in_word(last) ? 0 : nan_length(from);

@@ -1,5 +1,5 @@
-/* Result of a call: one list holds every status, what a caller can do about it, and its text. And
- * the messages that explain it, which go to one function that the owner of the instance supplies.
+/* Status of a call and the message that explains it. One list holds every status, what a caller can
+ * do about it, and its text. Messages go to one function that the owner of the instance supplies.
  */
 #ifndef STATUS_H
 #define STATUS_H
@@ -37,21 +37,21 @@ enum status { STATUS_LIST(STATUS_CODE) };
 
 enum severity status_severity(enum status status);
 
-/* Static text, never NULL. */
+/* Returns a static text, never NULL. */
 const char *status_text(enum status status);
 
-/* ---- Messages -------------------------------------------------------------------------------- */
+/* ---- Messages ------------------------------------------------------------------------------- */
 
-/* text: finished, one line, valid during the call only. */
+/* Receives a message: one finished line, valid during the call only. */
 typedef void message_function(void *context, enum status status, const char *text);
 
 struct message_sink {
-    message_function *write; /* NULL: texts are dropped */
+    message_function *write; /* NULL to drop messages */
     void *context;
 };
 
-/* vsnprintf, with numbers that look the same on every platform and have no more digits than needed:
- * %.17g writes 0.8 and 0.30000000000000004. */
+/* Formats like vsnprintf, but writes numbers alike on every platform and with no more digits than
+ * needed: %.17g writes 0.8 and 0.30000000000000004. */
 PRINTF_FORMAT(3, 0)
 void message_format(char *text, size_t size, const char *format, va_list arguments);
 

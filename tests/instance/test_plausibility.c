@@ -2,6 +2,7 @@
  * message. */
 #include "plausibility.h"
 
+#include "history.h"
 #include "one_instance.h"
 #include "oscillator_by_hand.h"
 #include "settings.h"
