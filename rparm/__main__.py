@@ -94,7 +94,7 @@ def _show_page(options: Namespace, ended: Ended) -> None:
 
 
 def _document(ended: Ended) -> dict[str, object]:
-    """How a command has ended, for programs."""
+    """Return the document of a command's end, for programs."""
     error = {} if ended.error is None else {"error": str(ended.error)}
     return {"exit_code": ended.code, **ended.document, **error}
 
@@ -129,7 +129,7 @@ def _drop_output(stream: TextIO | None = None) -> None:
 
 
 def _as_program() -> int:
-    """`main`, ended by Ctrl-C or another signal of its kind: temporary files are removed then.
+    """Run `main`; a signal as Ctrl-C ends it after temporary files are removed.
 
     Compiled code of libraries may turn the exception of a signal into another one: whatever
     arrives after a signal counts as its end.
@@ -161,7 +161,7 @@ def _end(code: int) -> NoReturn:
 
 
 def script() -> NoReturn:
-    """The command rparm of an installed package."""
+    """Run the command rparm of an installed package."""
     _end(_as_program())
 
 

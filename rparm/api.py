@@ -81,14 +81,14 @@ class Table(Mapping[str, np.ndarray]):
             files.write_trajectory(Path(path), self._times, self._names, self._values)
 
     def to_pandas(self) -> Any:
-        """The columns as a pandas.DataFrame; pandas must be installed."""
+        """Return the columns as a pandas.DataFrame; pandas must be installed."""
         import pandas
 
         return pandas.DataFrame(dict(self))
 
 
 def fmu(name: str, fmi: int = 2) -> Path:
-    """File of an FMU of the project.
+    """Return the file of an FMU of the project.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ class Scenario:
             return Table(result.times, result.names, result.values, _units(opened.model))
 
     def errors(self, table: Table) -> dict[str, float]:
-        """Largest error of each output of a run against the reference, relative to its scale."""
+        """Return each output's largest error against the reference, relative to its scale."""
         with self._opened(2) as (opened, loaded):
             expected = load_reference(loaded, opened.model)
         if len(table["time"]) != len(expected.times):
@@ -208,7 +208,7 @@ class Scenario:
     def proven_errors(
         self, *, method: str | None = None, tolerance: float | None = None
     ) -> dict[str, float]:
-        """How far each state in a run is from the exact motion at most, by validated integration.
+        """Bound each state's distance from the exact motion by validated integration.
 
         Assumed are the equations of motion, exact parameters and inputs as given, and IEEE doubles.
 
@@ -320,7 +320,7 @@ class System:
 
 
 def version(fmi: int) -> str:
-    """Version of FMI by its first digit; UserError if it is none of `project.VERSIONS`."""
+    """Return the version of FMI by its first digit; UserError if it is unknown."""
     found = project.fmi_version(fmi)
     if found is None:
         raise UserError(f"fmi: expected 2 or 3, got {fmi!r}")
@@ -347,7 +347,7 @@ def linearize(
     without: Sequence[str] = (),
     fmi: int = 2,
 ) -> "Linear":
-    """The linear model of an FMU or a system at a point; docs/linear-models.md explains.
+    """Return the linear model of an FMU or system; docs/linear-models.md explains.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ def function(command: str, form: str) -> Any:
 
 
 def parsed(arguments: Sequence[str]) -> argparse.Namespace:
-    """Options of the command that `arguments` ask for; `command` is its name.
+    """Parse the options of the command that `arguments` ask for; `command` is its name.
 
     Names and options without a command are those of `run`. Only the module of the command is
     imported, because some take long.
@@ -75,7 +75,7 @@ def parsed(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _help(names: Sequence[str]) -> str:
-    """Help on the first of `names`, or on everything if there are none."""
+    """Return the help on the first of `names`, or on everything if there are none."""
     if not names:
         return overview()
     if names[0] not in COMMANDS:
@@ -98,7 +98,7 @@ def parser(command: str) -> argparse.ArgumentParser:
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        """One line, like every other mistake of the user."""
+        """Refuse in one line, like every other mistake of the user."""
         raise UserError(f"{message} (--help explains)")
 
     def print_help(self, file: object = None) -> NoReturn:
@@ -115,7 +115,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
-    """Options of all commands."""
+    """Add the options of all commands."""
     parser.add_argument(
         "--json",
         action="store_true",
@@ -134,24 +134,24 @@ def add_system(
     ssp: str = "the system (default: all)",
     fmi: str = "systems with FMUs of this version of FMI (default: 2)",
 ) -> None:
-    """Which system: a file, or one of a version of FMI."""
+    """Add the choice of a system: a file, or one of a version of FMI."""
     choice = parser.add_mutually_exclusive_group()
     choice.add_argument("--ssp", type=Path, metavar="PATH", help=ssp)
     add_fmi(choice, VERSIONS[0], fmi)
 
 
 def add_fmi(parser: argparse._ActionsContainer, default: str | None, text: str) -> None:
-    """Which version of FMI, as one of `VERSIONS`."""
+    """Add the choice of a version of FMI, one of `VERSIONS`."""
     parser.add_argument("--fmi", type=_version, metavar="{2,3}", default=default, help=text)
 
 
 def add_tolerance(parser: argparse.ArgumentParser, text: str) -> None:
-    """The tolerance of the integrator."""
+    """Add the tolerance of the integrator."""
     parser.add_argument("--tolerance", type=relative_tolerance, metavar="X", help=text)
 
 
 def add_report(parser: argparse.ArgumentParser, part: str = "") -> None:
-    """Where pages and results go."""
+    """Add the folder for pages and results."""
     folder = project.report_folder(part)
     # its name until version 0.1
     parser.add_argument("--report", type=Path, default=folder, help=argparse.SUPPRESS)
@@ -166,12 +166,12 @@ def add_report(parser: argparse.ArgumentParser, part: str = "") -> None:
 
 
 def add_output(parser: argparse.ArgumentParser, text: str) -> None:
-    """Where something else goes than pages and results."""
+    """Add the folder for other files than pages and results."""
     parser.add_argument("--output", type=Path, metavar="DIR", help=text)
 
 
 def add_document(parser: argparse.ArgumentParser) -> None:
-    """Where the document goes, for a command that writes nothing else."""
+    """Add the folder for the document, for a command that writes nothing else."""
     parser.add_argument(
         "--output",
         dest="document",
@@ -182,7 +182,7 @@ def add_document(parser: argparse.ArgumentParser) -> None:
 
 
 def add_silence(parser: argparse.ArgumentParser, default: float, text: str) -> None:
-    """How long something may be silent."""
+    """Add the longest time that something may be silent."""
     parser.add_argument(
         "--silence",
         type=_seconds,
@@ -193,21 +193,21 @@ def add_silence(parser: argparse.ArgumentParser, default: float, text: str) -> N
 
 
 def number(text: str) -> int:
-    """Number of a run, from 0."""
+    """Parse the number of a run, from 0."""
     if not text.isdecimal() or len(text) > 12:
         raise argparse.ArgumentTypeError(f"expected the number of a run, got {text!r}")
     return int(text)
 
 
 def count(text: str) -> int:
-    """How many, from 1."""
+    """Parse a count, from 1."""
     if not text.isdecimal() or not 1 <= int(text) <= 10_000:
         raise argparse.ArgumentTypeError(f"expected a number from 1 to 10000, got {text!r}")
     return int(text)
 
 
 def pairs(option: str, given: Sequence[str]) -> dict[str, str]:
-    """Names and texts of values "NAME=VALUE"; UserError if one has another form or comes twice."""
+    """Split "NAME=VALUE"; UserError if a text has another form or a name comes twice."""
     found: dict[str, str] = {}
     for text in given:
         name, equals, value = text.partition("=")
@@ -220,12 +220,12 @@ def pairs(option: str, given: Sequence[str]) -> dict[str, str]:
 
 
 def names(given: Sequence[str]) -> list[str]:
-    """Names between commas, or given one by one."""
+    """Split names between commas, or given one by one."""
     return [name.strip() for text in given for name in text.split(",") if name.strip()]
 
 
 def retyped(command: str, positional: Iterable[object], given: Mapping[str, object]) -> str:
-    """What to type for a command again, in the project's folder; without options not given."""
+    """Write a command as it is typed again in the project's folder; without options not given."""
     parts = [project.PROGRAM, command, *map(_typed, positional)]
     for name, value in given.items():
         if value is True:
@@ -237,7 +237,7 @@ def retyped(command: str, positional: Iterable[object], given: Mapping[str, obje
 
 
 def file_or_name(given: str, suffixes: Iterable[str]) -> str | Path:
-    """What was typed where a file is expected or a name of the project, for `retyped`."""
+    """Return a path, or a name of the project, for `retyped`."""
     return Path(given) if Path(given).suffix.lower() in suffixes else given
 
 

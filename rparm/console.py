@@ -26,13 +26,13 @@ DELAY = 1.0  # s, shorter activities show nothing
 
 
 def is_quiet() -> bool:
-    """Whether the user wants to see the end only."""
+    """Return whether the user wants to see the end only."""
     return _quiet
 
 
 @contextmanager
 def results_stream(as_json: bool, quiet: bool) -> Iterator[TextIO | None]:
-    """The stream for a command's result; all else goes to standard error, or nowhere if `quiet`."""
+    """Lead a command's result to a stream, all else to standard error or nowhere (`quiet`)."""
     global _quiet
     real, before, _quiet = sys.stdout, _quiet, quiet
     try:
@@ -73,7 +73,7 @@ def _apart(real: TextIO, elsewhere: TextIO) -> Iterator[TextIO]:
 
 
 def json_line(content: Mapping[str, object]) -> str:
-    """JSON in one line; numbers that are not finite become null."""
+    """Return JSON in one line; numbers that are not finite become null."""
     return json.dumps(_plain(content), ensure_ascii=False)
 
 
@@ -93,7 +93,7 @@ def _plain(value: Any) -> Any:
 
 
 def width() -> int:
-    """Columns to fill: as many as the terminal has, within limits."""
+    """Return the columns to fill: as many as the terminal has, within limits."""
     return max(min(WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns), LEAST)
 
 
@@ -110,7 +110,7 @@ def messages(label: str, texts: Iterable[str]) -> None:
 
 
 def titles(named: Sequence[Mapping[str, str]]) -> str:
-    """Lines with the "name" and the "title" of each thing."""
+    """Write lines with the "name" and the "title" of each thing."""
     room = width()
     column = min(max((len(entry["name"]) for entry in named), default=0), room // 2)
     lines = []
@@ -122,7 +122,7 @@ def titles(named: Sequence[Mapping[str, str]]) -> str:
 
 
 def verdict_line(failed: Iterable[str], done: Sized, name: str) -> str:
-    """How many things have passed, or which have failed: the last line of a command."""
+    """Write the last line of a command: how many things have passed, or which have failed."""
     names = list(dict.fromkeys(failed))
     if not names:
         return f"passed: {counted(done, name)}"

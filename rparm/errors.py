@@ -39,12 +39,12 @@ def placed(where: object) -> Iterator[None]:
 
 
 def together(errors: Sequence[UserError]) -> UserError:
-    """All errors of a command as one."""
+    """Join all errors of a command to one."""
     return UserError("; ".join(dict.fromkeys(map(str, errors))))
 
 
 def closest(name: str, known: Iterable[str]) -> str:
-    """The one of `known` that `name` may be meant for, or nothing."""
+    """Return the one of `known` that `name` may be meant for, or nothing."""
     known = list(known)
     close = difflib.get_close_matches(name, known, n=1)
     if not close and len(name) >= SHORTEST_PART:
@@ -56,7 +56,7 @@ def closest(name: str, known: Iterable[str]) -> str:
 
 
 def _plain(name: str) -> str:
-    """A name without what is easily mistaken: case, underscores, hyphens and blanks."""
+    """Remove what is easily mistaken in a name: case, underscores, hyphens and blanks."""
     return re.sub("[_ -]", "", name).casefold()
 
 
@@ -73,10 +73,10 @@ def hint(name: str, known: Iterable[str], label: str = "known") -> str:
 
 
 def reason(error: Exception) -> str:
-    """The system's message about a file, without error number and file name."""
+    """Return the system's message about a file, without error number and file name."""
     return getattr(error, "strerror", None) or str(error) or type(error).__name__
 
 
 def one_line(text: object) -> str:
-    """`text` with each run of white space replaced by a single space."""
+    """Replace each run of white space by a single space."""
     return " ".join(str(text).split())

@@ -31,7 +31,7 @@ def handle_endings() -> list[int]:
 
 
 def arrived() -> bool:
-    """Whether a signal has arrived that ends the program."""
+    """Return whether a signal has arrived that ends the program."""
     return bool(_received)
 
 
@@ -64,7 +64,7 @@ def uninterrupted() -> Iterator[None]:
 
 @contextmanager
 def temporary_folder(within: Path | None = None) -> Iterator[Path]:
-    """A folder in the folder `within`, or where temporary files are; removed in any end."""
+    """Make a folder in `within`, or where temporary files are; it is removed in any end."""
     with uninterrupted():
         # Windows does not remove a library that is still loaded, as after a fatal error, nor files
         # that a program of a run that was interrupted still holds

@@ -58,7 +58,7 @@ VERSIONS = tuple(BUILD_FOLDERS)
 
 
 def check_current_folder() -> None:
-    """UserError if the current folder has been removed: most paths then lead nowhere."""
+    """Refuse a current folder that has been removed: most paths then lead nowhere."""
     try:
         Path.cwd()
     except OSError as error:
@@ -68,7 +68,7 @@ def check_current_folder() -> None:
 
 
 def fmi_version(given: object) -> str | None:
-    """Version of FMI by its first digit or in full; None if it is none of `VERSIONS`."""
+    """Return the version of FMI by its first digit or in full; None if it is none of `VERSIONS`."""
     return next((x for x in VERSIONS if str(given) in (x, x[0])), None)
 
 
@@ -77,7 +77,7 @@ def models_folder() -> Path:
 
 
 def scenario_files() -> dict[str, Path]:
-    """All scenarios by name; UserError if two scenarios have the same name."""
+    """Return all scenarios by name; UserError if two scenarios have the same name."""
     found: dict[str, Path] = {}
     for path in sorted(models_folder().glob("*/scenarios/*.toml")):
         if path.stem in found:
@@ -87,7 +87,7 @@ def scenario_files() -> dict[str, Path]:
 
 
 def scenario_file(name: str) -> Path:
-    """The scenario called `name`; UserError if there is none."""
+    """Return the scenario called `name`; UserError if there is none."""
     found = scenario_files()
     if name not in found:
         guess = did_you_mean(name, found)
@@ -96,13 +96,13 @@ def scenario_file(name: str) -> Path:
 
 
 def campaign_files() -> dict[str, Path]:
-    """All campaigns of models and systems by name."""
+    """Return all campaigns of models and systems by name."""
     found = {path.stem: path for path in models_folder().glob("*/campaigns/*.toml")}
     return dict(sorted(found.items()))
 
 
 def campaign_file(given: str | Path) -> Path:
-    """A campaign: a file, or one of the project by its name; UserError if there is none."""
+    """Return a campaign: a file, or one of the project by its name; UserError if there is none."""
     path, known = Path(given), campaign_files()
     if path.suffix or is_file(path):
         return path
@@ -113,13 +113,16 @@ def campaign_file(given: str | Path) -> Path:
 
 
 def models() -> dict[str, Path]:
-    """Folders of all models that have scenarios, by name."""
+    """Return the folders of all models that have scenarios, by name."""
     folders = sorted({path.parents[1] for path in models_folder().glob("*/scenarios/*.toml")})
     return {folder.name: folder for folder in folders}
 
 
 def model(name: str) -> Path:
-    """Folder of a model, by its own name or that of its FMU; a UserError lists the known ones."""
+    """Return the folder of a model, by its own name or that of its FMU.
+
+    A UserError lists the known ones.
+    """
     known = models()
     for folder in known.values():
         if name == folder.name or is_built_from(name, folder):
@@ -129,23 +132,23 @@ def model(name: str) -> Path:
 
 
 def is_in_model(file: Path) -> bool:
-    """Whether a file lies where a model has its scenarios and problems."""
+    """Return whether a file lies where a model has its scenarios and problems."""
     return Path(file).absolute().parent.name in SCENARIO_FOLDERS
 
 
 def is_ours(file: Path) -> bool:
-    """Whether a file is one of the project's scenarios, or lies where they do."""
+    """Return whether a file is one of the project's scenarios, or lies where they do."""
     file = Path(file).resolve()
     return is_in_model(file) and file.parents[2] == models_folder().resolve()
 
 
 def convergence_files() -> list[Path]:
-    """All problems for the order of convergence."""
+    """Return all problems for the order of convergence."""
     return sorted(models_folder().glob("*/convergence/*.toml"))
 
 
 def model_folder(scenario: Path) -> Path:
-    """Folder of the model of a scenario or problem; UserError if the file is in none."""
+    """Return the folder of the model of a scenario or problem; UserError if the file is in none."""
     folder = scenario.absolute().parent
     if folder.name not in SCENARIO_FOLDERS:
         raise UserError(f"{scenario}: expected in models/MODEL/scenarios/")
@@ -161,27 +164,27 @@ def reference_folder(scenario: Path) -> Path:
 
 
 def reference_file(scenario: Path, model: str) -> Path:
-    """Reference of a scenario, of a model whose FMU has the name `model`."""
+    """Return the reference of a scenario, of a model whose FMU has the name `model`."""
     return reference_folder(scenario) / f"{model}_ref.csv"
 
 
 def scales_file(folder: Path) -> Path:
-    """Sums that errors of a model or system are divided by."""
+    """Return the sums that errors of a model or system are divided by."""
     return references(folder) / "scales.toml"
 
 
 def exact_state_file(problem: Path) -> Path:
-    """Exact final state of a problem for the order of convergence."""
+    """Return the exact final state of a problem for the order of convergence."""
     return reference_folder(problem) / "exact.json"
 
 
 def variant_reference_file(system: Path, variant: str) -> Path:
-    """Reference of a system's variant: Jacobi stepping, read after inputs are set, as in Ecos."""
+    """Return the reference of a system's variant: Jacobi stepping, read as Ecos does."""
     return references(system) / variant / "ecos.csv"
 
 
 def making_references(folder: Path, name: str) -> str:
-    """How to make the reference called `name` of a model or system again, for messages."""
+    """Say how to make the reference called `name` of a model or system again, for messages."""
     if INSTALLED:
         return "it comes with rparm, install that again"
     # relative to the project's folder, in which its documentation gives all commands
@@ -190,7 +193,7 @@ def making_references(folder: Path, name: str) -> str:
 
 
 def systems() -> dict[str, Path]:
-    """Folders of all systems by name."""
+    """Return the folders of all systems by name."""
     found = sorted(path.parent for path in models_folder().glob(f"*/{STRUCTURE}"))
     if not found:
         raise UserError(f"{models_folder()}: has no folder with {STRUCTURE}")
@@ -198,12 +201,12 @@ def systems() -> dict[str, Path]:
 
 
 def is_built_from(name: str, folder: Path) -> bool:
-    """Whether an FMU or SSP called `name` is that of the folder of a model or system."""
+    """Return whether an FMU or SSP called `name` is that of the folder of a model or system."""
     return name.lower() == folder.name.replace("_", "").lower()
 
 
 def built_names(suffix: str) -> list[str]:
-    """Names of the FMUs (.fmu) or systems (.ssp) that are there, without suffix."""
+    """Return the names of the FMUs (.fmu) or systems (.ssp) that are there, without suffix."""
     if INSTALLED:
         files = [Path(name) for name in shipped.names() if name.startswith(VERSIONS[0])]
     else:
@@ -212,7 +215,7 @@ def built_names(suffix: str) -> list[str]:
 
 
 def built(folder: Path, suffix: str, option: str = "", version: str = VERSIONS[0]) -> Path:
-    """What has been built from the folder of a model (.fmu) or system (.ssp), of a version of FMI.
+    """Return the FMU (.fmu) or SSP (.ssp) built from a folder, of a version of FMI.
 
     UserError if it is not there; names `option`, which takes another file, if it is given.
     """
@@ -232,17 +235,17 @@ def built(folder: Path, suffix: str, option: str = "", version: str = VERSIONS[0
 
 
 def fmu_of(subject: Path, option: str = "", version: str = VERSIONS[0]) -> Path:
-    """The FMU of what a scenario is of: a file itself, or what was built from a model's folder."""
+    """Return the FMU of a scenario's subject: a file itself, or built from a model's folder."""
     return built(subject, ".fmu", option, version) if subject.is_dir() else subject
 
 
 def proof_file(folder: Path) -> Path:
-    """What the program that encloses motions of a model reads and gives."""
+    """Return the file that describes the program that encloses motions of a model."""
     return folder / PROOF / f"{PROOF}.toml"
 
 
 def proof_program(folder: Path) -> Path:
-    """That program; UserError if it is not there."""
+    """Return the program that encloses motions; UserError if it is not there."""
     build = built_for_all() / platform_name() if INSTALLED else ROOT / "build"
     program = build / PROOF / folder.name / "prove"
     program = program.with_suffix(".exe") if os.name == "nt" else program
@@ -253,7 +256,7 @@ def proof_program(folder: Path) -> Path:
 
 
 def platform_name() -> str:
-    """What FMI 3.0 calls the platform of this machine's binaries."""
+    """Return FMI 3.0's name for the platform of this machine's binaries."""
     if os.name == "nt":
         return "x86_64-windows"  # Windows on Arm runs them, too
     machine = platform.machine().replace("arm64", "aarch64")
@@ -261,7 +264,7 @@ def platform_name() -> str:
 
 
 def built_for_all() -> Path:
-    """Folder with what a release has built for each platform; UserError if there is none."""
+    """Return the folder built by a release for each platform; UserError if there is none."""
     if INSTALLED:
         return shipped.unpacked(shipped.BUILT, cache_folder("built"))
     archive = ROOT / "build" / "release" / shipped.BUILT.name
@@ -271,17 +274,17 @@ def built_for_all() -> Path:
 
 
 def page_of_models() -> Path:
-    """The page that explains files with equations."""
+    """Return the page that explains files with equations."""
     return from_root(ROOT / "examples" / "models" / "README.md")
 
 
 def model_builder() -> Path:
-    """The program that makes FMUs of own equations."""
+    """Return the path of the program that makes FMUs of own equations."""
     return Path(fmu_tools.__path__[0]) / "equations_to_fmu.py"
 
 
 def runtimes(all_platforms: bool) -> list[Path]:
-    """What models are linked with, here or on all platforms; UserError if it is not there."""
+    """Return the runtimes to link models with, here or on all platforms; UserError if not there."""
     if all_platforms:
         return sorted(built_for_all().glob("*.json"))
     if INSTALLED:
@@ -295,23 +298,23 @@ def runtimes(all_platforms: bool) -> list[Path]:
 
 
 def from_root(path: Path) -> Path:
-    """`path` as commands in the project's folder write it, in a checkout."""
+    """Write a path as commands in the project's folder do, in a checkout."""
     path = path.absolute()
     return path.relative_to(ROOT) if path.is_relative_to(ROOT) and not INSTALLED else path
 
 
 def report_folder(part: str = "") -> Path:
-    """Where the commands write if no other folder is given."""
+    """Return the folder that commands write to if no other one is given."""
     return (Path("rparm-output") if INSTALLED else ROOT / "build" / "report") / part
 
 
 def campaign_folder(name: str) -> Path:
-    """Where a campaign's results are if no other folder is given."""
+    """Return the folder for a campaign's results if no other one is given."""
     return (Path("rparm-output") if INSTALLED else ROOT / "build") / "campaigns" / name
 
 
 def playground_page() -> Path:
-    """The plant for a browser; UserError if it has not been built."""
+    """Return the page with the plant; UserError if it has not been built."""
     page = (built_for_all() if INSTALLED else ROOT / "build") / "playground" / "index.html"
     if not page.is_file():
         raise UserError(f"{page}: not there, {PROGRAM} playground builds it")
@@ -319,7 +322,7 @@ def playground_page() -> Path:
 
 
 def plotly_script() -> Path:
-    """The library that draws the plots of pages: of the package plotly, or shipped as .gz."""
+    """Return the library that draws the plots: of the package plotly, or shipped as .gz."""
     if INSTALLED:
         return ROOT / "plotly" / "plotly.min.js.gz"
     found = find_spec("plotly")
@@ -337,7 +340,7 @@ def version() -> str:
 
 
 def how_to_install(extra: str) -> str:
-    """The command that installs what an extra of the distribution needs."""
+    """Return the command that installs the packages of an extra of the distribution."""
     if INSTALLED:
         return f'pip install "rparm[{extra}]"'
     of_setup = extra in ("campaign", "control", "federation")
@@ -345,19 +348,19 @@ def how_to_install(extra: str) -> str:
 
 
 def not_installed(packages: str, extra: str) -> UserError:
-    """What to say of missing packages that an extra of the distribution needs."""
+    """Return the error for missing packages of an extra of the distribution."""
     return UserError(f"{packages}: not installed, {how_to_install(extra)} does it")
 
 
 def check_installed(packages: Iterable[str], extra: str) -> None:
-    """UserError if some of the packages are missing."""
+    """Refuse to run where some of the packages are missing."""
     missing = [name for name in packages if find_spec(name) is None]
     if missing:
         raise not_installed(", ".join(missing), extra)
 
 
 def cache_folder(part: str) -> Path:
-    """Where `part` of what can be made again is kept; the user's own for an installed package."""
+    """Return the folder for `part` of the files that can be made again."""
     if not INSTALLED:
         return ROOT / "build" / part
     given = os.environ.get("RPARM_CACHE")
@@ -372,7 +375,7 @@ def set_library_caches() -> None:
 
 
 def child_environment() -> dict[str, str]:
-    """Variables for a Python process of this package, started with -P."""
+    """Return the variables for a Python process of this package, started with -P."""
     if INSTALLED:
         return dict(os.environ)
     folders = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]

@@ -70,7 +70,7 @@ class Enclosure:
     starts: tuple[Start, ...]
 
     def of(self, names: Sequence[str]) -> "Enclosure":
-        """Intervals of these variables."""
+        """Return the intervals of these variables."""
         places = [self.names.index(name) for name in names]
         parts = {part: getattr(self, part)[:, places] for part in ("high", "low", "radius")}
         return replace(self, names=tuple(names), **parts)
@@ -93,7 +93,7 @@ class Prover:
         progress: Callable[[int], object] | None = None,
         seconds: float = threading.TIMEOUT_MAX,
     ) -> Enclosure:
-        """Intervals that contain all motions of a scenario at its communication points.
+        """Enclose all motions of a scenario at its communication points.
 
         A start that is too broad for one proof is halved, and so are its halves.
 
@@ -156,7 +156,7 @@ class Prover:
         return self.answer(lines, start)
 
     def problem(self, scenario: Scenario, start: Start) -> Iterable[str]:
-        """What the program is asked, in lines."""
+        """Write the question to the program, in lines."""
         value = scenario.start_values
         yield _line("start", [scenario.times[0]])
         yield _line("states", (x for n in self.states for x in (start[n][0], 0.0, start[n][1])))
@@ -167,7 +167,7 @@ class Prover:
             yield _line("to", [end, *held])
 
     def answer(self, lines: Iterable[str], start: Start) -> Enclosure:
-        """What the program has answered."""
+        """Read the answer of the program."""
         rows, times, stopped = [], [], None
         for line in lines:
             name, time, *numbers = line.split()
@@ -236,7 +236,7 @@ class Prover:
 
 
 def prover_of(path: Path) -> Prover:
-    """The prover of the model of a scenario; UserError if it has none."""
+    """Load the prover of the model of a scenario; UserError if it has none."""
     name = scenarios.name_of(scenarios.subject_of(path))
     known = provers()
     if name not in known:
@@ -248,7 +248,7 @@ def prover_of(path: Path) -> Prover:
 
 
 def provers() -> dict[str, Prover]:
-    """All provers by the folders of their models."""
+    """Load all provers by the folders of their models."""
     return {
         name: _load(folder)
         for name, folder in project.models().items()
@@ -257,7 +257,7 @@ def provers() -> dict[str, Prover]:
 
 
 def halves(start: Start) -> tuple[Start, Start]:
-    """Two pieces that cover a start, which is cut across where it is widest."""
+    """Cut a start into two pieces where it is widest."""
     name = max(start, key=lambda each: start[each][1])
     value, radius = start[name]
     least, greatest = value - radius, value + radius
@@ -271,7 +271,7 @@ def halves(start: Start) -> tuple[Start, Start]:
 
 
 def hull(one: Enclosure, other: Enclosure) -> Enclosure:
-    """Intervals that contain those of both, which go to the end."""
+    """Join intervals of two enclosures that go to the end."""
     ends = [sign * (x.high + x.low) + x.radius for sign in (-1, 1) for x in (one, other)]
     least, greatest = -np.maximum(*ends[:2]), np.maximum(*ends[2:])
     middle = (least + greatest) / 2
@@ -300,7 +300,7 @@ def _watched(lines: Iterable[str], progress: Callable[[int], object] | None) -> 
 
 
 def is_nearest(values: np.ndarray, enclosure: Enclosure, rows: np.ndarray) -> np.ndarray:
-    """Which values are proven to be the doubles nearest to the exact ones.
+    """Return which values are proven to be the doubles nearest to the exact ones.
 
     0 is so up to `UNDERFLOW`, because intervals are no narrower there.
 
@@ -317,7 +317,7 @@ def is_nearest(values: np.ndarray, enclosure: Enclosure, rows: np.ndarray) -> np
 
 
 def distances(values: np.ndarray, enclosure: Enclosure, rows: np.ndarray) -> np.ndarray:
-    """Bounds of |value - exact value|, shape (rows, names); arguments as in `is_nearest`."""
+    """Bound |value - exact value|, shape (rows, names); arguments as in `is_nearest`."""
     # the factor covers the roundings of these operations, far fewer than 30 of 2^-53 each
     beside = np.abs((values - enclosure.high[rows]) - enclosure.low[rows])
     return (beside + enclosure.radius[rows]) * (1 + 2.0**-48)
@@ -367,7 +367,7 @@ class ProvenReference:
 
 
 def methods_of(fmu: Fmu, chosen: str | None = None) -> list[str]:
-    """Methods of integration of an FMU, or the chosen one; UserError if it is not one of them."""
+    """List the methods of integration of an FMU, or the chosen one; UserError if it has none."""
     variable = fmu.model.variables.get(METHOD)
     known = list(variable.items) if variable is not None else []
     if chosen is not None and chosen not in known:
@@ -376,7 +376,7 @@ def methods_of(fmu: Fmu, chosen: str | None = None) -> list[str]:
 
 
 def tolerance_of(method: str, tolerance: float) -> float:
-    """The relative tolerance that a method integrates at if asked for one."""
+    """Return the relative tolerance that a method integrates at if asked for one."""
     return max(tolerance, SMALLEST_TOLERANCES.get(method, 0.0))
 
 
@@ -388,7 +388,7 @@ def error_bounds(
     tolerance: float,
     progress: Callable[[int], object] | None = None,
 ) -> np.ndarray:
-    """Proven errors in a run, (communication points, names of the enclosure), in their units."""
+    """Bound the errors in a run, (communication points, names), in the names' units."""
     run = replace(
         scenario,
         parameters=scenario.parameters | {METHOD: fmu.model.variables[METHOD].items[method]},
@@ -402,7 +402,7 @@ def error_bounds(
 def errors_of_run(
     scenario: Scenario, result: Result, most_steps: int = MOST_STEPS
 ) -> Mapping[str, ProvenError] | None:
-    """Proven errors of a run at the points that were recorded; None: nothing is proven.
+    """Bound the errors of a run at the points that were recorded; None: nothing is proven.
 
     That is so of models without a prover, where the proof does not come to the end, and of
     scenarios of more than `most_steps` communication steps or that take more than `SECONDS`.
@@ -426,7 +426,7 @@ def errors_of_run(
 def largest_errors(
     errors: np.ndarray, enclosure: Enclosure, rows: np.ndarray | None = None
 ) -> dict[str, ProvenError]:
-    """Largest proven errors of all variables of an enclosure, by name.
+    """Return the largest proven errors of all variables of an enclosure, by name.
 
     Parameters
     ----------
@@ -445,7 +445,7 @@ def largest_errors(
 
 
 def proven_reference(fmu: Fmu, scenario: Scenario, enclosure: Enclosure) -> ProvenReference:
-    """How good the reference of a scenario is, in all columns; UserError if it has none."""
+    """Prove the error of a scenario's reference, in all columns; UserError if it has none."""
     expected = comparison.load_reference(scenario, fmu.model)
     rows = scenario.reference_rows
     around = enclosure.of(expected.names)

@@ -33,7 +33,7 @@ class RunTable:
     def row(
         self, name: str, tolerance: float, runs: Sequence[Run], failures: Iterable[str]
     ) -> None:
-        """Runs of one scenario; `failures` says of others why they have not come to their end."""
+        """Print a scenario's runs, and why others have not come to their end (`failures`)."""
         first = next((run for run in runs if run.result.tolerance == tolerance), None)
         tight = next((run for run in runs if run.result.tolerance == TIGHTEST), None)
         cells = [
@@ -55,7 +55,7 @@ def _error(run: Run | None) -> str:
 
 
 def _count(number: int) -> str:
-    """A count in at most six characters: 1234567 as 1.23M."""
+    """Write a count in at most six characters: 1234567 as 1.23M."""
     return str(number) if number < 1_000_000 else f"{number / 1e6:.3g}M"
 
 
@@ -109,13 +109,13 @@ class VariantTable:
             console.remark(f"error {short(outcome.error, 1)} of {outcome.worst}, {bound}")
 
     def failed(self, name: str) -> None:
-        """A variant that a component did not finish."""
+        """Print a variant that a component did not finish."""
         self._table.row(name, [NONE] * (2 + len(self._measures)), verdict(False))
         console.remark("did not run to its end")
 
 
 def _seven_digits(value: float) -> str:
-    """A number of at most seven characters, unless it is very large or small."""
+    """Write a number in at most seven characters, unless it is very large or small."""
     return f"{value:.0f}" if 1000 <= abs(value) < 1e6 else f"{value:.3g}"
 
 
@@ -157,7 +157,7 @@ class Done:
 
 
 def document(done: Done) -> dict[str, object]:
-    """Each scenario with its runs and its sweep, and the studies."""
+    """Return each scenario with its runs and its sweep, and the studies."""
     return {
         "scenarios": [_scenario(done, scenario) for scenario in (*done.chosen, *done.own)],
         "convergence": [_study(study) for study in done.studies],

@@ -27,12 +27,12 @@ BUILT = SHARE / "built.tar.xz"
 
 
 def names() -> list[str]:
-    """All files, as VERSION OF FMI/NAME."""
+    """Return all files, as VERSION OF FMI/NAME."""
     return list(_files())
 
 
 def file(name: str, cache: Path) -> Path:
-    """A file of the release in `cache`; UserError if it cannot be written or is damaged."""
+    """Return a file of the release in `cache`; UserError if it cannot be written or is damaged."""
     entry = _files()[name]
     path = cache / entry["sha256"][:16] / PurePosixPath(name).name
     try:
@@ -49,7 +49,7 @@ def file(name: str, cache: Path) -> Path:
 
 @functools.cache
 def unpacked(archive: Path, cache: Path) -> Path:
-    """The folder below `cache` with an archive's files; UserError if one cannot be written."""
+    """Unpack an archive into a folder below `cache`; UserError if it cannot be written."""
     try:
         content = archive.read_bytes()
         folder = cache / _digest(content)[:16]

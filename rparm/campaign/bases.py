@@ -63,7 +63,7 @@ class Base(ABC):
     def components(
         self, read: Sequence[tuple[int, str]], fixed: Mapping[tuple[int, str], Value]
     ) -> list[Component]:
-        """The components, which read Real variables `read` and start from values `fixed`."""
+        """Return the components, which read Real variables `read` and start from values `fixed`."""
 
     @property
     @abstractmethod
@@ -78,14 +78,17 @@ class Base(ABC):
         return reals, HeldInputs.of(self._switches, count, np.int32)
 
     def variable(self, name: str) -> tuple[int, Variable]:
-        """A variable and the number of its component; WrongValueError if there is none."""
+        """Return a variable and the number of its component; WrongValueError if there is none."""
         if name not in self._variables:
             guess = did_you_mean(name, self._variables)
             raise WrongValueError(f"the {self.KIND} has no variable {name!r}{guess}")
         return self._variables[name]
 
     def settable(self, name: str) -> tuple[int, Variable]:
-        """A variable that a run may start from; WrongValueError if there is none of that name."""
+        """Return a variable that a run may start from.
+
+        WrongValueError if there is none of that name.
+        """
         component, variable = self.variable(name)
         if not variable.can_start:
             raise WrongValueError(f"{name!r} is not a parameter or the start value of a state")
@@ -103,7 +106,7 @@ class Base(ABC):
         return [f"{start}{x}" for start, model in self._models.items() for x in model.real_outputs]
 
     def states(self) -> list[str]:
-        """Names of the continuous states that are outputs."""
+        """Return the names of the continuous states that are outputs."""
         found = [f"{prefix}{x}" for prefix, model in self._models.items() for x in model.states]
         return [name for name in found if name in self.real_outputs()]
 
@@ -124,14 +127,14 @@ class ScenarioBase(Base):
             (self._switches if column.dtype == bool else self._reals)[name] = column
 
     def settable(self, name: str) -> tuple[int, Variable]:
-        """Also an input, which then is constant."""
+        """Find a variable to set; also an input, which then is constant."""
         component, variable = self.variable(name)
         if variable.is_a(INPUTS) and variable.type == "Real":
             return component, variable
         return super().settable(name)
 
     def hold(self, name: str, value: float) -> int:
-        """Column of a held input, which is `value` throughout from now on."""
+        """Return the column of a held input, which is `value` throughout from now on."""
         self._reals[name] = np.full(len(self.times), value)
         return list(self._reals).index(name)
 
@@ -166,14 +169,14 @@ class ScenarioBase(Base):
         return own | self._scenario.logs
 
     def derivatives(self) -> list[tuple[int, int]]:
-        """Value references of each state's derivative and of the state."""
+        """Return the value references of each state's derivative and of the state."""
         if not self._model.gives_directional_derivatives:
             raise WrongValueError("the FMU gives no directional derivatives")
         found = [x.variable for x in describe(self.path).description.derivatives]
         return [(v.valueReference, v.derivative.valueReference) for v in found]
 
     def discrete_outputs(self, kind: str) -> list[int]:
-        """Value references of the discrete outputs of a type, "Real" or "Integer"."""
+        """Return the value references of the discrete outputs of a type, "Real" or "Integer"."""
         return [
             v.reference
             for v in self._model.variables.values()
@@ -200,7 +203,7 @@ class SystemBase(Base):
         self._fed = {f"{c.end_component}.{c.end_connector}" for c in self._system.connections}
 
     def settable(self, name: str) -> tuple[int, Variable]:
-        """Also an input that nothing feeds, which then is constant."""
+        """Find a variable to set; also an input that nothing feeds, which then is constant."""
         component, variable = self.variable(name)
         if variable.is_a(INPUTS) and variable.type == "Real" and name not in self._fed:
             return component, variable
@@ -268,7 +271,7 @@ def _sha256(content: bytes) -> str:
 def opened(
     campaign: Campaign, given: Path | None, where: Path = Path("campaign")
 ) -> Iterator[Base]:
-    """The scenario or system of a campaign, on its own FMU or SSP, or on that which is `given`."""
+    """Open the scenario or system of a campaign, on its own FMU or SSP, or on the `given` one."""
     times = campaign.time.model_dump(exclude_none=True)
     if campaign.scenario is not None:
         with _said_of(where):
@@ -297,7 +300,7 @@ def opened(
 
 
 def _system_file(name: str, where: Path) -> Path:
-    """The SSP of a system of the project, or a file beside the campaign's."""
+    """Return the SSP of a system of the project, or a file beside the campaign's."""
     if Path(name).suffix.lower() == ".ssp":
         return where.parent / name
     folders = project.systems()
@@ -315,7 +318,7 @@ def _said_of(where: object) -> Iterator[None]:
 
 
 def _system_times(opened: Ssp, given: Mapping[str, float]) -> np.ndarray:
-    """Communication points (n + 1,) of a system in s, each computed from its number."""
+    """Return the communication points (n + 1,) of a system in s, each computed from its number."""
     system = opened.system
     start = given.get("start", system.start)
     stop, step = given.get("stop", system.stop), given.get("step", system.step)
@@ -331,7 +334,10 @@ def _system_times(opened: Ssp, given: Mapping[str, float]) -> np.ndarray:
 
 
 def in_si(campaign: Campaign, base: Base, where: object) -> Campaign:
-    """The campaign with numbers for values with units; UserError, at `where`, if one is wrong."""
+    """Return the campaign with numbers for values with units.
+
+    UserError, at `where`, if one is wrong.
+    """
     converter = _Converter(base, where)
     content = campaign.model_dump(exclude_unset=True)
     for name, distribution in content["parameters"].items():
@@ -358,7 +364,7 @@ def in_si(campaign: Campaign, base: Base, where: object) -> Campaign:
 
 
 def questions(campaign: Campaign, base: Base) -> Iterator[str]:
-    """Questions about start values: angles without a unit beyond one turn."""
+    """Ask about start values that are angles without a unit beyond one turn."""
     given = {name: (f"[set] {name}", [value]) for name, value in campaign.set.items()}
     for name, distribution in campaign.parameters.items():
         values = distribution.numbers[: 1 if distribution.kind == "normal" else None]
@@ -378,14 +384,14 @@ class _Converter:
         self._base, self._where = base, where
 
     def is_real(self, name: str) -> bool:
-        """Whether it is a variable of type Real; others take texts that are no numbers."""
+        """Return whether it is a variable of type Real; others take texts that are no numbers."""
         try:
             return self._base.variable(name)[1].type == "Real"
         except WrongValueError:  # refused later
             return False
 
     def number(self, given: Any, name: str, place: str, is_difference: bool = False) -> Any:
-        """What is given for a variable: a text with a unit as a number."""
+        """Convert a given value: a text with a unit becomes a number."""
         if not isinstance(given, str):
             return given
         with placed(f"{self._where}: {place}: without a variable no unit"):

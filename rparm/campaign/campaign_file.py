@@ -189,7 +189,7 @@ class Campaign(_Table):
         return -(-self.count // self.block)
 
     def block_range(self, block: int) -> range:
-        """Numbers of the runs of a block."""
+        """Return the numbers of the runs of a block."""
         return range(block * self.block, min((block + 1) * self.block, self.count))
 
     @property
@@ -248,7 +248,7 @@ class Campaign(_Table):
 
 
 def grid_value(distribution: Distribution, index: int) -> float:
-    """Value of a parameter on a grid; both limits are among them if there are two or more."""
+    """Return the value of a parameter on a grid; of two or more, limits are among them."""
     if distribution.kind == "values":
         return distribution.values[index]
     low, high = distribution.numbers
@@ -266,7 +266,10 @@ def read(path: Path) -> Campaign:
 
 
 def checked(content: Mapping[str, Any], where: object) -> Campaign:
-    """A campaign of its content; UserError if anything in it is wrong, beginning with `where`."""
+    """Return a campaign of its content.
+
+    UserError if anything in it is wrong, beginning with `where`.
+    """
     try:
         return Campaign.model_validate(content)
     except ValidationError as error:
@@ -284,7 +287,7 @@ EXPECTED = {
 
 
 def _explained(error: ValidationError) -> str:
-    """The first mistake in one line: where, what is expected, what is there."""
+    """Explain the first mistake in one line: its place, what is expected, what is there."""
     first = error.errors()[0]
     # what pydantic adds to say which member of a union it tried
     place = [x for x in first["loc"] if x not in ("float", "bool", "str", "constrained-float")]
@@ -311,7 +314,7 @@ def _where(place: list[int | str]) -> str:
 
 
 def _keys(place: list[int | str]) -> list[str]:
-    """Known keys of the table that an unknown key stands in."""
+    """Return the known keys of the table that an unknown key stands in."""
     tables = {
         "parameters": Distribution,
         "time": Time,

@@ -179,7 +179,7 @@ class Engine:
     def _fill(
         self, waiting: Iterator[int], tasks: as_completed, under_way: dict[str, _Block]
     ) -> None:
-        """Submit blocks until enough are under way, also for workers that have come later."""
+        """Submit blocks until enough are under way for all workers, later ones too."""
         ahead = AHEAD * max(self._threads, 1)
         for number in islice(waiting, max(ahead - len(under_way), 0)):
             runs = self._campaign.block_range(number)
@@ -195,7 +195,7 @@ class Engine:
         return future
 
     def _rows(self, future: Future, block: _Block) -> Rows:
-        """Results of a task; run by run if it has killed too many workers."""
+        """Return the results of a task; run by run if it has killed too many workers."""
         if future.status == "finished":
             return future.result()
         error = self._error(future)
@@ -205,7 +205,7 @@ class Engine:
         return _joined([self._alone(run, point[None]) for run, point in pairs])
 
     def _alone(self, run: int, point: np.ndarray) -> Rows:
-        """One run as a task; a failed row if it kills workers."""
+        """Submit one run as a task; return a failed row if it kills workers."""
         try:
             return self._submit([run], point).result()
         except KilledWorker:
@@ -219,7 +219,7 @@ class Engine:
 
 
 def _is_of_connection(error: Exception) -> bool:
-    """Whether an error is of Dask's connections: errors of the system have numbers, too."""
+    """Return whether an error is of Dask's connections: errors of the system have numbers, too."""
     return isinstance(error, CONNECTION) and not getattr(error, "errno", None)
 
 
@@ -243,7 +243,7 @@ def opened_cluster(
     security: Security | None = None,
     dashboard: bool = False,
 ) -> Iterator[Client]:
-    """A cluster's client; UserError if the scheduler cannot be reached.
+    """Return a cluster's client; UserError if the scheduler cannot be reached.
 
     Without the address of a scheduler that runs elsewhere, and certificates for it, the cluster is
     made on this machine: `workers` processes, by default one per core, with their files in
@@ -360,7 +360,7 @@ def _keep_workers(made: SpecCluster, count: int) -> None:
 def security_for(
     address: str, ca: Path | None, cert: Path | None, key: Path | None
 ) -> Security | None:
-    """What a client of the scheduler at `address` needs; None for one without certificates.
+    """Return the TLS settings of a client of the scheduler at `address`; None without certificates.
 
     Files in PEM form: the certificate of the authority that signs all others, and the client's own
     with its private key; without them, those of Dask's configuration. UserError if they do not fit

@@ -41,7 +41,7 @@ class Measure:
     options: tuple[float, ...] = ()
 
     def value(self, recorded: Recorded, columns: Sequence[int]) -> float:
-        """The number; `columns` of the variables, in `values` or `integers`."""
+        """Return the number; `columns` of the variables, in `values` or `integers`."""
         times, rows = recorded.times, recorded.values
         if self.kind == LYAPUNOV:
             return _log_sum(recorded.growth) / (times[-1] - times[0])
@@ -70,18 +70,18 @@ class Measure:
 
 
 def plain(kind: str, variable: str) -> Measure:
-    """One of `PLAIN` of a variable."""
+    """Measure one of `PLAIN` of a variable."""
     return Measure(f"{kind}({variable})", (variable,), kind)
 
 
 def final_integer(variable: str) -> Measure:
-    """Value of an Integer at the end."""
+    """Measure the value of an Integer at the end."""
     return Measure(f"final({variable})", (variable,), FINAL_INTEGER)
 
 
 @njit(cache=True, nogil=True)
 def _integral(times, values):
-    """Integral over time by the trapezoidal rule."""
+    """Integrate over time by the trapezoidal rule."""
     total = 0.0
     for i in range(len(times) - 1):
         total += 0.5 * (times[i + 1] - times[i]) * (values[i] + values[i + 1])
@@ -90,13 +90,13 @@ def _integral(times, values):
 
 @njit(cache=True, nogil=True)
 def _rms(times, values):
-    """Root of the mean square over time."""
+    """Return the root of the mean square over time."""
     return np.sqrt(_integral(times, values * values) / (times[-1] - times[0]))
 
 
 @njit(cache=True, nogil=True)
 def _distance(rows, first, second):
-    """Distance (n + 1,) of the points whose coordinates are the columns `first` and `second`."""
+    """Return the distance (n + 1,) of points whose coordinates are columns `first` and `second`."""
     result = np.empty(len(rows))
     for i in range(len(rows)):
         total = 0.0
@@ -109,7 +109,7 @@ def _distance(rows, first, second):
 
 @njit(cache=True, nogil=True)
 def _settling(times, values, target, band):
-    """Time since the start from which on values stay within the band; NaN: they end outside."""
+    """Return the time since the start after which values stay in the band; NaN if none do."""
     for i in range(len(values) - 1, -1, -1):
         if not abs(values[i] - target) <= band:
             return times[i + 1] - times[0] if i + 1 < len(values) else np.nan
@@ -118,7 +118,7 @@ def _settling(times, values, target, band):
 
 @njit(cache=True, nogil=True)
 def _crossings(values, level):
-    """How often the level is crossed upwards."""
+    """Count how often the level is crossed upwards."""
     count = 0
     for i in range(len(values) - 1):
         if values[i] < level <= values[i + 1]:
@@ -128,7 +128,7 @@ def _crossings(values, level):
 
 @njit(cache=True, nogil=True)
 def _log_sum(growth):
-    """Sum of the logarithms; factors are multiplied as far as they go, which rounds less."""
+    """Sum the logarithms; factors are multiplied as far as they go, which rounds less."""
     total, product = 0.0, 1.0
     for factor in growth:
         product *= factor
@@ -161,7 +161,7 @@ class HeldInputs:
 
     @staticmethod
     def of(inputs: Mapping[str, np.ndarray], count: int, kind: type) -> "HeldInputs":
-        """Inputs by name, (count,) each."""
+        """Return inputs by name, (count,) each."""
         columns = [values.astype(kind) for values in inputs.values()]
         rows = np.column_stack(columns) if columns else np.zeros((count, 0), kind)
         return HeldInputs(tuple(inputs), np.ascontiguousarray(rows))

@@ -84,20 +84,20 @@ class Index:
 
 
 def quantiles(values: np.ndarray) -> list[float]:
-    """Quantiles of the numbers in `values`, (runs,); NaN if there are none."""
+    """Return the quantiles of the numbers in `values`, (runs,); NaN if there are none."""
     numbers = values[np.isfinite(values)]
     return np.quantile(numbers, QUANTILES).tolist() if len(numbers) else [np.nan] * len(QUANTILES)
 
 
 def worst(values: np.ndarray) -> list[int]:
-    """Numbers of the runs with the largest of `values`, (runs,), the largest first."""
+    """Return the numbers of the runs with the largest of `values`, (runs,), the largest first."""
     numbers = np.flatnonzero(np.isfinite(values))
     order = np.argsort(-values[numbers], kind="stable")
     return numbers[order[:WORST]].tolist()
 
 
 def failures(reasons: Iterable[str]) -> list[Failure]:
-    """Reasons of the runs that failed, the most frequent first."""
+    """Count the reasons of failed runs, the most frequent first."""
     counts: Counter[str] = Counter()
     firsts: dict[str, tuple[str, int]] = {}
     for run, reason in enumerate(reasons):
@@ -110,13 +110,13 @@ def failures(reasons: Iterable[str]) -> list[Failure]:
 
 
 def saltelli_groups(campaign: Campaign, values: np.ndarray) -> np.ndarray:
-    """Rows of runs (groups, parameters + 2) that belong together, without incomplete ones."""
+    """Return rows of runs (groups, parameters + 2) that belong together, all complete."""
     rows = values.reshape(-1, len(campaign.parameters) + 2)
     return rows[np.isfinite(rows).all(axis=1)]
 
 
 def sobol_indices(campaign: Campaign, values: np.ndarray) -> list[Index]:
-    """First-order and total Sobol' indices of `values`, (runs,); none if too few runs have any."""
+    """Estimate first-order and total Sobol' indices of `values`, (runs,), if runs suffice."""
     rows = saltelli_groups(campaign, values)
     if len(rows) < 2 or np.ptp(rows) == 0:
         return []
@@ -182,7 +182,7 @@ class Page:
         return Command(f"{self.again} --replay {run}")
 
     def drawn(self, columns: Iterable[str]) -> tuple[list[str], str]:
-        """Columns that fit into a picture, and a note on the others."""
+        """Return the columns that fit into a picture, and a note on the others."""
         columns = list(columns)
         left = columns[DRAWN:]
         text = (
@@ -193,7 +193,7 @@ class Page:
     # ---- Distributions ---------------------------------------------------------------------------
 
     def distributions(self) -> Table | None:
-        """Table and picture; None if no run has a value."""
+        """Return table and picture; None if no run has a value."""
         there = [name for name, values in self.kept.items() if np.isfinite(values).any()]
         if not there:
             return None
@@ -208,7 +208,7 @@ class Page:
         return Table("Distributions", head, rows, note)
 
     def missing(self) -> list[str]:
-        """Which columns have no value in runs that did not fail."""
+        """Say which columns have no value in runs that did not fail."""
         texts = []
         for measure in self.job.measures:
             count = _lacking(self.kept[measure.column]) - self.failed
@@ -226,7 +226,7 @@ class Page:
         return {name: rows for name, rows in found.items() if rows}
 
     def indices_table(self, found: Mapping[str, list[Index]]) -> Table | None:
-        """Table and picture; None if there are none."""
+        """Return table and picture; None if there are none."""
         if not found:
             return None
         drawn, note = self.drawn(found)
@@ -247,7 +247,7 @@ class Page:
         return Table("Sobol' indices", head, rows, note)
 
     def doubts(self, found: Mapping[str, list[Index]]) -> list[str]:
-        """Warnings about the indices."""
+        """Warn about indices that say little."""
         if self.campaign.sampling != "indices":
             return []
         texts = []
@@ -295,7 +295,7 @@ class Page:
         return Table("Failed runs", head, rows, note)
 
     def map(self, number: int) -> tuple[object, list[str], int]:
-        """A map as its file says, its labels, and the number of runs that are drawn."""
+        """Draw a map as its file says; return it, its labels, and the number of runs in it."""
         drawn = self.campaign.maps[number]
         names = (drawn.colour, drawn.x, drawn.y)
         columns = [self.table[name] for name in (drawn.x, drawn.y, drawn.colour)]
@@ -318,7 +318,7 @@ def _lacking(values: np.ndarray) -> int:
 
 
 def distributions_figure(table: Mapping[str, np.ndarray]) -> Figure:
-    """Histograms of columns, (runs,) each, by their labels."""
+    """Draw histograms of columns, (runs,) each, by their labels."""
     rows = math.ceil(len(table) / COLUMNS)
     with mpl.rc_context(TEXTS):
         figure = Figure(figsize=(11, 2.6 * rows), layout="constrained")
@@ -331,7 +331,7 @@ def distributions_figure(table: Mapping[str, np.ndarray]) -> Figure:
 
 
 def _histogram(axes: Axes, values: np.ndarray, label: str) -> None:
-    """A histogram of one number or more; a text if they do not vary, or too much to be drawn."""
+    """Draw a histogram, or write a text if the numbers do not vary, or too much to be drawn."""
     smallest, largest = float(values.min()), float(values.max())
     if 0 < largest - smallest < math.inf:
         values, label = _centred(values, label)
@@ -349,7 +349,7 @@ def _histogram(axes: Axes, values: np.ndarray, label: str) -> None:
 
 
 def _centred(values: np.ndarray, label: str) -> tuple[np.ndarray, str]:
-    """Values as differences from one of them, rounded, if they vary little; and their label."""
+    """Return the label and values; rounded differences from one value if they vary little."""
     there = values[np.isfinite(values)]
     middle = float(np.median(there))
     spread = float(np.max(there) - np.min(there))
@@ -362,12 +362,12 @@ def _centred(values: np.ndarray, label: str) -> tuple[np.ndarray, str]:
 
 
 def _tick(value: float, _: int) -> str:
-    """A number with its exponent, for which there is no room at the end of a short axis."""
+    """Write a number with its exponent, for which there is no room at the end of a short axis."""
     return minus(f"{value:g}")
 
 
 def indices_figure(found: Mapping[str, Sequence[Index]]) -> Figure:
-    """Sobol' indices of columns as bars, with their confidence intervals, by their labels."""
+    """Draw Sobol' indices of columns as bars, with their confidence intervals, by their labels."""
     with mpl.rc_context(TEXTS):
         figure = Figure(figsize=(11, 2.8 * len(found)), layout="constrained")
         axes = figure.subplots(len(found), 1, squeeze=False)[:, 0]
@@ -399,7 +399,7 @@ def indices_figure(found: Mapping[str, Sequence[Index]]) -> Figure:
 def heat_map_figure(
     labels: Sequence[str], x: np.ndarray, y: np.ndarray, colour: np.ndarray
 ) -> Figure:
-    """Columns (runs,): cells where x and y form a grid, else points; of complete runs only."""
+    """Draw columns (runs,) of complete runs: cells where x and y form a grid, else points."""
     there = np.isfinite([x, y, colour]).all(axis=0)
     with mpl.rc_context(TEXTS):
         figure = Figure(figsize=(10, 7), layout="constrained")

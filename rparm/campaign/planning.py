@@ -43,7 +43,7 @@ SMALLEST = 2.0**-54  # a normal distribution is cut there, where its values are 
 
 
 def plan(campaign: Campaign, base: Base, where: object, also: Sequence[str] = ()) -> Job:
-    """The job of a campaign, which records `also`, too; UserError, at `where`, for a mistake."""
+    """Return the job, which records `also`, too; UserError, at `where`, for a mistake."""
     return _Planner(campaign, base, where).job(also)
 
 
@@ -102,7 +102,7 @@ class _Planner:
     # ---- Values that are set -----------------------------------------------------------------
 
     def targets(self) -> dict[str, Target]:
-        """Where each parameter and derived value goes that is a variable."""
+        """Return the variables that parameters and derived values go to."""
         campaign = self.campaign
         used = set().union(*(e.names for e in campaign.expressions.values()))
         targets = {}
@@ -130,14 +130,14 @@ class _Planner:
         return targets
 
     def constant(self, expression: Expression, constants: Mapping[str, float], place: str) -> float:
-        """Value of an expression that is the same in all runs."""
+        """Return the value of an expression that is the same in all runs."""
         try:
             return expression.value(constants)
         except (ArithmeticError, ValueError) as error:
             self.fail(place, f"has no value: {one_line(error)}")
 
     def settable(self, name: str, place: str, used: bool) -> tuple[int, Variable] | None:
-        """The variable; None for a name that is no variable, but `used` by an expression."""
+        """Return the variable; None for a name that is no variable, but `used` by an expression."""
         try:
             self.base.variable(name)
         except WrongValueError as error:
@@ -188,7 +188,7 @@ class _Planner:
                     model.check_tolerance(number, component.values)
 
     def fixed(self) -> dict[tuple[int, str], Value]:
-        """Section [set]."""
+        """Check section [set]."""
         result: dict[tuple[int, str], Value] = {}
         for name, given in self.campaign.set.items():
             with self.placed(f"[set] {name}"):
@@ -239,7 +239,7 @@ class _Planner:
         return variable
 
     def read(self, names: Iterable[str]) -> dict[tuple[int, str], None]:
-        """Component and name of each variable."""
+        """Return component and name of each variable."""
         found = (self.base.variable(name) for name in names)
         return {(component, variable.name): None for component, variable in found}
 
@@ -275,12 +275,12 @@ class _Planner:
 
 
 def columns_of(campaign: Campaign, measures: Sequence[Measure]) -> list[str]:
-    """Columns of the table that hold numbers."""
+    """Return the columns of the table that hold numbers."""
     return [*campaign.parameters, *campaign.derived, *(measure.column for measure in measures)]
 
 
 def units(campaign: Campaign, base: Base, measures: Iterable[Measure]) -> dict[str, str]:
-    """Units of the columns of numbers; empty if a column has none, or it is unknown."""
+    """Return the units of the columns of numbers; empty if a column has none, or it is unknown."""
 
     def of(name: str) -> str:
         try:
@@ -306,7 +306,7 @@ def units(campaign: Campaign, base: Base, measures: Iterable[Measure]) -> dict[s
 
 
 def constants(campaign: Campaign, base: Base) -> dict[str, float]:
-    """Numbers that a campaign's expressions may name: the start values of all its variables."""
+    """Return the start values of all variables, which a campaign's expressions may name."""
     known = base.start_values() | campaign.set
     return {
         name: float(value)
@@ -324,7 +324,7 @@ class Sampler:
         self._distributions = list(campaign.parameters.values())
 
     def points(self, runs: range) -> np.ndarray:
-        """Values of the parameters of consecutive runs, (runs, parameters)."""
+        """Return the values of the parameters of consecutive runs, (runs, parameters)."""
         if self._campaign.sampling == "grid":
             return self._grid(runs)
         cube = self._cube(runs)
@@ -332,14 +332,14 @@ class Sampler:
         return np.column_stack(columns)
 
     def _grid(self, runs: range) -> np.ndarray:
-        """The last parameter changes fastest."""
+        """Return points of a grid: the last parameter changes fastest."""
         sizes = [d.size for d in self._distributions]
         indices = np.unravel_index(np.arange(runs.start, runs.stop), sizes)
         axes = zip(self._distributions, indices, strict=True)
         return np.column_stack([[grid_value(d, i) for i in axis.tolist()] for d, axis in axes])
 
     def _cube(self, runs: range) -> np.ndarray:
-        """Points of the unit cube, (runs, parameters)."""
+        """Draw points of the unit cube, (runs, parameters)."""
         sampling, seed = self._campaign.sampling, self._campaign.seed
         size = len(self._distributions)
         if sampling in WHOLE:
@@ -374,13 +374,13 @@ class Sampler:
 
 
 def sampling_problem(campaign: Campaign) -> dict[str, object]:
-    """The campaign's parameters as SALib wants them: each between 0 and 1."""
+    """Return the campaign's parameters as SALib wants them: each between 0 and 1."""
     names = list(campaign.parameters)
     return {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
 
 
 def sampled_values(distribution: Distribution, probabilities: np.ndarray) -> np.ndarray:
-    """Values of a distribution at `probabilities`, (n,)."""
+    """Return the values of a distribution at `probabilities`, (n,)."""
     numbers = distribution.numbers
     match distribution.kind:
         case "uniform":
@@ -405,7 +405,7 @@ class Points:
         self.names = [*self._parameters, *self._expressions]
 
     def of(self, runs: range) -> np.ndarray:
-        """Values (runs, names); NaN where an expression is not defined."""
+        """Return values (runs, names); NaN where an expression is not defined."""
         given = self._sampler.points(runs)
         if not self._expressions:
             return given
@@ -423,5 +423,5 @@ class Points:
         return result
 
     def targets(self, points: np.ndarray, job: Job) -> np.ndarray:
-        """Columns of `points` that go to the job's targets, in their order."""
+        """Return the columns of `points` that go to the job's targets, in their order."""
         return points[:, [self.names.index(name) for name, _ in job.targets]]

@@ -78,7 +78,7 @@ class Results:
 
     @contextmanager
     def workers_folder(self) -> Iterator[Path]:
-        """Folder for the files of workers on this machine, which is removed at the end."""
+        """Make a folder for the files of workers on this machine; it is removed at the end."""
         folder = self.folder.absolute() / WORKERS.format(os.getpid())
         try:
             str(folder).encode()
@@ -164,7 +164,7 @@ class Results:
         return self.folder / BLOCKS / f"block_{block:0{DIGITS}d}.parquet"
 
     def missing(self) -> list[int]:
-        """Blocks that are still to be run: missing or damaged ones, trajectories included."""
+        """Return the blocks that are missing or damaged, trajectories included."""
         return [block for block in range(self._campaign.blocks) if not self._is_there(block)]
 
     def _is_there(self, block: int) -> bool:
@@ -182,7 +182,7 @@ class Results:
         return self._read(self.trajectory_path(run), self._recorded, f"run {run}")
 
     def _read(self, path: Path, schema: pa.Schema, part: str) -> pa.Table | None:
-        """A part of the results; None if it is missing or damaged."""
+        """Read a part of the results; None if it is missing or damaged."""
         try:
             with path.open("rb") as source:  # Parquet opens no name that is not UTF-8
                 table = pq.ParquetFile(source, page_checksum_verification=True).read()
@@ -198,7 +198,7 @@ class Results:
             return None
 
     def _marked(self, table: pa.Table, part: str) -> pa.Table:
-        """A table that says what it is."""
+        """Mark a table with what it belongs to."""
         marks = {CAMPAIGN: self._hash, PART: part.encode(), SHA256: _sha256(table).encode()}
         return table.replace_schema_metadata(marks)
 
@@ -220,7 +220,7 @@ class Results:
             ) from error
 
     def trajectory_path(self, run: int) -> Path:
-        """File of a run of which everything is kept."""
+        """Return the file of a run of which everything is kept."""
         return self.folder / TRAJECTORIES / f"run_{run:0{DIGITS}d}.parquet"
 
     def _write(self, path: Path, table: pa.Table, part: str) -> None:
@@ -233,14 +233,14 @@ class Results:
     # ---- The table -------------------------------------------------------------------------------
 
     def block(self, block: int) -> pa.Table:
-        """One block; UserError if it is missing or damaged."""
+        """Read one block; UserError if it is missing or damaged."""
         table = self._block(block)
         if table is None:
             raise UserError(f"{self.block_path(block)}: is missing or damaged; {RESUMES}")
         return table
 
     def table(self, columns: Sequence[str]) -> dict[str, np.ndarray]:
-        """Columns of all runs, (runs,) each, in the order of the runs."""
+        """Read the columns of all runs, (runs,) each, in the order of the runs."""
         parts = [self.block(block).select(columns) for block in range(self._campaign.blocks)]
         whole_table = pa.concat_tables(parts)
         return {name: whole_table[name].to_numpy() for name in columns}
@@ -250,7 +250,7 @@ class Results:
         return sum(pc.sum(pc.not_equal(texts, "")).as_py() for texts in reasons)
 
     def digest(self) -> str:
-        """SHA-256 of all numbers and texts of the table, block by block."""
+        """Return the SHA-256 of all numbers and texts of the table, block by block."""
         total = hashlib.sha256(json.dumps([str(field) for field in self._schema]).encode())
         for block in range(self._campaign.blocks):
             table = self.block(block)

@@ -95,7 +95,7 @@ class Runner(AbstractContextManager["Runner"]):
     # ---- Initialization --------------------------------------------------------------------------
 
     def _initialize(self, point: np.ndarray) -> None:
-        """From new or used instances to the first communication point, outputs read."""
+        """Initialize new or used instances up to the first communication point, outputs read."""
         job = self._job
         if self._instances:
             for instance in self._instances:
@@ -166,7 +166,7 @@ class Runner(AbstractContextManager["Runner"]):
 
 @contextmanager
 def open_fmus(archives: Mapping[str, bytes], folder: Path) -> Iterator[dict[str, Fmu]]:
-    """FMUs by their hash, unpacked in a folder."""
+    """Unpack FMUs by their hash, in a folder."""
     with ExitStack() as stack:
         fmus = {}
         for digest, content in archives.items():

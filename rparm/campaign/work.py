@@ -50,7 +50,7 @@ class Work:
     results: Results
 
     def begin(self) -> list[int]:
-        """Blocks whose results are not there, after a check that they can be made and kept."""
+        """Return the blocks without results, after a check that they can be made and kept."""
         runs.check(self.job, self.base.archives, self.base.path)
         self.results.begin()
         return self.results.missing()
@@ -70,7 +70,7 @@ class Work:
         engine.run(blocks, progress)
 
     def table(self) -> dict[str, np.ndarray]:
-        """All columns of all runs, (runs,) each: parameters, what is kept, why a run failed."""
+        """Read all columns, (runs,) each: parameters, measures, reasons of failures."""
         return self.results.table([RUN, *self.results.columns, FAILURE])
 
 
@@ -81,7 +81,7 @@ def opened(
     output: Path | None = None,
     ask: Callable[[Sequence[str]], object] = lambda _: None,
 ) -> Iterator[Work]:
-    """The work of a campaign's file; UserError if anything in it is wrong.
+    """Open the work of a campaign's file; UserError if anything in it is wrong.
 
     By default, the FMU or SSP is the built one, and results go to the folder that the file names,
     or else to the project's. `ask` is called with questions to the user: values that are hardly
@@ -202,7 +202,7 @@ def _serve(connection: Connection) -> None:
 
 
 def _data(base: Base, job: Job, given: dict[str, float], record: np.ndarray) -> RunData:
-    """Plots of the states, and the motion; record: (n + 1, watched)."""
+    """Return plots of the states, and the motion; record: (n + 1, watched)."""
     outputs = dict(zip(job.watched, record.T, strict=True))
     curves = [result_curve(x, outputs[x]) for x in base.states() or list(outputs)]
     rows = thinned([curve.values for curve in curves])
@@ -217,7 +217,7 @@ def _data(base: Base, job: Job, given: dict[str, float], record: np.ndarray) -> 
 def _recorded(
     base: Base, job: Job, given: dict[str, float], outputs: dict[str, np.ndarray]
 ) -> Recorded:
-    """Outputs and inputs of each row: those of the step that ends there."""
+    """Return outputs and inputs of each row: those of the step that ends there."""
     steps = np.maximum(np.arange(len(job.times)) - 1, 0)
     inputs = {
         name: values[steps]

@@ -128,7 +128,7 @@ def do_campaign(options: argparse.Namespace) -> Ended:
 
 
 def _security(options: argparse.Namespace) -> "Security | None":
-    """Certificates for a scheduler elsewhere; refuses options of another kind of cluster."""
+    """Read certificates for a scheduler elsewhere; refuse options of another kind of cluster."""
     certificates = options.tls_ca, options.tls_cert, options.tls_key
     if options.scheduler is None:
         if any(path is not None for path in certificates):

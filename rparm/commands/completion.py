@@ -39,7 +39,7 @@ def do_completion(options: argparse.Namespace) -> Ended:
 
 
 def _all_commands() -> argparse.ArgumentParser:
-    """One parser that knows what those of all commands know."""
+    """Return one parser that knows the options of all commands."""
     whole = argparse.ArgumentParser(prog=SCRIPT)
     commands = whole.add_subparsers()
     known = _values()
@@ -57,7 +57,7 @@ def _all_commands() -> argparse.ArgumentParser:
 
 
 def _values() -> dict[str, dict[str, Any]]:
-    """How to complete a value, by the name that help has for it, after that of its command."""
+    """Map each value, by its name in help after the name of its command, to its completion."""
     variants = {
         name: comparison.reference_names(folder) for name, folder in project.systems().items()
     }

@@ -109,7 +109,7 @@ def _write(path: Path, record: Record) -> None:
 
 
 def _command(path: Path, variant: str, component: str, address: str) -> str:
-    """What steps a component on another machine, in the folder of the project there."""
+    """Write the command that steps a component in the project's folder of another machine."""
     place = project.from_root(path)
     arguments = federation.arguments(place, variant, component, address)
     return f"{KEY}={key()} {project.PROGRAM} {shlex.join(arguments)}"
@@ -129,7 +129,7 @@ def _check_names(system: Ssp, options: argparse.Namespace) -> None:
 
 
 def _master(system: Ssp, variant: str, record: Record) -> tuple[float, float]:
-    """Largest relative difference to the Jacobi master, and its time for all steps, s."""
+    """Compare with the Jacobi master: return the largest relative difference, and its time, s."""
     with system.unpacked_fmus() as fmus, Master(fmus, real_connections(system)) as master:
         times = system.system.times
         master.initialize(times[0], times[-1], system.system.parameter_sets[variant])

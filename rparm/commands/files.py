@@ -87,7 +87,7 @@ def do_new(options: argparse.Namespace) -> Ended:
 
 
 def _scenario_path(name: str) -> Path:
-    """File for a name, with or without its suffix; UserError for one that no file can have."""
+    """Return the file for a name, with or without suffix; UserError for an impossible one."""
     path = Path(name)
     if not path.name or not path.stem.strip() or name.endswith(("/", "\\")):
         raise UserError(f"{name!r} is no name for a scenario")
@@ -100,7 +100,7 @@ def _scenario_path(name: str) -> Path:
 
 
 def _usual_model() -> Path:
-    """Folder of the model that has the most scenarios."""
+    """Return the folder of the model that has the most scenarios."""
     folders = list(project.models().values())
     if not folders:
         raise UserError(f"{project.models_folder()}: has no scenarios")

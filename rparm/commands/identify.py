@@ -84,7 +84,7 @@ def do_identify(options: argparse.Namespace) -> Ended:
 
 
 def _asked(options: argparse.Namespace) -> tuple[Path, "Request", dict[str, float]]:
-    """FMU and request of the options; the parameters' true values, as far as they are known."""
+    """Return FMU and request of the options, and true values of the parameters, if known."""
     from rparm.identification.request import Request, make_demo
 
     if options.demo:
@@ -126,7 +126,7 @@ def _refuse_others(options: argparse.Namespace) -> None:
 
 
 def _fmu(given: str) -> Path:
-    """A file, or the FMU of a model of the project."""
+    """Return a file, or the FMU of a model of the project."""
     path = Path(given)
     if path.suffix.lower() == ".fmu":
         return path
@@ -147,7 +147,7 @@ def _values(option: str, given: Sequence[str]) -> dict[str, Any]:
 
 
 def _value(text: str) -> float | bool | str:
-    """A number, a truth, or a text: with a unit, or the name of an item."""
+    """Parse a number, a truth, or a text: with a unit, or the name of an item."""
     if text in ("true", "false"):
         return text == "true"
     try:

@@ -96,12 +96,12 @@ def do_prove(options: argparse.Namespace) -> Ended:
 
 
 def _has_reference(path: Path) -> bool:
-    """Whether it is the file of one of the project's scenarios, which all have references."""
+    """Return whether it is one of the project's scenarios, which all have references."""
     return path.resolve() in {file.resolve() for file in project.scenario_files().values()}
 
 
 def _reference(fmu: Fmu, scenario: Scenario, enclosure: Enclosure) -> ProvenReference:
-    """How good a scenario's reference is; prints what is wrong with it."""
+    """Check a scenario's reference; print its wrong values."""
     if enclosure.stopped is not None:
         raise UserError(f"{scenario.path}: proven up to {enclosure.stopped} s only")
     good = proof.proven_reference(fmu, scenario, enclosure)
@@ -111,7 +111,7 @@ def _reference(fmu: Fmu, scenario: Scenario, enclosure: Enclosure) -> ProvenRefe
 
 
 def _verdict(references: Collection[ProvenReference]) -> str:
-    """The last line where values are wrong: where the first one is, and how many there are."""
+    """Write the last line where values are wrong: the first one, and how many there are."""
     wrong = [value for good in references for value in good.wrong]
     count = sum(good.values - good.nearest for good in references)
     return f"failed: {wrong[0]}" + (f"; {count} values are wrong" if count > 1 else "")
@@ -124,7 +124,7 @@ def _command(options: argparse.Namespace) -> str:
 
 
 def _within(given: str | None, program: Prover, fmu: Fmu) -> dict[str, float]:
-    """By how much the start of each state may be off; those of other units are exact."""
+    """Return by how much the start of each state may be off; states of other units are exact."""
     if given is None:
         return {}
     found: dict[str, float] = {}
@@ -178,7 +178,7 @@ def _runs(
 
 
 def _references(options: argparse.Namespace) -> Ended:
-    """How good the references of all models with a prover are."""
+    """Check the references of all models with a prover."""
     check_writable(options.report)
     found: dict[str, ProvenReference] = {}
     everything, rows = {}, []

@@ -100,7 +100,7 @@ def do_run(options: argparse.Namespace) -> Ended:
 
 
 def _ended(done: Done, report: Path, page: Path) -> Ended:
-    """How the command ends, with the page to show."""
+    """Return the end of the command, with the page to show."""
     wrong = [x.scenario.name for x in (*done.runs, *done.sweeps, *done.studies) if not x.passed]
     wrong += [failure.scenario.name for failure in done.failures]
     everything = [*done.chosen, *done.own]
@@ -133,7 +133,7 @@ def _check(
 def _open(
     options: argparse.Namespace, stack: ExitStack
 ) -> tuple[list[Scenario], list[Scenario], dict[str, Fmu], dict[str, Fmu]]:
-    """Scenarios that the options name, or all; users' own; FMUs by their models; and their twins.
+    """Return scenarios of the options, or all; users' own; FMUs by their models; and their twins.
 
     An FMU is opened once, and every scenario of its model is checked against it. Without names, one
     that is given runs only the scenarios of its model. There are twins if no FMU and no version of
@@ -174,7 +174,7 @@ def _open(
 
 
 def _files(names: Sequence[str]) -> tuple[list[Path], list[Path]]:
-    """Files of the project's scenarios that are named, and users' own files, by their paths."""
+    """Return the files of named scenarios of the project, and users' own files, by their paths."""
     files: dict[Path, None] = {}
     own: dict[str, Path] = {}
     for name in dict.fromkeys(names):
@@ -192,7 +192,7 @@ def _files(names: Sequence[str]) -> tuple[list[Path], list[Path]]:
 
 
 def _named(name: str) -> Path:
-    """File of a scenario of the project; a UserError guesses what else may be meant."""
+    """Return the file of a scenario of the project; a UserError guesses another meaning."""
     known = project.scenario_files()
     if name in known:
         return known[name]
@@ -209,7 +209,7 @@ def _named(name: str) -> Path:
 
 
 def _siblings(path: Path) -> list[Path]:
-    """Files of the folder of a path that may be scenarios."""
+    """Return files of the folder of a path that may be scenarios."""
     with suppress(OSError, ValueError):  # not there, or a name that no folder has
         return [x for x in sorted(path.parent.iterdir()) if x.suffix.lower() == SUFFIX]
     return []
@@ -218,7 +218,7 @@ def _siblings(path: Path) -> list[Path]:
 def _opened(
     subjects: Mapping[str, Path], version: str, option: str, stack: ExitStack
 ) -> dict[str, Fmu]:
-    """FMUs by their models: those that scenarios name, else those in build/ of a version of FMI."""
+    """Open FMUs by their models: those that scenarios name, else those in build/ of a version."""
     return {
         name: stack.enter_context(Fmu(project.fmu_of(subject, option, version)))
         for name, subject in subjects.items()
@@ -274,7 +274,7 @@ def _one(
     label: str,
     steps: int,
 ) -> list[Run]:
-    """The run that `run` makes; none, but a failure, if the FMU does not finish it."""
+    """Return the run that `run` makes; none, but a failure, if the FMU does not finish it."""
     try:
         with Progress(label, steps) as progress:
             found = run(scenario, tolerance, progress)
@@ -304,7 +304,7 @@ def _estimated(
 
 
 def _quick(done: Sequence[Run]) -> list[Scenario]:
-    """Scenarios of `done` whose sweep takes seconds; says which ones are left out."""
+    """Return the scenarios whose sweep takes seconds; print which ones are left out."""
     slowest: dict[Scenario, float] = {}
     for run in done:
         slowest[run.scenario] = max(slowest.get(run.scenario, 0.0), run.result.wall_time)

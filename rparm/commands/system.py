@@ -67,7 +67,7 @@ def do_system(options: argparse.Namespace) -> Ended:
 
 
 def _paths(options: argparse.Namespace) -> list[Path]:
-    """The SSPs to open: the one that is given, or those that the names may be of."""
+    """Return the SSPs to open: the given one, or all that the names may be of."""
     if options.ssp:
         return [options.ssp]
     folders = project.systems()
@@ -77,7 +77,7 @@ def _paths(options: argparse.Namespace) -> list[Path]:
 
 
 def _opened(path: Path, stack: ExitStack) -> Section:
-    """The system in an SSP, with the folder that it is from."""
+    """Open the system in an SSP, with the folder that it is from."""
     unpacked = stack.enter_context(ssp.unpacked(path))
     name, folders = unpacked.system.name, project.systems()
     if name not in folders:
@@ -87,7 +87,7 @@ def _opened(path: Path, stack: ExitStack) -> Section:
 
 
 def _choose(systems: Sequence[Section], names: Sequence[str]) -> list[tuple[Section, list[str]]]:
-    """Variants to run of each system, all without names; UserError if a name is not clear."""
+    """Choose the variants to run of each system, all without names; UserError for a wrong name."""
     owners: dict[str, str] = {system.name: "a system" for system in systems}
     for system in systems:
         for variant in system.variants:

@@ -84,7 +84,7 @@ class Node:
 
 
 def in_order(roots: Iterable[Item], known: Container[Item] = ()) -> list[Item]:
-    """All below and with `roots` that are not `known`, each once, arguments first."""
+    """List all below and with `roots` that are not `known`, each once, arguments first."""
     done: dict[Item, None] = {}
     todo = [root for root in roots if root not in known][::-1]
     while todo:
@@ -97,13 +97,13 @@ def in_order(roots: Iterable[Item], known: Container[Item] = ()) -> list[Item]:
 
 
 def names(root: Node) -> frozenset[str]:
-    """Names of variables in an expression."""
+    """Return the names of variables in an expression."""
     found = {node.name for node in in_order([root]) if node.op == "name"}
     return frozenset(found.difference(CONSTANTS))
 
 
 def finite_number(given: Any) -> float:
-    """`given` as a float; ValueError says what was expected if it is not a finite number."""
+    """Return `given` as a float; ValueError says what was expected if it is not a finite number."""
     if isinstance(given, bool) or not isinstance(given, int | float):
         raise ValueError("expected a number")
     try:
@@ -163,7 +163,7 @@ class Token:
 
 
 def parse(text: str) -> Node:
-    """Tree of an expression; ExpressionError says what is wrong with it."""
+    """Parse an expression; ExpressionError says what is wrong with it."""
     parser = _Parser(_tokens(text))
     root = parser.expression(CONDITIONAL)
     if parser.token.kind != "end":
@@ -193,7 +193,7 @@ class _Parser:
         self._depth = 0
 
     def take(self) -> Token:
-        """The present token; go to the next one."""
+        """Return the current token, and go to the next one."""
         token = self.token
         self.token = next(self._tokens, token)
         return token
@@ -207,7 +207,7 @@ class _Parser:
         self.take()
 
     def expression(self, floor: int) -> Node:
-        """What stands here, up to an operator that binds less than `floor`."""
+        """Parse up to an operator that binds less than `floor`."""
         self._depth += 1
         if self._depth > DEEPEST + 1:
             raise ExpressionError(self.token.column, f"more than {DEEPEST} levels of brackets")
@@ -218,7 +218,7 @@ class _Parser:
         return left
 
     def operation(self, left: Node) -> Node:
-        """The operation whose operator stands here."""
+        """Parse the operation whose operator stands here."""
         operator = self.take()
         binding = BINDING[operator.text]
         if binding == CONDITIONAL:
@@ -262,7 +262,7 @@ class _Parser:
         return Node("number", token.column, value=value)
 
     def call(self, function: Token) -> Node:
-        """The function whose arguments stand here."""
+        """Parse the arguments of a function."""
         if function.text not in FUNCTIONS:
             known = ", ".join(FUNCTIONS)
             raise ExpressionError(function.column, f"no function {function.shown} (known: {known})")
@@ -302,7 +302,7 @@ class Expression:
         return names(self.tree)
 
     def value(self, values: Mapping[str, float]) -> float:
-        """The number for the values of the names.
+        """Return the value for the values of the names.
 
         ArithmeticError, ValueError if it is not defined or too large.
         """
@@ -313,7 +313,7 @@ class Expression:
 
 
 def parsed(text: str) -> Expression:
-    """Expression that a text writes; ValueError says what is wrong with it."""
+    """Parse and check an expression; ValueError says what is wrong with it."""
     if len(text) > LONGEST:
         raise ValueError(f"has more than {LONGEST} characters")
     tree = parse(text)
@@ -322,7 +322,7 @@ def parsed(text: str) -> Expression:
 
 
 def evaluated(root: Node, values: Mapping[str, float]) -> float:
-    """Value of a tree whose kinds are right; a branch that is not taken need not have one.
+    """Evaluate a tree whose kinds are right; a branch that is not taken need not have a value.
 
     ArithmeticError, ValueError if it has none.
     """

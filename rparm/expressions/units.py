@@ -18,12 +18,12 @@ ONE: Unit = (Fraction(0),) * len(BASE)
 
 
 def unit_of_exponents(exponents: Mapping[str, int]) -> Unit:
-    """Unit with these exponents, by base unit."""
+    """Return the unit with these exponents, by base unit."""
     return tuple(Fraction(exponents.get(base, 0)) for base in BASE)
 
 
 def times(a: Unit, b: Unit, power: Fraction = Fraction(1)) -> Unit:
-    """The product a b^power."""
+    """Return the product a b^power."""
     return tuple(x + power * y for x, y in zip(a, b, strict=True))
 
 
@@ -39,7 +39,7 @@ PRODUCT = re.compile(r"([^/()]+)(?:/(?:([^./()]+)|\(([^/()]+)\)))?")  # a.b, a/b
 
 
 def exponents(text: str) -> dict[str, int]:
-    """Exponents of the base units and rad in a product of symbols, as FMI writes it.
+    """Return the exponents of the base units and rad in a product of symbols, as FMI writes it.
 
     ValueError if it is none.
     """
@@ -65,7 +65,7 @@ for _symbol, _product in DERIVED.items():
 
 
 def shown(unit: Unit | Mapping[str, int]) -> str:
-    """A unit, or exponents, as a message names it: kg.m/s2."""
+    """Write a unit, or exponents, as a message names it: kg.m/s2."""
     exponents = unit if isinstance(unit, Mapping) else dict(zip(BASE, unit, strict=True))
     above = [f"{b}{e if e != 1 else ''}" for b, e in exponents.items() if e > 0]
     below = [f"{b}{-e if e != -1 else ''}" for b, e in exponents.items() if e < 0]
@@ -76,7 +76,7 @@ def shown(unit: Unit | Mapping[str, int]) -> str:
 
 
 def unit_of(root: Node, units: Mapping[str, Unit], expected: Unit | None = None) -> Unit:
-    """Unit of an expression whose kinds are right; 1 for a condition and for a number.
+    """Return the unit of an expression whose kinds are right; 1 for a condition and for a number.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def _power(node: Node, given: list[Unit | None]) -> Unit | None:
 
 
 def _literal(node: Node) -> Fraction | None:
-    """A number that stands in the text, perhaps with a sign."""
+    """Return a number that stands in the text, perhaps with a sign."""
     sign = 1
     while node.op == "negative":
         node, sign = node.arguments[0], -sign

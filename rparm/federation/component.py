@@ -55,7 +55,7 @@ class Part:
     system: str  # variant and SHA-256 of the SSP: those of all processes must be the same
 
     def check_same(self, other: str) -> None:
-        """UserError if the federation steps another variant, or that of another SSP."""
+        """Refuse to step with a federation of another variant, or of another SSP."""
         if other == self.system:
             return
         (here, own), (there, foreign) = self.system.rsplit(" ", 1), other.rsplit(" ", 1)
@@ -70,7 +70,7 @@ class Part:
 
 
 def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
-    """The parts of a variant, by component; UserError if it is unknown."""
+    """Return the parts of a variant, by component; UserError if it is unknown."""
     system = ssp.system
     if variant not in system.parameters:
         known = hint(variant, system.parameters, "there are")
@@ -256,7 +256,7 @@ class Silence:
         self._calls, self._looks = federate.calls, 0
 
     def too_long(self) -> bool:
-        """For each look: whether the limit is reached since the last call, or the last True."""
+        """Return at each look whether the limit is reached since the last call or True."""
         is_new = self._federate.calls != self._calls
         self._calls, self._looks = self._federate.calls, 0 if is_new else self._looks + 1
         if self._looks * POLL < self._limit:

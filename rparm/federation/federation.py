@@ -33,7 +33,7 @@ class Record:
 
 
 def arguments(ssp: Path, variant: str, component: str, address: str) -> list[str]:
-    """Of the command line, to step a component on this machine or on another one."""
+    """Return the arguments that step a component on this machine or on another one."""
     return ["federate", ssp.as_posix(), variant, component, "--broker", address]
 
 
@@ -104,7 +104,7 @@ def run(
 def _opened(
     count: int, address: str, system: str, recorder: Federate, silence: float
 ) -> Iterator[Broker]:
-    """A federation that the recorder has joined: only then may another one refuse to step it."""
+    """Open a federation that the recorder has joined, so that nobody else steps it."""
     still = Silence(recorder, silence)
 
     def work() -> Broker:
@@ -163,7 +163,7 @@ def _recorded(
 def _processes(
     commands: Mapping[str, list[str]], folder: Path
 ) -> Iterator[dict[str, subprocess.Popen]]:
-    """Processes by component, with texts in `folder`, that end as their standard input closes."""
+    """Start processes by component, texts in `folder`; they end as their input closes."""
     places = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder))
     environment = project.child_environment() | places
     processes: dict[str, subprocess.Popen] = {}
@@ -196,14 +196,14 @@ def _wait(processes: Mapping[str, subprocess.Popen]) -> None:
 
 
 def _failure(processes: Mapping[str, subprocess.Popen], folder: Path) -> UserError | None:
-    """The error of a local process, but not that the federation has ended."""
+    """Return the error of a local process, but not that the federation has ended."""
     texts = _texts(processes, folder)
     causes = (text for text in texts if ENDED not in text and ABSENT not in text)
     return next(map(UserError, causes), None)
 
 
 def _texts(processes: Mapping[str, subprocess.Popen], folder: Path) -> list[str]:
-    """What processes that have failed say last."""
+    """Return the last texts of processes that have failed."""
     texts = []
     for component, process in processes.items():
         if process.poll() in (None, 0):

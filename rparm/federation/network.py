@@ -48,7 +48,7 @@ _is_separate = False
 
 
 def check_host_has_address() -> None:
-    """UserError where HELICS finds no address, not even 127.0.0.1: with no other one of IPv4."""
+    """Refuse a machine where HELICS finds no address, not even 127.0.0.1, as no other IPv4 one."""
     try:
         # as HELICS asks: glibc does not count loopback
         flags = socket.AI_ADDRCONFIG
@@ -61,7 +61,7 @@ def check_host_has_address() -> None:
 
 
 def free_address() -> str:
-    """An address on this machine at which nothing listens; UserError if HELICS finds none."""
+    """Find an address on this machine at which nothing listens; UserError if HELICS finds none."""
     check_host_has_address()
     with socket.socket() as probe:
         probe.bind((LOCAL, 0))
@@ -69,7 +69,7 @@ def free_address() -> str:
 
 
 def check_address(address: str) -> tuple[str, int]:
-    """Host and port; UserError for others, and for IPv6: HELICS would listen and never return."""
+    """Return host and port; UserError for others, and for IPv6: HELICS would never return."""
     found = re.fullmatch(r"tcp://([\w.-]+):([1-9]\d{0,4})", address)
     if not found or int(found[2]) > 65535 or found[1] == "0.0.0.0":
         raise UserError(f"{address!r}: expected an address as tcp://192.168.0.1:23404")
@@ -77,7 +77,7 @@ def check_address(address: str) -> tuple[str, int]:
 
 
 def check_address_is_free(address: str) -> None:
-    """UserError if no broker can listen at `address`."""
+    """Refuse an address at which no broker can listen."""
     check_host_has_address()
     refusal = _refusal_to_listen(*check_address(address))
     if refusal:
@@ -110,7 +110,7 @@ def wait_for_listener(address: str, seconds: float, say: Callable[[], object]) -
 
 
 def _refusal_to_listen(host: str, port: int) -> str:
-    """Why nothing can listen there; empty if it can."""
+    """Say why nothing can listen there; empty if it can."""
     try:
         with socket.socket() as probe:
             if os.name == "posix":  # as HELICS does: connections that have ended do not count
@@ -129,7 +129,7 @@ def _refusal_to_listen(host: str, port: int) -> str:
 
 
 def helics() -> Any:
-    """The package helics; UserError if it is not installed."""
+    """Import the package helics; UserError if it is not installed."""
     try:
         import helics as package
     except (ImportError, OSError) as error:
@@ -142,7 +142,7 @@ def helics() -> Any:
 
 
 def key() -> str:
-    """The secret that lets processes join, made if there is none; UserError if it is too weak."""
+    """Return the secret for joining, made if there is none; UserError if it is weak."""
     found = os.environ.setdefault(KEY, secrets.token_hex(16))
     if not re.fullmatch(r"[0-9A-Za-z]{16,128}", found):
         raise UserError(f"{KEY}: expected 16 to 128 letters and digits in the environment")
@@ -206,7 +206,7 @@ class Broker(AbstractContextManager["Broker"]):
         self._h.helicsBrokerGlobalError(self._broker, 1, text.encode())  # takes no str
 
     def silent(self, names: Sequence[str], to_come: Collection[str]) -> list[str]:
-        """Processes that do not answer, or else those that HELICS forgot and not `to_come`."""
+        """Return processes that do not answer, or that HELICS forgot and are not `to_come`."""
 
         def ask(name: str) -> object:
             query = self._h.helicsCreateQuery(name, "current_time")
@@ -225,7 +225,7 @@ class _Questions:
         self._threads: list[Thread] = []
 
     def answers(self, ask: Callable[[str], object], names: Sequence[str]) -> dict[str, object]:
-        """Answers of `ask` that arrive in time, by name."""
+        """Return the answers of `ask` that arrive in time, by name."""
         answers: dict[str, object] = {}
 
         def put(name: str) -> None:
@@ -296,7 +296,7 @@ class Federate:
         }
 
     def _information(self) -> Any:
-        """What HELICS needs to make the federate."""
+        """Return the settings that HELICS needs to make the federate."""
         h = self._h
         info = h.helicsCreateFederateInfo()
         h.helicsFederateInfoSetCoreTypeFromString(info, NETWORK)
@@ -314,7 +314,7 @@ class Federate:
         return info
 
     def system(self) -> str:
-        """The system that all must step, once the broker has announced it."""
+        """Return the system that all must step, once the broker has announced it."""
         with self._waiting(f"at the start {ENDED}"):
             while True:
                 answer = self._ask("global_value", SYSTEM)
@@ -338,7 +338,11 @@ class Federate:
         self._h.helicsPublicationPublishVector(self._publication, vector)
 
     def read(self) -> Mapping[str, Sequence[float]]:
-        """What sources published before the last exchange; UserError if it has not arrived."""
+        """Read the values that sources published before the last exchange.
+
+        UserError if none arrived.
+
+        """
         values = {}
         for source, place in self._subscriptions.items():
             count, *values[source] = self._h.helicsInputGetVector(place)
@@ -367,7 +371,7 @@ class Federate:
         self.exchanges += 1
 
     def begin(self) -> None:
-        """To the first communication point."""
+        """Go to the first communication point."""
         with self._waiting(f"in initialization {ENDED}"):
             self._h.helicsFederateEnterExecutingMode(self._federate)
         self.exchanges += 1

@@ -40,7 +40,7 @@ def _call(_context, function, arguments):
 
 @intrinsic
 def _place(_context):
-    """Eight bytes of the calling function's stack, all 0."""
+    """Return eight bytes of the calling function's stack, all 0."""
 
     def generate(_context, builder, _signature, _arguments):
         place = cgutils.alloca_once(builder, ir.IntType(64), zfill=True)
@@ -52,7 +52,7 @@ def _place(_context):
 # ---- Values --------------------------------------------------------------------------------------
 @njit(cache=True, nogil=True)
 def _move_booleans(row, function, references, count, values):
-    """A Boolean is an int in FMI 2.0 and a byte in FMI 3.0."""
+    """Move Booleans, which are ints in FMI 2.0 and bytes in FMI 3.0."""
     ints = carray(values, count, np.int32)
     truths = np.empty(count, np.bool_)
     for i in range(count):
@@ -91,7 +91,7 @@ def _get_boolean(row, references, count, values):
 # ---- Steps ---------------------------------------------------------------------------------------
 @cfunc(STATUS(ROW, REAL, REAL, BOOLEAN_2), cache=True)
 def _do_step(row, time, length, final):
-    """Of an instance without event mode and early return."""
+    """Step an instance without event mode and early return."""
     event, terminates, early, reached = _place(), _place(), _place(), _place()
     results = event, terminates, early, reached
     status = _call(row[DO_STEP], (row[INSTANCE], time, length, BOOLEAN_3(final), *results))

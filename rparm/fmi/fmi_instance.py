@@ -169,7 +169,7 @@ class Instance(ABC):
             self.messages.append(self._read_text((message or b"").decode(errors="replace")))
 
     def _read_text(self, text: str) -> str:
-        """A text of the FMU in one line, with the names of variables that it refers to."""
+        """Read a text of the FMU in one line, with the names of variables that it refers to."""
 
         def written(found: re.Match) -> str:
             if not found[2]:
@@ -186,7 +186,7 @@ class Instance(ABC):
         return f": {self.messages[-1]}" if self.messages else " and gave no message"
 
     def failure(self, error: FMICallException, when: str) -> UserError:
-        """What to raise after a function of the FMU failed."""
+        """Return the error to raise after a function of the FMU failed."""
         self._status = error.status
         known = error.status in range(len(STATUS_NAMES))
         name = STATUS_NAMES[error.status] if known else str(error.status)
@@ -204,7 +204,7 @@ class Instance(ABC):
 
     @contextmanager
     def explained_early(self) -> Iterator[None]:
-        """The same in initialization mode, at whose end FMUs explain which parameters are wrong."""
+        """Explain errors of initialization, at whose end FMUs say which parameters are wrong."""
         try:
             yield
         except FMICallException as error:
@@ -219,16 +219,16 @@ class Instance(ABC):
 
     @abstractmethod
     def enter_initialization(self) -> None:
-        """Into initialization mode; parameters and start values are set before."""
+        """Enter initialization mode; parameters and start values are set before."""
 
     def exit_initialization(self) -> None:
-        """To the first communication point; inputs are set before."""
+        """Go to the first communication point; inputs are set before."""
         with self.explained("in initialization"):
             self.fmi.exitInitializationMode()
         self._initialized = True
 
     def reset(self) -> None:
-        """Back to what it was when instantiated; its messages are forgotten."""
+        """Reset to the state after instantiation; messages are forgotten."""
         self.messages.clear()
         with self.explained("before the next run"):
             self.fmi.reset()
@@ -244,7 +244,7 @@ class Instance(ABC):
             raise self.failure(error, f"({name} = {value!r})") from error
 
     def integer(self, name: str) -> int | None:
-        """Value of an Integer variable; None if the FMU has none of that name."""
+        """Return the value of an Integer variable; None if the FMU has none of that name."""
         variable = self.fmu.model.variables.get(name)
         if variable is None or variable.type != "Integer":
             return None
@@ -259,17 +259,17 @@ class Instance(ABC):
             return bool(self.fmi.getBoolean([self.fmu.model.variables[name].reference])[0])
 
     def reals(self, names: Sequence[str], memory: Array | None = None) -> Reals:
-        """The Real variables `names`, to get or set together, many times, in `memory` if given."""
+        """Return Real variables to get or set together, many times, in `memory` if given."""
         values = (c_double * len(names))() if memory is None else memory
         calls = self._real_calls(self._references(names), values) if names else (no_call, no_call)
         return Reals(list(names), view(values), *calls)
 
     @abstractmethod
     def _real_calls(self, references: Array, values: Array) -> tuple[Call, Call]:
-        """Calls that get and set Real variables."""
+        """Return calls that get and set Real variables."""
 
     def output_derivatives(self, names: Sequence[str], order: int) -> OutputDerivatives:
-        """Derivatives of one order of the Real outputs `names`, to get together, many times."""
+        """Return derivatives of one order of Real outputs, to get together, many times."""
         values, numbers = doubles(len(names))
         references, orders = self._references(names), (c_int * len(names))(*[order] * len(names))
         call = self._derivative_call(references, orders, values) if names else no_call
@@ -280,7 +280,7 @@ class Instance(ABC):
         """Call that gets derivatives of Real outputs."""
 
     def partials(self, unknowns: Sequence[str], knowns: Sequence[str]) -> np.ndarray:
-        """Partial derivatives of variables by states and inputs, (unknowns, knowns)."""
+        """Return the partial derivatives of variables by states and inputs, (unknowns, knowns)."""
         variables = self.fmu.model.variables
         rows = [variables[name].reference for name in unknowns]
         found = np.zeros((len(unknowns), len(knowns)))
@@ -293,7 +293,7 @@ class Instance(ABC):
 
     @abstractmethod
     def input_polynomials(self, names: Sequence[str], order: int) -> InputPolynomials:
-        """Polynomials up to `order` for the Real inputs `names`, to set together, many times."""
+        """Return polynomials up to `order` of Real inputs, to set together, many times."""
 
     def _references(self, names: Sequence[str]) -> Array:
         variables = self.fmu.model.variables
@@ -307,19 +307,19 @@ class Instance(ABC):
 
     @abstractmethod
     def saved_state(self) -> SavedState:
-        """An empty place for a state to go back to."""
+        """Return an empty place for a state to go back to."""
 
 
 def no_call() -> None:
-    """In place of a call for no variables."""
+    """Do nothing, in place of a call for no variables."""
 
 
 def doubles(count: int) -> tuple[Array, np.ndarray]:
-    """Memory for `count` numbers, and a view of it."""
+    """Return memory for `count` numbers, and a view of it."""
     memory = (c_double * count)()
     return memory, view(memory)
 
 
 def view(memory: Array) -> np.ndarray:
-    """View of memory for numbers, (numbers,)."""
+    """View memory for numbers, (numbers,)."""
     return np.frombuffer(memory) if len(memory) else np.empty(0)

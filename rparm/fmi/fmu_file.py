@@ -102,7 +102,7 @@ def read_xml(path: Path) -> etree._ElementTree:
 
 
 def wrong_name(name: str) -> str:
-    """Why the name of a file can be no path in an archive, or nothing."""
+    """Say why the name of a file can be no path in an archive, or nothing."""
     if len(name) > LONGEST_NAME:
         return f"has a name of {len(name)} characters, expected at most {LONGEST_NAME}"
     if any(unicodedata.category(character) in CONTROL for character in name):
@@ -167,12 +167,12 @@ def _check(entries: Sequence[zipfile.ZipInfo]) -> None:
 
 
 def _leads_up(part: str) -> bool:
-    """Whether a part of a path is "..", or is so where blanks and dots at its end are dropped."""
+    """Return whether it is "..", or is so where blanks and dots at its end are dropped."""
     return len(part) > 1 and not part.strip(" .")
 
 
 def _wrong_entry(entry: zipfile.ZipInfo) -> str:
-    """Why an entry cannot be unpacked, or nothing."""
+    """Say why an entry cannot be unpacked, or nothing."""
     if stat.S_IFMT(entry.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR):
         return "is a link or a device, expected a file"
     if entry.flag_bits & ENCRYPTED:
@@ -184,7 +184,7 @@ def _wrong_entry(entry: zipfile.ZipInfo) -> str:
 
 
 def _place(name: str) -> tuple[str, ...]:
-    """Where a file is unpacked: the same for names that some system takes for the same file.
+    """Return where a file is unpacked: one place for names that are one file on some system.
 
     Windows ignores case and drops blanks and dots at the end; macOS knows one form of an accent.
     """
@@ -239,12 +239,12 @@ class Fmu(AbstractContextManager["Fmu"]):
         self._unpacked.close()
 
     def instance(self, name: str, smooth_inputs: Sequence[str] = ()) -> Instance:
-        """A new `Instance`, of the class for the FMU's kind and version."""
+        """Return a new `Instance`, of the class for the FMU's kind and version."""
         return INSTANCES[self.model.fmi_version, self.kind](self, name, smooth_inputs)
 
 
 def read_model(path: Path) -> Model:
-    """What the FMU at `path` declares; UserError if it cannot be run here."""
+    """Read the model that an FMU declares; UserError if it cannot be run here."""
     return _for_this_platform(Path(path), Path(path))[0].model
 
 
@@ -293,7 +293,7 @@ def _interface(description: ModelDescription, kind: str) -> Any:
 
 
 def _read(folder: Path, kind: str) -> ModelDescription:
-    """Model description in a folder, which fmpy reads once it is known to be one."""
+    """Read the model description in a folder, by fmpy once it is known to be one."""
     root = read_xml(folder / DESCRIPTION).getroot()
     if root.tag != "fmiModelDescription" or "fmiVersion" not in root.attrib:
         expected = "expected fmiModelDescription with an fmiVersion"
@@ -315,7 +315,7 @@ def _read(folder: Path, kind: str) -> ModelDescription:
 
 
 def _for_this_platform(path: Path, shown: Path, kind: str = CO_SIMULATION) -> tuple[Described, str]:
-    """What an FMU declares that can be run here, and the folder of its binary."""
+    """Return the description of an FMU that can be run here, and the folder of its binary."""
     with placed(shown):
         found = describe(path, kind)
     identifier = _interface(found.description, kind).modelIdentifier

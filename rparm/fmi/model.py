@@ -54,7 +54,7 @@ class Variable:
     variability: str | None = None
 
     def is_a(self, kind: str) -> bool:
-        """Whether it is one of `KINDS`."""
+        """Return whether it is one of `KINDS`."""
         if kind == INITIAL:
             return self.causality == "output" and self.initial == "exact"
         return self.causality == {PARAMETERS: "parameter", INPUTS: "input"}[kind]
@@ -66,7 +66,7 @@ class Variable:
         return self.causality == "parameter" or is_state
 
     def checked(self, given: Any) -> Value:
-        """Value to set, from what a user gives.
+        """Return the value to set, from what a user gives.
 
         That is a number, a text with a number and its unit, or the name of an Enumeration's item.
 
@@ -91,7 +91,7 @@ class Variable:
         return number
 
     def question(self, given: Any) -> str:
-        """What to ask about a start value in rad without a unit: one beyond a turn; or nothing."""
+        """Ask about a start value in rad without a unit beyond a turn; or nothing."""
         is_number = isinstance(given, int | float) and not isinstance(given, bool)
         if self.unit != ANGLE or self.initial != "exact" or not is_number or abs(given) <= TURN:
             return ""
@@ -100,7 +100,7 @@ class Variable:
         return f"{turns}, is that meant?{way_out}"
 
     def written(self, value: Value) -> Value:
-        """A value as a user gives it: an Enumeration's item by its name."""
+        """Return a value as a user gives it: an Enumeration's item by its name."""
         return next((name for name, item in self.items.items() if item == value), value)
 
     def item(self, name: Any) -> int:
@@ -160,18 +160,18 @@ class Model:
         return {v.name: v.start for v in self.variables.values() if v.start is not None}
 
     def method(self, values: Mapping[str, Value]) -> str:
-        """Method of integration by its name, with `values` for start values; "" if unknown."""
+        """Name the method of integration, with `values` for start values; "" if unknown."""
         variable = self.variables.get(METHOD)
         if variable is None or variable.start is None:
             return ""
         return str(variable.written(values.get(METHOD, variable.start)))
 
     def smallest_tolerance(self, values: Mapping[str, Value]) -> float:
-        """Smallest relative tolerance that makes a difference; 0 if none is known."""
+        """Return the smallest relative tolerance that makes a difference; 0 if none is known."""
         return SMALLEST_TOLERANCES.get(self.method(values), 0.0)
 
     def check_tolerance(self, tolerance: float, values: Mapping[str, Value]) -> None:
-        """WrongValueError if the method of these values, or of start values, cannot be so exact."""
+        """Refuse a tolerance that the method of these values, or of start values, cannot reach."""
         smallest = self.smallest_tolerance(values)
         if tolerance < smallest:
             method = self.method(values)
@@ -180,7 +180,10 @@ class Model:
             )
 
     def find(self, name: str, kind: str) -> Variable:
-        """A variable of one of `KINDS`; WrongValueError, with all of these, if it is none."""
+        """Return a variable of one of `KINDS`.
+
+        WrongValueError, with all of these, if it is none.
+        """
         variable = self.variables.get(name)
         if variable is not None and variable.is_a(kind):
             return variable
@@ -192,7 +195,7 @@ class Model:
 
 
 def described(description: ModelDescription) -> Model:
-    """Model that a description of FMI 2.0 or 3.0 declares.
+    """Return the model that a description of FMI 2.0 or 3.0 declares.
 
     Of its capabilities those for co-simulation, or for model exchange if it has no others.
 
@@ -231,7 +234,7 @@ def described(description: ModelDescription) -> Model:
 
 
 def _experiment(given: DefaultExperiment | None) -> Experiment:
-    """The default experiment of a description, without what is not finite."""
+    """Return the default experiment of a description, without what is not finite."""
     texts = given or DefaultExperiment()
 
     def number(text: str | None) -> float | None:

@@ -210,7 +210,7 @@ class Fmi3Instance(Instance):
         self._inputs = set_in_step
 
     def _update(self, _environment: int, time: float, set_requested: bool, *_: object) -> None:
-        """Called by the FMU within a step."""
+        """Set the inputs: the FMU calls this within a step."""
         if not set_requested or self._inputs is None:
             return
         try:

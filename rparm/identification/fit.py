@@ -85,7 +85,7 @@ class Problem:
     delay: float = 0.0  # s, if it is not among the parameters
 
     def predicted(self, segment: Segment, z: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Outputs (rows, outputs) as they would be measured; UserError if the FMU fails."""
+        """Predict the measured outputs (rows, outputs); UserError if the FMU fails."""
         values, delay = self.parameters.values(z), self.delay
         if DELAY in self.parameters.names:
             index = self.parameters.names.index(DELAY)
@@ -94,13 +94,13 @@ class Problem:
         return _late(segment.times, outputs, delay) if delay else outputs
 
     def residuals(self, segment: Segment, z: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Predicted minus measured, (rows that count * outputs,), row by row, in `noise`."""
+        """Return predicted minus measured in `noise`, (rows that count * outputs,), by rows."""
         rows = segment.counts
         difference = self.predicted(segment, z, x)[rows] - segment.measured[rows]
         return (difference / self.noise).ravel()
 
     def misfit(self, z: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Root mean square (outputs,) of predicted minus measured, in the outputs' units."""
+        """Return the RMS (outputs,) of predicted minus measured, in the outputs' units."""
 
         def of(i: int) -> np.ndarray:
             left = self.residuals(self.segments[i], z, x[i]).reshape(-1, len(self.noise))
@@ -110,7 +110,7 @@ class Problem:
         return self.noise * np.sqrt(np.mean(squares, axis=0))
 
     def tried(self, z: np.ndarray, x: np.ndarray, before: np.ndarray) -> tuple[float, np.ndarray]:
-        """Cost of a point, and the start states there, (segments, states).
+        """Return the cost of a point, and the start states there, (segments, states).
 
         Where the FMU refuses a start state of `x`, what it takes of the step from `before` is left:
         a joint starts at a stop, for example. The cost is the sum of the squares of all residuals,
@@ -128,14 +128,14 @@ class Problem:
         return (total if np.isfinite(total) else np.inf), np.array(states)
 
     def rounding(self) -> float:
-        """Length of a column of central differences where there is no effect."""
+        """Return the length of a column of central differences where there is no effect."""
         largest = np.abs(self.segments[0].measured[self.segments[0].counts]).max(axis=0)
         rows = sum(int(segment.counts.sum()) for segment in self.segments)
         digits = ROUNDING * np.linalg.norm(largest / self.noise)
         return float(digits * np.sqrt(rows) / CENTRAL_STEP)
 
     def linear(self, z: np.ndarray, x: np.ndarray, is_exact: bool = False) -> list[Linear]:
-        """All segments, linear at a point.
+        """Return all segments, linear at a point.
 
         Parameters
         ----------
@@ -171,7 +171,7 @@ class Problem:
 
 
 def _shortened(new: np.ndarray, old: np.ndarray) -> Iterator[np.ndarray]:
-    """A state (states,); if it is refused, without the step of one of them, then of all."""
+    """Yield a state (states,), then without the step of one state, then of all."""
     yield new
     for k in np.flatnonzero(new != old):
         yield np.where(np.arange(len(new)) == k, old, new)
@@ -179,7 +179,7 @@ def _shortened(new: np.ndarray, old: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _late(times: np.ndarray, values: np.ndarray, delay: float) -> np.ndarray:
-    """Values (rows, outputs) that are seen `delay` s late."""
+    """Return values (rows, outputs) that are seen `delay` s late."""
     return CubicSpline(times, values, axis=0)(times - delay)
 
 
@@ -211,7 +211,7 @@ def fit(problem: Problem, x: np.ndarray) -> Solution:
 
 
 def _descended(problem: Problem, z: np.ndarray, x: np.ndarray, enough: float = 0.0) -> Solution:
-    """Steps from a point, until they gain no more; or less than a share `enough` of the cost."""
+    """Step from a point until steps gain no more; or less than a share `enough` of the cost."""
     (cost, x), ridge = problem.tried(z, x, x), FIRST_RIDGE
     refused = np.zeros(x.shape)  # direction in which the FMU refuses a step of a state, or 0
     rows = max(sum(int(s.counts.sum()) for s in problem.segments) * len(problem.noise), 1)
@@ -257,7 +257,7 @@ class _Arrow:
         self.weights = np.sqrt(np.where(of_parameters > 0, of_parameters, 1.0))
 
     def _eliminated(self, ridge: float) -> tuple[np.ndarray, np.ndarray]:
-        """Triangles with damped states, and what they leave: rows (n, parameters + 1)."""
+        """Return triangles with damped states, and what they leave: rows (n, parameters + 1)."""
         n, (count, _, columns) = self.states, self.triangles.shape
         damped = np.zeros((count, n, columns))
         damped[:, range(n), range(n)] = np.sqrt(ridge) * self.state_weights
@@ -265,7 +265,7 @@ class _Arrow:
         return triangles, triangles[:, n:, n:].reshape(-1, columns - n)
 
     def step(self, ridge: float) -> tuple[np.ndarray, np.ndarray]:
-        """Steps of states (segments, states) and parameters (parameters,)."""
+        """Return the steps of states (segments, states) and parameters (parameters,)."""
         n = self.states
         triangles, rest = self._eliminated(ridge)
         damped = np.sqrt(ridge) * np.diag(self.weights)
@@ -277,7 +277,7 @@ class _Arrow:
         return to_x, to_z
 
     def gain(self) -> float:
-        """By how much the cost would fall by a step without ridge, if all were linear."""
+        """Return by how much the cost would fall by a step without ridge, if all were linear."""
         n = self.states
         triangles, rest = self._eliminated(LEAST_RIDGE)
         left, values, _ = np.linalg.svd(rest[:, :-1] / self.weights, full_matrices=False)
@@ -340,7 +340,10 @@ class Covariances:
 
 
 def covariances(segments: Sequence[Reduced], known: np.ndarray) -> Covariances:
-    """Covariances of the parameters at the indices `known`; the others are taken as given."""
+    """Return the covariances of the parameters at the indices `known`.
+
+    The others are taken as given.
+    """
     n = len(known)
     tables = [segment.by_parameters[:, known] for segment in segments]
     inverse = np.linalg.inv(sum(table.T @ table for table in tables)) if n else np.empty((0, 0))
@@ -366,7 +369,7 @@ def covariances(segments: Sequence[Reduced], known: np.ndarray) -> Covariances:
 
 
 def _degrees(norms: np.ndarray, overlaps: np.ndarray) -> np.ndarray:
-    """Degrees of freedom (known,): the first two moments are those of a chi-squared number.
+    """Return degrees of freedom (known,): the first two moments are those of a chi-squared number.
 
     Parameters
     ----------
@@ -422,11 +425,11 @@ class Effects:
         self._rounding = rounding
 
     def depend(self, columns: Sequence[int]) -> bool:
-        """Whether columns depend on each other, to the precision that they have."""
+        """Return whether columns depend on each other, to the precision that they have."""
         return self._smallest(self.units[:, columns]) <= self.precision(columns)
 
     def precision(self, columns: Sequence[int]) -> float:
-        """Smallest singular value of columns of length 1 that is not rounding."""
+        """Return the smallest singular value of columns of length 1 that is not rounding."""
         shortest = self.lengths[list(columns)].min(initial=np.inf)
         return min(max(NOTHING, self._rounding / max(shortest, 1e-300)), COARSE)
 
@@ -466,7 +469,7 @@ def combinations(effects: Effects, slopes: np.ndarray, names: Sequence[str]) -> 
 
 
 def _classes(effects: Effects) -> list[list[int]]:
-    """Columns that are multiples of each other, together."""
+    """Return the columns that are multiples of each other, together."""
     found: list[list[int]] = []
     for column in np.flatnonzero(effects.there).tolist():
         for group in found:
@@ -481,7 +484,7 @@ def _classes(effects: Effects) -> list[list[int]]:
 def _sum(
     table: np.ndarray, slopes: np.ndarray, names: Sequence[str], group: Sequence[int]
 ) -> Combination:
-    """Parameters whose effects are multiples of each other."""
+    """Return the parameters whose effects are multiples of each other."""
     by_unit = table[:, group] / slopes[list(group)]
     relative = by_unit.T @ by_unit[:, 0] / (by_unit[:, 0] @ by_unit[:, 0])
     is_sum = np.allclose(np.abs(relative), 1.0, atol=EQUAL)
@@ -489,9 +492,10 @@ def _sum(
 
 
 def _circuits(effects: Effects, classes: Sequence[Sequence[int]]) -> list[list[int]]:
-    """Sets of three columns or more, one of a class, that depend on each other; small ones first.
+    """Return the sets of three columns or more, one of a class, that depend on each other.
 
-    As many as there are combinations without effect, each with something that the others lack.
+    Small ones come first. There are as many as combinations without effect, each with a column that
+    the others lack.
     """
     columns = [group[0] for group in classes]
     if len(columns) < 3:

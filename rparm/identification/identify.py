@@ -99,7 +99,7 @@ def validate(
 
 
 def _whole(recording: Recording, first: Segment) -> Segment:
-    """From the start of the first segment to the next gap, or the end."""
+    """Return the rows from the start of the first segment to the next gap, or the end."""
     start = int(np.searchsorted(recording.times, first.times[0]))
     gaps = np.flatnonzero(np.diff(recording.times) > 10 * recording.step)
     end = next((int(gap) + 1 for gap in gaps if gap >= start), len(recording.times))
@@ -300,7 +300,7 @@ def _estimates(
     spread: Covariances,
     unknown: Sequence[Combination],
 ) -> tuple[dict[str, Estimate], dict[str, Estimate]]:
-    """Estimates of all parameters, and of sums of them."""
+    """Estimate all parameters, and sums of them."""
     values, unclear = parameters.values(z), {name for each in unknown for name in each.names}
     widths = [np.zeros(len(z)), np.zeros(len(z))]
     for width, halves in zip(widths, (spread.halves, spread.classical_halves), strict=True):
@@ -338,7 +338,7 @@ def _ends(
     widths: np.ndarray,
     covariance: np.ndarray,
 ) -> np.ndarray:
-    """Ends (parameters, 2) of the intervals, in the parameters' units.
+    """Return the ends (parameters, 2) of the intervals, in the parameters' units.
 
     Parameters
     ----------

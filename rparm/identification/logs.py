@@ -158,7 +158,7 @@ def segments(recording: Recording, length: float, lead: float = 0.0) -> list[Seg
 
 
 def segment_of(recording: Recording, start: int, first: int, last: int) -> Segment:
-    """The rows from `start` up to `last`, of which those from `first` on are compared."""
+    """Return the rows from `start` up to `last`, of which those from `first` on are compared."""
     rows = slice(start, last)
     return Segment(
         np.ascontiguousarray(recording.times[rows]),
@@ -170,7 +170,7 @@ def segment_of(recording: Recording, start: int, first: int, last: int) -> Segme
 
 
 def noise(recordings: Sequence[Recording]) -> np.ndarray:
-    """Standard deviation (outputs,) of the measured values' noise, whatever they follow.
+    """Return the standard deviation (outputs,) of the measured values' noise, whatever they follow.
 
     The third differences of what is smooth are small, those of noise are as large as it is: divided
     ones, as rows may be missing and times irregular. A log in counts has at least the noise of
@@ -189,7 +189,7 @@ def noise(recordings: Sequence[Recording]) -> np.ndarray:
 
 
 def _third_differences(times: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Of four rows each, (rows - 3, outputs), with the variance of the noise in `values`."""
+    """Return differences of four rows, (rows - 3, outputs), of the noise's variance."""
     four = np.stack([times[i : len(times) - 3 + i] for i in range(4)], axis=1)
     apart = four[:, :, None] - four[:, None, :] + np.eye(4)
     weights = 1 / apart.prod(axis=2)
@@ -198,7 +198,7 @@ def _third_differences(times: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def _count(differences: np.ndarray) -> float:
-    """The difference of which all others are multiples, or 0."""
+    """Return the difference of which all others are multiples, or 0."""
     smallest = float(differences.min())
     ratio = differences / smallest
     is_grid = np.abs(ratio - np.rint(ratio)).max() < 1e-3 and len(np.unique(np.rint(ratio))) > 1

@@ -67,7 +67,7 @@ def write(
 
 # ---- Plots ---------------------------------------------------------------------------------------
 def _data(found: Identification, model: Model) -> RunData:
-    """Residuals and measured over simulated values of the first log, and of the second."""
+    """Plot residuals and measured over simulated values of the first log, and of the second."""
     shown = found.segments[: found.of_first]
     times = np.concatenate([segment.times[segment.counts] for segment in shown])
     measured = np.vstack([segment.measured[segment.counts] for segment in shown])
@@ -88,7 +88,7 @@ def _data(found: Identification, model: Model) -> RunData:
 
 
 def _validation(found: Identification, model: Model, times: np.ndarray) -> list[Plot]:
-    """The second log, from its start, over the times of the first."""
+    """Plot the second log, from its start, over the times of the first."""
     second = found.validation
     assert second is not None
     own = second.times - second.times[0] + times[0]
@@ -186,7 +186,7 @@ def _second(found: Identification, model: Model) -> Table:
 
 
 def correlations(covariance: np.ndarray) -> np.ndarray:
-    """Correlations of a covariance (n, n)."""
+    """Return the correlations of a covariance (n, n)."""
     deviations = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     return covariance / np.outer(deviations, deviations)
 

@@ -90,11 +90,11 @@ class Parameters:
                 raise WrongValueError(f"{parameter.name}: {error}") from None
 
     def values(self, z: np.ndarray) -> np.ndarray:
-        """Values (parameters,) in their units; `z` is 0 at the start."""
+        """Return values (parameters,) in their units; `z` is 0 at the start."""
         return self._mapped(z)[0]
 
     def slopes(self, z: np.ndarray) -> np.ndarray:
-        """Derivatives (parameters, parameters) of the values by `z`."""
+        """Return the derivatives (parameters, parameters) of the values by `z`."""
         return self._mapped(z)[1]
 
     def _mapped(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -130,11 +130,11 @@ class Parameters:
         return np.array([np.isfinite([self._low[p.name], p.greatest]).any() for p in self.every])
 
     def at_limit(self, z: np.ndarray) -> np.ndarray:
-        """Which (parameters,) have come to a limit."""
+        """Return which (parameters,) have come to a limit."""
         return self.is_limited & (np.abs(z) >= -CLOSEST)
 
     def kept(self, z: np.ndarray) -> np.ndarray:
-        """`z` where no parameter is closer to a limit than counts."""
+        """Return `z` where no parameter is closer to a limit than counts."""
         return np.where(self.is_limited, np.clip(z, CLOSEST, -CLOSEST), z)
 
 
@@ -250,7 +250,7 @@ def _check_names(request: Request) -> None:
 
 
 def _settings(request: Request, model: Model) -> dict[str, Value]:
-    """Values that are not estimated."""
+    """Return the values that are not estimated."""
     estimated = [name.partition(ABOVE)[0] for name in request.parameters]
     settings = {}
     for name, given in request.settings.items():
@@ -262,7 +262,7 @@ def _settings(request: Request, model: Model) -> dict[str, Value]:
 
 
 def _fastest(fmu: Fmu, settings: Mapping[str, Value]) -> dict[str, Value]:
-    """The fastest method of integration that the FMU takes, if it has a choice."""
+    """Return the fastest method of integration that the FMU takes, if it has a choice."""
     variable = fmu.model.variables.get(METHOD)
     for method in FASTEST if variable is not None else ():
         if method in variable.items:
@@ -313,7 +313,7 @@ def _parameter(
 
 
 def _check_output(fmu: Fmu, name: str) -> None:
-    """A measured variable is a Real output, or a local one, that changes with time."""
+    """Refuse a measured variable that is no Real output or local one that changes with time."""
     model = fmu.model
     variable = model.variables.get(name)
     continuous = _continuous(fmu)
@@ -326,7 +326,7 @@ def _check_output(fmu: Fmu, name: str) -> None:
 
 
 def _continuous(fmu: Fmu) -> list[str]:
-    """Names of the continuous outputs and local variables."""
+    """Return the names of the continuous outputs and local variables."""
     described = fmpy.read_model_description(fmu.folder, validate=False).modelVariables
     return [
         variable.name

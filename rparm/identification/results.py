@@ -23,7 +23,7 @@ TYPES = ("Real", "Integer", "Boolean")  # of an SSV that all engines read
 
 
 def document(found: Identification) -> dict[str, object]:
-    """What --json prints."""
+    """Return the document that --json prints."""
     validation = None
     if found.validation is not None:
         outputs = list(found.checked.outputs)
@@ -83,7 +83,7 @@ def rows(found: Identification, true: Mapping[str, float]) -> list[tuple[str, li
 
 
 def texts(x: Estimate) -> list[str]:
-    """Value, interval and classical interval, with digits that show how wide these are."""
+    """Write value, interval and classical interval, with digits that show how wide these are."""
     digits = DIGITS
     if x.low is not None and x.high is not None and x.value and isfinite(x.high - x.low):
         half = max((x.high - x.low) / 2, 1e-12 * abs(x.value))
@@ -92,7 +92,7 @@ def texts(x: Estimate) -> list[str]:
 
 
 def text(number: float | None, digits: int = DIGITS) -> str:
-    """A number of a table; "–" if there is none."""
+    """Write a number of a table; "–" if there is none."""
     return "–" if number is None or not isfinite(number) else f"{number:.{digits}g}"
 
 
@@ -123,7 +123,7 @@ def _toml(value: Value) -> str:
 
 
 def _set(values: dict[str, Value], model: Model) -> str:
-    """A parameter set of SSP 1.0."""
+    """Write a parameter set of SSP 1.0."""
     rows = [
         f"    <ssv:Parameter name={quoteattr(name)}>"
         f"<ssv:{kind} value={quoteattr(_toml(value))}/></ssv:Parameter>"
@@ -142,7 +142,7 @@ def _set(values: dict[str, Value], model: Model) -> str:
 def _scenario(
     found: Identification, folder: Path, model: Model, values: dict[str, Value]
 ) -> Iterator[str]:
-    """Lines of a scenario over the first log, from its first segment's start state."""
+    """Write a scenario over the first log, from its first segment's start state."""
     log, times = found.recordings[0], found.recordings[0].times
     start = float(found.segments[0].times[0])
     steps = max(round((float(times[-1]) - start) / log.step), 1)

@@ -75,11 +75,11 @@ class Simulator:
             runner.close()
 
     def map(self, function: Callable[[Task], Answer], tasks: Iterable[Task]) -> list[Answer]:
-        """Answers to tasks, worked on by all cores."""
+        """Return answers to tasks, worked on by all cores."""
         return list(self._pool.map(function, tasks))
 
     def run(self, segment: Segment, values: np.ndarray) -> np.ndarray:
-        """Outputs (rows, outputs) at the rows of a segment.
+        """Run a segment; return the outputs (rows, outputs) at its rows.
 
         UserError if the FMU refuses `values`, those of parameters and states, or fails.
         """
@@ -115,7 +115,7 @@ class _Runner:
             raise
 
     def _fresh(self) -> tuple[Instance, Reals]:
-        """The instance, as new, and what is set in it."""
+        """Return the instance, as new, and what is set in it."""
         if self._instance is not None:
             self._instance.reset()
             return self._instance, self._given
@@ -128,7 +128,7 @@ class _Runner:
         return instance, self._given
 
     def _initialize(self, segment: Segment, values: np.ndarray) -> None:
-        """To the first row, inputs set and outputs read."""
+        """Initialize up to the first row, inputs set and outputs read."""
         simulator, (instance, given) = self._simulator, self._fresh()
         instance.set_up(segment.times[0], segment.times[-1], simulator.tolerance)
         for name, value in simulator.settings.items():
@@ -163,7 +163,7 @@ class _Runner:
 
 
 def state_names(fmu: Fmu) -> list[str]:
-    """Names of the states; UserError if one cannot be set."""
+    """Return the names of the states; UserError if one cannot be set."""
     for name in fmu.model.states:
         if not fmu.model.variables[name].is_a(INITIAL):
             raise UserError(f"{fmu.path}: state {name!r} cannot be set where a segment starts")
@@ -171,7 +171,7 @@ def state_names(fmu: Fmu) -> list[str]:
 
 
 def start_rates(fmu: Fmu) -> dict[str, str]:
-    """States that are the derivative of another one: that one by their name."""
+    """Map states to the state that they are the derivative of, by name."""
     description = fmpy.read_model_description(fmu.folder, validate=False)
     variables = fmu.model.variables
     of_reference = {variables[name].reference: name for name in fmu.model.states}
@@ -186,7 +186,7 @@ def start_rates(fmu: Fmu) -> dict[str, str]:
 def guess_start(
     fmu: Fmu, segments: Sequence[Segment], outputs: Sequence[str], given: Mapping[str, float]
 ) -> np.ndarray:
-    """States (segments, states): measured ones, their derivatives, else start values."""
+    """Guess states (segments, states): measured ones, their derivatives, else start values."""
     model, of = fmu.model, start_rates(fmu)
     names = state_names(fmu)
     found = np.empty((len(segments), len(names)))
@@ -208,7 +208,7 @@ def _limits(model: Model, names: Sequence[str]) -> tuple[list[float], list[float
 
 
 def _polynomials(segment: Segment) -> np.ndarray:
-    """Value and derivative (2, outputs) at the start, of polynomials through the first rows."""
+    """Fit polynomials to the first rows; return value and derivative (2, outputs) at the start."""
     there = np.flatnonzero(np.isfinite(segment.measured).all(axis=1))
     rows = there[: max(FEWEST, int(WINDOW * len(there)))]
     times = segment.times[rows] - segment.times[0]
@@ -220,7 +220,7 @@ def _polynomials(segment: Segment) -> np.ndarray:
 
 
 def start_scales(states: np.ndarray) -> np.ndarray:
-    """Scales (states,) of guessed states (segments, states)."""
+    """Return the scales (states,) of guessed states (segments, states)."""
     largest = np.abs(states).max(axis=0)
     return np.where(largest > 0, largest, 1.0)
 
@@ -228,7 +228,7 @@ def start_scales(states: np.ndarray) -> np.ndarray:
 def admitted_start(
     simulator: Simulator, segments: Sequence[Segment], parameters: Parameters, states: np.ndarray
 ) -> np.ndarray:
-    """States that the FMU starts from, near `states` (segments, states).
+    """Return states near `states` (segments, states) that the FMU starts from.
 
     What was measured a hair past a stop, for example, is moved inward. UserError if nothing helps.
     """

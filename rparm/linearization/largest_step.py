@@ -60,7 +60,7 @@ def largest_steps(
     connections: Sequence[Connection],
     ways: Sequence[tuple[str, str]] = tuple((o, i) for o in ORDERS for i in INPUT_MODES),
 ) -> list[LargestStep]:
-    """The limit of each way to step; empty if no signal comes back through connections.
+    """Find the limit of each way to step; empty if no signal comes back through connections.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def transition(
     inputs: str = "held",
     held: Callable[[str, float], Held] | None = None,
 ) -> np.ndarray:
-    """Matrix from one communication point to the next, shape (n, n).
+    """Return the matrix from one communication point to the next, shape (n, n).
 
     It acts on the deviations of all states, then all outputs, then, if inputs are extrapolated, the
     slopes of all outputs; each by component. `held` gives `hold` of a component, at a step.
@@ -156,7 +156,7 @@ def transition(
 def _layout(
     parts: Mapping[str, Linear], connections: Sequence[Connection]
 ) -> tuple[dict[str, tuple[slice, slice]], dict[str, list[Source]]]:
-    """Places of each component's states and outputs; the source of each of its inputs."""
+    """Place each component's states and outputs; find the source of each of its inputs."""
     slices, first_state, first_output = {}, 0, 0
     for name, part in parts.items():
         n, p = len(part.states), len(part.outputs)
@@ -212,7 +212,7 @@ class Resting:
         self.ways = subject.ways
 
     def predicted(self, way: tuple[str, str]) -> LargestStep:
-        """The largest stable step of one of `ways`, from the linear models."""
+        """Predict the largest stable step of one of `ways`, from the linear models."""
         parts = self._subject.parts(self._rest.values)
         held = self._subject.held(parts)
         parts = {name: parts[name].without(held[name]) for name in self._sequence}
@@ -220,7 +220,7 @@ class Resting:
         return found
 
     def growth(self, way: tuple[str, str], step: float) -> float:
-        """By how much a small deviation grows in a step, s, under the master."""
+        """Measure by how much a small deviation grows in a step, s, under the master."""
         rest, subject = self._rest, self._subject
         start = subject.at(rest.values).at
         moved = {name: start[name] + MOVED for name in rest.moved}
@@ -230,7 +230,7 @@ class Resting:
             return growth(master, step, rest.signals)
 
     def limit(self, way: tuple[str, str]) -> Limit:
-        """Predicted and measured."""
+        """Predict and measure the limit."""
         step = self.predicted(way).step
         below, above = (self.growth(way, step * (1 + x)) for x in (-WITHIN, WITHIN))
         return Limit(way, step, (below, above))
@@ -238,7 +238,7 @@ class Resting:
 
 @contextmanager
 def resting(path: Path, rest: Rest) -> Iterator[Resting]:
-    """A system from an SSP; everything is removed at the end."""
+    """Open a system from an SSP; everything is removed at the end."""
     with ExitStack() as stack:
         opened = stack.enter_context(ssp.unpacked(path))
         subject = SystemSubject(opened, rest.variant, without=rest.without)
@@ -262,7 +262,7 @@ def study_steps(path: Path, rest: Rest) -> dict[str, object]:
 
 
 def growth(master: Master, step: float, signals: Sequence[str]) -> float:
-    """Largest eigenvalue of what leads from two points of a run to the next, by least squares.
+    """Fit the largest eigenvalue of the map between points of a run, by least squares.
 
     Parameters
     ----------

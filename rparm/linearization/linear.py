@@ -85,16 +85,16 @@ class Linear:
         return one & (np.diag(self.A) == 0) & np.isclose(self.rates, self.A @ self.x, atol=0.0)
 
     def ss(self) -> "StateSpace":
-        """The same for python-control, which must be installed; in its names dots become _."""
+        """Return the model for python-control, if installed; in its names dots become _."""
         return _state_space(self.A, self.B, self.C, self.D, **self._labels)
 
     def zoh(self, step: float) -> "StateSpace":
-        """The model from one sample to the next, `step` s apart, for inputs held in between."""
+        """Return the model from one sample to the next, `step` s apart, for held inputs."""
         transition, forced = self.sampled(step)
         return _state_space(transition, forced, self.C, self.D, step, **self._labels)
 
     def sampled(self, step: float) -> tuple[np.ndarray, np.ndarray]:
-        """A and B of `zoh`; UserError if deviations grow beyond what a double holds."""
+        """Return A and B of `zoh`; UserError if deviations grow beyond what a double holds."""
         with np.errstate(over="ignore", invalid="ignore"):
             transition, forced, _ = hold(self.A, self.B, step)
         if not (np.isfinite(transition).all() and np.isfinite(forced).all()):
@@ -111,7 +111,7 @@ class Linear:
     def select(
         self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
     ) -> "Linear":
-        """Only some inputs and outputs, in the order given; UserError if one is unknown."""
+        """Select inputs and outputs, in the order given; UserError if one is unknown."""
         rows = _places(self.outputs, outputs, "outputs")
         columns = _places(self.inputs, inputs, "inputs")
         return replace(
@@ -142,7 +142,7 @@ class Linear:
 
 
 def hold(A: np.ndarray, B: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """State after `step` s by the state at its begin, by inputs, and by their slopes.
+    """Return the state after `step` s by the state at its begin, by inputs, and by their slopes.
 
     Shapes (n, n), (n, m), (n, m): x(h) = F x + G u + S u', where u is the value at the beginning.
     """
@@ -157,7 +157,7 @@ def hold(A: np.ndarray, B: np.ndarray, step: float) -> tuple[np.ndarray, np.ndar
 
 
 def _exponential(matrix: np.ndarray) -> np.ndarray:
-    """Of a matrix: Taylor's series of a part of it, squared. Within rounding for small ones."""
+    """Return exp of a matrix: Taylor's series of a part of it, squared; exact but for rounding."""
     halvings = max(0, 4 + math.frexp(np.abs(matrix).sum(axis=1).max(initial=0.0))[1])
     part = matrix / 2.0**halvings  # below 1/16: terms fall below rounding at once
     result = term = np.eye(len(matrix))
@@ -170,7 +170,7 @@ def _exponential(matrix: np.ndarray) -> np.ndarray:
 
 
 def _state_space(*arguments: object, **names: object) -> "StateSpace":
-    """A system of python-control, which nothing else here needs."""
+    """Return a system of python-control, which nothing else here needs."""
     return import_module("control").ss(*arguments, **names)
 
 
@@ -187,7 +187,7 @@ def _places(known: Sequence[str], wanted: Sequence[str] | None, option: str) -> 
 
 
 def eigenvalues(A: np.ndarray) -> np.ndarray:
-    """Eigenvalues of A, shape (n,): those that are 0 exactly so, also if they are multiple.
+    """Return eigenvalues of A, shape (n,): those that are 0 exactly so, also if they are multiple.
 
     States that influence each other form a block. Blocks are taken one by one, each in units that
     suit it: so neither units nor fast poles of other blocks cost accuracy.
@@ -203,7 +203,7 @@ def eigenvalues(A: np.ndarray) -> np.ndarray:
 
 
 def _of_block(A: np.ndarray) -> np.ndarray:
-    """Eigenvalues of states that all influence each other."""
+    """Return the eigenvalues of states that all influence each other."""
     if len(A) == 1:
         return A[0].astype(complex)
     scale = scales(A)
@@ -222,7 +222,7 @@ def _of_block(A: np.ndarray) -> np.ndarray:
 
 
 def zeros(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> np.ndarray:
-    """Finite zeros of C (s - A)^-1 B + D, which has one input and one output."""
+    """Return the finite zeros of C (s - A)^-1 B + D, which has one input and one output."""
     from scipy.linalg import eigvals
 
     n = len(A)
@@ -231,12 +231,12 @@ def zeros(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> np.ndar
 
 
 def cleared(entries: np.ndarray, terms: np.ndarray) -> np.ndarray:
-    """Entries with 0 where their terms, whose sizes add up to `terms`, cancel but for rounding."""
+    """Replace entries by 0 whose terms, of total size `terms`, cancel but for rounding."""
     return np.where(np.abs(entries) > CANCELLED * terms, entries, 0.0)
 
 
 def closure(arrows: np.ndarray) -> np.ndarray:
-    """Which nodes can be reached from which, (nodes, nodes), in no step or more."""
+    """Return which nodes can be reached from which, (nodes, nodes), in no step or more."""
     reached = arrows | np.eye(len(arrows), dtype=bool)
     while True:
         further = reached @ reached
@@ -246,7 +246,7 @@ def closure(arrows: np.ndarray) -> np.ndarray:
 
 
 def scales(A: np.ndarray) -> np.ndarray:
-    """Units of states, powers of 2, that make rows and columns of about the same size."""
+    """Return units of states, powers of 2, that make rows and columns of about the same size."""
     from scipy.linalg import matrix_balance
 
     return matrix_balance(A, permute=False, separate=True)[1][0] if len(A) else np.ones(0)
@@ -256,7 +256,7 @@ def scales(A: np.ndarray) -> np.ndarray:
 
 
 def linear_model(instance: Instance) -> Linear:
-    """The linear model of an instance after its initialization, with all states.
+    """Linearize an instance after its initialization, with all states.
 
     UserError if a value is not finite.
     """
@@ -321,11 +321,11 @@ class FmuSubject(ExitStack):
         self._instance = self.enter_context(fmu.instance(fmu.path.stem))
 
     def variable(self, name: str) -> Variable:
-        """What the FMU declares of a variable; UserError if it has none of that name."""
+        """Return the variable as the FMU declares it; UserError if it has none of that name."""
         return known_variable(self.fmu.model, name, str(self.fmu.path))
 
     def at(self, values: Mapping[str, Value]) -> Linear:
-        """The linear model where parameters, states and inputs have these values."""
+        """Linearize where parameters, states and inputs have these values."""
         instance = self._instance
         if not self._is_new:
             instance.reset()
@@ -338,7 +338,7 @@ class FmuSubject(ExitStack):
         return linear_model(instance)
 
     def held(self, found: Linear) -> list[str]:
-        """States of `found` that are held."""
+        """Return the states of `found` that are held."""
         return held_states(found, self.fmu.model)
 
     def check(self, found: Linear) -> None:
@@ -349,12 +349,12 @@ class FmuSubject(ExitStack):
 
 
 def next_event(instance: Instance) -> float | None:
-    """Time of the next time event in s, if the FMU can be asked: model exchange only."""
+    """Return the time of the next time event in s; None for co-simulation."""
     return getattr(instance, "next_event", None)
 
 
 def known_variable(model: Model, name: str, where: str) -> Variable:
-    """A variable of a model; UserError if there is none of that name."""
+    """Return a variable of a model; UserError if there is none of that name."""
     if name not in model.variables:
         known = [v.name for v in model.variables.values() if v.causality == "input"]
         guess = did_you_mean(name, model.variables)
@@ -364,7 +364,7 @@ def known_variable(model: Model, name: str, where: str) -> Variable:
 
 
 def is_settable(variable: Variable) -> bool:
-    """Whether a point may say its value: a state, an input or a parameter."""
+    """Return whether a point may say its value: a state, an input or a parameter."""
     is_state = variable.causality in ("output", "local") and variable.initial == "exact"
     return is_state or variable.causality == "input" or variable.is_a(PARAMETERS)
 
@@ -373,7 +373,7 @@ def is_settable(variable: Variable) -> bool:
 
 
 def held_states(found: Linear, model: Model) -> list[str]:
-    """States that stand still whatever inputs and states do: velocities, and what they move.
+    """Return states that stand still whatever inputs and states do: velocities, and what they move.
 
     A velocity is held if it and its derivative are 0, and no state or input changes its derivative,
     though the FMU declares that some do. A position is held if only held velocities move it.
@@ -396,7 +396,7 @@ def is_sampled(
     outputs: Sequence[str],
     next_event: Callable[[], float | None],
 ) -> bool:
-    """Whether `outputs` follow inputs only at ticks.
+    """Return whether `outputs` follow inputs only at ticks.
 
     That is so if all that depend on inputs are discrete, and if no state or input changes one of
     the others now and the FMU announces a time event.
@@ -421,18 +421,18 @@ class Subject(Protocol):
     """What can be linearized: an FMU or a system."""
 
     def variable(self, name: str) -> Variable:
-        """What is declared of a variable; UserError if there is none of that name."""
+        """Return the variable as it is declared; UserError if there is none of that name."""
         ...
 
     def at(self, values: Mapping[str, Value]) -> Linear:
-        """The linear model where parameters, states and inputs have these values."""
+        """Linearize where parameters, states and inputs have these values."""
         ...
 
 
 def checked_point(
     subject: Subject, given: Mapping[str, Any], with_outputs: bool = False
 ) -> tuple[dict[str, Value], dict[str, float]]:
-    """Values to set, and values that outputs are to have; in the variables' units.
+    """Return values to set, and values that outputs are to have; in the variables' units.
 
     UserError if a variable is unknown, cannot be set, or does not take the value.
 

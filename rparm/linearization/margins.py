@@ -69,12 +69,12 @@ class Margins:
 
 
 def open_loop(broken: Linear) -> Linear:
-    """L of a system that is broken: one input, and the output that fed it; minimal."""
+    """Return L of a system that is broken: one input, and the output that fed it; minimal."""
     return minimal(replace(broken, C=-broken.C, D=-broken.D))
 
 
 def margins(loop: Linear) -> Margins:
-    """Margins of a loop L, which has one input and one output and is minimal."""
+    """Return the margins of a loop L, which has one input and one output and is minimal."""
     grid = searched(loop)
     gains = tuple(_crossings(loop, grid, lambda value: np.abs(value) - 1))
     turns = (*_crossings(loop, grid, np.imag), *_ends(loop))
@@ -99,7 +99,7 @@ def margins(loop: Linear) -> Margins:
 
 
 def _ends(loop: Linear) -> Iterator[Crossing]:
-    """Where L is real at its ends: at 0, if it has no pole there, and at infinity."""
+    """Return the ends of L where it is real: at 0, if it has no pole there, and at infinity."""
     value, bound = (each[0] for each in bounded_response(loop)(np.zeros(1)))
     if loop.poles.all() and abs(value) > bound:
         yield Crossing(0.0, complex(value))
@@ -108,7 +108,7 @@ def _ends(loop: Linear) -> Iterator[Crossing]:
 
 
 def closed(loop: Linear) -> Linear:
-    """From what is asked for at the break to what is there, when the loop is closed."""
+    """Close the loop: from the request at the break to the value there."""
     back = loop.B @ loop.C / (1 + loop.D[0, 0])
     return replace(
         loop,
@@ -120,7 +120,7 @@ def closed(loop: Linear) -> Linear:
 
 
 def searched(loop: Linear) -> np.ndarray:
-    """Frequencies in rad/s between which L has one crossing at most, ascending.
+    """Return frequencies in rad/s between which L has one crossing at most, ascending.
 
     Crossings are zeros of L(s) L(-s) - 1 and of L(s) - L(-s) on the axis. Rounding moves those that
     eigenvalues give, so they only say where to look, as poles and zeros do.
@@ -152,7 +152,7 @@ def searched(loop: Linear) -> np.ndarray:
 def _crossings(
     loop: Linear, grid: np.ndarray, function: Callable[[np.ndarray], np.ndarray]
 ) -> Iterator[Crossing]:
-    """Where a function of L changes its sign, also if it is 0 at a frequency of the grid."""
+    """Find where a function of L changes its sign, also if it is 0 at a frequency of the grid."""
     response = frequency_response(loop)
     values, bounds = bounded_response(loop)(grid)
     clear = np.flatnonzero(np.abs(function(values)) > bounds)

@@ -112,7 +112,7 @@ def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
 
 
 def _pictures(folder: Path, found: Study, step: float | None) -> list[Picture]:
-    """Bode, Nyquist and steps: of the loop where it is broken, else of inputs and outputs."""
+    """Draw Bode, Nyquist and steps: of the loop where it is broken, else of inputs and outputs."""
     if found.loop is not None:
         save_figure(bode_figure(found.loop, step, found.margins), folder / "bode.png")
         save_figure(nyquist_figure(found.loop, step), folder / "nyquist.png")
@@ -144,7 +144,7 @@ def _not_drawn(found: Study) -> list[str]:
 
 
 def notes(found: Study) -> list[str]:
-    """What has been left out, in a sentence each."""
+    """Say what has been left out, in a sentence each."""
     linear, texts = found.linear, []
     if linear.held:
         texts.append(
@@ -191,13 +191,13 @@ def _names(names: list[str] | tuple[str, ...]) -> str:
 
 
 def point_table(found: Study) -> Table:
-    """Values of states and inputs."""
+    """Return the values of states and inputs."""
     rows = [[name, value, found.units.get(name, "")] for name, value in found.linear.at.items()]
     return Table("The point", ["variable", "value", "unit"], rows)
 
 
 def equilibrium_table(found: Study) -> Table:
-    """What was trimmed, and where friction or a stop leaves it."""
+    """Return the trimmed values, and the range where friction or a stop leaves one."""
     rows = []
     for name in found.trimmed:
         ends = found.linear.intervals.get(name, (math.nan, math.nan))
@@ -207,7 +207,7 @@ def equilibrium_table(found: Study) -> Table:
 
 
 def poles_table(found: Study) -> Table:
-    """Poles, conjugate pairs in one row."""
+    """Return poles, conjugate pairs in one row."""
     values = found.linear.poles
     rows = []
     for exact in values:
@@ -232,7 +232,7 @@ def poles_table(found: Study) -> Table:
 
 
 def margins_table(found: Margins) -> Table:
-    """Margins of a loop; those that it does not have are "–"."""
+    """Return the margins of a loop; those that it does not have are "–"."""
     rows = [
         ["gain, up to times", _or_none(found.gain_up)],
         ["gain, down to times", _or_none(found.gain_down or math.inf)],
@@ -245,7 +245,7 @@ def margins_table(found: Margins) -> Table:
 
 
 def steps_table(found: list[LargestStep] | tuple[LargestStep, ...]) -> Table:
-    """The largest stable step of each way to step."""
+    """Return the largest stable step of each way to step."""
     rows = []
     for x in found:
         text = "none" if x.step == 0 else milliseconds(x.step)
@@ -256,7 +256,7 @@ def steps_table(found: list[LargestStep] | tuple[LargestStep, ...]) -> Table:
 
 
 def matrices_table(found: Study) -> Table:
-    """[A B; C D]."""
+    """Return the matrix [A B; C D]."""
     linear = found.linear
     whole = np.block([[linear.A, linear.B], [linear.C, linear.D]])
     names = (*(f"{name}'" for name in linear.states), *linear.outputs)
@@ -278,7 +278,7 @@ def _or_none(number: float) -> str:
 
 
 def bode_figure(model: Linear, step: float | None, found: Margins | None = None) -> Figure:
-    """Gain and phase of each output by each input, with margins of a loop."""
+    """Draw gain and phase of each output by each input, with margins of a loop."""
     with mpl.rc_context(TEXTS):
         figure = Figure(figsize=(9, 6), layout="constrained")
         gain, phase = figure.subplots(2, 1, sharex=True)
@@ -328,7 +328,7 @@ def _bode(
 
 
 def nyquist_figure(loop: Linear, step: float | None) -> Figure:
-    """L along the frequencies; -1 is where it becomes unstable."""
+    """Draw L along the frequencies; -1 is where it becomes unstable."""
     with mpl.rc_context(TEXTS):
         figure = Figure(figsize=(6, 6), layout="constrained")
         axes = figure.subplots()
@@ -387,7 +387,7 @@ def _step(model: Linear, length: float, end: float) -> tuple[np.ndarray, np.ndar
 
 
 def poles_figure(model: Linear, step: float | None, loop: Linear | None = None) -> Figure:
-    """Poles in the plane of s, and of the sampled model in the plane of z."""
+    """Draw poles in the plane of s, and of the sampled model in the plane of z."""
     with mpl.rc_context(TEXTS):
         figure = Figure(figsize=(9, 4.2), layout="constrained")
         plain, sampled = figure.subplots(1, 2)
@@ -418,7 +418,7 @@ def poles_figure(model: Linear, step: float | None, loop: Linear | None = None) 
 
 
 def drawn(model: Linear) -> Linear:
-    """What of a model pictures show: the first outputs that respond, and inputs they respond to."""
+    """Select what pictures show: the first outputs that respond, and inputs they respond to."""
     s = 1j * frequencies(model.poles, (), AROUND)[:, None, None]
     states = np.linalg.solve(s * np.eye(len(model.A)) - model.A, model.B + 0 * s)
     answers = np.abs(model.C @ states + model.D).max(axis=0)  # (outputs, inputs)
@@ -440,7 +440,7 @@ def _colors() -> Iterator[str]:
 
 
 def _grid(model: Linear, found: Margins | None = None) -> np.ndarray:
-    """Frequencies around the poles of a model, in rad/s: of a loop also when it is closed."""
+    """Choose frequencies in rad/s around the poles of a model, or of a loop, closed too."""
     crossings = [x.frequency for x in (found.gain_crossings if found else ())]
     poles = np.array([*model.poles, *(closed(model).poles if found else ())])
     every = np.abs([*poles[poles != 0], *crossings])
@@ -452,7 +452,7 @@ def _grid(model: Linear, found: Margins | None = None) -> np.ndarray:
 
 
 def _below(grid: np.ndarray, model: Linear, step: float) -> np.ndarray:
-    """Frequencies below half the sampling rate, dense where sampled poles are."""
+    """Choose frequencies below half the sampling rate, dense where sampled poles are."""
     z = eigenvalues(hold(model.A, model.B, step)[0])
     own = frequencies(np.log(z[z != 0]) / step, (), 0.0)
     every = np.union1d(grid, own)
@@ -460,7 +460,7 @@ def _below(grid: np.ndarray, model: Linear, step: float) -> np.ndarray:
 
 
 def _end(model: Linear, step: float | None) -> float:
-    """How long a step is shown, s: until the slowest pole has settled."""
+    """Return how long a step is shown, s: until the slowest pole has settled."""
     rates = np.abs(model.poles[model.poles != 0])
     end = SETTLED / rates.min(initial=1.0 if not len(rates) else np.inf)
     fastest = model.poles.real.max(initial=0.0)

@@ -34,11 +34,11 @@ class _Transfer:
     D: np.ndarray
 
     def values(self, p: np.ndarray) -> np.ndarray:
-        """Values at p (k,)."""
+        """Return values at p (k,)."""
         return self._in_parts(p, lambda matrices: (self._value(self._states(matrices)),))[0]
 
     def bounded(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values at p (k,), and bounds of their rounding."""
+        """Return the values at p (k,), and bounds of their rounding."""
         return self._in_parts(p, self._bounded)
 
     def _in_parts(self, p: np.ndarray, function: Callable[[np.ndarray], Answers]) -> Answers:
@@ -65,7 +65,7 @@ class _Transfer:
 
 
 def _solved(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solutions (k, n, 1), refined once: so rounding is relative to each entry; nan at a pole."""
+    """Solve for (k, n, 1), refined once: rounding is relative to each entry; nan at a pole."""
     right = np.broadcast_to(right.astype(complex), (len(matrices), *right.shape[-2:]))
     try:
         x = np.linalg.solve(matrices, right)
@@ -79,13 +79,13 @@ def _solved(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def bounded_response(model: Linear) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
-    """Values of a model with one input and one output at rad/s, and bounds of their rounding."""
+    """Return the response of one output to one input over rad/s, and bounds of its rounding."""
     transfer = _transfer(model)
     return lambda w: transfer.bounded(1j * np.asarray(w))
 
 
 def frequency_response(model: Linear) -> Response:
-    """Values of a model with one input and one output at frequencies in rad/s; nan at a pole."""
+    """Return the response of one output to one input over frequencies in rad/s; nan at a pole."""
     transfer = _transfer(model)
     return lambda w: transfer.values(1j * np.asarray(w))
 
@@ -97,14 +97,14 @@ def _transfer(model: Linear) -> _Transfer:
 
 
 def sampled_response(model: Linear, step: float) -> Response:
-    """As `frequency_response`, of the model that is sampled, with inputs held in between."""
+    """Return the response of the model that is sampled, with inputs held in between."""
     transition, forced, _ = hold(model.A, model.B, step)
     transfer = _Transfer(transition, forced, model.C, model.D)
     return lambda w: transfer.values(np.exp(1j * step * np.asarray(w)))
 
 
 def frequencies(steep: Iterable[complex], further: Iterable[float], decades: float) -> np.ndarray:
-    """Frequencies in rad/s, ascending, that show what a response does.
+    """Choose frequencies in rad/s, ascending, that show what a response does.
 
     They are dense around poles and zeros, lie on both sides of each, and go beyond all of them.
 
@@ -167,7 +167,7 @@ def minimal(model: Linear) -> Linear:
 
 
 def suited(A: np.ndarray, B: np.ndarray, C: np.ndarray) -> np.ndarray:
-    """Units of states that suit the ways from inputs to outputs, too, shape (n,)."""
+    """Return units of states that suit the ways from inputs to outputs, too, shape (n,)."""
     sizes = np.block(
         [
             [np.abs(A), np.abs(B).sum(axis=1, keepdims=True)],
@@ -187,7 +187,7 @@ class _Rule:
 
 
 def _rule(A: np.ndarray, B: np.ndarray) -> _Rule | None:
-    """Sums of states that are 0 for ever if they are at first, if there are any.
+    """Find sums of states that are 0 for ever if they are at first, if there are any.
 
     Such a sum is a left eigenvector of A that B is orthogonal to: w^T [A - p, B] = 0. Rows and
     columns of this matrix are scaled, as a fast mode behind a chain of slow states moves them
@@ -226,7 +226,7 @@ def _equilibrated(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _ruled(
     rule: _Rule, A: np.ndarray, B: np.ndarray, C: np.ndarray, kept: np.ndarray, scale: np.ndarray
 ) -> tuple[np.ndarray, ...]:
-    """The same without the states that a rule gives by others, as many as it has sums."""
+    """Remove the states that a rule gives by others, as many as it has sums."""
     from scipy.linalg import qr
 
     order = qr(rule.weights.T, pivoting=True)[2]

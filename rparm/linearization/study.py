@@ -165,7 +165,7 @@ def _path(request: Request) -> Path:
 
 
 def _opened(path: Path, kind: str) -> Fmu:
-    """An FMU as one of a kind, or as one for model exchange if it can be."""
+    """Open an FMU as one of a kind, or as one for model exchange if it can be."""
     if kind:
         return Fmu(path, kind=kind)
     try:
@@ -195,7 +195,7 @@ def _units(subject: FmuSubject | SystemSubject, found: Linear) -> dict[str, str]
 
 
 def document(found: Study, step: float | None) -> Document:
-    """All that is found, of names, numbers and lists; with a `step` (s) also the sampled model."""
+    """Return all results as names, numbers and lists; with a `step` (s) also the sampled model."""
     linear = found.linear
     result: Document = {
         "states": list(linear.states),
@@ -239,12 +239,12 @@ def document(found: Study, step: float | None) -> Document:
 
 
 def pairs(poles: np.ndarray) -> list[list[float]]:
-    """Real and imaginary part of each."""
+    """Return real and imaginary part of each."""
     return [[float(pole.real), float(pole.imag)] for pole in poles]
 
 
 def finite(number: float) -> float | None:
-    """A number that JSON has; None for what is not finite."""
+    """Return a number that JSON has; None if it is not finite."""
     return number if np.isfinite(number) else None
 
 
@@ -284,7 +284,7 @@ def _save_mat(path: Path, found: Document, linear: Linear) -> None:
 
 
 def _save_csv(path: Path, found: Document, linear: Linear) -> None:
-    """One table, [A B; C D]: a column for each state and input, a row for each x' and output."""
+    """Write the table [A B; C D], a column a state and input, a row an x' and output."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["", *linear.states, *linear.inputs])

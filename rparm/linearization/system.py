@@ -79,14 +79,14 @@ class SystemSubject(ExitStack):
             self.push(stack.pop_all())
 
     def _found(self, name: str) -> Connection:
-        """The connection to an input."""
+        """Return the connection to an input."""
         ends = {f"{c.end_component}.{c.end_connector}": c for c in self.connections}
         if name not in ends:
             raise UserError(f"--break: {name}: no connection ends there{hint(name, ends)}")
         return ends[name]
 
     def variable(self, name: str) -> Variable:
-        """What is declared of ``component.variable``; UserError if there is none of that name."""
+        """Return the variable ``component.variable``; UserError if there is none of that name."""
         component, dot, variable = name.partition(".")
         if not dot or component not in self.names:
             where = f"{self.ssp.path}: {name}: expected COMPONENT.VARIABLE"
@@ -95,7 +95,7 @@ class SystemSubject(ExitStack):
         return known_variable(self.ssp.models[component], variable, where)
 
     def parts(self, values: Mapping[str, Value]) -> dict[str, Linear]:
-        """The linear model of each component, without held states, by its name.
+        """Linearize each component, without held states, by its name.
 
         UserError if one is sampled, or if the connections form an algebraic loop.
         """
@@ -110,7 +110,7 @@ class SystemSubject(ExitStack):
         return found
 
     def at(self, values: Mapping[str, Value]) -> Linear:
-        """The linear model where parameters and states have these values, held states included.
+        """Linearize where parameters and states have these values, held states included.
 
         All loops are closed, also the one that is to be broken: the point is that of the system.
         """
@@ -138,11 +138,11 @@ class SystemSubject(ExitStack):
         ]
 
     def held(self, parts: Mapping[str, Linear]) -> dict[str, list[str]]:
-        """Held states by component."""
+        """Return held states by component."""
         return {name: held_states(part, self.ssp.models[name]) for name, part in parts.items()}
 
     def merged(self, values: Mapping[str, Value]) -> dict[str, dict[str, Value]]:
-        """All that is set, by component."""
+        """Join all that is set, by component."""
         merged = {name: dict(self._parameters.get(name, {})) for name in self.names}
         for name, value in values.items():
             component, _, variable = name.partition(".")
@@ -174,7 +174,7 @@ class SystemSubject(ExitStack):
 
 
 def bypassed(ssp: Ssp, connections: Sequence[Connection], name: str) -> list[Connection]:
-    """Connections without a component: what it fed is fed by what fed it, by the same names."""
+    """Remove a component: its source feeds what it fed, by the same names."""
     sources = dict.fromkeys(c.start_component for c in connections if c.end_component == name)
     result = []
     for c in connections:
@@ -193,7 +193,7 @@ def bypassed(ssp: Ssp, connections: Sequence[Connection], name: str) -> list[Con
 
 
 def _next_event(ssp: Ssp, name: str, values: Mapping[str, Value], time: float) -> float | None:
-    """Time of the first time event of a component, if its FMU is for model exchange, too."""
+    """Return the first time event of a component, if its FMU is for model exchange, too."""
     try:
         fmu = Fmu(ssp.fmu(name), kind=MODEL_EXCHANGE)
     except (UserError, UnreadableError):
@@ -211,7 +211,7 @@ def _next_event(ssp: Ssp, name: str, values: Mapping[str, Value], time: float) -
 
 
 def connected(parts: Mapping[str, Linear], connections: Iterable[Connection]) -> Linear:
-    """The linear model of components whose outputs feed inputs.
+    """Join the linear models of components whose outputs feed inputs.
 
     Its inputs are those of all components, each added to what its connection brings; names are
     "component.variable". UserError if connections form an algebraic loop, with its path.
@@ -244,7 +244,7 @@ def connected(parts: Mapping[str, Linear], connections: Iterable[Connection]) ->
 def _feeding(
     inputs: Sequence[str], outputs: Sequence[str], connections: Iterable[Connection]
 ) -> np.ndarray:
-    """1 where an output feeds an input, (inputs, outputs); others are constant."""
+    """Return 1 where an output feeds an input, (inputs, outputs); others are constant."""
     fed = np.zeros((len(inputs), len(outputs)))
     for c in connections:
         start = f"{c.start_component}.{c.start_connector}"
@@ -255,7 +255,7 @@ def _feeding(
 
 
 def _clear(part: Linear) -> tuple[np.ndarray, ...]:
-    """A, B, C and D of a component with 0 for rounding.
+    """Set A, B, C and D of a component to 0 where they are rounding.
 
     An entry is compared with its row and its column, as units may make a whole row or column small.
     """
@@ -268,7 +268,7 @@ def _clear(part: Linear) -> tuple[np.ndarray, ...]:
 
 
 def _solved(direct: np.ndarray) -> np.ndarray:
-    """The inverse of 1 - direct, which has no loops: 1 + direct + direct^2 + ..."""
+    """Return the inverse of 1 - direct, which has no loops: 1 + direct + direct^2 + ..."""
     solved = term = np.eye(len(direct))
     while (term := term @ direct).any():
         solved = solved + term
@@ -286,7 +286,7 @@ def _diagonal(blocks: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _refuse_algebraic_loop(outputs: Sequence[str], direct: np.ndarray) -> None:
-    """`direct[i, j]`: output i follows output j at once."""
+    """Refuse an algebraic loop; `direct[i, j]`: output i follows output j at once."""
     following = [np.flatnonzero(row).tolist() for row in direct]
     path: list[int] = []
     done: set[int] = set()
@@ -319,7 +319,7 @@ class Looped:
 
 
 def looped(parts: Mapping[str, Linear], connections: Iterable[Connection]) -> Looped:
-    """The part of a system that signals come back to through a connection."""
+    """Return the part of a system that signals come back to through a connection."""
     nodes = [
         (name, kind, variable)
         for name, part in parts.items()

@@ -114,7 +114,7 @@ class _Problem:
                 raise UserError(f"--trim: {name} leaves its range: {error}") from error
 
     def evaluated(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What is left of each equation, its derivatives by the free variables, its size."""
+        """Return the rest of each equation, its derivatives by the free variables, its size."""
         self.check_range(point)
         found = self.subject.at(self.set_to(point))
         wanted = np.array([*self.targets.values()])
@@ -127,7 +127,7 @@ class _Problem:
         return left, responses[:, self.columns], np.maximum(size, 1.0)
 
     def _is_given_velocity(self, found: Linear) -> np.ndarray:
-        """Which derivatives are a velocity that is given or may move: no equation binds them."""
+        """Return which derivatives are a given or free velocity: no equation binds them."""
         n = len(found.states)
         given = np.ones(n, bool)
         given[[column for column in self.columns if column < n]] = self.is_moving
@@ -138,7 +138,7 @@ class _Problem:
         return bool(np.all(np.abs(left) <= EXACT * size))
 
     def solved(self) -> np.ndarray:
-        """Newton's method with steps that are halved until less is left."""
+        """Solve by Newton's method with steps that are halved until less is left."""
         point = self.start
         left, responses, size = self.evaluated(point)
         for _ in range(MOST_STEPS):
@@ -167,7 +167,7 @@ class _Problem:
         )
 
     def interval(self, point: np.ndarray, i: int) -> tuple[float, float] | None:
-        """Values of a free variable at which all stays in equilibrium, if there is more than one.
+        """Return values of a free variable that keep the equilibrium, if there is more than one.
 
         UserError if it may have any value.
         """
@@ -177,7 +177,7 @@ class _Problem:
         return None if ends[0] == ends[1] else ends
 
     def _end(self, point: np.ndarray, i: int, side: float) -> float:
-        """Where the equilibrium ends on one side."""
+        """Find where the equilibrium ends on one side."""
 
         def holds(distance: float) -> bool:
             moved = point.copy()

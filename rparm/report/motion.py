@@ -34,7 +34,7 @@ class Recorded:
     values: Mapping[str, Value]  # of parameters, by name
 
     def component(self, name: str) -> "Recorded":
-        """The same of one component of a system, without its name in front."""
+        """Return the columns of one component of a system, without its name in front."""
         named = self.columns, self.references, self.values
         return Recorded(self.times, *(_within(name, each) for each in named))
 
@@ -49,7 +49,7 @@ class Animation:
 
 
 def of_run(run: Run, rows: Rows = EVERY) -> dict | None:
-    """Data of the player for a scenario's run, at `rows` of it; None: nothing to animate."""
+    """Return the player's data of a scenario's run at `rows`; None: nothing to animate."""
     references = {name: run.reference.column(name) for name in run.result.names}
     return of_result(run.scenario, run.result, references, rows)
 
@@ -60,7 +60,7 @@ def of_result(
     references: Mapping[str, np.ndarray],
     rows: Rows = EVERY,
 ) -> dict | None:
-    """The same of a run that may have stopped early, and may have no references."""
+    """Return data for a run that may have stopped early, and may have no references."""
     # a row holds the outputs at the end of a step, so the inputs too are those of this step
     steps = scenario.input_rows[: len(result.times)]
     inputs = {name: values[steps] for name, values in scenario.inputs.items()}
@@ -72,7 +72,7 @@ def of_result(
 
 
 def of_outcome(system: str, ssp: Ssp, outcome: Outcome, rows: Rows = EVERY) -> dict | None:
-    """Data of the player for a run of a variant of `system`, a folder; None: nothing to animate."""
+    """Return data for a run of a variant of `system`, a folder; None: nothing to animate."""
     given = ssp.system.parameter_sets[outcome.variant]
     values = {
         f"{component}.{name}": value
@@ -84,7 +84,7 @@ def of_outcome(system: str, ssp: Ssp, outcome: Outcome, rows: Rows = EVERY) -> d
 
 
 def of_recorded(folder: str, recorded: Recorded, rows: Rows = EVERY) -> dict[str, Any] | None:
-    """Data of the player for a folder below models/; None: nothing to animate."""
+    """Return the data of the player for a folder below models/; None: nothing to animate."""
     animate = _animate(folder)
     if animate is None:
         return None
@@ -103,7 +103,7 @@ def of_recorded(folder: str, recorded: Recorded, rows: Rows = EVERY) -> dict[str
 
 
 def _animate(folder: str) -> Callable[[Recorded], Animation] | None:
-    """Function `animation` of a folder below models/."""
+    """Return the function `animation` of a folder below models/."""
     if not folder.isidentifier():  # an FMU from elsewhere
         return None
     name = f"rparm.models.{folder}.{project.ANIMATION}"

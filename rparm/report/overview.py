@@ -91,7 +91,7 @@ def forget(report: Path, section: str, names: Collection[str] | None = None) -> 
 
 
 def read(report: Path, section: str) -> list[Entry]:
-    """Entries of a section; those of a file that nobody can read do not count."""
+    """Read the entries of a section; those of a file that nobody can read do not count."""
     with suppress(OSError, ValueError, TypeError, RecursionError):
         content = json.loads((report / section / ENTRIES).read_text(encoding="utf-8"))
         return [Entry(**item) for item in content]
@@ -124,7 +124,7 @@ def write(report: Path) -> Path:
 
 
 def _summary(entries: Sequence[Entry]) -> dict[str, object]:
-    """How many of a section passed, and which is worst."""
+    """Say how many of a section passed, and which is worst."""
     compared = [entry for entry in entries if entry.status != RAN]
     known = [entry for entry in compared if entry.error is not None]
     return {
@@ -136,7 +136,7 @@ def _summary(entries: Sequence[Entry]) -> dict[str, object]:
 
 
 def sparkline_scale(x: np.ndarray, plot: Plot, unit: str) -> str:
-    """Between which values the first curve of a plot runs, and how long `x` is (`unit`)."""
+    """Say between which values the first curve of a plot runs, and how long `x` is (`unit`)."""
     values = plot.curves[0].values[np.isfinite(plot.curves[0].values)]
     if not len(values):
         return ""
@@ -147,7 +147,7 @@ def sparkline_scale(x: np.ndarray, plot: Plot, unit: str) -> str:
 
 
 def sparkline(x: np.ndarray, y: np.ndarray) -> str:
-    """Path of an SVG of `WIDTH` by `HEIGHT` through points (rows,), `x` ascending; may be empty."""
+    """Draw an SVG path of `WIDTH` by `HEIGHT` through points (rows,), if any, `x` ascending."""
     finite = np.isfinite(y)
     x, y = x[finite], y[finite]
     if not len(x):

@@ -149,7 +149,7 @@ def write_assets(report: Path) -> None:
 
 @functools.cache
 def _plotly() -> bytes:
-    """The library, compressed, in a script that unpacks it."""
+    """Return the library, compressed, in a script that unpacks it."""
     file = project.plotly_script()
     bundle = file.read_bytes()
     bundle = gzip.decompress(bundle) if file.suffix == ".gz" else bundle

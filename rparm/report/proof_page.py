@@ -106,7 +106,7 @@ def _write(report: Path, name: str, page: RunPage) -> Path:
 
 
 def _largest(model: Model, enclosure: Enclosure, errors: Mapping[str, np.ndarray]) -> Table:
-    """Largest error of each state in each run, and when."""
+    """Return the largest error of each state in each run, and its time."""
     heads = [f"{n} in {unit(model.variables[n].unit)}" for n in enclosure.names]
     found = {
         run: proof.largest_errors(course, enclosure).values() for run, course in errors.items()

@@ -192,7 +192,7 @@ def write(file: Path, drawn: "Sequence[Image]", duration: float) -> int:
 
 
 def _with_few_colours(drawn: "Sequence[Image]") -> "list[Image]":
-    """The same frames with one palette, which makes the file smaller by far."""
+    """Return the frames with one palette, which makes the file smaller by far."""
     from PIL import Image
 
     codes = np.stack([np.asarray(frame) @ np.array([1 << 16, 1 << 8, 1]) for frame in drawn])

@@ -27,7 +27,7 @@ class Curve:
     limit: bool = False  # is not a result but what results stay below
 
     def at(self, rows: np.ndarray) -> "Curve":
-        """The same at some of its rows."""
+        """Reduce to some of the rows."""
         reference = None if self.reference is None else self.reference[rows]
         return replace(self, values=self.values[rows], reference=reference)
 
@@ -59,7 +59,7 @@ class Plot:
         return [np.log10(np.maximum(values, tiny)) for values in found]
 
     def at(self, rows: np.ndarray) -> "Plot":
-        """The same at some of its rows."""
+        """Reduce to some of the rows."""
         return replace(self, curves=[curve.at(rows) for curve in self.curves])
 
     @property
@@ -99,7 +99,7 @@ class RunData:
     motion: dict[str, Any] | None = None  # of rparm.report.motion
 
     def json(self) -> str:
-        """Text for a script element: no text in it ends the element."""
+        """Write text for a script element: no text in it ends the element."""
         packer = _Packer()
         content = {
             "name": self.name,
@@ -127,7 +127,7 @@ class RunData:
 
 
 def without_rounding(values: np.ndarray) -> np.ndarray:
-    """Values of a variable, with 0 for what is rounding beside its scale, 3e-17 say."""
+    """Return values with 0 for rounding beside the variable's scale, 3e-17 say."""
     scale = max(np.abs(values[np.isfinite(values)]).max(initial=0.0), SMALLEST_SCALE)
     return np.where(np.abs(values) < ROUNDING * scale, 0.0, values)
 
@@ -135,13 +135,15 @@ def without_rounding(values: np.ndarray) -> np.ndarray:
 def result_curve(
     name: str, values: np.ndarray, reference: np.ndarray | None = None, steps: bool = False
 ) -> Curve:
-    """Values of a variable over those of its reference, without rounding."""
+    """Return the values of a variable over those of its reference, without rounding."""
     below = None if reference is None else without_rounding(reference)
     return Curve(name, without_rounding(values), below, steps)
 
 
 def thinned(columns: Sequence[np.ndarray], most: int = MOST_ROWS) -> np.ndarray:
-    """Rows to show of columns (rows,): at most `most`, unless the columns have more extremes.
+    """Choose rows to show of columns (rows,).
+
+    They are at most `most`, unless the columns have more extremes.
 
     Rows at equal distances, half of `most` at least, and those where a column is smallest and
     largest in each of many equal intervals: as many intervals as `most` permits, at least one.
@@ -160,7 +162,7 @@ def thinned(columns: Sequence[np.ndarray], most: int = MOST_ROWS) -> np.ndarray:
 
 
 def _extremes(table: np.ndarray, every: int) -> np.ndarray:
-    """The first of every k rows of a table (rows, columns), the last, the extremes in between."""
+    """Choose every k-th row of a table (rows, columns), the last, and extremes between."""
     count = len(table)
     bins = -(-count // every)
     padded = np.pad(table, ((0, bins * every - count), (0, 0)), mode="edge")
@@ -179,7 +181,7 @@ def _extremes(table: np.ndarray, every: int) -> np.ndarray:
 
 
 def narrow(values: np.ndarray) -> np.ndarray:
-    """Floats for doubles, unless one of them is too large or too small for seven digits."""
+    """Return floats for doubles, unless one is too large or too small for seven digits."""
     with np.errstate(over="ignore", under="ignore"):
         floats = values.astype(np.float32)
     digits = np.isfinite(floats) & (np.abs(floats) >= np.finfo(np.float32).tiny)
@@ -211,7 +213,7 @@ class _Packer:
         self._known: dict[tuple[str, bytes], int] = {}
 
     def packed(self, content: Any) -> Any:
-        """`content` with arrays, and lists of floats, replaced by their indices in `arrays`."""
+        """Replace arrays and lists of floats in `content` by their indices in `arrays`."""
         if isinstance(content, dict):
             return {name: self.packed(value) for name, value in content.items()}
         long = isinstance(content, list) and len(content) >= FEWEST_PACKED

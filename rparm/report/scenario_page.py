@@ -96,7 +96,7 @@ def write_failed(folder: Path, name: str, failure: Failure, again: str) -> Entry
 
 
 def _described(failure: Failure) -> str:
-    """Which run failed, and why."""
+    """Return a line that names the failed run's tolerance and the reason."""
     return f"Tolerance {short(failure.tolerance)}: {failure.text}"
 
 
@@ -114,7 +114,7 @@ def _write_values(
 
 
 def recorded(scenario: Scenario, model: Model, result: Result) -> dict[str, np.ndarray]:
-    """All columns of the values, (rows,) each: Real outputs, Integers to draw, and given inputs.
+    """Return the columns (rows,) of Real outputs, Integers to draw, and given inputs.
 
     A row holds what an importer reads after a step, so it holds the inputs of that step too.
     """
@@ -133,20 +133,20 @@ def recorded(scenario: Scenario, model: Model, result: Result) -> dict[str, np.n
 
 
 def status(run: Run) -> str:
-    """What the overview says of a run."""
+    """Return the status of a run for the overview."""
     if not run.passed:
         return FAILED
     return PASSED if run.compared else RAN
 
 
 def _thinned(plots: Sequence[Plot]) -> tuple[np.ndarray, list[Plot]]:
-    """Rows that are shown, and the plots at these."""
+    """Return the numbers of the rows to show, and the plots reduced to these rows."""
     rows = thinned([values for plot in plots for values in plot.columns])
     return rows, [plot.at(rows) for plot in plots]
 
 
 def _plots(runs: Sequence[Run], columns: dict[str, np.ndarray]) -> list[Plot]:
-    """States over their references, inputs, what the scenario asks for, and errors."""
+    """Plot states over their references, inputs, requested variables, and errors."""
     run, references = runs[0], {}
     if run.compared:
         references = {name: run.reference.column(name) for name in run.result.names}
@@ -161,7 +161,7 @@ def _value_plots(
     columns: dict[str, np.ndarray],
     references: Mapping[str, np.ndarray] = MappingProxyType({}),
 ) -> list[Plot]:
-    """States, inputs and what the scenario asks for, over references, beside what was measured."""
+    """Plot states, inputs and requested variables, over references, beside measured values."""
     variables = model.variables
     states = [name for name in model.states if name in columns]
     panels = [(name,) for name in states or model.real_outputs]
@@ -189,13 +189,13 @@ def _value_plots(
 
 
 def meanings(variables: Iterable[Variable]) -> str:
-    """What the values of Integers mean, from their descriptions."""
+    """Say what the values of Integers mean, from their descriptions."""
     texts = [v.description for v in variables if v.type == "Integer" and v.description]
     return ". ".join(texts) + "." if texts else ""
 
 
 def _error_plot(runs: Sequence[Run]) -> Plot:
-    """Largest error of all outputs at each time; one curve a run."""
+    """Plot the largest error of all outputs at each time; one curve a run."""
     curves, levels = [], []
     for run in runs:
         scales = np.array([run.reference.scale(name) for name in run.result.names])
@@ -225,7 +225,7 @@ def _facts(run: Run) -> list[tuple[str, str]]:
 
 
 def _proven(proof: Mapping[str, ProvenError], model: Model) -> list[tuple[str, str]]:
-    """How far each state is from the exact motion at most."""
+    """Say how far each state is from the exact motion at most."""
     texts = [
         f"{n} {rounded_up(e.error, 1)} {unit(model.variables[n].unit)}" for n, e in proof.items()
     ]
@@ -270,7 +270,7 @@ def _tables(runs: Sequence[Run]) -> list[Table]:
 
 
 def _start_tables(scenario: Scenario, model: Model) -> list[Table]:
-    """Parameters, initial state and inputs."""
+    """Return tables of parameters, initial state and inputs."""
     given = scenario.parameters | scenario.initial
     tables = []
     if given:
@@ -345,7 +345,7 @@ def _errors(runs: Sequence[Run]) -> Table:
 def with_measured(
     plots: Sequence[Plot], comparisons: Sequence[Comparison], model: Model
 ) -> list[Plot]:
-    """`plots` with what was measured beside what was simulated, in new plots if need be."""
+    """Add measured values to `plots` of their variables, in new plots if need be."""
     result = list(plots)
     for compared in comparisons:
         name = compared.name
@@ -360,7 +360,7 @@ def with_measured(
 
 
 def measured_tables(comparisons: Sequence[Comparison], model: Model) -> list[Table]:
-    """A table of how far the simulation is from what was measured; none without measurements."""
+    """Return a table of the distance from measured values; none without measurements."""
     if not comparisons:
         return []
     rows = [
@@ -378,7 +378,7 @@ def measured_tables(comparisons: Sequence[Comparison], model: Model) -> list[Tab
 
 
 def describe_signal(signal: Signal) -> str:
-    """An input as text."""
+    """Describe an input."""
     if isinstance(signal, Constant):
         return f"constant {number(signal.value)}"
     if isinstance(signal, Sines):

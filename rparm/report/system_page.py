@@ -126,7 +126,7 @@ def write_failed(report: Path, section: Section, variant: str, error: UserError)
 
 
 def _folder(report: Path, section: Section) -> Path:
-    """Folder of the pages, with what they share."""
+    """Return the folder of the pages, with the assets that they share."""
     pages.write_assets(report)
     folder = report / SYSTEM
     folder.mkdir(parents=True, exist_ok=True)
@@ -136,7 +136,7 @@ def _folder(report: Path, section: Section) -> Path:
 
 
 def _texts(section: Section, variant: str) -> dict[str, Any]:
-    """What a page says of a variant, however its run ended."""
+    """Return the texts of a variant's page, however its run ended."""
     stem = section.ssp.path.stem
     return {
         "title": f"{stem}: {variant}",
@@ -147,7 +147,7 @@ def _texts(section: Section, variant: str) -> dict[str, Any]:
 
 
 def _data(section: Section, outcome: Outcome) -> tuple[np.ndarray, RunData]:
-    """Rows of the file of values, and plots and motion at these."""
+    """Return the rows of the file of values, and plots and motion at these."""
     times = outcome.run.times
     plots = [_plot(section.ssp, outcome, diagram) for diagram in section.study.DIAGRAMS]
     rows = thinned([column for plot in plots for column in plot.columns], MOST_ROWS)
@@ -194,14 +194,14 @@ def _measures(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
 
 
 def _description(system: System, variant: str) -> str:
-    """What the variant is, and how it is run."""
+    """Describe the variant, and how it is run."""
     said = system.descriptions.get(variant, "").rstrip(".")
     how = f"Run by Ecos with steps of {milliseconds(system.step)}."
     return f"{said}. {how}" if said else how
 
 
 def _parameters(ssp: Ssp, variant: str) -> list[Table]:
-    """What the variant sets, then per component what has its start value."""
+    """Return a table of the variant's values, then start values per component."""
     given = ssp.system.parameter_sets[variant]
     connected = {(x.end_component, x.end_connector) for x in ssp.system.connections}
     rows: list[Sequence[object]] = []
@@ -225,7 +225,7 @@ def _parameters(ssp: Ssp, variant: str) -> list[Table]:
 
 
 def _solvers(ssp: Ssp, run: ecos.Run) -> list[Table]:
-    """Statistics of the components that integrate."""
+    """Return statistics of the components that integrate."""
     rows = []
     for component in ssp.models:
         values = [run.statistics.get(f"{component}.{name}") for name in ecos.STATISTICS]

@@ -46,7 +46,7 @@ class ReportWriter:
 
     @staticmethod
     def grouped(runs: Sequence[Run]) -> dict[Path, list[Run]]:
-        """Runs by scenario."""
+        """Return runs by scenario."""
         groups: dict[Path, list[Run]] = {}
         for run in runs:
             groups.setdefault(run.scenario.path, []).append(run)

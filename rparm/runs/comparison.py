@@ -58,7 +58,7 @@ class Reference:
     summed: Summed = field(default_factory=dict)
 
     def column(self, name: str) -> np.ndarray:
-        """Values of one variable, (rows,)."""
+        """Return the values of one variable, (rows,)."""
         if name not in self.names:
             raise UserError(f"{self.path}, line 1: has no column {name!r}")
         return self.values[:, self.names.index(name)]
@@ -69,7 +69,7 @@ class Reference:
         return dict(zip(self.names, self.values.T, strict=True))
 
     def scale(self, name: str) -> float:
-        """What an error of a variable is divided by, in its unit."""
+        """Return the divisor of a variable's error, in its unit."""
         return error_scale(self.columns, name, self.summed)
 
 
@@ -89,12 +89,12 @@ def load_reference(scenario: Scenario, model: Model) -> Reference:
 
 
 def reference_failure(path: Path, folder: Path, name: str) -> files.Failure:
-    """Makes errors of the reference `name` of a model or system, with how to make it again."""
+    """Return a function that makes errors of a reference, with how to make it again."""
     return files.csv_failure(path, f"; {project.making_references(folder, name)}")
 
 
 def read_summed(folder: Path) -> Summed:
-    """Errors of a model or system, by folder, that a sum scales; UserError if the file is wrong."""
+    """Read which errors a sum scales, by variable; UserError if the file is wrong."""
     path = project.scales_file(folder)
     if not is_file(path):
         return {}
@@ -106,7 +106,7 @@ def read_summed(folder: Path) -> Summed:
 
 
 def error_scale(columns: Mapping[str, np.ndarray], name: str, summed: Summed) -> float:
-    """What an error of a variable is divided by, in its unit: its largest value, or that of a sum.
+    """Return the divisor of a variable's error, in its unit: its largest value, or a sum's.
 
     `columns` are the reference of all variables, (rows,) each; a sum of which a term is missing
     does not count.
@@ -119,7 +119,7 @@ def error_scale(columns: Mapping[str, np.ndarray], name: str, summed: Summed) ->
 
 
 def errors_against(result: Result, reference: Reference) -> dict[str, float]:
-    """Error of each variable of `result`, relative: its largest difference over time / `scale`."""
+    """Return each variable's relative error: its largest difference over time / `error_scale`."""
     return {
         name: float(np.max(np.abs(values - reference.column(name)))) / reference.scale(name)
         for name, values in zip(result.names, result.values.T, strict=True)
@@ -127,7 +127,7 @@ def errors_against(result: Result, reference: Reference) -> dict[str, float]:
 
 
 def error_bound(tolerance: float) -> float:
-    """Largest error allowed of a run at a relative tolerance.
+    """Return the largest error allowed of a run at a relative tolerance.
 
     1000 times the tolerance, and no more than 1e-6 from tolerance 1e-8 on and 1e-8 from tolerance
     1e-11 on: of these the least that applies.
@@ -241,7 +241,7 @@ class Runs:
     def steps_ahead(
         self, scenario: Scenario, tolerances: Sequence[float], compared: bool = False
     ) -> int:
-        """Communication steps still to be made at `tolerances`; `compared`: by twins too."""
+        """Count communication steps still to be made at `tolerances`; `compared`: by twins too."""
         missing = [t for t in tolerances if (scenario.name, t) not in self._runs]
         times = 2 if compared and scenario.model in self._twins else 1
         return times * len(missing) * (len(scenario.times) - 1)
@@ -249,7 +249,7 @@ class Runs:
     def run(
         self, scenario: Scenario, tolerance: float, progress: Callable[[int], object] | None = None
     ) -> Run:
-        """`scenario` at `tolerance`, simulated now unless it was before."""
+        """Run `scenario` at `tolerance`, unless it was before."""
         key = scenario.name, tolerance
         if key not in self._runs:
             expected, fmu = self.reference(scenario), self._fmus[scenario.model]
@@ -261,7 +261,7 @@ class Runs:
     def compared(
         self, scenario: Scenario, tolerance: float, progress: Callable[[int], object] | None = None
     ) -> Run:
-        """`scenario` at `tolerance`, compared with its twin too, if there is one."""
+        """Run `scenario` at `tolerance`; compare it with its twin too, if there is one."""
         run, twin = self.run(scenario, tolerance, progress), self._twins.get(scenario.model)
         if twin is not None and run.twin is None:
             other = simulation.simulate(twin, scenario, tolerance, progress)
@@ -271,7 +271,7 @@ class Runs:
         return run
 
     def failure(self, scenario: Scenario, tolerance: float, error: UserError) -> Failure:
-        """What is known of a run that ended with `error`."""
+        """Return the failure of a run that ended with `error`."""
         result = error.result if isinstance(error, StoppedError) else None
         rows = result if result is not None and len(result.times) else None
         return Failure(scenario, self._fmus[scenario.model], tolerance, str(error), rows)
@@ -279,7 +279,7 @@ class Runs:
     def estimated(
         self, scenario: Scenario, tolerance: float, progress: Callable[[int], object] | None = None
     ) -> Run:
-        """`scenario`, which has no reference, compared with itself at another tolerance."""
+        """Run `scenario`, which has no reference; compare it with itself at another tolerance."""
         fmu = self._fmus[scenario.model]
         result = simulation.simulate(fmu, scenario, tolerance, progress)
         other = estimated_from(tolerance, scenario.smallest_tolerance)
@@ -292,7 +292,7 @@ class Runs:
 
 
 def estimated_from(tolerance: float, smallest: float) -> float:
-    """Tolerance of the run that a run at `tolerance` is compared with if there is no reference.
+    """Choose the tolerance to compare a run at `tolerance` with if there is no reference.
 
     A tighter one, unless it would be below the `smallest` that makes a difference. Then it is a
     looser one, whose own error is what the runs differ by: more than that of the run.
@@ -302,7 +302,7 @@ def estimated_from(tolerance: float, smallest: float) -> float:
 
 
 def differing(one: Result, other: Result) -> tuple[str, ...]:
-    """Outputs that are not in both, or whose values differ in a bit."""
+    """Return outputs that are not in both, or whose values differ in a bit."""
     columns, others = (
         {name: column.tobytes() for name, column in zip(r.names, r.values.T, strict=True)}
         | {name: column.tobytes() for name, column in r.integers.items()}
@@ -343,7 +343,7 @@ class Comparison:
 
 
 def comparisons(scenario: Scenario, result: Result) -> Iterator[Comparison]:
-    """What a scenario has measured, compared with a run of it."""
+    """Compare a run with the logs of a scenario."""
     elapsed = scenario.elapsed[scenario.reference_rows][: len(result.times)]
     for name, log in scenario.measured.items():
         measured = np.where(log.covers(elapsed), log.values(elapsed), np.nan)
@@ -374,13 +374,13 @@ def sweep(
     progress: Callable[[int], object] | None = None,
     tolerances: Sequence[float] = TOLERANCES,
 ) -> Sweep:
-    """`scenario` at all `tolerances`, loosest first, and what breaks the rules."""
+    """Run `scenario` at all `tolerances`, loosest first; return errors and broken rules."""
     errors = tuple(runs.run(scenario, tolerance, progress).error for tolerance in tolerances)
     return Sweep(scenario, tuple(tolerances), errors, sweep_violations(tolerances, errors))
 
 
 def sweep_violations(tolerances: Sequence[float], errors: Sequence[float]) -> list[str]:
-    """Rules that errors over tolerances (loosest first) break, one sentence each.
+    """Return rules that errors over tolerances (loosest first) break, one sentence each.
 
     An error stays within its bound; it never grows to more than 3 times that of the next looser
     tolerance; at the tightest it is at most 1/1000 of that at the loosest, or below 1e-10. The

@@ -60,7 +60,7 @@ class Problem:
         return self.scenario.steps[0] * np.array(FACTORS)
 
     def final_error(self, states: dict[str, float]) -> float:
-        """Largest difference of final `states`, each relative to its largest value on the way."""
+        """Return the largest difference of final `states`, relative to their largest values."""
         return max(abs(states[name] - self.exact[name]) / self.largest[name] for name in self.exact)
 
 
@@ -111,7 +111,7 @@ class Convergence:
         )
 
     def holds(self, i: int) -> bool:
-        """Whether the slope of case i is the one expected, from as many errors as it takes."""
+        """Return whether case i has the expected slope, from as many errors as it takes."""
         enough = bool(self.fitted[i].all()) or POWERS[i] > ALL_FITTED
         return enough and abs(self.slopes[i] - POWERS[i]) <= LARGEST_DEVIATION
 
@@ -139,12 +139,15 @@ class Convergence:
 
 
 def slope(steps: np.ndarray, errors: np.ndarray) -> float:
-    """Slope of the straight line through log `errors` over log `steps`, by least squares."""
+    """Fit a straight line through log `errors` over log `steps`; return its slope."""
     return float(np.polynomial.Polynomial.fit(np.log(steps), np.log(errors), 1).convert().coef[1])
 
 
 def smooth_inputs(scenario: Scenario) -> dict[str, Sines]:
-    """Inputs of `scenario` as smooth functions; UserError if one of them is no sum of sines."""
+    """Return the inputs of `scenario` as smooth functions.
+
+    UserError if one of them is no sum of sines.
+    """
     for name, signal in scenario.signals.items():
         if not isinstance(signal, Sines):
             raise UserError(f"{scenario.path}: [inputs.{name}]: expected sines, which are smooth")
@@ -152,7 +155,7 @@ def smooth_inputs(scenario: Scenario) -> dict[str, Sines]:
 
 
 def load(path: Path, model: Model) -> Problem:
-    """A problem and its exact final state; UserError if one of the files is missing or wrong."""
+    """Read a problem and its exact final state; UserError if a file is missing or wrong."""
     scenario = scenarios.load(path, model)
     if len(scenario.steps) != 1 or (len(scenario.times) - 1) % FACTORS[0]:
         raise UserError(f"{path}: [time] step: {FACTORS[0]} of it do not divide the duration")
@@ -173,7 +176,7 @@ def load(path: Path, model: Model) -> Problem:
 
 
 def steps_ahead(problem: Problem, with_updates: bool) -> int:
-    """Communication steps that `study` makes, with intermediate update or without."""
+    """Count the communication steps of `study`, with intermediate update or without."""
     cases = len(ORDERS) + with_updates
     shortest = len(problem.scenario.times) - 1
     return cases * sum(shortest // factor for factor in FACTORS)
@@ -202,7 +205,7 @@ def study(
 
 
 def final_state(fmu: Fmu, problem: Problem, case: int, factor: int) -> dict[str, float]:
-    """States at the end of a run, whose step is `factor` shortest steps of the problem.
+    """Run a problem with steps of `factor` shortest ones; return the states at the end.
 
     The case is the highest derivative of the inputs that is set, along with all lower ones, 0:
     none; or INTERMEDIATE_UPDATE.
@@ -221,7 +224,7 @@ def final_state(fmu: Fmu, problem: Problem, case: int, factor: int) -> dict[str,
 
 
 def _with_derivatives(instance: Instance, problem: Problem, order: int, times: np.ndarray) -> None:
-    """All steps, with the inputs' values and derivatives at the beginning of each."""
+    """Step through, with the inputs' values and derivatives at the beginning of each step."""
     elapsed = (times - problem.scenario.start)[:-1]
     sines, names = list(problem.inputs.values()), list(problem.inputs)
 
@@ -236,7 +239,7 @@ def _with_derivatives(instance: Instance, problem: Problem, order: int, times: n
 
 
 def _with_updates(instance: Fmi3Instance, problem: Problem, _: int, times: np.ndarray) -> None:
-    """All steps, with the inputs' values at the times that the FMU asks for."""
+    """Step through, with the inputs' values at the times that the FMU asks for."""
     start, sines = problem.scenario.start, list(problem.inputs.values())
     instance.input_functions(
         list(problem.inputs), lambda time: [s.derivative(time - start, 0) for s in sines]

@@ -49,7 +49,7 @@ class Reader:
         raise UserError(f"{self.path}: {message}")
 
     def placed(self, key: str) -> AbstractContextManager[None]:
-        """Where values are checked that this key has."""
+        """Name this key in errors of the values that are checked inside."""
         return placed(f"{self.path}: {key}")
 
     def number(self, value: Any, key: str) -> float:
@@ -57,7 +57,7 @@ class Reader:
             return finite_number(value)
 
     def quantity(self, value: Any, key: str, known: Units, is_difference: bool = False) -> float:
-        """A number, or a text with a number and one of the `known` units."""
+        """Convert a number, or a text with a number and one of the `known` units."""
         with self.placed(key):
             return quantity(value, known, is_difference)
 
@@ -118,10 +118,10 @@ class Sines:
         return total.astype(np.float64)
 
     def derivative(self, elapsed: np.ndarray, order: int) -> np.ndarray:
-        """Derivative of an order at `elapsed` seconds after the start, (n,); order 0: the value.
+        """Return the derivative of an order at `elapsed` seconds after the start, (n,).
 
-        Exact but for one rounding, unlike `values`, whose pi is a double: what the exact final
-        states of the convergence problems are compared with.
+        Order 0 is the value. It is exact but for one rounding, unlike `values`, whose pi is a
+        double: the exact final states of the convergence problems are compared with it.
         """
         pi = np.arctan2(np.longdouble(0), np.longdouble(-1))
         t = np.asarray(elapsed, dtype=np.longdouble)
@@ -171,7 +171,7 @@ class Logged:
         return np.interp(elapsed, self.times, self.numbers)
 
     def covers(self, elapsed: np.ndarray) -> np.ndarray:
-        """Which of the times are within the log, (n,)."""
+        """Return which of the times are within the log, (n,)."""
         return (self.times[0] - EARLY <= elapsed) & (elapsed <= self.times[-1] + EARLY)
 
 
@@ -192,7 +192,7 @@ class Columns:
     joined: Sequence[tuple[int, int]]  # lines that are one row: first and last
 
     def warnings(self, begin: float = -math.inf, end: float = math.inf) -> list[str]:
-        """What looks damaged from `begin` to `end`, in the same time as the rows; a line each."""
+        """Warn of what looks damaged from `begin` to `end`, in the rows' time; a line each."""
         texts = [
             f"lines {first} to {last} are one row, by a quoted field with line ends: "
             "is a quotation mark there by mistake?"
@@ -223,7 +223,7 @@ class Log:
     names: tuple[str, ...]  # of the columns
 
     def columns(self, time: str, names: Sequence[str], since: float | None = None) -> Columns:
-        """Columns, with times since `since` (s), or since the first row.
+        """Read columns, with times since `since` (s), or since the first row.
 
         UserError names the line of what is wrong. Times are subtracted as decimals: doubles of
         clocks that count from 1970 are 0.2 microseconds apart.
@@ -267,7 +267,7 @@ class Log:
         return self.names.index(name)
 
     def _rows(self) -> Iterator[tuple[int, int, list[str]]]:
-        """Names and rows that are not blank, after the lines that each begins and ends in."""
+        """Yield names and rows that are not blank, after the lines of their begin and end."""
         rows, begin = _csv_reader(self.text, self.delimiter), 1
         try:
             for row in rows:
@@ -278,7 +278,7 @@ class Log:
             raise self._wrong(str(error), rows.line_num) from None
 
     def _no_number(self, row: Sequence[str], columns: Sequence[int], line: int) -> UserError:
-        """What is wrong with the first value in `columns` of a row that is no finite number."""
+        """Return the error for the first value in `columns` of a row that is no finite number."""
         for column in columns:
             expected = "a finite number"
             try:
@@ -312,7 +312,7 @@ def read_log(path: Path) -> Log:
 
 
 def _fitting(text: str, delimiter: str, count: int) -> int:
-    """Numbers in the first rows of `count` fields; a comma is no delimiter of them, or decimal."""
+    """Count numbers in the first rows of `count` fields, where a comma may be a decimal one."""
     found = 0
     with suppress(csv.Error):  # is said when the rows are read
         for row in islice(_csv_reader(text, delimiter), 1, MOST_TRIED):
@@ -368,7 +368,7 @@ class InputReader:
         return list(self._warnings)
 
     def inputs(self, content: Mapping[str, Any]) -> dict[str, Signal]:
-        """Section [inputs] as functions of time."""
+        """Read section [inputs] as functions of time."""
         result = {}
         for name, given in self._reader.table(content.get(INPUTS, {}), f"[{INPUTS}]").items():
             with self._reader.placed(f"[{INPUTS}]"):
@@ -380,7 +380,7 @@ class InputReader:
         return result
 
     def measured(self, content: Mapping[str, Any]) -> dict[str, Logged]:
-        """Section [measured]: logs of Real outputs."""
+        """Read section [measured]: logs of Real outputs."""
         result = {}
         outputs = self._model.real_outputs
         for name, given in self._reader.table(content.get(MEASURED, {}), f"[{MEASURED}]").items():
@@ -397,7 +397,7 @@ class InputReader:
         return result
 
     def sampled(self, signals: Mapping[str, Signal]) -> dict[str, np.ndarray]:
-        """Values of the inputs at the communication points, (n + 1,) each."""
+        """Sample the inputs at the communication points, (n + 1,) each."""
         result = {}
         for name, signal in signals.items():
             where = f"[{INPUTS}.{name}]"
@@ -466,7 +466,7 @@ class InputReader:
         return Table(tuple((t, self._reader.quantity(v, key, known)) for t, v, key in rows))
 
     def _rows(self, table: dict[str, Any], where: str) -> list[tuple[float, Any, str]]:
-        """Times in s, values as they stand in the file, and their keys."""
+        """Read times in s, values as they stand in the file, and their keys."""
         rows: list[tuple[float, Any, str]] = []
         pairs = self._reader.array(table[TABLE], f"{where} {TABLE}", "[time, value] pairs")
         for i, row in enumerate(pairs):
@@ -483,7 +483,7 @@ class InputReader:
     # ---- Logs ------------------------------------------------------------------------------------
 
     def _logged(self, table: dict[str, Any], where: str, variable: Variable) -> Logged:
-        """A column of a log, whose times are the run's unless `begin` says otherwise."""
+        """Read a column of a log, whose times are the run's unless `begin` says otherwise."""
         reader = self._reader
         file = reader.text(table[FILE], f"{where} {FILE}")
         column = reader.text(table.get("column", variable.name), f"{where} column")
@@ -512,7 +512,7 @@ class InputReader:
         return Logged(found.times, numbers, is_held, f"{file}, column {column}")
 
     def _log(self, file: str) -> Log:
-        """A log, read once."""
+        """Read a log, once."""
         if file not in self._logs:
             self._logs[file] = read_log(Path(self._reader.path).parent / file)
         return self._logs[file]
@@ -531,7 +531,7 @@ class InputReader:
         )
 
     def _on_or_off(self, table: dict[str, Any], numbers: np.ndarray, where: str) -> np.ndarray:
-        """Values of a Boolean input."""
+        """Convert values of a Boolean input."""
         if "scale" in table or table.get("hold") is False:
             self._reader.fail(f"{where}: a Boolean input is held and not scaled")
         wrong = numbers[(numbers != 0) & (numbers != 1)]

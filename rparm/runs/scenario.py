@@ -99,7 +99,7 @@ class Scenario:
         return self.defaults | self.parameters | self.initial
 
     def input(self, name: str) -> np.ndarray:
-        """Values of an input, (n + 1,): its start value throughout if the file gives none."""
+        """Return the values of an input, (n + 1,), or its start value if the file has none."""
         if name in self.inputs:
             return self.inputs[name]
         return np.full(len(self.times), self.defaults[name])
@@ -122,7 +122,7 @@ class Scenario:
 
 
 def title(path: Path) -> str:
-    """Title of the scenario at `path`; the rest of the file is not checked."""
+    """Read the title of the scenario at `path`; the rest of the file is not checked."""
     content = read_toml(path)
     reader = Reader(path)
     if "title" not in content:
@@ -131,7 +131,7 @@ def title(path: Path) -> str:
 
 
 def subject_of(path: Path) -> Path:
-    """What a scenario is of: the FMU that its key `fmu` names, or the folder of its model.
+    """Return the FMU that the scenario's key `fmu` names, or the folder of its model.
 
     The key `model` names the model, else it is the one whose folder the file lies in. UserError if
     the file cannot be read, or names nothing that is there.
@@ -160,7 +160,7 @@ def subject_of(path: Path) -> Path:
 
 
 def name_of(subject: Path) -> str:
-    """`Scenario.model` for what `subject_of` gives."""
+    """Return `Scenario.model` for what `subject_of` gives."""
     return subject.name if subject.is_dir() else str(subject)
 
 
@@ -232,7 +232,7 @@ class _Reader(Reader):
     # parameters and initial states
 
     def values(self, content: dict[str, Any], section: str, model: Model) -> dict[str, Value]:
-        """Section [parameters] or [initial]: name = value, as `Variable.checked` takes it."""
+        """Read section [parameters] or [initial]: name = value, as `Variable.checked` takes it."""
         result = {}
         for name, given in self.table(content.get(section, {}), f"[{section}]").items():
             with self.placed(f"[{section}]"):
@@ -255,7 +255,7 @@ class _Reader(Reader):
     # pictures
 
     def panels(self, content: dict[str, Any], model: Model) -> tuple[tuple[str, ...], ...]:
-        """Key panels: lists of variables that are drawn into one diagram, of one unit."""
+        """Read key panels: lists of variables that are drawn into one diagram, of one unit."""
         if "panels" not in content:
             return ()
         drawn = [
@@ -311,7 +311,7 @@ class _Reader(Reader):
     def communication_points(
         self, start: float, stop: float, steps: tuple[float, ...]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Times from start to stop in s, and since the start.
+        """Return times from start to stop in s, and since the start.
 
         Each is computed from its index: nothing accumulates.
         """
@@ -336,7 +336,7 @@ class _Reader(Reader):
 
 
 def template(name: str, key: str, subject: str, model: Model) -> str:
-    """Content of the file, which runs as it is.
+    """Write the file, which runs as it is.
 
     The `key` is `model`, with its folder below models/, or `fmu`, with the path of an FMU from the
     file.
@@ -356,7 +356,7 @@ def template(name: str, key: str, subject: str, model: Model) -> str:
 
 
 def _template_times(model: Model) -> dict[str, float]:
-    """The default experiment of the FMU, as far as a scenario can have it."""
+    """Return the default experiment of the FMU, as far as a scenario can have it."""
     given = model.experiment
     start = 0.0 if given.start is None else given.start
     stop = given.stop
@@ -380,12 +380,12 @@ def _template_times(model: Model) -> dict[str, float]:
 
 
 def _toml_number(number: float) -> str:
-    """A number as TOML has it, with all its digits."""
+    """Write a number as TOML does, with all its digits."""
     return repr(number).replace("e-0", "e-")
 
 
 def toml_text(content: str) -> str:
-    """A text as TOML writes it; UserError for the name of a file that is not UTF-8."""
+    """Write a text as TOML does; UserError for the name of a file that is not UTF-8."""
     try:
         content.encode()
     except UnicodeEncodeError:
@@ -394,7 +394,7 @@ def toml_text(content: str) -> str:
 
 
 def _template_section(section: str, title: str, model: Model) -> Iterator[str]:
-    """A section with the start value of each variable in a comment."""
+    """Write a section with the start value of each variable in a comment."""
     known = [
         variable
         for variable in model.variables.values()
@@ -414,7 +414,7 @@ def _template_line(variable: Variable) -> str:
 
 
 def _template_comment(variable: Variable) -> str:
-    """Meaning and limits of a variable, above its line, set off from what may be uncommented."""
+    """Write meaning and limits of a variable, above the line that may be uncommented."""
     limits = []
     if math.isfinite(variable.least) and variable.type == "Real":
         limits.append(f"at least {variable.least:g}")

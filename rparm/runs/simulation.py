@@ -102,7 +102,7 @@ def simulate(
 
 
 def initialize(instance: Instance, scenario: Scenario, tolerance: float) -> None:
-    """From instantiated to the first communication point of `scenario`."""
+    """Go from instantiated to the first communication point of `scenario`."""
     instance.set_up(scenario.start, scenario.stop, tolerance)
     for name, value in (scenario.parameters | scenario.initial).items():
         instance.set(name, value)
@@ -113,7 +113,7 @@ def initialize(instance: Instance, scenario: Scenario, tolerance: float) -> None
 
 
 def _compiled_loop(wanted: bool, steps: int) -> Callable[..., Steps] | None:
-    """The compiled stepping loop; None if it does not pay or cannot be loaded."""
+    """Load the compiled stepping loop; None if it does not pay or cannot be loaded."""
     global _steps_made
     _steps_made += steps
     if wanted or _steps_made > WORTH_COMPILING:
@@ -129,7 +129,7 @@ def _step_through(
     drawn: Sequence[str],
     progress: Callable[[int], object] | None,
 ) -> Steps:
-    """All steps, or those before one that fails."""
+    """Make all steps, or those before one that fails."""
     switches = {name: values for name, values in scenario.inputs.items() if values.dtype == bool}
     inputs = instance.reals([name for name in scenario.inputs if name not in switches])
     outputs = instance.reals(instance.fmu.model.real_outputs)
@@ -179,7 +179,7 @@ def _step_through(
 
 
 def _switching(switches: dict[str, np.ndarray]) -> dict[int, list[str]]:
-    """Boolean inputs whose value is another one at a communication point, by its index."""
+    """Map communication points to the Boolean inputs that change there."""
     found: dict[int, list[str]] = {}
     for name, values in switches.items():
         for i in np.flatnonzero(values[1:] != values[:-1]) + 1:
@@ -193,7 +193,7 @@ def _switching(switches: dict[str, np.ndarray]) -> dict[int, list[str]]:
 def _step_compiled(
     instance: Instance, scenario: Scenario, progress: Callable[[int], object] | None
 ) -> tuple[np.ndarray, np.ndarray, float, UserError | None]:
-    """All steps of an initialized instance, or those before one that fails.
+    """Make all steps of an initialized instance, or those before one that fails.
 
     Recorded outputs (rows, outputs), no Integers (rows, 0), seconds of the loop, why it ended.
     """
@@ -239,7 +239,7 @@ class _CompiledSteps:
 
     @staticmethod
     def _columns(scenario: Scenario, names: list[str], kind: type) -> np.ndarray:
-        """Inputs at all communication points, (n + 1, names)."""
+        """Return inputs at all communication points, (n + 1, names)."""
         columns = np.empty((len(scenario.times), len(names)), kind)
         for column, name in zip(columns.T, names, strict=True):
             column[:] = scenario.inputs[name]
@@ -274,7 +274,7 @@ class _CompiledSteps:
         return failure
 
     def rows(self) -> np.ndarray:
-        """Outputs at the recorded points that were reached, (rows, outputs)."""
+        """Return outputs at the recorded points that were reached, (rows, outputs)."""
         return self._values[: self._recorded]
 
 
@@ -282,12 +282,16 @@ class _CompiledSteps:
 
 
 def is_finite_number(given: object) -> bool:
-    """Whether it is a real number, neither infinite nor nan; a Boolean is none."""
+    """Return whether it is a real number, neither infinite nor nan; a Boolean is none."""
     return isinstance(given, Real) and not isinstance(given, bool) and bool(np.isfinite(given))
 
 
 def communication_points(start: float, stop: float, step: float) -> np.ndarray:
-    """Communication points in s; UserError if no whole number of steps leads to the stop time."""
+    """Return communication points in s.
+
+    UserError if the stop time is no whole number of steps on.
+
+    """
     for name, value in (("start_time", start), ("stop_time", stop), ("step", step)):
         if not is_finite_number(value):
             raise UserError(f"{name}: expected a finite number, got {value!r}")
@@ -308,7 +312,7 @@ def communication_points(start: float, stop: float, step: float) -> np.ndarray:
 
 
 def start_values(model: Model, given: Mapping[str, Any]) -> dict[str, Value]:
-    """Parameters and states to set; UserError if one is wrong."""
+    """Check the given values and return them by name; UserError for a wrong one."""
     checked = {}
     for name, value in given.items():
         with placed(f"start_values: {name}"):
@@ -320,7 +324,7 @@ def start_values(model: Model, given: Mapping[str, Any]) -> dict[str, Value]:
 
 
 def input_values(model: Model, name: str, given: Any, times: np.ndarray) -> np.ndarray:
-    """Values of an input at all communication points `times` (s), of their shape.
+    """Sample an input at all communication points `times` (s).
 
     `given` is a number, a value for each point, a pair (times, values) to interpolate, or a
     function of the time. UserError if a value is not finite or not in the input's range.

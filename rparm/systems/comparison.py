@@ -32,7 +32,7 @@ class Reference:
     summed: Summed
 
     def scale(self, name: str) -> float:
-        """What an error of the variable is divided by, in its unit."""
+        """Return the divisor of a variable's error, in its unit."""
         return comparison.error_scale(self.columns, name, self.summed)
 
 
@@ -50,12 +50,12 @@ class Outcome(Compared):
         return self.error <= BOUND
 
     def column(self, name: str) -> np.ndarray:
-        """Values of one variable, (rows,)."""
+        """Return the values of one variable, (rows,)."""
         return self.run.values[:, self.run.names.index(name)]
 
 
 def recorded(ssp: Ssp) -> list[str]:
-    """All Real outputs of all components, then the continuous states that are no outputs."""
+    """Return all Real outputs of all components, then the continuous states that are no outputs."""
     outputs, states = [], []
     for component, model in ssp.models.items():
         outputs += [f"{component}.{name}" for name in model.real_outputs]
@@ -64,7 +64,7 @@ def recorded(ssp: Ssp) -> list[str]:
 
 
 def discrete(ssp: Ssp) -> list[str]:
-    """All Integer and Boolean outputs of all components; references may have them or not."""
+    """Return all Integer and Boolean outputs of all components; references may have them or not."""
     return [
         f"{component}.{variable.name}"
         for component, model in ssp.models.items()
@@ -89,7 +89,7 @@ def simulate(
 
 
 def reference_names(system: Path) -> list[str]:
-    """Variants that the folder of a system has references of."""
+    """Return the variants that the folder of a system has references of."""
     folder = project.references(system)
     return sorted(path.name for path in folder.glob("*") if path.is_dir())
 
@@ -120,7 +120,7 @@ def load_reference(
 
 
 def _steps(ssp: Ssp, times: np.ndarray, wrong: files.Failure) -> np.ndarray:
-    """Numbers of the communication points at `times`, (rows,)."""
+    """Return the numbers of the communication points at `times`, (rows,)."""
     system = ssp.system
     steps = np.rint((times - system.start) / system.step).astype(int)
     off = np.abs(times - (system.start + steps * system.step)) > 1e-6 * system.step
@@ -187,7 +187,7 @@ class Study(Protocol):
     DIAGRAMS: Sequence[Diagram]  # of the page of a variant
 
     def figure(self, ssp: Ssp, outcome: Outcome) -> "Figure":
-        """Picture of a run of one variant, for READMEs."""
+        """Draw a run of one variant, for READMEs."""
         ...
 
 
@@ -202,7 +202,7 @@ class CouplingStudy(Study, Protocol):
 
 
 def load_study(folder: Path) -> Study:
-    """The module of a system's folder; UserError if there is none."""
+    """Import the module of a system's folder; UserError if there is none."""
     file = folder / f"{project.STUDY}.py"
     if not is_file(file):
         raise UserError(
@@ -212,7 +212,7 @@ def load_study(folder: Path) -> Study:
 
 
 def coupling_study() -> tuple[Path, CouplingStudy]:
-    """Folder and module of the one system that has a study of its coupling; else UserError."""
+    """Return folder and module of the system with a coupling study; UserError if not one."""
     found = _studies_with("study_coupling")
     if len(found) != 1:
         names = ", ".join(folder.name for folder in found) or "none"
@@ -222,11 +222,11 @@ def coupling_study() -> tuple[Path, CouplingStudy]:
 
 
 def rests() -> dict[Path, Rest]:
-    """Where systems rest, by folder, of those that define ``REST``."""
+    """Return where systems rest, by folder, of those that define ``REST``."""
     return {folder: cast(Rest, known.REST) for folder, known in _studies_with("REST").items()}
 
 
 def _studies_with(name: str) -> dict[Path, Any]:
-    """Modules of systems that have this name, by folder."""
+    """Return the modules of systems that have this name, by folder."""
     loaded = {folder: load_study(folder) for folder in project.systems().values()}
     return {folder: known for folder, known in loaded.items() if hasattr(known, name)}

@@ -64,7 +64,7 @@ class Run:
 
 
 def absent() -> str:
-    """Why Ecos cannot run here, or nothing."""
+    """Say why Ecos cannot run here, or nothing."""
     if find_spec("ecospy") is None:
         return "ecospy is not installed"
     here = sys.platform, platform.machine().lower()
@@ -124,7 +124,7 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
 
 
 def said_at_end(ssp: "Ssp") -> list[str]:
-    """What the components have of STATISTICS, as ``component.variable``."""
+    """Return the statistics that components have, as ``component.variable``."""
     return [
         f"{component}.{name}"
         for component, model in ssp.models.items()
@@ -147,7 +147,7 @@ def _check_messages(
 
 
 def _to_read(ssp: "Ssp", names: Sequence[str]) -> list[tuple[str, str]]:
-    """Names of variables as Ecos has them, each after the name of its reader."""
+    """Return the names of variables as Ecos has them, each after the name of its reader."""
     return [(READERS[ssp.variable(name).type], name.replace(".", "::", 1)) for name in names]
 
 
@@ -164,7 +164,7 @@ def _check_parameters(ssp: "Ssp", variant: str) -> None:
 
 
 def _as_ecos_opens(path: Path, folder: Path) -> Path:
-    """The file, or a copy of it in a folder: Ecos opens no name that is not UTF-8."""
+    """Return the file, or a copy of it in a folder: Ecos opens no name that is not UTF-8."""
     try:
         str(path).encode()
     except UnicodeEncodeError:
@@ -189,7 +189,7 @@ def _start(folder: Path) -> int:
 
 
 def _unzip(folder: Path) -> Path:
-    """A folder with a command that does what Ecos wants of unzip: unzip -o ARCHIVE -d FOLDER."""
+    """Make a folder with a command that works as Ecos calls it: unzip -o ARCHIVE -d FOLDER."""
     command = folder / "programs" / "unzip"
     command.parent.mkdir()
     python, extract = shlex.quote(sys.executable), "import sys, zipfile as z; "
@@ -217,7 +217,7 @@ def _components(ssp: "Ssp", fmu: str) -> str:
 def _check_values(
     ssp: "Ssp", variant: str, names: Sequence[str], times: np.ndarray, values: np.ndarray
 ) -> None:
-    """UserError if a value is not finite: it names the component that the first of them is from.
+    """Refuse values that are not finite, naming the component that the first of them is from.
 
     `values` are (times, names); each name is component.variable.
     """

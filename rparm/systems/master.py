@@ -116,7 +116,10 @@ def check_finite(component: str, outputs: Reals, when: str) -> None:
 
 
 def start_value(fmu: UnpackedFmu, component: str, name: str, value: Value) -> Value:
-    """Value to set before initialization, an item as its number; UserError if it cannot be set."""
+    """Return the value to set before initialization, an item as its number.
+
+    UserError if it cannot be set.
+    """
     variable = fmu.model.variables.get(name)
     if variable is None or not (variable.can_start or variable.is_a(INPUTS)):
         raise UserError(f"{component}: {fmu.path} has no parameter {name!r}")
@@ -269,7 +272,7 @@ class Master(AbstractContextManager["Master"]):
         stop: float | None = None,
         parameters: Mapping[str, Mapping[str, Value]] | None = None,
     ) -> None:
-        """To the first communication point, with consistent outputs there; times in s."""
+        """Initialize up to the first communication point, outputs consistent; times in s."""
         parameters = parameters or {}
         for name in parameters:
             if name not in self.components:
@@ -320,7 +323,7 @@ class Master(AbstractContextManager["Master"]):
         check_finite(component.name, component.outputs, "in initialization")
 
     def _propagate_slopes(self) -> None:
-        """Slopes at one time: once per component, since those of inputs show in outputs'."""
+        """Read slopes at one time: once per component, since those of inputs show in outputs'."""
         when = f"for slopes at t = {self.time!r} s"
         for _ in self.components:
             for component in self.components.values():
@@ -338,7 +341,7 @@ class Master(AbstractContextManager["Master"]):
     # ---- Steps -----------------------------------------------------------------------------------
 
     def advance(self, end: float) -> None:
-        """One step to the time `end`, s."""
+        """Make one step to the time `end`, s."""
         length = end - self.time
         components = list(self.components.values())
         groups = [components] if self.jacobi else [[component] for component in components]
@@ -360,7 +363,7 @@ class Master(AbstractContextManager["Master"]):
                 self._propagate_slopes()
 
     def _set_inputs(self, component: ConnectedInstance, length: float) -> None:
-        """Inputs at the beginning of the step, of sources ahead and of others."""
+        """Set inputs at the beginning of the step, of sources ahead and of others."""
         values = self.values[component.sources]
         if self.extrapolates:
             slopes = self.slopes[component.sources]
@@ -380,7 +383,7 @@ class Master(AbstractContextManager["Master"]):
     def run(
         self, times: Sequence[float], progress: Callable[[int], object] = lambda _: None
     ) -> np.ndarray:
-        """Steps from the present time, times[0]; rows (times, names) of what is read after each."""
+        """Step from times[0]; return rows (times, names) of the values after each step."""
         rows = np.empty((len(times), len(self.names)))
         rows[0] = self.values
         for i, end in enumerate(np.asarray(times)[1:].tolist(), start=1):
@@ -404,7 +407,7 @@ def _find(fmus: Mapping[str, Fmu], component: str, name: str, causality: str | N
 def _split(
     fmus: Mapping[str, Fmu], connections: Iterable[Connection], sloped: bool
 ) -> tuple[list[Connection], list[Connection]]:
-    """Connections of Booleans, and of Reals; no input has two."""
+    """Split connections into Booleans and Reals; no input has two."""
     switches: list[Connection] = []
     reals: list[Connection] = []
     seen = set()

@@ -165,12 +165,12 @@ class Ssp:
         return self.folder / self.system.component(component).source
 
     def unpacked_fmu(self, component: str) -> Fmu:
-        """FMU of a component, unpacked; messages name the SSP."""
+        """Return FMU of a component, unpacked; messages name the SSP."""
         return Fmu(self.fmu(component), shown=self.path / self.system.component(component).source)
 
     @contextmanager
     def unpacked_fmus(self, names: Iterable[str] | None = None) -> Iterator[dict[str, Fmu]]:
-        """FMUs of all components, or of those named, in this order."""
+        """Return FMUs of all components, or of those named, in this order."""
         with ExitStack() as stack:
             wanted = self.models if names is None else names
             yield {name: stack.enter_context(self.unpacked_fmu(name)) for name in wanted}
@@ -189,7 +189,7 @@ class Ssp:
         return [*self.system.notes, *held]
 
     def variable(self, name: str) -> Variable:
-        """What the FMU declares of ``component.variable``."""
+        """Return the variable ``component.variable`` as the FMU declares it."""
         component, _, variable = name.partition(".")
         return self.models[component].variables[variable]
 
@@ -227,7 +227,7 @@ class SspReader:
         raise UserError(f"{self.path}: {file}{line}: {message}")
 
     def parse(self, file: str, schema: str) -> etree._Element:
-        """Root of an XML file that is valid against its schema."""
+        """Parse an XML file that is valid against its schema; return its root."""
         path = self.folder / file
         if not is_file(path):
             self.fail(file, "is missing in the SSP")
@@ -359,7 +359,7 @@ class SspReader:
     def chosen_step(
         self, span: float, defaults: Mapping[str, tuple[float | None, float | None]]
     ) -> float:
-        """A step of which a whole number lead to the stop time."""
+        """Choose a step of which a whole number lead to the stop time."""
         steps = {name: x for name, (_, x) in defaults.items() if x is not None}
         shortest = min(steps, key=lambda name: steps[name], default=None)
         step = span / STEPS if shortest is None else min(steps[shortest], span)
@@ -373,7 +373,7 @@ class SspReader:
     # parameter sets
 
     def bindings(self, node: etree._Element, component: str) -> dict[str, dict[str, Parameter]]:
-        """Parameter sets bound at a component, by name."""
+        """Return parameter sets bound at a component, by name."""
         sets: dict[str, dict[str, Parameter]] = {}
         sources: set[str] = set()
         for binding in node.iterfind("ssd:ParameterBindings/ssd:ParameterBinding", NAMESPACES):
@@ -433,7 +433,7 @@ class SspReader:
     def variants(
         self, bound: dict[str, dict[str, dict[str, Parameter]]]
     ) -> dict[str, dict[str, dict[str, Parameter]]]:
-        """Sets by variant; every component that has a binding has all of them."""
+        """Return the sets by variant; every component that has a binding has all of them."""
         if not any(bound.values()):
             return {ALONE: {}}
         names = list(dict.fromkeys(name for sets in bound.values() for name in sets))
@@ -448,7 +448,7 @@ class SspReader:
 
 
 def _positive(text: object) -> float | None:
-    """A time above 0 that an FMU declares."""
+    """Return a time above 0 that an FMU declares; None for others."""
     with suppress(TypeError, ValueError):
         time = float(text)  # type: ignore[arg-type]
         if 0 < time < math.inf:
@@ -544,7 +544,7 @@ class _Checker:
             fed[target] = str(connection)
 
     def end(self, where: str, component: str, connector: str) -> Variable:
-        """The variable at one end of a connection."""
+        """Return the variable at one end of a connection."""
         names = [known.name for known in self.system.components]
         if component not in names:
             hint = did_you_mean(component, names)

@@ -130,7 +130,7 @@ class _Steps:
         return float(difference.max()) / (2**self._order - 1)
 
     def reject(self, start: float, length: float, estimate: float) -> None:
-        """Want a shorter step from `start`."""
+        """Request a shorter step from `start`."""
         control = self._control
         self.rejected, self.was_rejected = self.rejected + 1, True
         self.wanted = length * min(self._factor(estimate), SAFETY)
@@ -141,7 +141,7 @@ class _Steps:
             )
 
     def accept(self, length: float, estimate: float, cut: bool) -> None:
-        """Want the next step, after one of this length that the end may have `cut`."""
+        """Request the next step, after one of this length that the end may have `cut`."""
         factor, control = self._factor(estimate), self._control
         limits = control.longest, LARGEST_FACTOR * length
         grown = length * factor if not self.was_rejected else length * min(factor, 1.0)
@@ -149,7 +149,7 @@ class _Steps:
         self.wanted, self.was_rejected = max(min(grown, *limits), control.shortest), False
 
     def _factor(self, estimate: float) -> float:
-        """Of the step: the one whose error is expected to be a little below the tolerance."""
+        """Return the factor of the step whose error is expected a little below the tolerance."""
         if estimate == 0.0:
             return LARGEST_FACTOR
         factor = SAFETY * (self._control.tolerance / estimate) ** (1 / (self._order + 1))
@@ -157,7 +157,7 @@ class _Steps:
 
 
 def _norm(master: Master, control: Control) -> tuple[np.ndarray, np.ndarray]:
-    """Columns of the signals among the values, and their scales."""
+    """Return the signals' columns among the values, and their scales."""
     for name in control.scales:
         if name not in master.names:
             raise UserError(f"{name}: the system has no such value to control the step by")
