@@ -184,7 +184,7 @@ class Points:
             self._of_kind.setdefault(known.type, []).append(known.name)
 
     def draw(self, known: ModelVariable) -> float:
-        """Return a value in the range of a variable; now and then 0, or so large that it limits nothing."""
+        """Return a value in the variable's range: now and then 0, or one that limits nothing."""
         chance = self.chance
         low = -math.inf if known.min is None else float(known.min)
         high = math.inf if known.max is None else float(known.max)
