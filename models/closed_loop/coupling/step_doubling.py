@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from rparm.models.closed_loop.coupling.loop import (
     FINEST,
+    REFERENCES,
     STATES,
     ClosedLoop,
     Method,
@@ -15,7 +15,7 @@ from rparm.models.closed_loop.coupling.loop import (
 
 from rparm.coupling import step_control
 
-FAST_AND_SLOW = Path(__file__).resolve().with_name("fast_and_slow.csv")
+FAST_AND_SLOW = REFERENCES / "fast_and_slow" / "monolithic.csv"
 RATES = ("arm.dq1", "arm.dq2", "arm.ddq1", "arm.ddq2")
 
 CORNERS = (0.5, 0.8)  # s, begin and end of the fast part
