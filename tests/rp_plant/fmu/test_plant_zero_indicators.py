@@ -1,4 +1,4 @@
-"""Events where an indicator begins or ends at 0, which rounding may leave on either side of it: each
+"""Events where an indicator begins or ends at 0, which rounding may leave on either side: each one
 comes once, at communication points, after long internal steps, and in Model Exchange wherever the
 root finder of an importer ends."""
 
