@@ -1,54 +1,57 @@
-"""What the scripts that make a model's references share: their command line and their files.
+"""What the modules that make references share: inputs, variants of systems, files.
 
-A reference is three files in the format of the FMI cross-check, in a folder of the scenario's name:
-MODEL_ref.csv with the outputs, MODEL_in.csv with the inputs, MODEL_ref.opt with the times.
-Scenarios are checked against the built FMU, and start values are those that it declares.
+The reference of a scenario is three files in the format of the FMI cross-check, in a folder of its
+name: MODEL_ref.csv with the outputs, MODEL_in.csv with the inputs, MODEL_ref.opt with the times.
+The reference of a system's variant is a folder of its name with CSV files; the variant's parameters
+are in the system's folder, in resources/<component>_<variant>.ssv.
 """
 
-import argparse
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 
-from rparm import files, project
-from rparm.errors import UserError
+from rparm import files as trajectory_csv
 from rparm.files import write_text
-from rparm.fmi.fmu_file import read_model
-from rparm.runs import scenario as scenarios
+from rparm.fmi.model import Value
 from rparm.runs.scenario import Scenario
 
-# Writes the reference of a scenario to a folder.
-Writer = Callable[[Scenario, Path], None]
+NAMESPACE = {"ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues"}
+KEPT = 20  # every 20th communication point of a system goes into its files
+
+Columns = Mapping[str, np.ndarray]
+# Times (rows,) and columns (rows,) by name of each file of a variant, by the name of the file.
+Files = Mapping[str, tuple[np.ndarray, Columns]]
+
+
+# ---- Scenarios -----------------------------------------------------------------------------------
 
 
 def input_table(scenario: Scenario, names: Sequence[str]) -> np.ndarray:
-    """Inputs at every communication point, (n + 1, names)."""
+    """Return the inputs at every communication point, (n + 1, names)."""
     table = np.empty((len(scenario.times), len(names)))
     for column, name in zip(table.T, names, strict=True):
         column[:] = scenario.input(name)
     return table
 
 
-def write(
-    scenario: Scenario,
-    folder: Path,
-    model: str,
-    outputs: Sequence[str],
-    values: np.ndarray,
-    inputs: Sequence[str],
+def held_rows(scenario: Scenario, names: Sequence[str]) -> np.ndarray:
+    """Return the inputs of the step that ends at each point, (n + 1, names); at 0 the first."""
+    table = input_table(scenario, names)
+    return np.concatenate((table[:1], table[:-1]))
+
+
+def write_scenario(
+    scenario: Scenario, folder: Path, model: str, inputs: Sequence[str], outputs: Columns
 ) -> None:
-    """Write the reference of a scenario; `values` are at all points, (n + 1, outputs)."""
+    """Write the reference of a scenario; `outputs` are at all points, (n + 1,) each."""
     folder.mkdir(parents=True, exist_ok=True)
     rows = scenario.reference_rows
-    tables = {
-        "ref": (scenario.times[rows], outputs, values[rows]),
-        "in": (scenario.times, inputs, input_table(scenario, inputs)),
-    }
-    for file, (times, names, table) in tables.items():
-        rounded = table.astype(np.float64) + 0.0  # no negative zeros
-        files.write_trajectory(folder / f"{model}_{file}.csv", times, names, rounded)
+    kept = np.column_stack([*outputs.values()])[rows]
+    _write_table(folder / f"{model}_ref.csv", scenario.times[rows], list(outputs), kept)
+    table = input_table(scenario, inputs)
+    _write_table(folder / f"{model}_in.csv", scenario.times, list(inputs), table)
     options = {
         "StartTime": scenario.start,
         "StopTime": scenario.stop,
@@ -59,28 +62,35 @@ def write(
     write_text(folder / f"{model}_ref.opt", text)
 
 
-def main(model_folder: Path, prepare: Callable[[], Writer]) -> None:
-    """Command line: make the references of the scenarios named, or of all of the model's."""
-    parser = argparse.ArgumentParser(description="Makes the reference trajectories.")
-    parser.add_argument("names", nargs="*", metavar="NAME", help="scenarios (default: all)")
-    parser.add_argument("--output", type=Path, metavar="DIR", help="write to DIR/NAME instead")
-    arguments = parser.parse_args()
-    try:
-        known = {
-            name: path
-            for name, path in project.scenario_files().items()
-            if project.model_folder(path) == model_folder
-        }
-        for name in arguments.names:
-            if name not in known:
-                raise UserError(f"no scenario {name!r} of this model (known: {', '.join(known)})")
-        model = read_model(project.built(model_folder, ".fmu"))
-        write_one = prepare()
-        for name in arguments.names or known:
-            scenario = scenarios.load(known[name], model)
-            write_one(
-                scenario, arguments.output / name if arguments.output else scenario.reference_folder
-            )
-            print(f"{name}: {len(scenario.reference_rows)} rows")
-    except UserError as error:
-        sys.exit(f"error: {error}")
+def _write_table(path: Path, times: np.ndarray, names: Sequence[str], table: np.ndarray) -> None:
+    rounded = table.astype(np.float64) + 0.0  # no negative zeros
+    trajectory_csv.write_trajectory(path, times, names, rounded)
+
+
+# ---- Systems -------------------------------------------------------------------------------------
+
+
+def variants(system: Path, components: Iterable[str]) -> dict[str, dict[str, Value]]:
+    """Return the parameters of every variant of the system in a folder, ``component.name``."""
+    found: dict[str, dict[str, Value]] = {}
+    for component in components:
+        for path in sorted((system / "resources").glob(f"{component}_*.ssv")):
+            parameters = found.setdefault(path.stem.removeprefix(f"{component}_"), {})
+            for parameter in ElementTree.parse(path).iterfind(".//ssv:Parameter", NAMESPACE):
+                kind, value = parameter[0].tag, parameter[0].get("value", "")
+                is_number = kind.endswith(("}Real", "}Integer"))
+                name = f"{component}.{parameter.get('name')}"
+                parameters[name] = float(value) if is_number else value
+    return found
+
+
+def communication_points(stop: float, per_second: int) -> np.ndarray:
+    """Return the communication points from 0 to `stop` in s, each rounded once."""
+    return np.arange(round(stop * per_second) + 1) / per_second
+
+
+def write_variant(folder: Path, files: Files) -> None:
+    """Write the files of a variant to a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for file, (times, columns) in files.items():
+        _write_table(folder / file, times, list(columns), np.column_stack([*columns.values()]))

@@ -188,7 +188,7 @@ def making_references(folder: Path, name: str) -> str:
     if INSTALLED:
         return "it comes with rparm, install that again"
     # relative to the project's folder, in which its documentation gives all commands
-    script = f"models/{folder.name}/references/make_references.py {name}"
+    script = f"models/make_references.py {folder.name} {name}"
     return f"to make it again: build/venv/bin/python {script}"
 
 

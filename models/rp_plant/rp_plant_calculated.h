@@ -2,8 +2,52 @@
 #ifndef RP_PLANT_CALCULATED_H
 #define RP_PLANT_CALCULATED_H
 
-#include "rp_plant_loads.h"
+#include "rp_plant_equations.h"
 #include "rp_plant_model.h"
+#include "rp_recursion.h"
+
+/* ---- Loads of the joints --------------------------------------------------------------------
+ *
+ * Force and moment that each link receives through its joint, in frames 1 and 2 as in
+ * rp_manipulator.h. Drives with their armature, damping, friction and stops act through the joints;
+ * the wrench and the payload do not. */
+
+/* Calculates the loads of joint 2. The recursion for link 2 with payload takes moments about a
+ * point that lies by the payload's offset from the end of link 1, where (20) has it: the moment of
+ * f2 is moved there. The wrench (w, m) at the end effector, r from the end of link 1, carries a
+ * part of link 2. */
+static inline void plant_link2_loads(const struct plant *plant, const struct link_motion *motion,
+                                     const real wrench[3], struct joint_loads *loads) {
+    const struct arm *hand = &plant->hand;
+    const struct vector offset = {plant->offset_x, 0.0, plant->offset_z};
+    const struct vector r = {0.0, 0.0, hand->q[1]};
+    const struct vector w = {
+        .x = hand->c1 * wrench[1] - hand->s1 * wrench[0],
+        .y = 0.0,
+        .z = hand->c1 * wrench[0] + hand->s1 * wrench[1],
+    };
+    const struct vector m = {0.0, wrench[2], 0.0};
+
+    link2_loads(&plant->arm, motion, loads);
+    const struct vector moved = vector_minus(loads->tau2, vector_cross(loads->f2, offset));
+    loads->tau2 = vector_minus(moved, vector_plus(vector_cross(r, w), m));
+    loads->f2 = vector_minus(loads->f2, w);
+}
+
+/* driven: efforts of drives, armature, damping, friction and stops on the joints. The loads take
+ * their derivatives from there, as the manipulator's do from its efforts. */
+static inline struct joint_loads plant_loads(const struct plant *plant, const real wrench[3],
+                                             const real driven[2], const real ddq[2]) {
+    const struct link_motion motion = link_motion(&plant->arm, ddq);
+    struct joint_loads loads;
+    plant_link2_loads(plant, &motion, wrench, &loads);
+    loads.f2.z = moving_as(loads.f2.z, driven[1]);
+    link1_loads(&plant->hand, &motion, &loads);
+    loads.tau1.y = moving_as(loads.tau1.y, driven[0]);
+    return loads;
+}
+
+/* ---- Calculated fields ---------------------------------------------------------------------- */
 
 /* (L z1 + a x1)'' with z1' = q1' x1 and x1' = -q1' z1. */
 static inline void plant_end_effector_acceleration(const struct arm *hand, const real ddq[2],
@@ -39,7 +83,7 @@ static inline void write_energies(const struct plant *plant, const struct rp_pla
     values->actuator_power = tau[0] * values->dq[0] + tau[1] * values->dq[1];
 }
 
-/* Friction and stops with their power and indicators. driven: what acts through the joints. */
+/* Writes friction and stops with their power and indicators. driven: as in plant_loads. */
 static inline void write_joints(const struct rp_plant_modes *modes, const real reaction[2],
                                 struct rp_plant_values *values, real driven[2]) {
     const struct rp_plant_parameters *p = &values->parameters;
@@ -63,8 +107,8 @@ static inline void write_joints(const struct rp_plant_modes *modes, const real r
     values->friction_power = power;
 }
 
-/* Writes them from the parameters, inputs and states. modes: in effect; values has them
- * only after initialization. */
+/* Writes the calculated fields from the parameters, inputs and states. modes: in effect; values has
+ * them only after initialization. */
 static inline void rp_plant_calculate(struct rp_plant_values *values,
                                       const struct rp_plant_modes *modes) {
     const struct rp_plant_parameters *p = &values->parameters;

@@ -1,10 +1,8 @@
-#include "rp_plant_events.h"
-
 #include "rp_plant_contact.h"
 #include "rp_plant_equations.h"
 #include "rp_plant_impact.h"
+#include "rp_plant_model.h"
 #include "rp_plant_modes.h"
-#include "rp_plant_series.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -48,7 +46,7 @@ static bool place_on_stops(struct rp_plant_values *values, const struct triggere
     return is_any;
 }
 
-/* Whether a joint on a stop leaves it and comes back from no more than the tolerance of q: at v^2 /
+/* True if a joint on a stop leaves it and comes back from no more than the tolerance of q: at v^2 /
  * (2 |q''|), where q'' points into the stop. */
 static bool hardly_leaves(const struct rp_plant_values *values, const struct event *event,
                           int joint, int side) {
@@ -83,10 +81,10 @@ static void apply_impact(struct rp_plant_values *values, const struct rp_plant_i
     values->sums.impact_loss += impact->loss;
 }
 
-/* Bouncing comes to rest: a joint that hardly leaves its stop stays, whether it bounces or another
+/* Ends bouncing: a joint that hardly leaves its stop stays, whether it bounces or another
  * joint's impact kicks it. One that rests on its own stop stays with it; otherwise each would kick
  * the other, for ever. True if velocities jump. */
-static bool catch_bouncing(struct rp_plant_values *values, const struct event *event,
+static bool catch_on_stops(struct rp_plant_values *values, const struct event *event,
                            const int side[2]) {
     bool leaves = false;
     bool caught[2];
@@ -104,14 +102,15 @@ static bool catch_bouncing(struct rp_plant_values *values, const struct event *e
     return leaves;
 }
 
-/* True if velocities jump. With both joints on stops, an impact of one can drive the other, which
- * was leaving, back into its stop: that is the next impact, at the same time. There may be many
- * before both leave or stay; from some number on they are plastic, and one or two more end them. */
-static bool resolve_impacts(struct rp_plant_values *values, const struct event *event,
-                            const int side[2]) {
+/* Applies impacts until no joint moves into its stop; true if velocities jump. With both joints on
+ * stops, an impact of one can drive the other, which was leaving, back into its stop: that is the
+ * next impact, at the same time. There may be many before both leave or stay; from some number on
+ * they are plastic, and one or two more end them. */
+static bool apply_impacts(struct rp_plant_values *values, const struct event *event,
+                          const int side[2]) {
     enum { MOST_ELASTIC = 8, MOST = 16 };
     const struct rp_plant_parameters *p = &values->parameters;
-    bool jumps = catch_bouncing(values, event, side);
+    bool jumps = catch_on_stops(values, event, side);
     for (int count = 0; count < MOST && moves_into_stop(values, side); count++) {
         const bool elastic = count < MOST_ELASTIC;
         const struct rp_plant_contacts contacts = {
@@ -122,7 +121,7 @@ static bool resolve_impacts(struct rp_plant_values *values, const struct event *
         struct rp_plant_impact impact;
         rp_plant_impact(&inertia, &contacts, values->dq, &impact);
         apply_impact(values, &impact);
-        (void)catch_bouncing(values, event, side);
+        (void)catch_on_stops(values, event, side);
         jumps = true;
     }
     return jumps;
@@ -130,8 +129,8 @@ static bool resolve_impacts(struct rp_plant_values *values, const struct event *
 
 /* ---- Payload -------------------------------------------------------------------------------- */
 
-/* True if the inertia changes. Before the first event nothing is grasped: what is attached then
- * belongs to link 2. */
+/* Grasps or releases the payload; true if the inertia changes. Before the first event nothing is
+ * grasped: a payload that is attached then belongs to link 2. */
 static bool take_payload(struct rp_plant_values *values) {
     const struct rp_plant_parameters *p = &values->parameters;
     const int mode = values->payload_attached != 0 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED;
@@ -230,7 +229,7 @@ static enum status update(void *values_pointer, const struct event *event) {
         jumps = true;
     }
     int side[2];
-    if (place_on_stops(values, &triggered, side) && resolve_impacts(values, event, side)) {
+    if (place_on_stops(values, &triggered, side) && apply_impacts(values, event, side)) {
         jumps = true;
     }
 

@@ -1,9 +1,7 @@
 #include "rp_plant_model.h"
 
 #include "rp_plant_calculated.h"
-#include "rp_plant_events.h"
 #include "rp_plant_modes.h"
-#include "rp_plant_series.h"
 
 #include <string.h>
 

@@ -49,6 +49,20 @@ struct rp_plant_values {
 /* check_parameters of struct model (rp_plant_check.c). */
 enum status rp_plant_check_parameters(const void *values, char *text, size_t size);
 
+/* Events of the plant: a joint comes to rest, breaks away, reaches a stop; the payload is grasped
+ * or released; an input or a parameter jumps (rp_plant_events.c). */
+extern const struct model_events rp_plant_events;
+
+/* True if all modes are of their enumerations. */
+bool rp_plant_modes_exist(const struct rp_plant_modes *modes);
+
+/* The Taylor series of the motion in its modes (rp_plant_series.c): states q1, q2, q1', q2', inputs
+ * tau1, f2 and the wrench. */
+extern const struct series rp_plant_series;
+
+/* reach of struct model_events (rp_plant_series.c). */
+void rp_plant_reach(const void *values, const double x[], double reach[]);
+
 extern const struct model rp_plant_model;
 
 #endif

@@ -1,12 +1,48 @@
-/* Which joints stick, slide or move freely: decided for both at once, from velocities and forces.
- */
+/* Which joints stick, slide or move freely: decided for both at once, by velocities and forces. */
 #ifndef RP_PLANT_MODES_H
 #define RP_PLANT_MODES_H
 
 #include "model.h"
 #include "rp_plant_contact.h"
 #include "rp_plant_model.h"
-#include "rp_plant_rest.h"
+
+/* ---- Joints at rest -------------------------------------------------------------------------
+ *
+ * Which of two coupled joints that are at rest begin to move, and how fast.
+ *
+ * b: all generalized forces but friction of the joints at rest and stops; R: the joints at rest;
+ * F: their breakaway friction. By Gauss' principle
+ *
+ *   q'' = argmin  a^T D a / 2 - b^T a + sum over R of F_i |a_i| ,
+ *         a_i >= 0 at a closed lower stop,  a_i <= 0 at a closed upper one.
+ *
+ * D is positive definite, so that the function is strictly convex and has one minimum. A pattern
+ * says of each joint at rest that it goes backward, stays or goes forward: of the nine, and fewer
+ * at a stop, exactly one fits the optimality conditions. */
+struct rp_plant_rest {
+    struct rp_plant_inertia inertia;
+    double forces[2];    /* b: N.m, N */
+    double breakaway[2]; /* F: N.m, N */
+    bool at_rest[2];     /* the others move and have no pattern: 0 */
+    int closed[2];       /* of joints at rest: +1 at the lower stop, -1 at the upper one, else 0 */
+};
+
+struct rp_plant_outcome {
+    int pattern[2];     /* of joints at rest: -1, 0, 1 */
+    double ddq[2];      /* rad/s2, m/s2 */
+    double reaction[2]; /* N.m, N: b - D q'', of joints at rest friction - stop, else 0 */
+};
+
+/* Writes the motion of a pattern, and returns by how much it misses the conditions, in parts of the
+ * forces: at most 0 if it fits, infinite if a stop does not allow it. */
+double rp_plant_rest_misfit(const struct rp_plant_rest *rest, const int pattern[2],
+                            struct rp_plant_outcome *outcome);
+
+/* Writes the motion of the pattern that fits, or that fits best where rounding leaves none. At the
+ * limit, where |reaction| = F, the joint stays. */
+void rp_plant_rest_decide(const struct rp_plant_rest *rest, struct rp_plant_outcome *outcome);
+
+/* ---- Modes ---------------------------------------------------------------------------------- */
 
 /* A decision about the joints at rest, and what it was made from. */
 struct rp_plant_decision {
@@ -14,28 +50,28 @@ struct rp_plant_decision {
     struct rp_plant_outcome outcome;
 };
 
-/* Whether a joint can stick: by dry friction or on a rigid stop. */
+/* True if a joint can stick: by dry friction or on a rigid stop. */
 static inline bool rp_plant_can_stick(const struct rp_plant_parameters *p, int joint) {
     return p->coulomb_friction[joint] > 0.0 || p->breakaway_friction[joint] > 0.0 ||
            p->stops[joint] == RP_PLANT_STOPS_RIGID;
 }
 
-/* Writes the contacts, which joints are at rest, and the joints' modes as long as these stay. True:
- * one is at rest. */
+/* Writes the contacts, which joints are at rest, and the joints' modes as long as these stay. True
+ * if one is at rest. */
 bool rp_plant_find_rest(const struct rp_plant_parameters *p, const double q[2], const double dq[2],
                         struct rp_plant_modes *modes, struct rp_plant_rest *rest);
 
-/* After rp_plant_find_rest: the accelerations, and the modes of the joints that begin to move. That
- * of the payload is given. */
+/* Writes the accelerations, and the modes of the joints that begin to move, after
+ * rp_plant_find_rest. The mode of the payload is given. */
 void rp_plant_decide(const struct rp_plant_parameters *p, const double q[2], const double dq[2],
                      const struct rp_plant_inputs *inputs, struct rp_plant_modes *modes,
                      struct rp_plant_decision *decision);
 
-/* Both joints stick and will do so, without a payload and apart from stops: whatever the angle is,
- * friction exceeds the forces. False: that takes a decision. */
+/* True if both joints stick and will do so, without a payload and apart from stops: whatever the
+ * angle is, friction exceeds the forces. If false, a decision is needed. */
 bool rp_plant_surely_holds(const struct rp_plant_values *values);
 
-/* At the limit with no acceleration, stuck and sliding fit both: the next derivative decides. It
+/* Decides by the next derivative at the limit with no acceleration, where stuck and sliding fit. It
  * follows the same principle: D q''' = rates of the reactions, where a joint at its limit can only
  * go to that side, and without friction, since that does not change at breakaway. A joint whose
  * indicator has triggered (leaves: 1 forward, -1 backward, otherwise 0) leaves unless the rate

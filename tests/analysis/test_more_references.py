@@ -1,4 +1,4 @@
-"""The references of a model are what its script writes into an empty folder, byte for byte."""
+"""The references of a model are what the program writes into an empty folder, byte for byte."""
 
 import subprocess
 import sys
@@ -14,8 +14,8 @@ from tests.support.rparm_project import names_of
 @pytest.mark.parametrize("part", ["actuator", "controller", "environment", "sensor", "trajectory"])
 def test_references_made_again_are_the_same(part: str, tmp_path: Path) -> None:
     kept = ROOT / "models" / f"rp_{part}" / "references"
-    script = kept / "make_references.py"
-    subprocess.run([sys.executable, script, "--output", tmp_path], check=True, cwd=tmp_path)
+    command = [sys.executable, ROOT / "models" / "make_references.py", f"rp_{part}"]
+    subprocess.run([*command, "--output", tmp_path], check=True, cwd=tmp_path)
     names = {path.name for path in tmp_path.iterdir()}
     assert names == set(names_of(f"rp_{part}"))
     assert names == {path.parent.name for path in kept.glob("*/*_ref.csv")}

@@ -222,10 +222,11 @@ def test_the_motion_meets_its_reference(motion: FastAndSlow) -> None:
 
 
 def test_the_reference_of_the_motion_is_up_to_date(tmp_path: Path) -> None:
-    from rparm.models.closed_loop.references import make_coupling
+    from rparm.models.closed_loop.references import make_references
+    from rparm.models.reference_files import write_variant
 
-    made = tmp_path / "made.csv"
-    make_coupling.write(made)
+    write_variant(tmp_path, make_references.fast_and_slow())
+    made = tmp_path / FAST_AND_SLOW.name
     rows = [np.loadtxt(path, delimiter=",", skiprows=1) for path in (made, FAST_AND_SLOW)]
     np.testing.assert_allclose(*rows, rtol=0, atol=1e-13)
 

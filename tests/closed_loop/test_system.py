@@ -248,4 +248,4 @@ def test_a_damaged_reference_is_refused(tmp_path: Path) -> None:
                 path.write_text("".join(content), encoding="utf-8")
             with pytest.raises(UserError, match=message) as caught:
                 comparison.load_reference(opened, "nominal", system, EXPERIMENT)
-            assert "make_references.py nominal" in str(caught.value)
+            assert "make_references.py closed_loop nominal" in str(caught.value)

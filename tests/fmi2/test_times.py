@@ -1,18 +1,16 @@
 """Long runs, masters that are a little off, and what the solver says of itself."""
 
 import math
-import sys
-from collections.abc import Iterator
 from ctypes import c_double
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 import heyoka as hy
 import numpy as np
 import pytest
 from fmpy import fmi2
+from rparm.models.rp_manipulator.references.make_references import integrator
 
 from tests.support.instances import INPUTS, STATES, Instance, LoadedFmu
-from tests.support.paths import ROOT
 from tests.support.rparm_project import declared
 
 START = {"q1": -1.43, "q2": 0.58, "dq1": 1.97, "dq2": 0.12}
@@ -21,22 +19,11 @@ START = {"q1": -1.43, "q2": 0.58, "dq1": 1.97, "dq2": 0.12}
 WHIRL = {"g": 0.0, "q2": 0.1, "dq1": 4.0, "f2": -5.0}
 
 
-@pytest.fixture(scope="module")
-def maker() -> Iterator[ModuleType]:
-    """make_smooth_inputs.py: the independent equations."""
-    folder = str(ROOT / "models" / "rp_manipulator" / "references")
-    sys.path.insert(0, folder)
-    import make_smooth_inputs
-
-    yield make_smooth_inputs
-    sys.path.remove(folder)
-
-
-def reference(maker: ModuleType, values: dict[str, float]) -> hy.taylor_adaptive:
+def reference(values: dict[str, float]) -> hy.taylor_adaptive:
     """The motion from `values`, the inputs being heyoka's parameters; in long double."""
     case = SimpleNamespace(start_values=declared("rp_manipulator").start_values | values)
     inputs = {name: hy.par[i] for i, name in enumerate(INPUTS)}
-    motion = maker.integrator(case, inputs, pars=len(INPUTS))
+    motion = integrator(case, inputs, pars=len(INPUTS))
     motion.pars[:] = [np.longdouble(values.get(name, 0.0)) for name in INPUTS]
     return motion
 
@@ -73,16 +60,14 @@ def whirl(
 
 
 @pytest.mark.parametrize("accumulated", [False, True])
-def test_ten_minutes_in_steps_of_a_sixtieth(
-    loaded: LoadedFmu, maker: ModuleType, accumulated: bool
-) -> None:
+def test_ten_minutes_in_steps_of_a_sixtieth(loaded: LoadedFmu, accumulated: bool) -> None:
     """Points i / 60 s, and points that a master adds up: 36 000 steps are followed."""
     h, count = 1 / 60, 36_000
     times = [i / 60 for i in range(count + 1)]
     if accumulated:
         for i in range(count):
             times[i + 1] = times[i] + h
-    motion = reference(maker, WHIRL)
+    motion = reference(WHIRL)
     motion.propagate_until(np.longdouble(times[-1]))
     states, change = whirl(loaded, times, [h] * count, 600.0)
     assert change < 1e-8
@@ -97,10 +82,10 @@ def control(t: float, states: list[float]) -> tuple[float, float]:
     return tau1, f2
 
 
-def test_ten_minutes_under_control(loaded: LoadedFmu, maker: ModuleType) -> None:
+def test_ten_minutes_under_control(loaded: LoadedFmu) -> None:
     """Both inputs change at each of 36 000 steps of 1/60 s: the controller is in the master."""
     h, count = 1 / 60, 36_000
-    motion = reference(maker, START)
+    motion = reference(START)
     expected = np.empty((count, len(STATES)))
     for i in range(count):
         motion.pars[:] = control(i / 60, motion.state.astype(float).tolist())

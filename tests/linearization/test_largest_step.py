@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rparm.models.closed_loop.study import REST as LOOP
-from rparm.models.machine.stability import Contact, growth
 from rparm.models.machine.study import REST as MACHINE
+from rparm.models.machine.wall_limit import Contact, growth
 from scipy.linalg import expm
 
 from rparm.linearization.largest_step import (
@@ -91,7 +91,7 @@ def test_the_closed_loop_is_stable_up_to_21_ms_in_jacobi_order(fmu: Path) -> Non
 def test_a_mass_at_a_sampled_wall_grows_as_its_theory_says(
     way: tuple[str, str], step: float
 ) -> None:
-    """The factor of models/machine/stability.py, which is derived by hand."""
+    """The factor of models/machine/wall_limit.py, which is derived by hand."""
     contact = Contact(mass=2.0, stiffness=300.0, damping=1.5)
     zero = np.zeros(1)
     mass = Linear(

@@ -6,8 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rparm.models.machine import wall_limit
-from rparm.models.machine.stability import Contact, exact_least_damping, least_damping
-from rparm.models.machine.wall_limit import CASES, DEPTH, MASS, MOVED, PUSH, STEP, STEPS, Measure
+from rparm.models.machine.wall_limit import (
+    CASES,
+    DEPTH,
+    MASS,
+    MOVED,
+    PUSH,
+    STEP,
+    STEPS,
+    Contact,
+    Measure,
+    exact_least_damping,
+    least_damping,
+)
 
 from rparm.fmi.fmu_file import Fmu
 from rparm.systems.ssp import Ssp

@@ -1,4 +1,4 @@
-"""RPActuator as a unit: what it refuses, its derivatives and dependencies, rollback, references.
+"""RPActuator.fmu: values of the equations, refusals, a run with the arm, worth of its scenarios.
 
 The closed forms are in test_rp_actuator.c.
 """
@@ -12,10 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rparm.fmi.fmu_file import Fmu
 from rparm.runs import comparison
-from rparm.runs.comparison import Runs
-from tests.support.instances import ERROR, OK, Instance, LoadedFmu, status_of
+from tests.support.instances import ERROR, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
 from tests.support.rparm_project import declared, load, names_of
 
@@ -29,17 +27,13 @@ PER_JOINT = (
 )  # fmt: skip
 PARAMETERS = tuple(f"{name}{joint}" for name in PER_JOINT for joint in (1, 2))
 INPUTS = ("tau1_cmd", "f2_cmd", "dq1", "dq2")
-STATES = ("current1", "current2")
-OUTPUTS = ("tau1", "f2", *STATES, "voltage1", "voltage2")
-RATES = ("dcurrent1", "dcurrent2")
-LIMITED = ("current1_limited", "current2_limited")
-KNOWNS = (*PARAMETERS, *INPUTS, *STATES)
+KNOWNS = (*PARAMETERS, *INPUTS, "current1", "current2")
 LIMITS = ("command", "current", "voltage")
 
 Values = dict[str, float]
 
 
-# ---- Derivatives and dependencies ----------------------------------------------------------------
+# ---- Values --------------------------------------------------------------------------------------
 
 
 def random_point(limit: str, seed: int) -> Values:
@@ -99,53 +93,6 @@ def test_values_are_those_of_the_equations(loaded: LoadedFmu, limit: str) -> Non
             assert instance.get(*values) == pytest.approx([*values.values()], rel=1e-12)
 
 
-@pytest.mark.parametrize("limit", LIMITS)
-def test_directional_derivatives(loaded: LoadedFmu, limit: str) -> None:
-    h = 2.0**-12
-    for seed in range(5):
-        point = random_point(limit, seed)
-        with in_initialization_mode(loaded, point) as instance:
-            unknowns = [*expected(point, limit)]
-            references = [loaded.references[name] for name in unknowns]
-            for known in KNOWNS:
-                column = instance.fmi.getDirectionalDerivative(
-                    references, [loaded.references[known]], [1.0]
-                )
-                # central, with one extrapolation: the next term is in the fourth power of h
-                slopes = []
-                for step in (h, 2 * h):
-                    step *= abs(point[known])
-                    ahead = expected(point | {known: point[known] + step}, limit)
-                    behind = expected(point | {known: point[known] - step}, limit)
-                    slopes.append(np.array([(ahead[n] - behind[n]) / (2 * step) for n in unknowns]))
-                slope = (4 * slopes[0] - slopes[1]) / 3
-                assert column == pytest.approx(slope, rel=1e-8, abs=1e-8), (known, seed)
-
-
-def test_dependencies_are_those_of_the_equations(loaded: LoadedFmu) -> None:
-    unknowns = (*OUTPUTS, *RATES)
-    depends: dict[str, set[str]] = {name: set() for name in unknowns}
-    references = [loaded.references[name] for name in unknowns]
-    for limit in LIMITS:
-        with in_initialization_mode(loaded, random_point(limit, 0)) as instance:
-            for known in KNOWNS:
-                column = instance.fmi.getDirectionalDerivative(
-                    references, [loaded.references[known]], [1.0]
-                )
-                for name, entry in zip(unknowns, column, strict=True):
-                    if entry != 0.0:
-                        depends[name].add(known)
-
-    structure = loaded.description
-    listed = {u.variable.name: u for u in (*structure.outputs, *structure.derivatives)}
-    assert set(listed) == set(unknowns)
-    for name, unknown in listed.items():
-        assert {v.name for v in unknown.dependencies} == depends[name] - set(PARAMETERS), name
-    initial = {u.variable.name: u for u in structure.initialUnknowns}
-    for name in set(unknowns) - set(STATES):
-        assert {v.name for v in initial[name].dependencies} == depends[name], name
-
-
 # ---- What is refused -----------------------------------------------------------------------------
 
 
@@ -194,40 +141,6 @@ def test_a_run_up_on_full_voltage_is_that_of_a_dc_motor(
         assert coarse / fine == pytest.approx([2.0, 2.0], abs=0.1), errors
 
 
-# ---- As a unit -----------------------------------------------------------------------------------
-
-
-def test_rollback_at_the_limits_is_exact(loaded: LoadedFmu) -> None:
-    def run(instance: Instance, first: int, last: int) -> list[bytes]:
-        seen = []
-        for i in range(first, last):
-            if i % 5 == 0:
-                instance.set(tau1_cmd=60.0 if i % 2 else -20.0, dq1=0.2 * i, f2_cmd=50.0 * (i % 9))
-            instance.set_input_derivatives(tau1_cmd=[4e3 * (-1) ** i], dq2=[50.0])
-            instance.step(0.002 * i, 0.002)
-            seen.append(instance.everything())
-        return seen
-
-    with Instance(loaded) as instance:
-        instance.initialize(tolerance=1e-11)
-        run(instance, 0, 33)
-        state = instance.fmi.getFMUState()
-        once = run(instance, 33, 80)
-        instance.fmi.setFMUState(state)
-        assert run(instance, 33, 80) == once
-        assert status_of(instance.fmi.freeFMUState, state) == OK
-
-
-def test_units_of_what_is_connected_are_those_of_arm_and_controller(
-    fmu: Path, loaded: LoadedFmu, tmp_path: Path
-) -> None:
-    own = {v.name: v.unit for v in loaded.description.modelVariables}
-    arm = {v.name: v.unit for v in LoadedFmu(fmu, tmp_path).description.modelVariables}
-    for name in ("tau1", "f2", "dq1", "dq2"):
-        assert own[name] == arm[name], name
-    assert (own["tau1_cmd"], own["f2_cmd"]) == (arm["tau1"], arm["f2"])
-
-
 # ---- References ----------------------------------------------------------------------------------
 
 
@@ -267,12 +180,3 @@ def test_currents_of_the_scenarios_end_within_their_limit() -> None:
             limit = scenario.start_values[f"current_max{joint}"]
             settled = scenario.times[scenario.reference_rows] > scenario.start + 0.04
             assert np.abs(table.column(f"current{joint}")[settled]).max() <= limit * 1.0001
-
-
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_scenarios_meet_their_references(path: Path, name: str) -> None:
-    with Fmu(path) as opened:
-        runs = Runs({FOLDER.name: opened})
-        scenario = load(name)
-        errors = [runs.run(scenario, tolerance).error for tolerance in (1e-5, 1e-8, 1e-11)]
-    assert all(np.array(errors) <= [1e-6, 1e-8, 1e-10]), errors

@@ -8,15 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rparm.models.machine.stability import (
+from rparm.models.machine.wall_limit import (
     AGE,
     Contact,
-    effective_mass,
     eigenvalues,
     exact_least_damping,
     growth,
     least_damping,
-    rate_of_growth,
     transition,
 )
 
@@ -89,18 +87,6 @@ def test_limits_are_the_leading_terms_of_the_exact_ones(order: str, inputs: str)
         assert ratios[2] / ratios[1] == pytest.approx(4.0, rel=0.02)
 
 
-@each_case
-def test_growth_rate_is_that_of_the_eigenvalues(order: str, inputs: str) -> None:
-    step = CONTACT.period / 1000
-    least = least_damping(CONTACT, step, order, inputs)
-    for share in (0.0, 0.5, 2.0):
-        contact = replace(CONTACT, damping=share * least)
-        exact = math.log(growth(contact, step, order, inputs)) / step
-        expected = rate_of_growth(contact, step, order, inputs)
-        assert exact == pytest.approx(expected, rel=0.01), share
-        assert (expected > 0) == (share < 1)
-
-
 def test_ratios_of_the_page() -> None:
     page = PAGE.read_text(encoding="utf-8")
     (steps,) = re.findall(r"\| Steps in a period \| (.*) \|", page)
@@ -120,17 +106,6 @@ def test_figures_of_the_page() -> None:
     found = [least_damping(contact, 1e-3, *case) for case in (CASES[0], CASES[2], *CASES[1::2])]
     assert found == pytest.approx([15.0, 5.0, 0.125, 0.0083], rel=5e-3)
     assert "15, 5, 0.125 and 0.0083 N.s/m" in PAGE.read_text(encoding="utf-8")
-
-
-def test_effective_mass() -> None:
-    inertia = np.array([[2.0, -0.3], [-0.3, 1.5]])
-    direction = np.array([0.4, -0.8])
-    # along the acceleration that a unit force at the tip gives
-    acceleration = np.linalg.solve(inertia, direction)
-    mass = effective_mass(inertia, direction)
-    assert mass * direction @ acceleration == pytest.approx(1.0, rel=1e-15)
-    assert effective_mass(np.diag([3.0, 1.2]), np.array([0.0, 1.0])) == 1.2
-    assert effective_mass(np.diag([3.0, 1.2]), np.array([0.5, 0.0])) == pytest.approx(12.0)
 
 
 # ---- The FMUs ------------------------------------------------------------------------------------
@@ -264,44 +239,3 @@ def test_limit_of_the_fmus_is_that_of_the_theory(
     assert measured == pytest.approx(theory, rel=0.02)
     exact = exact_least_damping(CONTACT, STEP, order, inputs)
     assert measured == pytest.approx(exact, rel=1e-3)
-
-
-@each_case
-def test_the_whole_arm_vibrates_with_its_effective_mass(
-    units: tuple[LoadedFmu, LoadedFmu], order: str, inputs: str
-) -> None:
-    """Both joints free, an oblique wall, the tip beside the end effector; pressed with 1 N."""
-    q1, q2, l1, a, normal = 0.6, 0.1, 0.5, 0.15, complex(math.cos(3.4), math.sin(3.4))
-    local = complex(l1 + q2 + 0.05, a - 0.04)
-    slide = complex(math.cos(q1), math.sin(q1))
-    tip = slide * local
-    # rows of the tip's Jacobian along the normal, and the efforts that press with 1 N
-    along = np.array([(1j * tip / normal).real, (slide / normal).real])
-    stiffness, damping = 1e4, 20.0
-    wall = {"stiffness": stiffness, "damping": damping, "angle": 3.4, "tip_x": -0.04, "tip_z": 0.05}
-    wall["position"] = (tip / normal).real + 1 / stiffness
-    efforts = dict(zip(("tau1", "f2"), -along, strict=True))
-    depths = []
-    with Instance(units[0]) as arm, Instance(units[1]) as surface:
-        # 1 um deeper than the equilibrium, along the row that the wall acts on
-        arm.fmi.setupExperiment(tolerance=1e-12)
-        arm.set(a=a, l1=l1, g=0.0, q1=q1, q2=q2, **efforts)
-        arm.fmi.enterInitializationMode()
-        d11, d12, d22 = arm.get("D11", "D12", "D22")
-        inertia = np.array([[d11, d12], [d12, d22]])
-        mass = effective_mass(inertia, along)
-        shift = -1e-6 * mass * np.linalg.solve(inertia, along)
-        arm.set(q1=q1 + shift[0], q2=q2 + shift[1])
-        at_start = dict(zip(MOTION, arm.get(*MOTION), strict=True))
-        surface.initialize(**wall, **at_start)
-        arm.set(**dict(zip(WRENCH, surface.get(*WRENCH), strict=True)))
-        arm.fmi.exitInitializationMode()
-        loop = Loop(arm, surface, order, inputs)
-        for _ in range(80):
-            depths.append(surface.get("penetration")[0] - 1 / stiffness)
-            loop.step()
-    contact = Contact(mass, stiffness, damping)
-    expected = eigenvalues(contact, STEP, order, inputs)[0]
-    assert fitted(np.array(depths)[10:]) == pytest.approx(
-        complex(expected.real, abs(expected.imag)), abs=1e-4
-    )

@@ -62,39 +62,6 @@ double rp_test_inertia(const struct rp_parameters *p, double q2) {
     return p->m1 * p->lc1 * p->lc1 + p->I1z + p->I2z + p->m2 * L * L;
 }
 
-void rp_test_force_scale(const struct rp_parameters *p, const struct rp_test_state *state,
-                         double scale[2]) {
-    double a = fabs(p->a), g = fabs(p->g), L = p->l1 + fabs(state->q[1]);
-    double dq1 = fabs(state->dq[0]), dq2 = fabs(state->dq[1]);
-    double ddq1 = fabs(state->ddq[0]), ddq2 = fabs(state->ddq[1]);
-    double d11 = rp_test_inertia(p, fabs(state->q[1])) + p->m2 * a * a;
-
-    scale[0] = d11 * ddq1 + p->m2 * a * ddq2 + 2.0 * p->m2 * L * dq1 * dq2 +
-               g * (p->m1 * p->lc1 + p->m2 * (L + a)) + fabs(state->tau[0]);
-    scale[1] = p->m2 * (a * ddq1 + ddq2 + L * dq1 * dq1 + g) + fabs(state->tau[1]);
-}
-
-void rp_test_acceleration_scale(const struct rp_parameters *p, const double q[2],
-                                const double force_scale[2], double scale[2]) {
-    /* |D^-1| from det D = m2 J: [[1, |a|], [|a|, a^2 + J / m2]] / J */
-    double a = fabs(p->a);
-    scale[0] = (force_scale[0] + a * force_scale[1]) / rp_test_inertia(p, q[1]);
-    scale[1] = a * scale[0] + force_scale[1] / p->m2;
-}
-
-double rp_test_derivative(rp_test_function *f, const void *context, double x, double h) {
-    static const double weights[4] = {4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0};
-    double sum = 0.0;
-    for (int k = 4; k >= 1; --k) {
-        sum += weights[k - 1] * (f(context, x + k * h) - f(context, x - k * h));
-    }
-    return sum / h;
-}
-
-double rp_test_power_of_two(double x) {
-    return ldexp(1.0, ilogb(x));
-}
-
 void rp_test_close(double expected, double actual, double bound, int line) {
     if (fabs(actual - expected) <= bound) {
         return;

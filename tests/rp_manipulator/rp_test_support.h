@@ -1,5 +1,5 @@
-/* What the tests of the RP manipulator share: seeded random samples, rounding bounds, numeric
- * derivatives. Nothing here calls the code under test.
+/* Seeded random samples and rounding bounds, for tests of models. Nothing here calls the code under
+ * test.
  *
  * Bounds are a count of DBL_EPSILON times a scale, the sum of the absolute values of the terms
  * that are added up: each operation of a sum or product errs by at most half an epsilon of it. */
@@ -43,21 +43,6 @@ void rp_test_default_parameters(struct rp_parameters *p);
 
 /* m1 lc1^2 + I1z + I2z + m2 (l1 + q2)^2, called J. */
 double rp_test_inertia(const struct rp_parameters *p, double q2);
-
-/* Bounds of the terms of (14) and (15) for any q1, with |q2| <= q2_bound and so on. The second is
- * that of the accelerations which follow through |D^-1|, without their inertial terms. */
-void rp_test_force_scale(const struct rp_parameters *p, const struct rp_test_state *state,
-                         double scale[2]);
-void rp_test_acceleration_scale(const struct rp_parameters *p, const double q[2],
-                                const double force_scale[2], double scale[2]);
-
-/* Central differences of eighth order, exact for polynomials up to degree 8. Truncation:
- * h^8 f(9) / 630. Rounding: 2.1 times the error of f, by h. Steps are powers of two. */
-typedef double rp_test_function(const void *context, double x);
-double rp_test_derivative(rp_test_function *f, const void *context, double x, double h);
-
-/* Largest power of two that is not above x > 0. */
-double rp_test_power_of_two(double x);
 
 /* Fails the running test unless |actual - expected| <= bound; NaN fails. */
 #define ASSERT_CLOSE(expected, actual, bound) rp_test_close(expected, actual, bound, __LINE__)

@@ -60,7 +60,7 @@ def test_each_equation_of_the_notes_is_stated_once() -> None:
         ARM / "rp_recursion.h",
         ARM / "rp_payload.h",
         PLANT / "equations" / "rp_plant_equations.h",
-        PLANT / "equations" / "rp_plant_loads.h",
+        PLANT / "rp_plant_calculated.h",
         MODELS / "rp_controller" / "rp_controller_law.h",
         MODELS / "rp_actuator" / "rp_actuator_equations.h",
     ],

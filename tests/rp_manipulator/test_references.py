@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
-from rparm.models.reference_files import input_table
+from rparm.models.reference_files import input_table, write_scenario
 from rparm.models.rp_manipulator.references.make_references import (
     INPUTS,
     PARAMETERS,
@@ -22,7 +22,7 @@ from tests.support.paths import ROOT
 from tests.support.rparm_project import declared, load, names_of
 
 MODEL = ROOT / "models" / "rp_manipulator"
-SCRIPT = MODEL / "references" / "make_references.py"
+PROGRAM = [sys.executable, MODEL.parent / "make_references.py", MODEL.name]
 FILES = ("RPManipulator_ref.csv", "RPManipulator_in.csv", "RPManipulator_ref.opt")
 SCENARIOS = {name: load(name) for name in names_of(MODEL.name)}
 each_scenario = pytest.mark.parametrize("run", SCENARIOS.values(), ids=SCENARIOS.keys())
@@ -46,8 +46,13 @@ def made(
     """All references, made again."""
     folder = tmp_path_factory.mktemp("references")
     for name, run in SCENARIOS.items():
-        reference.write(run, folder / name, simulated[name])
+        write(reference, run, folder / name, simulated[name])
     return folder
+
+
+def write(reference: Reference, run: Scenario, folder: Path, values: np.ndarray) -> None:
+    columns = dict(zip(reference.outputs, values.T, strict=True))
+    write_scenario(run, folder, "RPManipulator", INPUTS, columns)
 
 
 def read(path: Path) -> tuple[list[str], np.ndarray]:
@@ -85,21 +90,21 @@ def test_nothing_is_left_over(made: Path) -> None:
 def test_made_by_the_program_or_after_another_gives_identical_bytes(
     reference: Reference, made: Path, tmp_path: Path
 ) -> None:
-    command = [sys.executable, SCRIPT, "early_start", "--output", tmp_path]
+    command = [*PROGRAM, "early_start", "--output", tmp_path]
     subprocess.run(command, check=True, cwd=tmp_path)
     for name in ("sixtieth", "early_start"):
         if name == "sixtieth":
             run = SCENARIOS[name]
-            reference.write(run, tmp_path / name, reference.simulate(run))
+            write(reference, run, tmp_path / name, reference.simulate(run))
         for file in FILES:
             assert (tmp_path / name / file).read_bytes() == (made / name / file).read_bytes()
 
 
 def test_unknown_scenario_is_refused() -> None:
-    command = [sys.executable, SCRIPT, "none"]
+    command = [*PROGRAM, "none"]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     assert result.returncode == 1
-    assert result.stderr.startswith("error: no scenario 'none' of this model (known: coasting, ")
+    assert result.stderr.startswith("error: no reference 'none' (known: coasting, ")
 
 
 @each_scenario

@@ -3,7 +3,6 @@
 #ifndef PLANT_TEST_SUPPORT_H
 #define PLANT_TEST_SUPPORT_H
 
-#include "rp_plant_events.h"
 #include "rp_plant_model.h"
 #include "rp_test_support.h"
 

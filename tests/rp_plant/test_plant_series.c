@@ -3,7 +3,6 @@
 #include "last_text.h"
 #include "plant_test_support.h"
 #include "rp_model.h"
-#include "rp_plant_series.h"
 #include "rp_series.h"
 #include "unity.h"
 

@@ -1,10 +1,9 @@
-/* The reference motions: geometry, continuity, what is refused, and a model without states. Outputs
+/* The reference motions at their ends and boundaries, refusals, and a model without states. Outputs
  * and their derivatives are compared with 40 digits in test_trajectory.py. */
 #include "continuous_states.h"
 #include "instance.h"
 #include "last_text.h"
 #include "model_description.h"
-#include "rp_equations.h"
 #include "rp_trajectory_example.h"
 #include "rp_trajectory_model.h"
 #include "trajectory_derivatives.h"
@@ -94,46 +93,6 @@ static void set_kind(int kind) {
 
 /* ---- Geometry ------------------------------------------------------------------------------- */
 
-static void assert_on_path(const struct sample *point) {
-    const double x = point->ee[0].position.value;
-    const double y = point->ee[1].position.value;
-    if (p.motion == RP_TRAJECTORY_CIRCLE) {
-        const double dx = x - p.center[0];
-        const double dy = y - p.center[1];
-        TEST_ASSERT_DOUBLE_WITHIN(1e-15, p.radius, sqrt(dx * dx + dy * dy));
-    } else if (p.motion == RP_TRAJECTORY_LINE) {
-        const double area = (x - p.ee_from[0]) * (p.ee_to[1] - p.ee_from[1]) -
-                            (y - p.ee_from[1]) * (p.ee_to[0] - p.ee_from[0]);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.0, area);
-    }
-}
-
-static void test_forward_kinematics_of_the_joints_gives_the_path(void) {
-    for (int kind = 0; kind < KINDS; kind++) {
-        set_kind(kind);
-        const struct rp_parameters parameters = {.l1 = p.l1, .a = p.a, .m2 = 1.0};
-        for (int i = 0; i <= 400; i++) {
-            const struct sample point = at(0.3 + i * end_time() / 390.0);
-            const double q[2] = {point.q[0].position.value, point.q[1].position.value};
-            const double dq[2] = {point.q[0].velocity.value, point.q[1].velocity.value};
-            double position[2];
-            double velocity[2];
-            const struct arm arm = arm_in_state(&parameters, q, dq);
-            arm_end_effector_position(&arm, position);
-            arm_end_effector_velocity(&arm, velocity);
-            for (int j = 0; j < 2; j++) {
-                TEST_ASSERT_DOUBLE_WITHIN(1e-14, position[j], point.ee[j].position.value);
-                TEST_ASSERT_DOUBLE_WITHIN(1e-13, velocity[j], point.ee[j].velocity.value);
-            }
-            assert_on_path(&point);
-            const double L = p.l1 + q[1];
-            if (p.motion != RP_TRAJECTORY_POINT_TO_POINT) {
-                TEST_ASSERT_TRUE(p.branch == RP_TRAJECTORY_BACKWARD ? L < 0.0 : L > 0.0);
-            }
-        }
-    }
-}
-
 static void test_the_start_is_the_principal_solution(void) {
     for (int kind = 1; kind < KINDS; kind++) {
         for (int i = 0; i < 24; i++) {
@@ -208,38 +167,6 @@ static void test_a_line_along_an_axis_keeps_the_other_coordinate(void) {
 
 /* ---- Time ----------------------------------------------------------------------------------- */
 
-static size_t boundaries(double times[4]) {
-    times[0] = p.start_time;
-    times[1] = end_time();
-    if (p.motion != RP_TRAJECTORY_CIRCLE) {
-        times[2] = p.start_time + 0.5 * p.duration; // where the nearer end changes
-        return 3;
-    }
-    times[2] = p.start_time + p.ramp_time;
-    times[3] = end_time() - p.ramp_time;
-    return 4;
-}
-
-static void test_joints_are_twice_continuously_differentiable(void) {
-    const double h = 1e-9;
-    for (int kind = 0; kind < KINDS; kind++) {
-        set_kind(kind);
-        double times[4];
-        const size_t count = boundaries(times);
-        for (size_t k = 0; k < count; k++) {
-            const struct sample before = at(times[k] - h);
-            const struct sample after = at(times[k] + h);
-            for (int i = 0; i < 2; i++) {
-                const struct moving b = before.q[i];
-                const struct moving a = after.q[i];
-                TEST_ASSERT_DOUBLE_WITHIN(1e-7, b.position.value, a.position.value);
-                TEST_ASSERT_DOUBLE_WITHIN(1e-6, b.velocity.value, a.velocity.value);
-                TEST_ASSERT_DOUBLE_WITHIN(1e-5, b.acceleration.value, a.acceleration.value);
-            }
-        }
-    }
-}
-
 /* At the boundary itself the later formula holds: the third derivative jumps there. */
 static void test_the_later_segment_holds_at_a_boundary(void) {
     p.motion = RP_TRAJECTORY_POINT_TO_POINT;
@@ -262,25 +189,6 @@ static void test_the_later_segment_holds_where_a_ramp_ends_or_begins(void) {
     }
 }
 
-static void test_derivatives_along_time_are_the_rates(void) {
-    for (int kind = 0; kind < KINDS; kind++) {
-        set_kind(kind);
-        for (int i = 0; i <= 200; i++) {
-            const struct sample point = at(0.4 + i * end_time() / 190.0);
-            const struct moving all[] = {point.q[0], point.q[1], point.ee[0], point.ee[1]};
-            for (size_t j = 0; j < COUNT(all); j++) {
-                const struct moving m = all[j];
-                const double scale = 1.0 + fabs(m.acceleration.value);
-                TEST_ASSERT_DOUBLE_WITHIN(1e-14 * scale, m.velocity.value, m.position.first);
-                TEST_ASSERT_DOUBLE_WITHIN(1e-13 * scale, m.acceleration.value, m.velocity.first);
-                TEST_ASSERT_DOUBLE_WITHIN(1e-13 * scale, m.acceleration.value, m.position.second);
-                TEST_ASSERT_DOUBLE_WITHIN(1e-12 * (scale + fabs(m.velocity.second)),
-                                          m.velocity.second, m.acceleration.first);
-            }
-        }
-    }
-}
-
 static void test_it_rests_before_and_after(void) {
     for (int kind = 0; kind < KINDS; kind++) {
         set_kind(kind);
@@ -298,30 +206,6 @@ static void test_it_rests_before_and_after(void) {
             }
         }
     }
-}
-
-static double largest_jump_of_q1(int count) {
-    double largest = 0.0;
-    double last = at(p.start_time).q[0].position.value;
-    for (int i = 1; i <= count; i++) {
-        const double t = p.start_time + (end_time() - p.start_time) * i / count;
-        const double q1 = at(t).q[0].position.value;
-        largest = fmax(largest, fabs(q1 - last));
-        last = q1;
-    }
-    return largest;
-}
-
-static void test_q1_goes_on_without_a_jump(void) {
-    for (int kind = 1; kind < KINDS; kind++) {
-        set_kind(kind);
-        TEST_ASSERT_TRUE(largest_jump_of_q1(4000) < 0.02);
-    }
-    set_around();
-    p.motion = RP_TRAJECTORY_CIRCLE;
-    p.turns = 5.0;
-    const double turned = at(end_time()).q[0].position.value - at(p.start_time).q[0].position.value;
-    TEST_ASSERT_DOUBLE_WITHIN(1e-13, -10.0 * pi, turned);
 }
 
 static void test_q1_follows_a_line_over_the_negative_axis(void) {

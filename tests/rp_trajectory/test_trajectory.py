@@ -3,13 +3,10 @@
 import ctypes
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
-import fmpy
 import mpmath as mp
 import numpy as np
 import pytest
-from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from rparm.models.rp_trajectory.references import make_references
 
@@ -71,10 +68,9 @@ def running(
     loaded: LoadedFmu,
     parameters: dict[str, object],
     start: float = 0.0,
-    kind: type = fmi2.FMU2Slave,
 ) -> Iterator[Instance]:
     """An instance with `parameters`, initialized at `start` (s)."""
-    with Instance(loaded, kind) as instance:
+    with Instance(loaded) as instance:
         give(instance, parameters)
         yield instance.initialize(start=start)
 
@@ -150,33 +146,6 @@ def test_outputs_and_their_derivatives(loaded: LoadedFmu, motion: str) -> None:
         assert_close(np.array(got[order]), np.array(expected[order]), bound)
 
 
-@each_motion
-def test_derivatives_by_parameters(loaded: LoadedFmu, motion: str) -> None:
-    """Directional derivatives in initialization mode, against differences in 40 digits."""
-    parameters = START | numbered(MOTIONS[motion])
-    names = [name for name in START if DECLARED[name].type == "Real"]
-    times, h = random_times(MOTIONS[motion], 1), mp.mpf("1e-20")
-
-    def rows(**changed: mp.mpf) -> np.ndarray:
-        exact = make_references.Motion(parameters | changed)
-        return np.array([follow(exact, t) for t in times])
-
-    here = rows()
-    moved = [rows(**{name: mp.mpf(parameters[name]) + h}) for name in names]
-    expected = (np.stack(moved, axis=1) - here[:, None]) / h
-    outputs = [loaded.references[output] for output in OUTPUTS]
-    for i, t in enumerate(times):
-        with Instance(loaded) as instance:
-            give(instance, MOTIONS[motion])
-            instance.fmi.setupExperiment(startTime=t)
-            instance.fmi.enterInitializationMode()
-            got = [
-                instance.fmi.getDirectionalDerivative(outputs, [loaded.references[name]], [1.0])
-                for name in names
-            ]
-        assert_close(np.array(got).T, expected[i].T.astype(float), 1e-11)
-
-
 def follow(exact: object, t: float) -> list[mp.mpf]:
     """Outputs at `t` (s), the angle brought there in steps of less than half a turn."""
     if exact.q1 is None:
@@ -213,23 +182,6 @@ def test_an_arc_that_leaves_out_the_nearest_point_is_accepted(loaded: LoadedFmu)
 
 
 # ---- a unit without states and inputs ----------------------------------------------------------
-
-
-@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
-def test_fmpy_simulates_it(path: Path, kind: str) -> None:
-    result = fmpy.simulate_fmu(
-        str(path),
-        fmi_type=kind,
-        stop_time=6.0,
-        output_interval=0.125,
-        start_values={"motion": "2", "branch": "1", "duration": 2.0},
-    )
-    line = numbered({"motion": "line", "branch": "forward", "duration": 2.0})
-    exact = make_references.Motion(START | line)
-    assert len(result) == 49
-    expected = np.array([[float(x) for x in exact.outputs(t)] for t in result["time"]])
-    got = np.array([result[name] for name in OUTPUTS]).T
-    assert_close(got, expected, 1e-13)
 
 
 def test_only_the_start_is_settable(loaded: LoadedFmu) -> None:

@@ -1,7 +1,6 @@
 """How the error falls with the communication step: slopes 1 to 4 with input derivatives 0 to 3, and
 slope 4 with intermediate update of FMI 3.0."""
 
-import importlib.util
 import json
 import shutil
 import subprocess
@@ -9,11 +8,11 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
 import sympy as sp
+from rparm.models.rp_manipulator.references.make_references import final_state, integrator
 
 from rparm import result_tables
 from rparm.errors import UserError
@@ -35,19 +34,7 @@ from tests.support.paths import ROOT
 from tests.support.rparm_project import Console, declared, load, repacked
 
 MODEL = ROOT / "models" / "rp_manipulator"
-SCRIPT = MODEL / "references" / "make_smooth_inputs.py"
 PATH = MODEL / "convergence" / "smooth_inputs.toml"
-
-
-@pytest.fixture(scope="module")
-def maker() -> Iterator[ModuleType]:
-    """make_smooth_inputs.py as a module."""
-    sys.path.insert(0, str(SCRIPT.parent))
-    spec = importlib.util.spec_from_file_location(SCRIPT.stem, SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    yield module
-    sys.path.remove(str(SCRIPT.parent))
 
 
 @pytest.fixture(scope="module")
@@ -78,8 +65,9 @@ def made_up(problem: Problem, *coefficients: float, floor: float = 1e-13) -> Con
 
 
 def test_exact_state_made_again_is_the_same(tmp_path: Path) -> None:
-    subprocess.run([sys.executable, SCRIPT, "--output", tmp_path], check=True, cwd=tmp_path)
     folders = [path.stem for path in convergence_files()]
+    command = [sys.executable, MODEL.parent / "make_references.py", MODEL.name, *folders]
+    subprocess.run([*command, "--output", tmp_path], check=True, cwd=tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == folders
     for name in folders:
         files = (MODEL / "references" / name / "exact.json", tmp_path / name / "exact.json")
@@ -92,19 +80,19 @@ def test_exact_state_made_again_is_the_same(tmp_path: Path) -> None:
                 assert abs(new[key][state] - value) <= 1e-14 * old["largest"][state]
 
 
-def test_exact_state_does_not_depend_on_the_precision(maker: ModuleType, problem: Problem) -> None:
-    final, largest = maker.final_state(problem.scenario, np.float64)
+def test_exact_state_does_not_depend_on_the_precision(problem: Problem) -> None:
+    final, largest = final_state(problem.scenario, np.float64)
     assert problem.final_error(final) < 1e-12
     assert largest == pytest.approx(problem.largest, rel=1e-12)
 
 
-def test_motion_is_bounded_and_not_chaotic(maker: ModuleType, problem: Problem) -> None:
+def test_motion_is_bounded_and_not_chaotic(problem: Problem) -> None:
     """A change of the start by 1e-6 does not grow: the motion does not amplify errors of steps."""
     assert max(problem.largest.values()) < 10
     initial = problem.scenario.initial
     for name in problem.exact:
         changed = replace(problem.scenario, initial=initial | {name: initial[name] + 1e-6})
-        assert problem.final_error(maker.final_state(changed)[0]) < 5e-5
+        assert problem.final_error(final_state(changed)[0]) < 5e-5
 
 
 def test_derivatives_of_the_inputs_are_exact() -> None:
@@ -157,7 +145,6 @@ def cubic(sines: Sines, times: np.ndarray, h: np.ndarray) -> list[np.ndarray]:
     ("case", "derivatives"), [(ORDERS[-1], taylor), (INTERMEDIATE_UPDATE, cubic)]
 )
 def test_error_of_the_integration_by_itself(
-    maker: ModuleType,
     opened: Fmu,
     updated: Fmu,
     study: Convergence,
@@ -179,7 +166,7 @@ def test_error_of_the_integration_by_itself(
         t = hy.time
         polynomials[name] = c[0] + t * (c[1] + t / 2.0 * (c[2] + t / 3.0 * c[3]))
     real = np.longdouble
-    motion = maker.integrator(problem.scenario, polynomials, real, width * len(polynomials))
+    motion = integrator(problem.scenario, polynomials, real, width * len(polynomials))
     start = motion.state.copy()
     errors = []
     for factor in FACTORS:

@@ -14,7 +14,7 @@ from tests.support.rparm_project import LONG, NAMES, declared, edit, load, refer
 
 Change = Callable[[list[str]], list[str]]  # of the lines of a file
 
-MAKE_REFERENCES = "build/venv/bin/python models/rp_manipulator/references/make_references.py"
+MAKE_REFERENCES = "build/venv/bin/python models/make_references.py rp_manipulator"
 
 
 def refused(project: Path, name: str = LONG) -> str:

@@ -5,15 +5,12 @@ system stepped in Jacobi order, read before inputs are set; ``ecos.csv``, the sa
 are set, as Ecos does. closed_loop.py says what they mean, equations.py where they come from.
 """
 
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-
-FOLDER = Path(__file__).resolve().parent
-sys.path.insert(0, str(FOLDER.parents[2]))
-
+from rparm.models.closed_loop.coupling.loop import STATES
+from rparm.models.closed_loop.coupling.step_doubling import FAST, FAST_AND_SLOW, FAST_STOP
 from rparm.models.closed_loop.experiment import STEPS_PER_SECOND, STOP
 from rparm.models.closed_loop.references.closed_loop import (
     COMPONENTS,
@@ -21,15 +18,18 @@ from rparm.models.closed_loop.references.closed_loop import (
     monolithic,
     sampled,
 )
-from rparm.models.system_references import KEPT, communication_points
+from rparm.models.reference_files import KEPT, Files, communication_points
 
 from rparm.fmi.model import Value
-from rparm.models import system_references
+from rparm.models import reference_files
+
+SYSTEM = Path(__file__).resolve().parents[1]
+FAST_ROWS_PER_SECOND = 50
 
 
 def variants() -> dict[str, dict[str, Value]]:
     """Parameters of every variant of the system, ``component.name``."""
-    return system_references.variants(FOLDER.parent, COMPONENTS)
+    return reference_files.variants(SYSTEM, COMPONENTS)
 
 
 def make(
@@ -49,6 +49,17 @@ def make(
     }
 
 
-if __name__ == "__main__":
-    found = variants()
-    system_references.main(FOLDER, found, lambda name: make(found[name]))
+def fast_and_slow() -> Files:
+    """Return times and states of the motion of the study of the coupling."""
+    times = communication_points(FAST_STOP, FAST_ROWS_PER_SECOND)
+    values = {f"{c}.{name}": value for c, of in FAST.items() for name, value in of.items()}
+    columns = monolithic(values, times)
+    return {FAST_AND_SLOW.name: (times, {name: columns[name] for name in STATES})}
+
+
+def names() -> tuple[str, ...]:
+    return (*variants(), FAST_AND_SLOW.parent.name)
+
+
+def files(name: str) -> Files:
+    return fast_and_slow() if name == FAST_AND_SLOW.parent.name else make(variants()[name])

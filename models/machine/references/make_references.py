@@ -7,35 +7,32 @@ were nearest to another count. ``pick_and_place`` and ``pick_and_place_untold`` 
 ``monolithic.csv`` too, the solution in continuous time of monolithic.py.
 """
 
-import sys
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
-
-FOLDER = Path(__file__).resolve().parent
-sys.path.insert(0, str(FOLDER.parents[2]))
-
 from rparm.models.machine.experiment import STEPS_PER_SECOND, STOP
 from rparm.models.machine.references.components import Sample
 from rparm.models.machine.references.machine import COMPONENTS, DISCRETE, Machine, columns
 from rparm.models.machine.references.monolithic import monolithic
+from rparm.models.reference_files import KEPT, Files, communication_points
 from rparm.models.rp_plant.references.solver import Solver
-from rparm.models.system_references import KEPT, communication_points
 
 from rparm.fmi.model import Value
-from rparm.models import system_references
+from rparm.models import reference_files
 
+SYSTEM = Path(__file__).resolve().parents[1]
 FILES = ("sampled.csv", "ecos.csv")  # read before inputs are set, and after it
 TIGHTEST = 200  # samples of either joint that are kept
 CONTINUOUS = ("pick_and_place", "pick_and_place_untold")  # variants with monolithic.csv
 
-Files = dict[str, tuple[np.ndarray, dict[str, np.ndarray]]]
+solver = cache(Solver)  # compiles the equations once
 
 
 def variants() -> dict[str, dict[str, Value]]:
     """Parameters of every variant, ``component.name``."""
-    return system_references.variants(FOLDER.parent, COMPONENTS)
+    return reference_files.variants(SYSTEM, COMPONENTS)
 
 
 def make(solver: Solver, parameters: Mapping[str, Value], stop: float = STOP) -> Files:
@@ -64,18 +61,14 @@ def _tightest(samples: Sequence[Sample]) -> tuple[np.ndarray, dict[str, np.ndarr
     return np.array([samples[k].time for k in kept]), columns
 
 
-def main() -> None:
-    solver, known = Solver(), variants()
-
-    def files(name: str) -> Files:
-        found = make(solver, known[name])
-        if name in CONTINUOUS:
-            times = communication_points(STOP, STEPS_PER_SECOND)[::KEPT]
-            found["monolithic.csv"] = times, monolithic(known[name], times)
-        return found
-
-    system_references.main(FOLDER, known, files)
+def names() -> tuple[str, ...]:
+    return tuple(variants())
 
 
-if __name__ == "__main__":
-    main()
+def files(name: str) -> Files:
+    parameters = variants()[name]
+    found = dict(make(solver(), parameters))
+    if name in CONTINUOUS:
+        times = communication_points(STOP, STEPS_PER_SECOND)[::KEPT]
+        found["monolithic.csv"] = times, monolithic(parameters, times)
+    return found

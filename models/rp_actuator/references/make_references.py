@@ -5,19 +5,12 @@ each current approaches it by exp(-t/T), in closed form with 40 digits. What the
 solved from the voltages, one case after the other, and not by clipping currents as the C code does.
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 from mpmath import mp, mpf
-
-MODEL_FOLDER = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(MODEL_FOLDER.parents[1]))
 
 from rparm.models import reference_files
 from rparm.runs.scenario import Scenario
 
-MODEL = "RPActuator"
 INPUTS = ("tau1_cmd", "f2_cmd", "dq1", "dq2")
 OUTPUTS = ("tau1", "f2", "current1", "current2", "voltage1", "voltage2")
 
@@ -60,15 +53,13 @@ class Drive:
         return limited + (current - limited) * mp.exp(-h / self.time_constant)
 
 
-def simulate(scenario: Scenario) -> np.ndarray:
-    """Outputs (n + 1, outputs); row i has the inputs of the step before it, row 0 the first."""
+def outputs(scenario: Scenario) -> dict[str, np.ndarray]:
+    """Return the columns of OUTPUTS, (n + 1,) each."""
     start = {name: mpf(float(value)) for name, value in scenario.start_values.items()}
-    inputs = reference_files.input_table(scenario, INPUTS)
     times = [mpf(float(t)) for t in scenario.times]
     currents = [start["current1"], start["current2"]]
     rows = []
-    for i in range(len(times)):
-        held = inputs[max(i - 1, 0)]
+    for i, held in enumerate(reference_files.held_rows(scenario, INPUTS)):
         value = start | {n: mpf(float(x)) for n, x in zip(INPUTS, held, strict=True)}
         drives = [Drive(value, joint) for joint in (1, 2)]
         if i > 0:
@@ -78,12 +69,4 @@ def simulate(scenario: Scenario) -> np.ndarray:
         efforts = [drive.constant * current for drive, current in pairs]
         voltages = [drive.voltage(current) for drive, current in pairs]
         rows.append([float(x) for x in (*efforts, *currents, *voltages)])
-    return np.array(rows)
-
-
-def write(scenario: Scenario, folder: Path) -> None:
-    reference_files.write(scenario, folder, MODEL, OUTPUTS, simulate(scenario), INPUTS)
-
-
-if __name__ == "__main__":
-    reference_files.main(MODEL_FOLDER, lambda: write)
+    return dict(zip(OUTPUTS, np.array(rows).T, strict=True))

@@ -7,26 +7,21 @@ evaluated at the end of each piece, and the limit is located by bisection. The s
 same laws at the samples, with Euler's method from one to the next.
 """
 
-import sys
 from collections.abc import Callable
-from pathlib import Path
+from functools import cache
 
 import numpy as np
 import sympy as sp
 from mpmath import mp, mpf
-
-MODEL_FOLDER = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(MODEL_FOLDER.parents[1]))
-
 from rparm.models.rp_plant.references import equations as plant
 
 from rparm.models import reference_files
 from rparm.runs.scenario import Scenario
 
-MODEL = "RPController"
 REFERENCES = ("q1_ref", "q2_ref", "dq1_ref", "dq2_ref", "ddq1_ref", "ddq2_ref")
 INPUTS = (*REFERENCES, "q1", "q2", "dq1", "dq2")
 ATTACHED = "payload_attached"
+OPTIONAL_INPUTS = (ATTACHED,)
 OUTPUTS = ("tau1", "f2", "q1_error", "q2_error", "dq1_error", "dq2_error")
 PD, PD_GRAVITY, COMPUTED_TORQUE = 1, 2, 3
 
@@ -38,6 +33,7 @@ PROBES = 8  # per piece, for a limit that is met and left within it
 mp.dps = 40
 
 
+@cache
 def equations_of_the_arm() -> Callable[..., tuple]:
     """Function of parameters, q and dq that gives D, C(q, dq) dq and g(q), by Euler-Lagrange.
 
@@ -154,28 +150,28 @@ class Law:
 
 
 class Laws:
-    """The law of a scenario with the inputs that are held after each communication point."""
+    """Laws of a scenario; law i has the inputs of the step that ends at communication point i."""
 
-    def __init__(self, scenario: Scenario, arm: Callable[..., tuple]) -> None:
-        self.arm = arm
+    def __init__(self, scenario: Scenario) -> None:
+        self.arm = equations_of_the_arm()
         self.start = {name: mpf(float(value)) for name, value in scenario.start_values.items()}
         self.names = (*INPUTS, ATTACHED) if ATTACHED in scenario.inputs else INPUTS
-        self.inputs = reference_files.input_table(scenario, self.names)
+        self.held = reference_files.held_rows(scenario, self.names)
         # times of the communication points are exact, their differences need not be
         self.times = [mpf(float(t)) for t in scenario.times]
 
-    def after(self, i: int) -> Law:
-        held = (mpf(float(x)) for x in self.inputs[i])
+    def __getitem__(self, i: int) -> Law:
+        held = (mpf(float(x)) for x in self.held[i])
         return Law({ATTACHED: 0} | self.start | dict(zip(self.names, held, strict=True)), self.arm)
 
 
 def simulate(laws: Laws) -> np.ndarray:
-    """Outputs (n + 1, outputs); row i has the inputs of the step before it, row 0 the first."""
+    """Return the outputs, (n + 1, outputs)."""
     times = laws.times
     w = [mpf(0), mpf(0)]
     rows = []
     for i in range(len(times)):
-        law = laws.after(max(i - 1, 0))
+        law = laws[i]
         if i > 0:
             length = times[i] - times[i - 1]
             pieces = int(mp.ceil(length / (LONGEST * laws.start["tracking_time"])))
@@ -193,7 +189,7 @@ def simulate_samples(laws: Laws) -> np.ndarray:
     in_effect: list[tuple[mpf, list[mpf]]] = []  # from a time on, the efforts
     rows, k = [], 0
     for i in range(len(times)):
-        law = laws.after(max(i - 1, 0))
+        law = laws[i]
         while times[0] + k * period <= times[i]:
             w = [x + period * rate for x, rate in zip(w, rates, strict=True)]
             rates = law.rates(w)
@@ -204,17 +200,8 @@ def simulate_samples(laws: Laws) -> np.ndarray:
     return np.array(rows)
 
 
-def prepare() -> Callable[[Scenario, Path], None]:
-    """Derive the arm's equations; return what writes the reference of a scenario to a folder."""
-    arm = equations_of_the_arm()
-
-    def write(scenario: Scenario, folder: Path) -> None:
-        laws = Laws(scenario, arm)
-        outputs = simulate_samples(laws) if laws.start["sample_time"] > 0 else simulate(laws)
-        reference_files.write(scenario, folder, MODEL, OUTPUTS, outputs, laws.names)
-
-    return write
-
-
-if __name__ == "__main__":
-    reference_files.main(MODEL_FOLDER, prepare)
+def outputs(scenario: Scenario) -> dict[str, np.ndarray]:
+    """Return the columns of OUTPUTS, (n + 1,) each."""
+    laws = Laws(scenario)
+    table = simulate_samples(laws) if laws.start["sample_time"] > 0 else simulate(laws)
+    return dict(zip(OUTPUTS, table.T, strict=True))

@@ -4,10 +4,11 @@ The Lagrangian is written from the positions of both centers of mass, sympy turn
 of motion, and heyoka's Taylor method integrates them in numbers of 113 bits at their precision:
 what is written are the nearest doubles. No closed form of "Example of dynamics computation
 (Euler-Lagrange and Newton-Euler formulations): Revolute-Prismatic (RP) manipulator (Problem 7.8)"
-goes in.
+goes in. The exact final state of a problem in ../convergence has inputs that are smooth functions
+of time, in long double.
 """
 
-import sys
+import json
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -16,22 +17,23 @@ import heyoka as hy
 import numpy as np
 import sympy as sp
 
-MODEL_FOLDER = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(MODEL_FOLDER.parents[1]))
-
+from rparm import project
 from rparm.errors import UserError
+from rparm.files import write_text
 from rparm.models import reference_files
+from rparm.runs import convergence
+from rparm.runs.inputs import Sines
 from rparm.runs.scenario import Scenario
 
-MODEL = "RPManipulator"
 PARAMETERS = ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g")
 INPUTS = ("tau1", "f2")
 STATES = ("q1", "q2", "dq1", "dq2")
+ON_THE_WAY = 1000  # points of a smooth motion at which the largest values are looked for
 
 
 @dataclass(frozen=True)
 class Equations:
-    """What the integrator and the outputs evaluate: sympy expressions in the names above."""
+    """Expressions in the names above, for the integrator and the outputs."""
 
     accelerations: tuple[sp.Expr, sp.Expr]  # ddq1 in rad/s2, ddq2 in m/s2
     outputs: dict[str, sp.Expr]
@@ -39,7 +41,7 @@ class Equations:
 
 @cache
 def derive() -> Equations:
-    """Equations of motion by Euler-Lagrange from positions in frame 0, and every Real output."""
+    """Return the equations by Euler-Lagrange from positions in frame 0, and every Real output."""
     m1, m2, I1z, I2z, l1, lc1, a, g = sp.symbols(PARAMETERS)
     tau1, f2 = sp.symbols(INPUTS)
     t = sp.Symbol("t")
@@ -119,12 +121,11 @@ class Reference:
         )
 
     def simulate(self, scenario: Scenario) -> np.ndarray:
-        """Outputs (n + 1, outputs); row i has the inputs of the step before it, row 0 the first."""
+        """Return the outputs, (n + 1, outputs); each row has the inputs of the step before."""
         value = scenario.start_values
         # time counts from the start; the differences of the communication points are exact
         elapsed = scenario.times.astype(self.real) - self.real(scenario.start)
-        inputs = reference_files.input_table(scenario, INPUTS)
-        held = np.concatenate((inputs[:1], inputs[:-1])).astype(self.real)
+        held = reference_files.held_rows(scenario, INPUTS).astype(self.real)
 
         integrator = self.integrator
         integrator.time = self.real(0)
@@ -147,16 +148,68 @@ class Reference:
         runtime[:, len(PARAMETERS) :] = held
         return self.evaluate(np.ascontiguousarray(states.T), pars=np.ascontiguousarray(runtime.T)).T
 
-    def write(self, scenario: Scenario, folder: Path, values: np.ndarray) -> None:
-        """Write what `simulate` gives."""
-        reference_files.write(scenario, folder, MODEL, self.outputs, values, INPUTS)
+
+compiled = cache(Reference)
 
 
-def writer() -> reference_files.Writer:
-    """Simulates and writes one scenario after the other."""
-    reference = Reference()
-    return lambda scenario, folder: reference.write(scenario, folder, reference.simulate(scenario))
+def outputs(scenario: Scenario) -> dict[str, np.ndarray]:
+    """Return the columns of the Real outputs, (n + 1,) each."""
+    reference = compiled()
+    return dict(zip(reference.outputs, reference.simulate(scenario).T, strict=True))
 
 
-if __name__ == "__main__":
-    reference_files.main(MODEL_FOLDER, writer)
+# ---- Smooth inputs -------------------------------------------------------------------------------
+
+
+def signal(sines: Sines, real: type) -> hy.expression:
+    """`sines` as a function of heyoka's time."""
+    omega = 2 * np.arctan2(real(0), real(-1))
+    total = hy.expression(real(sines.offset))
+    for amplitude, frequency, phase in sines.terms:
+        angle = hy.expression(omega * real(frequency)) * hy.time + hy.expression(real(phase))
+        total += hy.expression(real(amplitude)) * hy.sin(angle)
+    return total
+
+
+def integrator(
+    scenario: Scenario, inputs: dict[str, hy.expression], real: type = np.longdouble, pars: int = 0
+) -> hy.taylor_adaptive:
+    """The motion from time 0, with tau1 (N.m) and f2 (N) of heyoka's time and `pars` parameters."""
+    start = scenario.start_values
+    names = {sp.Symbol(name): hy.expression(real(start[name])) for name in PARAMETERS}
+    names |= {sp.Symbol(name): inputs[name] for name in INPUTS}
+    states = hy.make_vars(*STATES)
+    ddq1, ddq2 = (hy.from_sympy(e, names) for e in derive().accelerations)
+    return hy.taylor_adaptive(
+        list(zip(states, (states[2], states[3], ddq1, ddq2), strict=True)),
+        np.array([start[name] for name in STATES], real),
+        pars=np.zeros(pars, dtype=real),
+        fp_type=real,
+    )
+
+
+def final_state(
+    scenario: Scenario, real: type = np.longdouble
+) -> tuple[dict[str, float], dict[str, float]]:
+    """States at the end, and the largest absolute value of each on the way."""
+    if real is np.longdouble and np.finfo(real).eps > 2e-19:
+        raise UserError("long double is no wider than double here: make the references elsewhere")
+    sines = convergence.smooth_inputs(scenario)
+    motion = integrator(scenario, {name: signal(s, real) for name, s in sines.items()}, real)
+    end = real(scenario.stop) - real(scenario.start)
+    outcome, *_, path = motion.propagate_grid(np.linspace(real(0), end, ON_THE_WAY))
+    if outcome != hy.taylor_outcome.time_limit:
+        raise UserError(f"{scenario.path}: the motion blows up")
+    largest = np.max(np.abs(path), axis=0)
+    return (
+        dict(zip(STATES, path[-1].astype(float).tolist(), strict=True)),
+        dict(zip(STATES, largest.astype(float).tolist(), strict=True)),
+    )
+
+
+def write_exact_state(scenario: Scenario, folder: Path) -> None:
+    """Write the exact final state of `scenario` to `folder`."""
+    final, largest = final_state(scenario)
+    content = {"time": scenario.stop, "final": final, "largest": largest}
+    file = project.exact_state_file(scenario.path).name
+    write_text(folder / file, json.dumps(content, indent=2) + "\n")

@@ -5,21 +5,15 @@ hash of the page in Python's integers and a normal number in 40 digits. A scenar
 could decide a count or the step of a tick is refused.
 """
 
-import sys
 from collections.abc import Mapping
 from fractions import Fraction
-from pathlib import Path
 
 import mpmath as mp
 import numpy as np
 
-MODEL_FOLDER = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(MODEL_FOLDER.parents[1]))
-
 from rparm.models import reference_files
 from rparm.runs.scenario import Scenario
 
-MODEL = "RPSensor"
 DIGITS = 40
 INPUTS = ("q1", "q2")
 OUTPUTS = ("q1_measured", "q2_measured", "dq1_measured", "dq2_measured")
@@ -96,8 +90,8 @@ class Encoder:
         return positions + rates
 
 
-def simulate(scenario: Scenario) -> np.ndarray:
-    """Outputs at every communication point, (n + 1, outputs), with inputs held over each step."""
+def outputs(scenario: Scenario) -> dict[str, np.ndarray]:
+    """Return the columns of OUTPUTS, (n + 1,) each, with inputs held over each step."""
     encoder = Encoder(scenario.start_values)
     inputs = reference_files.input_table(scenario, INPUTS).tolist()
     times = [Fraction(t) for t in scenario.times.tolist()]
@@ -109,12 +103,5 @@ def simulate(scenario: Scenario) -> np.ndarray:
         if next_tick - end < CLEAR * encoder.sample_time:
             raise ValueError(f"rounding decides the step of the tick at {float(end)} s")
         rows.append(encoder.outputs())
-    return np.array([[float(x) for x in row] for row in rows])
-
-
-def write(scenario: Scenario, folder: Path) -> None:
-    reference_files.write(scenario, folder, MODEL, OUTPUTS, simulate(scenario), INPUTS)
-
-
-if __name__ == "__main__":
-    reference_files.main(MODEL_FOLDER, lambda: write)
+    table = np.array([[float(x) for x in row] for row in rows])
+    return dict(zip(OUTPUTS, table.T, strict=True))

@@ -6,22 +6,16 @@ time, solved in 40 digits and rounded once.
 """
 
 import functools
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import mpmath as mp
 import numpy as np
 import sympy as sp
 
-MODEL_FOLDER = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(MODEL_FOLDER.parents[1]))
-
-from rparm.models import reference_files
 from rparm.runs.scenario import Scenario
 
-MODEL = "RPTrajectory"
+INPUTS = ()
 DIGITS = 40
 JOINTS = ("q1_ref", "q2_ref", "dq1_ref", "dq2_ref", "ddq1_ref", "ddq2_ref")
 OUTPUTS = (*JOINTS, "ee_x_ref", "ee_y_ref", "ee_vx_ref", "ee_vy_ref")
@@ -164,17 +158,10 @@ class Motion:
         return [part for pair in pairs for part in (pair.real, pair.imag)]
 
 
-def simulate(scenario: Scenario) -> np.ndarray:
-    """Values of OUTPUTS at every communication point, (n + 1, outputs)."""
+def outputs(scenario: Scenario) -> dict[str, np.ndarray]:
+    """Return the columns of OUTPUTS, (n + 1,) each."""
     with mp.workdps(DIGITS):
         motion = Motion(scenario.start_values)
         rows = [motion.outputs(t) for t in scenario.times]
-        return np.array([[float(x) for x in row] for row in rows])
-
-
-def write(scenario: Scenario, folder: Path) -> None:
-    reference_files.write(scenario, folder, MODEL, OUTPUTS, simulate(scenario), ())
-
-
-if __name__ == "__main__":
-    reference_files.main(MODEL_FOLDER, lambda: write)
+        table = np.array([[float(x) for x in row] for row in rows])
+        return dict(zip(OUTPUTS, table.T, strict=True))

@@ -9,8 +9,9 @@ import pytest
 from rparm.models.rp_plant.references.solver import Solver
 
 from rparm.fmi.fmu_file import Fmu
-from tests.rp_plant.fmu.plant_runs import COMPLIANT, each_method
+from tests.rp_plant.fmu.plant_runs import COMPLIANT
 from tests.rp_plant.fmu.random_motions import (
+    BOUNDS,
     MOST_EVENTS,
     Outcome,
     compliant_case,
@@ -29,12 +30,12 @@ def outcomes(fmi2_plant: Fmu) -> Outcomes:
     return {kind: judge_all(fmi2_plant, solver, *draws)[0] for kind, draws in kinds.items()}
 
 
-@each_method
+@pytest.mark.parametrize("method", BOUNDS)
 @pytest.mark.parametrize("kind", ["rigid", "compliant"])
 def test_events_and_states_agree(outcomes: Outcomes, kind: str, method: str) -> None:
-    """Times to 1e-9 s, states to 1e-8, and the same modes."""
-    failed = [(x.number, x.errors[method]) for x in outcomes[kind] if not x.errors[method].passed]
-    assert failed == []
+    """Times to 1e-9 s, states to 1e-8 (in Model Exchange ten times that), and the same modes."""
+    errors = [(x.number, x.errors[method]) for x in outcomes[kind] if method in x.errors]
+    assert len(errors) >= 6 and [(n, e) for n, e in errors if not e.pass_by(method)] == []
 
 
 def test_rigid_cases_are_worth_it(outcomes: Outcomes) -> None:

@@ -25,10 +25,9 @@ from tests.rp_plant.fmu.plant_runs import (
     each_method,
     events,
     last_event,
-    modes,
     started,
 )
-from tests.support.instances import DISCARD, LoadedFmu, restore, serialized, status_of
+from tests.support.instances import DISCARD, LoadedFmu, status_of
 from tests.support.instances import Instance as Fmi2Instance
 
 SEQUENCES = int(os.environ.get("PLANT_SEQUENCES", "100"))
@@ -204,26 +203,6 @@ def test_random_rollback(plant: Fmu, number: int) -> None:
                 position += 1
         for _, state in saved:
             state.free()
-
-
-@each_method
-def test_serialized_states_keep_the_modes(plant: Fmu, method: str) -> None:
-    """Another instance continues alike from each mode: held, sliding, free, on a stop, loaded."""
-    chance = random.Random(1)
-    moves = sequence(150, chance)
-    at = times(moves)
-    seen = set()
-    with busy(plant, method) as run, busy(plant, "erk") as other:
-        for t, move in zip(at, moves, strict=False):
-            content = serialized(run.instance)
-            expected = run.do(t, move)
-            if modes(run.instance) not in seen or chance.random() < 0.2:
-                restore(other.instance, content)
-                assert other.do(t, move) == expected
-                assert serialized(other.instance) == serialized(run.instance)
-            seen.add(modes(run.instance))
-    assert {0, 1, -1} <= {mode for pair in seen for mode in pair}
-    assert (0, 0) in seen and len(seen) > 4
 
 
 # ---- Too many events -------------------------------------------------------------------------
