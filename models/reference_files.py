@@ -12,8 +12,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from rparm import files as trajectory_csv
-from rparm.files import write_text
+from rparm.files import write_text, write_trajectory
 from rparm.fmi.model import Value
 from rparm.runs.scenario import Scenario
 
@@ -64,7 +63,7 @@ def write_scenario(
 
 def _write_table(path: Path, times: np.ndarray, names: Sequence[str], table: np.ndarray) -> None:
     rounded = table.astype(np.float64) + 0.0  # no negative zeros
-    trajectory_csv.write_trajectory(path, times, names, rounded)
+    write_trajectory(path, times, names, rounded)
 
 
 # ---- Systems -------------------------------------------------------------------------------------

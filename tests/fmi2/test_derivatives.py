@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 import sympy as sp
 from fmpy.fmi2 import FMU2Model, FMU2Slave
+from tests.support.rp_symbolic import KNOWNS, Exact, Model, Values, random_arm
 
 from tests.support.instances import ERROR, INPUTS, STATES, Instance, LoadedFmu, status_of
-from tests.support.rp_symbolic import KNOWNS, Exact, Model, Values, random_arm
 
 
 @pytest.fixture(scope="module")

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.linearization.exact_models import Exact
 
 from rparm.fmi.fmu_file import CO_SIMULATION, MODEL_EXCHANGE, Fmu
 from rparm.linearization.linear import FmuSubject, Linear
 from tests.linearization import exact_models
-from tests.linearization.exact_models import Exact
 
 BOUND = 1e-12  # of the largest entry of a matrix
 POINTS = 25
