@@ -54,12 +54,8 @@ _Static_assert((int)COMPONENT_OK == fmi2OK && (int)COMPONENT_WARNING == fmi2Warn
                    (int)COMPONENT_FATAL == fmi2Fatal,
                "a component_status is converted by a cast");
 
-static inline fmi2Status fmi2_status(enum component_status status) {
+static fmi2Status fmi2_status(enum component_status status) {
     return (fmi2Status)status;
-}
-
-static inline fmi2Status fmi2_result(struct component *component, enum status status) {
-    return fmi2_status(component_result(component, status));
 }
 
 /* ---- Versions, life and logging ------------------------------------------------------------- */
@@ -368,7 +364,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
     if (status_severity(status) == SEVERITY_DISCARD) {
         component->state = STATE_STEP_FAILED;
     }
-    return fmi2_result(component, status);
+    return fmi2_status(component_result(component, status));
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c) {

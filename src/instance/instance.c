@@ -268,12 +268,42 @@ enum status instance_enter_initialization(struct instance *instance) {
     return STATUS_OK;
 }
 
+/* Returns STATUS_OK if the chosen method can integrate the model; otherwise a message names methods
+ * that can. */
+static enum status check_method(const struct instance *instance) {
+    const enum integrator_method method = (enum integrator_method)instance->state.own.solver_method;
+    if (integrator_is_possible(method, &instance->ode)) {
+        return STATUS_OK;
+    }
+    message_write(
+        &instance->sink, STATUS_INVALID_PARAMETERS,
+        "solver_method = %d (%s) is refused: %s has no Taylor series. %d (%s) is for any model, "
+        "%d (%s) for a stiff one, %d (%s) for inputs that change in each step",
+        (int)method, integrator_method_name(method), instance->description->name,
+        INTEGRATOR_CVODE_ADAMS, integrator_method_name(INTEGRATOR_CVODE_ADAMS),
+        INTEGRATOR_CVODE_BDF, integrator_method_name(INTEGRATOR_CVODE_BDF), INTEGRATOR_ERK,
+        integrator_method_name(INTEGRATOR_ERK));
+    return STATUS_INVALID_PARAMETERS;
+}
+
+/* Sends a message if the experiment's tolerance is too coarse to be used. */
+static void report_tolerance(const struct instance *instance) {
+    const struct instance_state *state = &instance->state;
+    if (state->own.relative_tolerance == 0.0 && state->experiment.tolerance_defined &&
+        state->experiment.tolerance > INSTANCE_COARSEST_EXPERIMENT_TOLERANCE) {
+        message_write(&instance->sink, STATUS_COARSE_TOLERANCE,
+                      "the tolerance %g of the experiment is too coarse: %g is used instead. Set "
+                      "relative_tolerance for a coarser one",
+                      state->experiment.tolerance, INSTANCE_COARSEST_EXPERIMENT_TOLERANCE);
+    }
+}
+
 static enum status setup_integrator(struct instance *instance) {
-    enum status status = instance_check_method(instance);
+    enum status status = check_method(instance);
     if (status != STATUS_OK) {
         return status;
     }
-    instance_report_tolerance(instance);
+    report_tolerance(instance);
     status = instance_configure_integrator(instance);
     if (status != STATUS_OK) {
         message_write(&instance->sink, status, "initialization failed: %s", status_text(status));

@@ -135,18 +135,6 @@ enum status instance_count_event(struct instance *instance, const bool triggered
 
 /* ---- The event at which a step has ended ---------------------------------------------------- */
 
-void instance_leave_event(struct instance *instance, const bool triggered[],
-                          struct clock_time end) {
-    memcpy(instance->memory.unhandled, triggered, instance_event_size(instance->model));
-    instance->state.event_point = EVENT_UNHANDLED;
-    instance->state.cut_end = end;
-}
-
-void instance_note_handled_event(struct instance *instance, struct clock_time end) {
-    instance->state.event_point = EVENT_HANDLED;
-    instance->state.cut_end = end;
-}
-
 /* Forgets forces that had triggered the event: after a change of inputs or parameters they may no
  * longer do so; states still do. */
 static void forget_unhandled_forces(struct instance *instance) {
@@ -185,13 +173,6 @@ bool instance_is_unchanged(const struct instance *instance) {
     return (instance->state.has_history || instance->state.event_point != NO_EVENT) &&
            !polynomials_move(instance->memory.active_inputs, count_of(instance->model->inputs)) &&
            instance_values_are_active(instance);
-}
-
-struct clock_time instance_resumed_end(const struct instance *instance, struct clock_time end) {
-    const struct instance_state *state = &instance->state;
-    const double difference = clock_difference(end, state->cut_end);
-    const double rounding = clock_rounding(instance_size_of_times(instance, end.s));
-    return fabs(difference) <= rounding ? state->cut_end : end;
 }
 
 /* ---- Events for an integrator outside ------------------------------------------------------- */

@@ -22,16 +22,7 @@ MUST_CHECK NONNULL enum status instance_count_event(struct instance *instance,
                                                     const bool triggered[],
                                                     struct event_counts *in_step);
 
-/* ---- The event at which a step has ended ----------------------------------------------------
- * Whether it is handled, and how the motion continues from there as if the step had not ended. */
-
-/* Ends a step that would have lasted until `end` at the present time, at which these indicators
- * fall to 0. The event stays unhandled. */
-NONNULL void instance_leave_event(struct instance *instance, const bool triggered[],
-                                  struct clock_time end);
-
-/* Notes that the event at the present time, before `end`, has been handled. */
-NONNULL void instance_note_handled_event(struct instance *instance, struct clock_time end);
+/* ---- The event at which a step has ended ---------------------------------------------------- */
 
 /* Updates modes, states and discrete states after the unhandled event, if there is one. It counts
  * as an event of this communication step. */
@@ -41,11 +32,6 @@ MUST_CHECK NONNULL enum status instance_handle_event(struct instance *instance,
 /* True if nothing has changed since the end of the last step, and no input moved over that step:
  * the modes already follow from the values that are set now. */
 NONNULL bool instance_is_unchanged(const struct instance *instance);
-
-/* Returns the end of a step after an event: the end of the step that the event cut short, if the
- * importer means the same time. Its own differences of times have rounding errors. */
-NONNULL struct clock_time instance_resumed_end(const struct instance *instance,
-                                               struct clock_time end);
 
 /* ---- Events for an integrator outside ------------------------------------------------------- */
 

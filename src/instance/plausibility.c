@@ -246,8 +246,7 @@ static bool check_event_point(const struct instance *instance, const struct inst
     return check_all(instance, values, COUNT(values));
 }
 
-/* ---- Values stored twice ----------------------------------------------------------------------
- */
+/* ---- Values stored twice -------------------------------------------------------------------- */
 
 /* A value with its name, and the value that follows from the rest of the state. */
 struct twin {

@@ -77,17 +77,6 @@ void instance_update_tolerance(struct instance *instance) {
     }
 }
 
-void instance_report_tolerance(const struct instance *instance) {
-    const struct instance_state *state = &instance->state;
-    if (state->own.relative_tolerance == 0.0 && state->experiment.tolerance_defined &&
-        state->experiment.tolerance > INSTANCE_COARSEST_EXPERIMENT_TOLERANCE) {
-        message_write(&instance->sink, STATUS_COARSE_TOLERANCE,
-                      "the tolerance %g of the experiment is too coarse: %g is used instead. Set "
-                      "relative_tolerance for a coarser one",
-                      state->experiment.tolerance, INSTANCE_COARSEST_EXPERIMENT_TOLERANCE);
-    }
-}
-
 static struct integrator_settings settings_of(const struct instance *instance) {
     const struct instance_values *own = &instance->state.own;
     return (struct integrator_settings){
@@ -95,22 +84,6 @@ static struct integrator_settings settings_of(const struct instance *instance) {
         .relative_tolerance = own->effective_relative_tolerance,
         .max_step = own->max_step,
     };
-}
-
-enum status instance_check_method(const struct instance *instance) {
-    const enum integrator_method method = (enum integrator_method)instance->state.own.solver_method;
-    if (integrator_is_possible(method, &instance->ode)) {
-        return STATUS_OK;
-    }
-    message_write(
-        &instance->sink, STATUS_INVALID_PARAMETERS,
-        "solver_method = %d (%s) is refused: %s has no Taylor series. %d (%s) is for any model, "
-        "%d (%s) for a stiff one, %d (%s) for inputs that change in each step",
-        (int)method, integrator_method_name(method), instance->description->name,
-        INTEGRATOR_CVODE_ADAMS, integrator_method_name(INTEGRATOR_CVODE_ADAMS),
-        INTEGRATOR_CVODE_BDF, integrator_method_name(INTEGRATOR_CVODE_BDF), INTEGRATOR_ERK,
-        integrator_method_name(INTEGRATOR_ERK));
-    return STATUS_INVALID_PARAMETERS;
 }
 
 bool instance_is_configured_otherwise(const struct instance *instance) {

@@ -16,19 +16,12 @@ instance_check_experiment(const struct instance *instance,
 /* Returns STATUS_OK if the parameters are consistent; otherwise a message says why not. */
 MUST_CHECK NONNULL enum status instance_check_parameters(struct instance *instance);
 
-/* Returns STATUS_OK if the chosen method can integrate the model; otherwise a message names methods
- * that can. */
-MUST_CHECK NONNULL enum status instance_check_method(const struct instance *instance);
-
 /* Returns the relative tolerance at which the integrator runs, by the settings in state. */
 NONNULL double instance_tolerance(const struct instance *instance,
                                   const struct instance_state *state);
 
 /* Writes this tolerance where users read it, and the absolute tolerances. */
 NONNULL void instance_update_tolerance(struct instance *instance);
-
-/* Sends a message if the experiment's tolerance is too coarse to be used. */
-NONNULL void instance_report_tolerance(const struct instance *instance);
 
 /* True if the values ask for another method, tolerance or limit than the integrator has. */
 NONNULL bool instance_is_configured_otherwise(const struct instance *instance);

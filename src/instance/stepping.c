@@ -300,6 +300,20 @@ static enum status move(struct step *step, enum continuation continuation) {
 
 /* ---- Events --------------------------------------------------------------------------------- */
 
+/* Ends a step that would have lasted until `end` at the present time, at which these indicators
+ * fall to 0. The event stays unhandled. */
+static void leave_event(struct instance *instance, const bool triggered[], struct clock_time end) {
+    memcpy(instance->memory.unhandled, triggered, instance_event_size(instance->model));
+    instance->state.event_point = EVENT_UNHANDLED;
+    instance->state.cut_end = end;
+}
+
+/* Notes that the event at the present time, before `end`, has been handled. */
+static void note_handled_event(struct instance *instance, struct clock_time end) {
+    instance->state.event_point = EVENT_HANDLED;
+    instance->state.cut_end = end;
+}
+
 /* Moves the instance to the time of an event and handles it, unless the step ends there. */
 static enum status meet_event(struct step *step, struct clock_time time) {
     struct instance *instance = step->instance;
@@ -313,7 +327,7 @@ static enum status meet_event(struct step *step, struct clock_time time) {
         step->is_early = clock_difference(end, state->time) > 0.0;
         step->end = state->time;
         if (step->options->at_event == EVENTS_LEFT) {
-            instance_leave_event(instance, triggered, end);
+            leave_event(instance, triggered, end);
             return STATUS_OK;
         }
     }
@@ -322,7 +336,7 @@ static enum status meet_event(struct step *step, struct clock_time time) {
         status = instance_update_modes(instance, triggered);
     }
     if (status == STATUS_OK && !(clock_difference(step->end, state->time) > 0.0)) {
-        instance_note_handled_event(instance, end);
+        note_handled_event(instance, end);
     }
     return status;
 }
@@ -510,6 +524,15 @@ static enum status do_step(struct step *step, double communication_point, double
     return step->answer;
 }
 
+/* Returns the end of a step after an event: the end of the step that the event cut short, if the
+ * importer means the same time. Its own differences of times have rounding errors. */
+static struct clock_time resumed_end(const struct instance *instance, struct clock_time end) {
+    const struct instance_state *state = &instance->state;
+    const double difference = clock_difference(end, state->cut_end);
+    const double rounding = clock_rounding(instance_size_of_times(instance, end.s));
+    return fabs(difference) <= rounding ? state->cut_end : end;
+}
+
 enum status instance_do_step_with(struct instance *instance, double communication_point,
                                   double step_size, const struct step_options *options) {
     const double mismatch =
@@ -532,7 +555,7 @@ enum status instance_do_step_with(struct instance *instance, double communicatio
         .steps_before = instance->state.statistics.steps,
     };
     if (instance->state.event_point != NO_EVENT) {
-        step.end = instance_resumed_end(instance, step.end);
+        step.end = resumed_end(instance, step.end);
     }
     instance->step_met_event = false;
     status = do_step(&step, communication_point, step_size);
