@@ -341,7 +341,6 @@ class Federate:
         """Read the values that sources published before the last exchange.
 
         UserError if none arrived.
-
         """
         values = {}
         for source, place in self._subscriptions.items():

@@ -290,7 +290,6 @@ def communication_points(start: float, stop: float, step: float) -> np.ndarray:
     """Return communication points in s.
 
     UserError if the stop time is no whole number of steps on.
-
     """
     for name, value in (("start_time", start), ("stop_time", stop), ("step", step)):
         if not is_finite_number(value):
