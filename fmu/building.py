@@ -86,7 +86,7 @@ def build(
 
 
 def _libraries(name: str, runtime: Runtime, work: Path) -> dict[str, tuple[str, Path]]:
-    """The shared object for one platform, by the version of FMI, with its name in the archive."""
+    """Link the shared object for one platform; return name and file by the version of FMI."""
     folder = work / runtime.content["platform"]
     folder.mkdir()
     objects = runtime.compile([work / source for source in C_FILES], folder)
@@ -100,7 +100,7 @@ def _libraries(name: str, runtime: Runtime, work: Path) -> dict[str, tuple[str, 
 
 
 def _write_sources(version: str, runtime: Runtime, work: Path, output: Path) -> None:
-    """The folder sources/ of an FMU: all that its shared object consists of."""
+    """Write the folder sources/ of an FMU: all that its shared object consists of."""
     own = Library("model", [work / name for name in C_FILES], [work], None)
     write(collect(runtime.sources(version, own, work)).texts, output)
 
@@ -129,7 +129,7 @@ class Runtime:
 
     @classmethod
     def load(cls, path: Path, of_this_machine: bool) -> Runtime:
-        """ModelFileError if it is not there, or no compiler for it.
+        """Load runtime.json; ModelFileError if it is not there, or no compiler for it.
 
         For this machine, a compiler of its own comes before zig.
         """
@@ -140,11 +140,11 @@ class Runtime:
         return cls(content, path.resolve().parent, _found(content["compiler"], of_this_machine))
 
     def paths(self, listed: list[str]) -> list[Path]:
-        """Files or folders of a list in runtime.json."""
+        """Return the files or folders of a list in runtime.json."""
         return [self.folder / item for item in listed if item]
 
     def compile(self, sources: list[Path], work: Path) -> list[Path]:
-        """The objects of source files, in the folder `work`."""
+        """Compile source files in the folder `work`; return their objects."""
         # what warnings are about, the user has not written
         options = [o for o in self.content["options"] if o and not o.startswith("-W")]
         folders = [f"-I{path}" for path in self.paths(self.content["include"])]
@@ -156,7 +156,7 @@ class Runtime:
         return objects
 
     def link(self, version: str, objects: list[Path], target: Path) -> None:
-        """The shared object of a version of FMI, in the folder of the objects."""
+        """Link the shared object of a version of FMI, in the folder of the objects."""
         options = [option.replace("@NAME@", target.stem) for option in self.content["link"]]
         parts = [*self.content["versions"][version]["objects"], *self.content["libraries"]]
         own = [path.name for path in objects]
@@ -189,7 +189,7 @@ class Runtime:
             )
 
     def sources(self, version: str, own: Library, root: Path) -> Manifest:
-        """All that the shared object of a version consists of, with the model's own part."""
+        """Return all sources of a version's shared object, with the model's own part."""
         content = self.content
         entries = [content["versions"][version]["sources"], *content["sources"]]
         shared = manifest(entries, content["roots"], self.folder)
@@ -199,7 +199,7 @@ class Runtime:
 
 
 def _found(words: list[str], of_this_machine: bool) -> list[str]:
-    """A compiler as runtime.json names it, or one of this machine, else zig."""
+    """Return a compiler as runtime.json names it, or one of this machine, else zig."""
     if Path(words[0]).is_absolute() and shutil.which(words[0]):
         return words
     if of_this_machine:

@@ -58,7 +58,8 @@ class FormulaError(Exception):
 
 
 def mathml(latex: str, display: str) -> str:
-    """A formula without its dollar signs as a math element; `display` is "inline" or "block".
+    """Convert a formula without dollar signs to a math element, "inline" or "block" (`display`).
+
 
     FormulaError if it does not convert: the converter passes on unknown commands and does not
     notice a missing argument, so its result is searched for signs of either.
@@ -98,7 +99,7 @@ def improve(element: ET.Element) -> None:
 
 
 def is_remote(address: str) -> bool:
-    """Whether a link leads out of the folder of the page."""
+    """Return whether a link leads out of the folder of the page."""
     parts = urlsplit(address)
     return bool(parts.scheme or parts.netloc)
 
@@ -119,7 +120,7 @@ def without_local_links(tokens: Iterable[Token]) -> list[Token]:
 
 
 def scroller(kind: str, name: str) -> str:
-    """Opening tag of a box that scrolls, also by keys, what is wider than the page."""
+    """Write the opening tag of a box that scrolls, also by keys, if it is wider than the page."""
     return f'<div class="{kind}" tabindex="0" role="group" aria-label="{html.escape(name)}">'
 
 
@@ -143,7 +144,7 @@ def prepare_tables(tokens: Iterable[Token]) -> None:
 
 
 def readme_page(readme: Path) -> tuple[str, list[Path], list[tuple[str, str]]]:
-    """README.md as the inside of an HTML body.
+    """Write README.md as the inside of an HTML body.
 
     Also its local images, which the HTML refers to by their names, and identifier and text (HTML)
     of each heading of level 2.
@@ -216,7 +217,7 @@ def variable_row(variable: ET.Element) -> dict[str, str]:
 
 
 def variable_groups(root: ET.Element) -> Iterator[tuple[str, list[dict[str, str]]]]:
-    """Heading and rows of a table per causality."""
+    """Yield heading and rows of a table per causality."""
     rows = [variable_row(v) for v in root.iterfind("ModelVariables/ScalarVariable")]
     for causality, heading in GROUPS.items():
         group = [row for row in rows if row["causality"] == causality]

@@ -174,7 +174,7 @@ class ModelFile:
         return found + [expression for event in self.events for expression in event.expressions]
 
     def of(self, *sections: str) -> list[Variable]:
-        """Variables of these sections, in the order of the file."""
+        """Return variables of these sections, in the order of the file."""
         return [v for section in sections for v in self.variables.values() if v.section == section]
 
 
@@ -188,13 +188,13 @@ def placed(*place: object) -> Iterator[None]:
 
 
 def _instead(text: str) -> str:
-    """What to do instead of what is not supported, or nothing."""
+    """Propose a replacement of what is not supported, or nothing."""
     found = [sentence for pattern, sentence in INSTEAD.items() if re.search(pattern, text)]
     return f"; {found[0]}" if found else ""
 
 
 def tables_of(path: Path) -> tuple[str, dict[str, Any]]:
-    """Text and tables of a file."""
+    """Read text and tables of a file."""
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -214,7 +214,7 @@ def tables_of(path: Path) -> tuple[str, dict[str, Any]]:
 
 
 def _expect(what: str, kind: type, fits: Callable[[Any], object] = bool) -> Callable[[Any], Any]:
-    """What refuses all values but those that are of a kind and fit."""
+    """Return a function that refuses values unless they are of a kind and fit."""
 
     def read(value: Any) -> Any:
         if type(value) is not kind or not fits(value):
@@ -249,7 +249,7 @@ READ = {
 def _entries(
     table: object, known: Collection[str], needed: str = "", what: str = "key"
 ) -> dict[str, Any]:
-    """A table with these keys, and its values as they are used."""
+    """Check a table with these keys, and return its values as they are used."""
     if not isinstance(table, dict):
         example = needed or next(iter(known))
         raise ModelFileError(f"expected a table such as {{ {example} = ... }}, got {shown(table)}")
@@ -275,7 +275,7 @@ def _value(key: str, value: object, what: str) -> Any:
 def read_tables(
     path: Path, text: str, tables: dict[str, Any], solver_names: Iterable[str]
 ) -> ModelFile:
-    """What the tables say, without the meaning of the expressions."""
+    """Read the tables, without the meaning of the expressions."""
     head = _entries(tables, HEAD, "name", "section")
     if DEVICE.fullmatch(head["name"]):
         raise ModelFileError("name: Windows keeps this name for a device, choose another one")
@@ -404,7 +404,7 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
 
 
 def _line(text: str, message: str) -> str:
-    """In which line the message's section and name are, as far as that is sure."""
+    """Find the line of a message's section and name, as far as that is sure."""
     place = re.match(r"(\[.*?\])(?:: ['\"]?(\w+))?|(\w+): ", message)
     lines = text.split("\n")
     begin, key = 0, place and (place[2] or place[3])
@@ -446,7 +446,7 @@ def _check_names(file: ModelFile) -> None:
 
 
 def _in_order(file: ModelFile) -> list[Expression]:
-    """All expressions: those of [where] and [outputs] first, each after those that it names."""
+    """Order all expressions: [where] and [outputs] first, each after those that it names."""
     entries = {variable.name: variable for variable in file.of("where", "outputs")}
     for variable in entries.values():
         used = names(variable.expression.tree) & entries.keys()

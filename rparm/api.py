@@ -119,7 +119,7 @@ def simulate(
     Parameters
     ----------
     fmu : path
-        Any FMU; see `fmu` for those of the project.
+        Any FMU; see `fmu` for the project's.
     stop_time, step, start_time : float
         s. `step` is the communication step; a whole number of them leads to the stop time.
     start_values : mapping, optional
@@ -180,14 +180,14 @@ class Scenario:
         self.title = scenarios.title(self.path)
 
     def run(self, *, fmi: int = 2, tolerance: float | None = None) -> Table:
-        """Run it on the FMU of its model, or that its file names; rows are those of its reference.
+        """Run it on the FMU of its model, or that its file names; rows are its reference's.
 
         Parameters
         ----------
         fmi : int
             Version of FMI: 2 or 3; an FMU that the file names has its own.
         tolerance : float, optional
-            Relative; default: that of the scenario.
+            Relative; default: the scenario's.
         """
         with self._opened(fmi) as (opened, loaded):
             loaded = replace(loaded, panels=())  # Integers, which only pages draw, cost time
@@ -215,9 +215,9 @@ class Scenario:
         Parameters
         ----------
         method : str, optional
-            Of integration; default: that of the scenario.
+            Of integration; default: the scenario's.
         tolerance : float, optional
-            Relative; default: that of the scenario.
+            Relative; default: the scenario's.
 
         Returns
         -------
@@ -273,7 +273,7 @@ class System:
         variant : str, optional
             Default: the first one.
         engine : str
-            "master", that of rparm; "ecos", where ecospy is installed; "helics", each FMU in its
+            "master", rparm's own; "ecos", where ecospy is installed; "helics", each FMU in its
             own process, where helics is installed.
 
         Returns
@@ -403,7 +403,7 @@ def identify(
     Parameters
     ----------
     fmu : path
-        Any FMU for co-simulation whose states can be set; see `fmu` for those of the project.
+        Any FMU for co-simulation whose states can be set; see `fmu` for the project's.
     logs : path or sequence of path
         CSV files with a row of names; "time" in s.
     parameters : sequence of str
@@ -458,9 +458,9 @@ def run_campaign(
     file : path or str
         The campaign, as the command takes it.
     output : path, optional
-        Folder for the results; default: that in the file, or that of the command.
+        Folder for the results; default: the file's, or the command's.
     fmu : path, optional
-        The FMU or SSP; default: that of the project.
+        The FMU or SSP; default: the project's.
     workers : int, optional
         Number of processes; default: one a core.
 

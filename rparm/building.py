@@ -13,7 +13,7 @@ from rparm.errors import UserError, one_line
 from rparm.files import whole, written
 from rparm.interruption import run_group, temporary_folder, uninterrupted
 
-# what the program imports, beside this package
+# packages that the program imports
 NEEDED = ("latex2mathml", "markdown_it", "mdit_py_plugins", "pydantic")
 
 
@@ -53,7 +53,7 @@ def _made(file: Path, runtimes: list[Path], of_this_machine: bool, work: Path) -
     tool = project.model_builder()
     command = [sys.executable, tool, "--output", work, "--runtime", *runtimes]
     command += ["--of-this-machine"] if of_this_machine else []
-    # zig compiles its C library once; what a program that is killed leaves is in `work`
+    # zig keeps its C library in a cache; temporary files go to `work`, also of a killed program
     environment = {"ZIG_GLOBAL_CACHE_DIR": str(project.cache_folder("zig"))}
     environment |= dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(work))
     environment["PYTHONIOENCODING"] = "utf-8:surrogateescape"  # names of files may be no UTF-8

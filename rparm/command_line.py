@@ -22,7 +22,7 @@ it, and "error" with the message if there is one. A command that is interrupted 
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command has ended."""
+    """End of a command."""
 
     code: int  # to exit with
     verdict: str  # the last line
@@ -53,7 +53,7 @@ def function(command: str, form: str) -> Any:
 def parsed(arguments: Sequence[str]) -> argparse.Namespace:
     """Parse the options of the command that `arguments` ask for; `command` is its name.
 
-    Names and options without a command are those of `run`. Only the module of the command is
+    Names and options without a command are for `run`. Only the module of the command is
     imported, because some take long.
 
     UserError if something in them is wrong. Raises Answered if no command is to run.

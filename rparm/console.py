@@ -136,7 +136,7 @@ def verdict_line(failed: Iterable[str], done: Sized, name: str) -> str:
 class Table:
     """Rows under a head, each printed when it is known.
 
-    `names` are those of all rows to come: they set the width of the first column, which is cut if
+    `names` are of all rows to come: they set the width of the first column, which is cut if
     it has no room. `columns` are titles with the widths of their columns, `gap` blanks apart. The
     last column is aligned to the left and `result` characters wide; 0: there is none.
     """

@@ -22,11 +22,11 @@ class StoppedError(UserError):
 
 
 class UnplacedError(Exception):
-    """What is wrong, in one line that does not say where: `placed` does."""
+    """A mistake, in one line without its place, which `placed` adds."""
 
 
 class WrongValueError(UnplacedError):
-    """Why a variable does not take a value, or is not of a kind."""
+    """A value that a variable does not take, or a variable of another kind."""
 
 
 @contextmanager

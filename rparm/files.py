@@ -39,7 +39,7 @@ Failure = Callable[[str, int | None], Exception]  # made from the mistake and it
 
 
 class UnreadableError(UnplacedError):
-    """Why a file cannot be read, in a few words without its name."""
+    """Reason why a file cannot be read, in a few words without its name."""
 
 
 # ---- Files that are given ------------------------------------------------------------------------

@@ -60,7 +60,7 @@ COMMANDS = {
         "print what makes a shell complete these commands", "completion", target=""
     ),
 }  # fmt: skip
-DEFAULT = "run"  # what names and options without a command are for
+DEFAULT = "run"  # the command of names and options without one
 COMMON = ("--json", "--quiet")  # may stand in front of the command
 HELP = ("help", "--help", "-h")
 VERSION = "--version"

@@ -1,4 +1,4 @@
-"""Where everything is: no other module of rparm knows the project's folders and file names.
+"""Places of all files: no other module of rparm knows the project's folders and file names.
 
 models/MODEL/scenarios/NAME.toml        a scenario
 models/MODEL/convergence/NAME.toml      a problem for the order of convergence, of that format
@@ -40,7 +40,7 @@ from rparm.errors import UserError, did_you_mean, reason
 from rparm.files import is_file
 
 PACKAGE = Path(__file__).resolve().parent
-INSTALLED = shipped.SHARE.is_dir()  # else the package is that of a checkout
+INSTALLED = shipped.SHARE.is_dir()  # else the package is in a checkout
 ROOT = shipped.SHARE if INSTALLED else PACKAGE.parent
 PROGRAM = "rparm" if INSTALLED else "./run.sh"
 
@@ -119,7 +119,7 @@ def models() -> dict[str, Path]:
 
 
 def model(name: str) -> Path:
-    """Return the folder of a model, by its own name or that of its FMU.
+    """Return the folder of a model, by its own name or its FMU's.
 
     A UserError lists the known ones.
     """
@@ -201,7 +201,7 @@ def systems() -> dict[str, Path]:
 
 
 def is_built_from(name: str, folder: Path) -> bool:
-    """Return whether an FMU or SSP called `name` is that of the folder of a model or system."""
+    """Return whether an FMU or SSP called `name` is built from the folder of a model or system."""
     return name.lower() == folder.name.replace("_", "").lower()
 
 

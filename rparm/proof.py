@@ -354,7 +354,7 @@ class WrongValue:
 
 @dataclass(frozen=True)
 class ProvenReference:
-    """How good the reference of a scenario is."""
+    """Proven error of a scenario's reference."""
 
     values: int  # of all columns
     nearest: int  # those that are proven to be the doubles nearest to the exact ones

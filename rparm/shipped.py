@@ -1,7 +1,7 @@
 """The built files of an installed package, assembled or unpacked on first use.
 
 It has the bytes of FMUs and systems in pieces, each once: FMUs share most of their sources, and
-systems contain FMUs. The files keep every byte of those of the release.
+systems contain FMUs. The files keep every byte of the release.
 
 share/pieces     all pieces
 share/files.json  by the name of a file, VERSION OF FMI/NAME: its SHA-256, and its pieces as

@@ -21,7 +21,7 @@ from rparm.files import show
 
 PREFIXES = {"m": Fraction(1000), "c": Fraction(100), "k": Fraction(1, 1000)}
 PREFIXED = {"m": "mck", "s": "mck", "N": "mck", "rad": "m"}
-NONE = (None, "", "1")  # what variables without a unit have
+NONE = (None, "", "1")  # units of variables without one
 ANGLE = "rad"
 DEGREE = Fraction(180 / math.pi)  # degrees of a radian
 SAME = Fraction(1, 10**12)  # FMUs write as many digits of it as they like
@@ -47,7 +47,7 @@ class Unit:
         """Return the value of a `number`, a finite literal; a difference of two has no offset."""
         if not self.offset and abs(self.factor - DEGREE) <= SAME * DEGREE:
             return math.radians(float(number))
-        # an exponent of any size is that of 0 here: others have been refused
+        # here only 0 can have an exponent of any size: others have been refused
         exact = Fraction(number) if float(number) else Fraction(0)
         exact = (exact if is_difference else exact - self.offset) / self.factor
         return float(exact) if exact else math.copysign(0.0, float(number))

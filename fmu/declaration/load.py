@@ -39,7 +39,7 @@ class DeclarationError(WrongInputError):
 def files_of(
     path: Path, file: File, including: tuple[Path, ...] = ()
 ) -> Iterator[tuple[Path, File]]:
-    """What a file, included by others, includes and changes, and the file itself at the end."""
+    """Yield the files that a file includes, with their changes, and the file itself at the end."""
     if path.resolve() in including:
         raise DeclarationError(f"{path}: includes itself")
     left = dict(file.changes)
@@ -58,7 +58,7 @@ def files_of(
 
 
 def changed(variable: Variable, include: Include, change: Change, place: str) -> Variable:
-    """A variable of an included file as the including one has it."""
+    """Return a variable of an included file as the including one has it."""
     keys = variable.model_dump(by_alias=True, exclude_unset=True)
     for old, new in include.fields.items():
         if variable.owner == "model" and variable.field.startswith(old):
@@ -98,7 +98,7 @@ def check(path: Path, document: dict[str, Any]) -> File:
 
 
 def first_mistake(error: ValidationError) -> str:
-    """Place and reason of one mistake; a misspelt key comes before what is then missing."""
+    """Explain one mistake; a misspelt key comes before the one that is then missing."""
     mistakes = error.errors(include_url=False)
     mistake = min(mistakes, key=lambda m: m["type"] != "extra_forbidden")
     words, table, key = place_of(list(mistake["loc"]))
@@ -106,7 +106,7 @@ def first_mistake(error: ValidationError) -> str:
 
 
 def place_of(location: list[str | int]) -> tuple[list[str], type[Table], str]:
-    """Words for a table of the file, its class, and the path of the value within it."""
+    """Return words for a table of the file, its class, and the path of the value within it."""
     match location:
         case ["model", *keys]:
             words, table = ["[model]"], Model
@@ -161,7 +161,7 @@ def keys_of(table: type[Table]) -> list[str]:
 
 
 def shown(value: object) -> str:
-    """Short form of a value; an integer may have more digits than Python writes."""
+    """Write a value in short; an integer may have more digits than Python writes."""
     try:
         text = repr(value)
     except ValueError:
@@ -186,7 +186,7 @@ class Declaration:
         return self.token()
 
     def token(self, *versions: str) -> str:
-        """Hash of the interface in the form of a GUID, other than `guid` if versions are named."""
+        """Hash the interface in the form of a GUID, other than `guid` if versions are named."""
         interface = {
             "model": self.model.name,
             "units": {name: unit.model_dump() for name, unit in self.units.items()},
@@ -208,7 +208,7 @@ def load(path: Path) -> Declaration:
 
 
 def assemble(path: Path, file: File) -> Declaration:
-    """All that a file, which is or could be at this path, declares with what it includes."""
+    """Read all that a file, which is or could be at this path, declares with its includes."""
     units = dict(read(UNITS).units)
     variables: dict[str, Variable] = {}
     places: dict[str, str] = {}

@@ -51,14 +51,14 @@ class Need:
 
 
 def cost(value: Value) -> int:
-    """About how long an operation takes, in additions."""
+    """Estimate how long an operation takes, in additions."""
     if not value.arguments or value.op in CONDITIONS:
         return 0
     return COSTS.get(value.op, OF_FUNCTION)
 
 
 def plain(value: Value) -> Value:
-    """The value without what differs in derivatives only."""
+    """Return the value without operations that differ in derivatives only."""
     while value.op in ("value_of", "moving_as"):
         value = value.arguments[0]
     return value
@@ -67,7 +67,7 @@ def plain(value: Value) -> Value:
 def stripped(targets: Mapping[str, Value], conditions: Conditions) -> tuple[
     dict[str, Value], dict[Value, Value]
 ]:  # fmt: skip
-    """Values without operations that differ in derivatives only, and what became of each."""
+    """Remove operations that differ in derivatives only; map each value to its successor."""
     found: dict[Value, Value] = {}
     for value in in_order(targets.values()):
         if value.op in ("value_of", "moving_as"):
@@ -78,7 +78,7 @@ def stripped(targets: Mapping[str, Value], conditions: Conditions) -> tuple[
 
 
 def _with(value: Value, arguments: list[Value], conditions: Conditions) -> Value:
-    """The operation with other arguments."""
+    """Return the operation with other arguments."""
     if all(a is b for a, b in zip(value.arguments, arguments, strict=True)):
         return value
     graph = conditions.graph
@@ -89,7 +89,7 @@ def _with(value: Value, arguments: list[Value], conditions: Conditions) -> Value
 
 
 def paths(targets: Mapping[str, Value]) -> dict[Value, Path]:
-    """The innermost branch that contains all uses of a value."""
+    """Find the innermost branch that contains all uses of a value."""
     found: dict[Value, Path] = {value: () for value in targets.values()}
 
     def use(value: Value, path: Path) -> None:
@@ -103,7 +103,7 @@ def paths(targets: Mapping[str, Value]) -> dict[Value, Path]:
 
 
 def _uses(value: Value) -> list[tuple[Value, tuple[Value, bool] | None]]:
-    """Arguments, with the condition under which they are used."""
+    """Yield arguments, with the condition under which they are used."""
     if value.op != "if":
         return [(argument, None) for argument in value.arguments]
     condition, first, second = value.arguments
@@ -111,7 +111,7 @@ def _uses(value: Value) -> list[tuple[Value, tuple[Value, bool] | None]]:
 
 
 def common(first: Path, second: Path) -> Path:
-    """What two paths begin with."""
+    """Return the common begin of two paths."""
     length = 0
     for a, b in zip(first, second, strict=False):
         if a[0] is not b[0] or a[1] is not b[1]:
@@ -121,7 +121,7 @@ def common(first: Path, second: Path) -> Path:
 
 
 def known_on(path: Path, conditions: Conditions) -> Known:
-    """What is known in a branch."""
+    """Return the knowledge in a branch."""
     known = Known()
     for condition, holds in path:
         known = conditions.assume(condition, holds, known) or known
@@ -131,7 +131,7 @@ def known_on(path: Path, conditions: Conditions) -> Known:
 def costs_inside(
     values: Iterable[Value], places: Mapping[Value, Path]
 ) -> Counter[tuple[Path, Value]]:
-    """Cost of both branches of each condition, by where it stands."""
+    """Return the cost of both branches of each condition, by its place."""
     found: Counter[tuple[Path, Value]] = Counter()
     for value in values:
         path = places[value]
@@ -143,7 +143,7 @@ def costs_inside(
 def guarded(
     targets: Mapping[str, Value], conditions: Conditions
 ) -> tuple[dict[str, Value], dict[Value, Value]]:
-    """Values that are needed in some cases only behind choices, and what became of each value."""
+    """Put values that only some cases need behind choices; map each to its successor."""
     became = {value: value for value in in_order(targets.values())}
     for _ in range(MOST_LEVELS):
         guards = Guards(targets, conditions)
@@ -158,7 +158,7 @@ def guarded(
 def settled(
     targets: Mapping[str, Value], conditions: Conditions
 ) -> tuple[dict[str, Value], dict[Value, Value]]:
-    """Values without choices that the blocks around them have made, and what became of each."""
+    """Remove choices that the blocks around them have made; map each value to its successor."""
     places = paths(targets)
     found: dict[Value, Value] = {}
     for value in in_order(targets.values()):
@@ -189,7 +189,7 @@ class Guards:
         self.found = self._guards()
 
     def rewritten(self) -> tuple[dict[str, Value], dict[Value, Value]]:
-        """The targets' values with guards, and what became of each value."""
+        """Return the targets' values with guards; map each value to its successor."""
         zero = self.conditions.graph.number(0.0)
         guards = self.found
         found: dict[Value, Value] = {}
@@ -210,7 +210,7 @@ class Guards:
         literal: tuple[Value, bool] | None,
         guards: Mapping[Value, Value],
     ) -> bool:
-        """Whether a use of a value is behind the same guard."""
+        """Return whether a use of a value is behind the same guard."""
         guard, path = guards[value], self.paths[value]
         if guards.get(user) is guard and self.paths[user] == path:
             return literal is None
@@ -221,7 +221,7 @@ class Guards:
         return guard is (condition if holds else self.conditions.no(condition))
 
     def _guards(self) -> dict[Value, Value]:
-        """Conditions that are stronger than where the uses are, and worth a branch."""
+        """Return conditions that are stronger than the uses' and worth a branch."""
         found: dict[Value, Value] = {}
         costs: Counter[tuple[Path, Value]] = Counter()
         inside = costs_inside(self.order, self.paths)
@@ -240,7 +240,7 @@ class Guards:
         return {value: found[value] for value in worth if len(self.paths[value]) == depth}
 
     def _condition(self, need: Need, known: Known) -> Value:
-        """A need as a condition, where some is known already."""
+        """Turn a need into a condition, where some is known already."""
         result = self.conditions.true
         for leaf, values in need.sets:
             member = self.conditions.member(leaf, values, known)
@@ -251,7 +251,7 @@ class Guards:
         return result
 
     def _and(self, need: Need, condition: Value, holds: bool) -> Need:
-        """A need that also has this condition."""
+        """Add a condition to a need."""
         if condition.op == "not":
             return self._and(need, condition.arguments[0], not holds)
         if condition in self.conditions.members:
@@ -268,7 +268,7 @@ class Guards:
         return need if new in need.literals else Need(need.sets, (*need.literals, new))
 
     def _either(self, first: Need, second: Need) -> Need:
-        """What two needs have in common."""
+        """Return the common part of two needs."""
         other = dict(second.sets)
         sets = []
         for leaf, values in first.sets:
@@ -339,28 +339,28 @@ class Blocks:
         self.bits, self.in_progress = bits, 0
 
     def lines(self) -> list[str]:
-        """The statements."""
+        """Return the statements."""
         scope = Scope((), set(self.order))
         for target, value in self.targets.items():
             scope.lines.append(f"{target} = {self._result(value, scope)};")
         return scope.lines
 
     def _result(self, value: Value, scope: Scope) -> str:
-        """Text of a value that is stored: it needs no name if nothing else uses it."""
+        """Write a value that is stored: it needs no name if nothing else uses it."""
         is_only_here = self.uses[value] == 1 and value.arguments and value not in self.blocks
         if is_only_here and scope.find(value) is None and len(self.paths[value]) >= len(scope.path):
             return self._expression(value, scope)[0]
         return self.text(value, scope)[0]
 
     def _is_constant(self, value: Value) -> bool:
-        """Whether it may get a name: an operation, or what is read more than once."""
+        """Return whether it may get a name, as an operation, or as it is read twice."""
         is_read = value.op in LEAVES and value.op != "integer" and self.uses[value] > 1
         return is_read or bool(value.arguments)
 
     # ---- Where values are calculated -------------------------------------------------------------
 
     def _block_values(self) -> dict[Value, None]:
-        """Choices with calculations in a branch; the others are `?:`."""
+        """Return choices with calculations in a branch; the others are `?:`."""
         inside = costs_inside(self.order, self.paths)
         return {
             value: None for value in self.order
@@ -370,7 +370,7 @@ class Blocks:
     # ---- Statements ------------------------------------------------------------------------------
 
     def text(self, value: Value, scope: Scope) -> Text:
-        """Expression of a value in a block, after statements that it needs."""
+        """Write the expression of a value in a block, after statements that it needs."""
         found = scope.find(value)
         if found is not None:
             return found
@@ -441,7 +441,7 @@ class Blocks:
         return f"{value.op}({', '.join(text for text, _ in given)})", PRIMARY
 
     def _of_integer(self, value: Value) -> Text:
-        """A comparison of an integer leaf with a whole number."""
+        """Write a comparison of an integer leaf with a whole number."""
         leaf, other = value.arguments
         named = self.enumerators.get(leaf.name, {})
         constant = int(other.number)
@@ -456,7 +456,7 @@ class Blocks:
         return text[0] if text[1] >= least else f"({text[0]})"
 
     def _block(self, value: Value, scope: Scope) -> None:
-        """The `if` that calculates a choice and all others that go with it."""
+        """Write the `if` that calculates a choice and all others that go with it."""
         condition, path = value.arguments[0], self.paths[value]
         group = [value]
         busy, below = self.in_progress | self.bits[value], self.depends[value]
@@ -503,7 +503,7 @@ class Blocks:
         scope.lines += self._if(head[0], names, *bodies[: 1 if has_values else 2])
 
     def _if(self, head: str, names: list[str], *bodies: tuple[list[str], list[str]]) -> list[str]:
-        """Lines of a block: statements and results of one branch or of both."""
+        """Write a block: statements and results of one branch or of both."""
         found = [f"if ({head}) {{"]
         for i, (lines, given) in enumerate(bodies):
             results = [f"{name} = {value};" for name, value in zip(names, given, strict=True)]
@@ -511,7 +511,7 @@ class Blocks:
         return [*found, "}"]
 
     def _inside(self, roots: list[Value], depth: int) -> set[Value]:
-        """What the roots follow from in a block."""
+        """Return the values in a block that the roots follow from."""
         found: set[Value] = set()
         todo = list(roots)
         while todo:
@@ -522,7 +522,7 @@ class Blocks:
         return found
 
     def _shared(self, later: list[Value], scope: Scope, branch: int) -> set[Value]:
-        """Of what a block calculates, what other choices of the same condition start from."""
+        """Return the values of a block that other choices of the same condition start from."""
         if not later:
             return set()
         depth = len(scope.path)
@@ -532,7 +532,7 @@ class Blocks:
         return {v for v in read & scope.wanted if self.paths[v] == scope.path and v.arguments}
 
     def _needed(self, group: list[Value], path: Path) -> list[Value]:
-        """What branches need that is calculated before them, in this block."""
+        """Return values that branches need and that are calculated before them, in this block."""
         members, seen, found = set(group), set(group), []
         todo = [a for value in group[::-1] for a in value.arguments[::-1]]
         while todo:
@@ -550,7 +550,7 @@ class Blocks:
         return found
 
     def _new_name(self, value: Value) -> str:
-        """A name that is free."""
+        """Return a name that is free."""
         base = self.names.get(value, "")
         if value.op == "if" and not base:
             base = self.names.get(value.arguments[1]) or self.names.get(value.arguments[2], "")
@@ -564,7 +564,7 @@ class Blocks:
 
 
 def wrapped(line: str) -> list[str]:
-    """A statement in lines that are not too long."""
+    """Break a statement into lines that are not too long."""
     lines: list[str] = []
     own = len(line) - len(line.lstrip()) + 4
     while len(line) > WIDTH:

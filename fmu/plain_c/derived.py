@@ -38,7 +38,7 @@ class Curve:
         self.seconds: dict[Value, Value] = {}
 
     def first(self, roots: Iterable[Value]) -> list[Value]:
-        """First derivatives."""
+        """Return the first derivatives."""
         roots = list(roots)
         for y in in_order(roots, self.firsts):
             if not y.arguments:
@@ -52,11 +52,11 @@ class Curve:
         return [self.firsts[root] for root in roots]
 
     def rests(self, y: Value) -> bool:
-        """Whether the derivatives of a value are 0."""
+        """Return whether the derivatives of a value are 0."""
         return is_number(self.firsts[y], 0.0) and is_number(self.seconds.get(y, self.zero), 0.0)
 
     def second(self, roots: Iterable[Value]) -> list[Value]:
-        """Second derivatives."""
+        """Return the second derivatives."""
         roots = list(roots)
         self.first(roots)
         for y in in_order(roots, self.seconds):
@@ -130,7 +130,7 @@ class Wanted:
 
     @staticmethod
     def read(text: str) -> Wanted:
-        """What a text of the form `FORM` says."""
+        """Parse a text of the form `FORM`."""
         match text.split():
             case [name, "=", kind, "of", function, *rest] if kind in KINDS and "by" in rest:
                 at = rest.index("by")
@@ -147,7 +147,7 @@ class Derived:
     warnings: list[str] = field(default_factory=list)
 
     def text(self, wanted: Iterable[Wanted], header: str) -> str:
-        """Text of the C file; header: what it includes, with the prototypes."""
+        """Write the C file; header: its include, with the prototypes."""
         parts = [Function(self, each).text() for each in wanted]
         own = [path.name for path in self.program.files]
         lines = [
@@ -194,7 +194,7 @@ class Function:
     def _modes(
         self, modes: Mapping[str, tuple[str, ...]]
     ) -> tuple[dict[str, tuple[int, ...]], dict[str, dict[int, str]]]:
-        """Possible values of integer parts, and the names of these."""
+        """Return possible values of integer parts, and their names."""
         values: dict[str, tuple[int, ...]] = {}
         names: dict[str, dict[int, str]] = {}
         for place, words in modes.items():
@@ -233,7 +233,7 @@ class Function:
         return self._along_curve(outputs)
 
     def _outputs(self) -> dict[Place, Value]:
-        """What the function writes, in the order of its declaration."""
+        """Return what the function writes, in the order of its declaration."""
         written = {
             place: value
             for place, value in self.written.items()
@@ -248,7 +248,7 @@ class Function:
         return {place: written[place] for place in places}
 
     def _rank(self, place: Place) -> tuple[int, ...]:
-        """Position of a part among all of its argument."""
+        """Return the position of a part among all of its argument."""
         kind, found = pointed(self.kinds[place[0]]), []
         for part in place[1:]:
             if isinstance(kind, Structure):
@@ -261,7 +261,7 @@ class Function:
         return tuple(found)
 
     def _jacobian(self, outputs: dict[Place, Value]) -> str:
-        """J[i + n j]: derivative of output i by variable j."""
+        """Write J[i + n j]: derivative of output i by variable j."""
         variables = self._variables()
         one, zero, n = self.graph.number(1.0), self.graph.number(0.0), len(outputs)
         targets: dict[str, Value] = {}
@@ -281,7 +281,7 @@ class Function:
         return self._definition(self.wanted.name, parameters, self._lines(targets, names))
 
     def _variables(self) -> list[Place]:
-        """Parts of the arguments that move, in their order."""
+        """Return parts of the arguments that move, in their order."""
         return [
             place for name in self.wanted.by for place in self._parts((name,), self.kinds[name])
         ]
@@ -298,7 +298,7 @@ class Function:
         return [place] if is_real(kind) else []
 
     def _along_curve(self, outputs: dict[Place, Value]) -> str:
-        """First and, if they are wanted, second derivatives."""
+        """Write first and, if they are wanted, second derivatives."""
         orders = ("first", "second") if self.wanted.kind == "derivatives" else ("first",)
         curve = Curve(self.graph, self._rates)
         found = {"first": curve.first(outputs.values())}
@@ -353,7 +353,7 @@ class Function:
         return first, second
 
     def _derivative(self, place: Place, order: str) -> str:
-        """Where the derivative of a part is."""
+        """Return the place of a part's derivative."""
         return shown((self._of_order(str(place[0]), order), *place[1:]), self.kinds[place[0]])
 
     def _of_order(self, name: str, order: str) -> str:
@@ -363,7 +363,7 @@ class Function:
         return [parameter for parameter, _ in self.parameters]
 
     def _parameter(self, declared: c_ast.Decl, name: str, is_const: bool) -> str:
-        """Declaration of a parameter by another name."""
+        """Declare a parameter by another name."""
         kind = self.kinds[declared.name]
         if is_real(kind) or is_whole(kind):
             return f"{'double' if is_real(kind) else kind} {name}"
@@ -377,7 +377,7 @@ class Function:
         return f"{const}{c_name(kind.to)} *{name}"
 
     def _read(self, names: Collection[str]) -> list[str]:
-        """Parameters that are passed on, but those with these names."""
+        """Return the parameters that are passed on, but those with these names."""
         return [self._parameter(d, d.name, True) for d in self._declared() if d.name not in names]
 
     def _lines(self, targets: Mapping[str, Value], names: Mapping[Value, str]) -> list[str]:
@@ -388,7 +388,7 @@ class Function:
     def _definition(
         self, name: str, parameters: list[str], lines: list[str], storage: str = ""
     ) -> str:
-        """Text of a function."""
+        """Write the definition of a function."""
         head, own = f"{storage}void {name}(", []
         indent = len(head)
         for i, parameter in enumerate(parameters):
@@ -404,12 +404,12 @@ class Function:
 
 
 def pointed(kind: Any) -> Any:
-    """What an argument is of."""
+    """Return the type that an argument points to."""
     return kind.to if isinstance(kind, Pointer) else kind
 
 
 def shown(place: Place, kind: Any) -> str:
-    """A part of an argument in C."""
+    """Write a part of an argument in C."""
     text, rest = str(place[0]), list(place[1:])
     if isinstance(kind, Pointer) and not isinstance(kind.to, Array | Structure):
         return f"*{text}"
@@ -423,12 +423,12 @@ def shown(place: Place, kind: Any) -> str:
 
 
 def general(place: Place) -> str:
-    """A part of an argument, of any index."""
+    """Write a part of an argument, of any index."""
     return ".".join(str(part) for part in place if isinstance(part, str))
 
 
 def c_name(kind: Any) -> str:
-    """A type in C."""
+    """Write a type in C."""
     if isinstance(kind, Structure):
         return f"struct {kind.name}"
     return "double" if is_real(kind) else str(kind)
@@ -440,7 +440,7 @@ def parameter_name(text: str) -> str:
 
 
 def wrapped_list(head: str, words: list[str]) -> list[str]:
-    """Words behind each other in lines of a comment."""
+    """Write words behind each other in lines of a comment."""
     lines, line = [], head
     for i, word in enumerate(words):
         more = word + ("," if i + 1 < len(words) else "")

@@ -60,22 +60,22 @@ class Expressions(Memory):
     def call(
         self, function: c_ast.FuncDef, arguments: list[Any], state: State, place: c_ast.Node
     ) -> tuple[State, Any]:
-        """The state after a call, and what it returns."""
+        """Return the state after a call, and its result."""
         raise NotImplementedError
 
     def parameters(self, function: c_ast.FuncDef) -> list[tuple[c_ast.Decl, Any]]:
-        """Declarations of parameters, with their types."""
+        """Return declarations of parameters, with their types."""
         raise NotImplementedError
 
     def size(self, node: c_ast.Node) -> int:
-        """A whole number that is known: length of an array, value of an enumerator."""
+        """Evaluate a whole number that is known: length of an array, value of an enumerator."""
         kind, value = self.value(node, self.globals, State())
         if not is_whole(kind) or not isinstance(value, int):
             raise refused(node, "a whole number is expected that is known here")
         return value
 
     def condition(self, node: c_ast.Node, scope: Scope, state: State) -> Value:
-        """An expression as a condition."""
+        """Evaluate an expression as a condition."""
         kind, value = self.value(node, scope, state)
         if isinstance(kind, Pointer | Structure) or kind == VOID:
             raise refused(node, "this is no condition")
@@ -84,7 +84,7 @@ class Expressions(Memory):
         return self.conditions.resolve(self.conditions.truth(value, state.known), state.known)
 
     def place(self, node: c_ast.Node, scope: Scope, state: State) -> Any:
-        """Address of what can be assigned to, or choices of addresses."""
+        """Return the address of an assignable expression, or choices of addresses."""
         match node:
             case c_ast.ID():
                 found = scope.find(node.name) or self.constant(node)
@@ -120,7 +120,7 @@ class Expressions(Memory):
         return kind, value
 
     def moved(self, places: Any, index: Any, state: State, node: c_ast.Node) -> Any:
-        """A pointer by some elements further."""
+        """Move a pointer by some elements."""
 
         def moved_by(address: Address, by: int) -> Address:
             if by == 0:
@@ -135,7 +135,7 @@ class Expressions(Memory):
         return self.each(moved_each, places, state)
 
     def value(self, node: c_ast.Node, scope: Scope, state: State) -> tuple[Any, Any]:
-        """Type and value of an expression."""
+        """Return type and value of an expression."""
         kind, value = self._value(node, scope, state)
         if value is UNSET:
             raise refused(node, f"{_shown(node)} has no value here on every path")
@@ -181,7 +181,7 @@ class Expressions(Memory):
         raise refused(node, f"{node.value} is no number")
 
     def enumerator(self, name: str) -> int:
-        """Value of an enumerator: written, or one more than that before it."""
+        """Evaluate an enumerator: written, or one more than the one before it."""
         for enum in self.program.enums.values():
             at = -1
             for enumerator in enum.values.enumerators:
@@ -191,7 +191,7 @@ class Expressions(Memory):
         raise CTextError(f"{name} is not defined")
 
     def constant(self, node: c_ast.ID) -> tuple[Address, Any]:
-        """A constant at the top of a file."""
+        """Evaluate a constant at the top of a file."""
         declared = self.program.constants.get(node.name)
         if declared is None:
             raise refused(node, f"{node.name} is not declared")
@@ -246,7 +246,7 @@ class Expressions(Memory):
     def operated(
         self, op: str, left: tuple[Any, Any], right: tuple[Any, Any], state: State, node: c_ast.Node
     ) -> tuple[Any, Any]:
-        """An operation on two values."""
+        """Apply an operation to two values."""
         (kind, a), (other, b) = left, right
         if isinstance(kind, Pointer) and is_whole(other) and op in ("+", "-"):
             by = b if op == "+" else self.each(lambda x, _: -x, b, state)
@@ -272,7 +272,7 @@ class Expressions(Memory):
         return is_moving, self.operation(op, a, b)
 
     def whole(self, op: str, a: Any, b: Any, state: State, node: c_ast.Node) -> Any:
-        """An operation on two whole numbers."""
+        """Apply an operation to two whole numbers."""
         if op in RELATION:
             return self.conditions.compare(op, a, b, state.known)
 
@@ -295,7 +295,7 @@ class Expressions(Memory):
         return self.conditions.binary(calculate, a, b, state.known)
 
     def relation(self, op: str, a: Value, b: Value, node: c_ast.Node) -> Value:
-        """A comparison of real numbers."""
+        """Compare real numbers."""
         if not self.graph.has_switches:
             a, b = (v.arguments[0] if v.op == "value_of" else v for v in (a, b))
         if a.op == "number" and b.op == "number":
@@ -308,7 +308,7 @@ class Expressions(Memory):
         return equal if op == "==" else self.conditions.no(equal)
 
     def logical(self, node: c_ast.BinaryOp, scope: Scope, state: State) -> tuple[Any, Any]:
-        """&& and ||: the second is looked at where the first does not decide."""
+        """Evaluate && and ||: the second operand only where the first does not decide."""
         first = self.condition(node.left, scope, state)
         is_and = node.op == "&&"
         if first.op == "number":
@@ -358,7 +358,7 @@ class Expressions(Memory):
         return kind, value
 
     def converted(self, kind: Any, value: Any, to: Any, state: State, node: c_ast.Node) -> Any:
-        """A value as one of another type."""
+        """Convert a value to another type."""
         if is_real(to) and is_real(kind):
             return value
         if is_real(to) and is_whole(kind):
@@ -376,7 +376,7 @@ class Expressions(Memory):
         raise refused(node, "the types do not fit")
 
     def scalar(self, kind: Any, value: Any, to: Any, state: State, node: c_ast.Node) -> Any:
-        """As `converted`, for a variable, an argument or a result."""
+        """Convert a value for a variable, an argument or a result."""
         value = self.converted(kind, value, to, state, node)
         if to == DOUBLE and not self.doubles_move and self.carries(value):
             raise refused(
@@ -387,7 +387,7 @@ class Expressions(Memory):
         return value
 
     def carries(self, value: Value) -> bool:
-        """Whether a value has derivatives."""
+        """Return whether a value has derivatives."""
         for v in in_order([value], self.still):
             is_leaf = v.op in ("parameter", "input", "state", "time")
             moving = v.arguments[-1:] if v.op == "moving_as" else v.arguments
@@ -397,7 +397,7 @@ class Expressions(Memory):
     # ---- Initializers ----------------------------------------------------------------------------
 
     def initialized(self, node: c_ast.Node, kind: Any, scope: Scope, state: State) -> Any:
-        """Value of an initializer, of this type."""
+        """Evaluate an initializer of this type."""
         if not isinstance(node, c_ast.InitList):
             return self.converted(*self.value(node, scope, state), kind, state, node)
         if isinstance(kind, Structure):
@@ -420,7 +420,7 @@ class Expressions(Memory):
         return self.initialized(node.exprs[0], kind, scope, state)
 
     def _parts(self, node: c_ast.InitList, names: list[Any]) -> dict[Any, c_ast.Node]:
-        """Initializers by the fields or indices that they are for."""
+        """Map fields or indices to their initializers."""
         found, at = {}, 0
         for item in node.exprs:
             if isinstance(item, c_ast.NamedInitializer):
@@ -439,7 +439,7 @@ class Expressions(Memory):
         return found
 
     def zero(self, kind: Any, node: c_ast.Node) -> Any:
-        """What an initializer leaves out."""
+        """Return the value of parts that an initializer leaves out."""
         if isinstance(kind, Structure):
             fields = self.types.fields(kind, node)
             return {name: self.zero(of, node) for name, of in fields.items()}
@@ -480,7 +480,7 @@ class Expressions(Memory):
     def built_in(
         self, name: str, given: list[tuple[Any, Any]], state: State, node: c_ast.Node
     ) -> tuple[Any, Any]:
-        """A function of libm or of real.h."""
+        """Call a function of libm or of real.h."""
         if len(given) != ARGUMENTS[name]:
             raise refused(node, f"{name} has {ARGUMENTS[name]} arguments, not {len(given)}")
         if name == "abs":
@@ -509,7 +509,7 @@ class Expressions(Memory):
 
 
 def _shown(node: c_ast.Node) -> str:
-    """A variable as messages name it."""
+    """Write a variable as messages name it."""
     match node:
         case c_ast.ID():
             return node.name

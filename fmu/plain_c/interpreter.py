@@ -43,7 +43,7 @@ class Interpreter(Expressions):
     # ---- Functions -------------------------------------------------------------------------------
 
     def run(self, name: str, leaf_of: LeafOf) -> tuple[Any, dict[tuple[str | int, ...], Any]]:
-        """What a function returns, and what it writes to its arguments, by their paths.
+        """Run a function; return its result, and what it writes to its arguments, by their paths.
 
         leaf_of gives the parts of arguments that the function reads.
         """
@@ -85,7 +85,7 @@ class Interpreter(Expressions):
         return result, written
 
     def parameters(self, function: c_ast.FuncDef) -> list[tuple[c_ast.Decl, Any]]:
-        """Declarations of parameters, with their types."""
+        """Return declarations of parameters, with their types."""
         listed = function.decl.type.args
         found = []
         for parameter in listed.params if listed else []:
@@ -99,7 +99,7 @@ class Interpreter(Expressions):
     def call(
         self, function: c_ast.FuncDef, arguments: list[Any], state: State, place: c_ast.Node
     ) -> tuple[State, Any]:
-        """The state after a call, and what it returns."""
+        """Return the state after a call, and its result."""
         name = function.decl.name
         if name not in self.checked:
             check_function(function)
@@ -128,7 +128,7 @@ class Interpreter(Expressions):
     # ---- Statements ------------------------------------------------------------------------------
 
     def execute(self, todo: Todo | None, state: State) -> tuple[State, Any]:
-        """The state at the end, and what is returned: None where the end is reached without."""
+        """Run statements; return the state at the end, None if they all return, and the result."""
         while todo is not None:
             node, scope, after = todo.statement, todo.scope, todo.after
             match node:
@@ -170,7 +170,7 @@ class Interpreter(Expressions):
     def branch(
         self, node: c_ast.If, scope: Scope, after: Todo | None, state: State
     ) -> Todo | None | tuple[State, Any]:
-        """What is to run after an if, or the end of the function."""
+        """Return the statements after an if, or the end of the function."""
         condition = self.condition(node.cond, scope, state)
         branches = [Todo(b, Scope(scope), None) if b else None for b in (node.iftrue, node.iffalse)]
         if condition.op == "number":
@@ -198,7 +198,7 @@ class Interpreter(Expressions):
     def merged(
         self, condition: Value, first: tuple[State, Any], second: tuple[State, Any]
     ) -> tuple[State, Any]:
-        """The end of two paths."""
+        """Merge the ends of two paths."""
         choose = partial(self.chosen, condition)
         a, b = first[0].memory, second[0].memory
         memory = {
@@ -226,7 +226,7 @@ class Interpreter(Expressions):
         return State(memory, first[0].known), result
 
     def loop(self, todo: Todo, state: State) -> Todo | None:
-        """What is to run after the head of a loop."""
+        """Return the statements after the head of a loop."""
         node, scope = todo.statement, todo.scope
         if not todo.is_round:
             scope = Scope(scope)

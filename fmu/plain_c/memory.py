@@ -62,7 +62,7 @@ class Types:
         self.structures: dict[str, dict[str, Any]] = {}
 
     def of(self, node: c_ast.Node) -> Any:
-        """Type of a declaration."""
+        """Return the type of a declaration."""
         if isinstance(node, c_ast.Decl | c_ast.Typename | c_ast.Typedef | c_ast.TypeDecl):
             return self.of(node.type)
         if isinstance(node, c_ast.PtrDecl):
@@ -94,7 +94,7 @@ class Types:
         raise refused(node, f"{name} is no type of the equations' C: use double, int or a struct")
 
     def fields(self, structure: Structure, node: c_ast.Node) -> dict[str, Any]:
-        """Types of the fields of a structure."""
+        """Return the types of the fields of a structure."""
         name = structure.name
         if name not in self.structures:
             if name not in self.program.structs:
@@ -143,7 +143,7 @@ class Memory:
         self.read: set[Address] = set()  # parts of arguments that were read before they were set
 
     def size(self, node: c_ast.Node) -> int:
-        """A whole number that is known: length of an array, value of an enumerator."""
+        """Evaluate a whole number that is known: length of an array, value of an enumerator."""
         raise NotImplementedError
 
     def new_object(self, kind: Any) -> Address:
@@ -151,7 +151,7 @@ class Memory:
         return Address(len(self.objects) - 1)
 
     def declare(self, scope: Scope, name: str, kind: Any, value: Any, state: State) -> None:
-        """A new variable with a value, of its type."""
+        """Declare a new variable with a value, of its type."""
         address = self.new_object(kind)
         self.titles[address.object] = name
         scope.own[name] = (address, kind)
@@ -159,7 +159,7 @@ class Memory:
             self.set_all(address, value, state)
 
     def kind_at(self, address: Address, node: c_ast.Node | None) -> Any:
-        """Type of a part of an object."""
+        """Return the type of a part of an object."""
         kind = self.objects[address.object]
         for part in address.path:
             if isinstance(kind, Structure) and isinstance(part, str):
@@ -181,7 +181,7 @@ class Memory:
         return leaf_of((name, *address.path), kind)
 
     def get(self, address: Address, kind: Any, state: State, node: c_ast.Node) -> Any:
-        """What is at an address."""
+        """Read the value at an address."""
         if isinstance(kind, Structure):
             fields = self.types.fields(kind, node)
             return {name: self.get(address + name, of, state, node) for name, of in fields.items()}
@@ -196,7 +196,7 @@ class Memory:
         return value
 
     def set_all(self, address: Address, value: Any, state: State) -> None:
-        """Store a value with all of its parts."""
+        """Return the store a value with all of its parts."""
         if isinstance(value, dict):
             for name, part in value.items():
                 self.set_all(address + name, part, state)
@@ -209,13 +209,13 @@ class Memory:
                 self.names.setdefault(value, self._name_of(address))
 
     def _name_of(self, address: Address) -> str:
-        """The last field of a path with its indices, or the variable's name."""
+        """Return the last field of a path with its indices, or the variable's name."""
         names = [self.titles.get(address.object, "t"), *address.path]
         last = max(i for i, part in enumerate(names) if isinstance(part, str))
         return "_".join(map(str, names[last:]))
 
     def store(self, places: Any, value: Any, state: State, node: c_ast.Node) -> None:
-        """Store a value where the places, an address or choices of some, say."""
+        """Store a value at an address, or at choices of addresses."""
         for address, condition in self.alternatives(places, state.known):
             if condition is None:
                 self.set_all(address, value, state)
@@ -228,7 +228,7 @@ class Memory:
     def alternatives(
         self, places: Any, known: Known, condition: Value | None = None
     ) -> list[tuple[Address, Value | None]]:
-        """Addresses with the conditions under which they are meant; None: always."""
+        """Return addresses with the conditions under which they are meant; None: always."""
         places = self.conditions.simplified(places, known)
         if isinstance(places, Table):
             places = self.conditions.as_choice(places, known)
@@ -244,7 +244,7 @@ class Memory:
         ]
 
     def load(self, places: Any, state: State, node: c_ast.Node) -> tuple[Any, Any]:
-        """Type and value of what is at an address or at choices of some."""
+        """Read type and value at an address, or at choices of addresses."""
         places = self.conditions.simplified(places, state.known)
         if isinstance(places, Table):
             places = self.conditions.as_choice(places, state.known)
@@ -258,7 +258,7 @@ class Memory:
         return kind, self.get(places, kind, state, node)
 
     def chosen(self, condition: Value, first: Any, second: Any) -> Any:
-        """The first value where the condition holds, else the second."""
+        """Choose the first value where the condition holds, else the second."""
         if isinstance(first, dict):
             return {k: self.chosen(condition, first[k], second[k]) for k in first}
         if isinstance(first, list):

@@ -46,7 +46,7 @@ class CTextError(ValueError):
 
 
 def refused(node: c_ast.Node | None, reason: str) -> CTextError:
-    """The error of a place in a text."""
+    """Return the error of a place in a text."""
     places = [found.coord for found in walk(node) if found.coord] if node else []
     coord = places[0] if places else None
     return CTextError(f"{coord.file}:{coord.line}: {reason}" if coord else reason)
@@ -99,7 +99,7 @@ class Preprocessor:
             raise CTextError(f"{shown}:{number}: #ifndef without #endif")
 
     def directive(self, name: str, rest: str, skipping: list[bool], path: Path, place: str) -> None:
-        """One line that begins with #."""
+        """Read a line that begins with #."""
         if name == "ifndef":
             skipping.append(rest in self.defined)
         elif name == "endif" and skipping:
@@ -135,7 +135,7 @@ class Preprocessor:
 
 
 def without_comments(text: str) -> str:
-    """The text with comments as spaces, and lines that end in a backslash joined."""
+    """Replace comments by spaces, and join lines that end in a backslash."""
 
     def blank(found: re.Match[str]) -> str:
         return found[0] if found[0].startswith('"') else re.sub(r"[^\n]", " ", found[0])
@@ -151,7 +151,7 @@ def _joined(found: re.Match[str]) -> str:
 
 # ---- Parser --------------------------------------------------------------------------------------
 def read(path: Path, folders: Iterable[Path] = (), ignored: Iterable[str] = ()) -> Program:
-    """What a file declares, with all that it includes.
+    """Read the declarations of a file, with all that it includes.
 
     folders: where included files are, besides the file's own folder. ignored: names of headers that
     are not opened.
@@ -172,7 +172,7 @@ def read(path: Path, folders: Iterable[Path] = (), ignored: Iterable[str] = ()) 
 
 
 def _rephrased(message: str, text: str, name: str) -> str:
-    """A message of pycparser for a reader who does not know parsers."""
+    """Rephrase a message of pycparser for a reader who does not know parsers."""
     found = PLACE.fullmatch(message)
     if found is None:  # "name: At end of input"
         line = _lines(text, name)
@@ -188,7 +188,7 @@ def _rephrased(message: str, text: str, name: str) -> str:
 
 
 def _lines(text: str, name: str) -> int:
-    """Number of the last line that is not empty, of the file with this name."""
+    """Return the number of the last line that is not empty, of the file with this name."""
     current, number, last = "", 0, 1
     for line in text.split("\n"):
         found = re.fullmatch(r'# (\d+) "(.*)"', line)
@@ -238,7 +238,7 @@ def _note_types(program: Program, node: c_ast.Node) -> None:
 
 
 def walk(node: c_ast.Node) -> Iterator[c_ast.Node]:
-    """All nodes of a tree, each before its children."""
+    """Yield all nodes of a tree, each before its children."""
     todo = [node]
     while todo:
         found = todo.pop()

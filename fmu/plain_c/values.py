@@ -62,7 +62,7 @@ class Conditions:
         self.true, self.false = graph.number(1.0), graph.number(0.0)
 
     def leaf(self, name: str, domain: tuple[int, ...] | None) -> Table:
-        """A whole number from outside."""
+        """Return a whole number from outside."""
         leaf = self.graph.value("integer", name=name)
         if domain is None:
             return Table(leaf, None)
@@ -75,7 +75,7 @@ class Conditions:
         return self.true if value else self.false
 
     def no(self, condition: Value) -> Value:
-        """not condition."""
+        """Return not condition."""
         if condition.op == "number":
             return self.constant(not condition.number)
         if condition.op == "not":
@@ -83,7 +83,7 @@ class Conditions:
         return self.graph.value("not", condition)
 
     def both(self, first: Value, second: Value) -> Value:
-        """first and second; of one leaf it is one condition."""
+        """Return first and second; of one leaf it is one condition."""
         if is_number(first, 0.0) or is_number(second, 0.0):
             return self.false
         if first.op == "number" or first is second:
@@ -96,7 +96,7 @@ class Conditions:
         return self.graph.value("and", first, second)
 
     def either(self, first: Value, second: Value) -> Value:
-        """first or second."""
+        """Return first or second."""
         if first.op != "number" and second.op != "number" and first is not second:
             one, other = self._membership(first), self._membership(second)
             if not (one and other and one[0] is other[0]):
@@ -105,14 +105,14 @@ class Conditions:
         return self.no(self.both(self.no(first), self.no(second)))
 
     def _membership(self, condition: Value) -> tuple[Value, frozenset[int]] | None:
-        """The leaf that a condition is of, and the values where it holds."""
+        """Return the leaf of a condition, and the values where it holds."""
         if condition.op == "not":
             inner = self._membership(condition.arguments[0])
             return inner and (inner[0], self.domains[inner[0]] - inner[1])
         return self.members.get(condition)
 
     def member(self, leaf: Value, values: frozenset[int], known: Known | None = None) -> Value:
-        """Whether a leaf is one of these values, in the shortest form."""
+        """Return whether a leaf is one of these values, in the shortest form."""
         possible = known.sets.get(leaf) if known else None
         possible = self.domains[leaf] if possible is None else possible
         inside, outside = values & possible, possible - values
@@ -148,7 +148,7 @@ class Conditions:
     # ---- What is known ---------------------------------------------------------------------------
 
     def resolve(self, condition: Value, known: Known) -> Value:
-        """The condition, or a constant if it is known."""
+        """Return the condition, or a constant if it is known."""
         truth = self._truth(condition, known)
         return condition if truth is None else self.constant(truth)
 
@@ -175,7 +175,7 @@ class Conditions:
         return None
 
     def assume(self, condition: Value, holds: bool, known: Known) -> Known | None:
-        """What is known where the condition holds, or does not; None: nowhere."""
+        """Return the knowledge where the condition holds, or does not; None: nowhere."""
         found = Known(dict(known.truths), dict(known.sets), known.clauses)
         return found if self._assume(condition, holds, found) else None
 
@@ -199,7 +199,7 @@ class Conditions:
         return self._propagate(known)
 
     def _propagate(self, known: Known) -> bool:
-        """Conclude from alternatives: if all parts but one are known, that one is too."""
+        """Return conclude from alternatives: if all parts but one are known, that one is too."""
         for clause in known.clauses:
             open_parts = [p for p in clause.arguments if self._truth(p, known) is None]
             decided = clause.op == "or"  # a part with this truth satisfies the clause
@@ -215,7 +215,7 @@ class Conditions:
     # ---- Whole numbers ---------------------------------------------------------------------------
 
     def simplified(self, value: Any, known: Known) -> Any:
-        """A whole number or a pointer with what is known."""
+        """Simplify a whole number or a pointer by the knowledge."""
         while isinstance(value, Choice):
             condition = self.resolve(value.condition, known)
             if condition.op != "number":
@@ -234,7 +234,7 @@ class Conditions:
         return value
 
     def choice(self, condition: Value, first: Any, second: Any) -> Any:
-        """A choice between two whole numbers or pointers."""
+        """Return a choice between two whole numbers or pointers."""
         if condition.op == "number":
             return first if condition.number else second
         if condition.op == "not":
@@ -242,7 +242,7 @@ class Conditions:
         return first if first == second else Choice(condition, first, second)
 
     def each(self, function: Callable[[Any, Known], Any], value: Any, known: Known) -> Any:
-        """The function of a whole number or a pointer: of each that it may be."""
+        """Apply a function to each number or pointer that a value may be."""
         value = self.simplified(value, known)
         if isinstance(value, Table) and value.results is not None:
             results = tuple((at, function(result, known)) for at, result in value.results)
@@ -263,7 +263,7 @@ class Conditions:
         return function(value, known)
 
     def as_choice(self, table: Table, known: Known) -> Any:
-        """A table as choices between its results."""
+        """Turn a table into choices between its results."""
         groups: dict[Any, set[int]] = {}
         for at, result in table.results or ():
             groups.setdefault(result, set()).add(at)
@@ -274,7 +274,7 @@ class Conditions:
         return value
 
     def truth(self, value: Any, known: Known) -> Value:
-        """The condition that a whole number is not 0."""
+        """Return the condition that a whole number is not 0."""
         value = self.simplified(value, known)
         if isinstance(value, Table):
             if value.results is None:
@@ -294,7 +294,7 @@ class Conditions:
         return self.constant(bool(value))
 
     def compare(self, op: str, left: Any, right: Any, known: Known) -> Any:
-        """A relation of two whole numbers, as a whole number: 1 or 0."""
+        """Compare two whole numbers; return 1 or 0 as a whole number."""
         left, right = self.simplified(left, known), self.simplified(right, known)
         if isinstance(right, Table) and isinstance(left, int):
             op, left, right = MIRRORED[op], right, left
@@ -308,7 +308,7 @@ class Conditions:
     def binary(
         self, function: Callable[[int, int], int], left: Any, right: Any, known: Known
     ) -> Any:
-        """A function of two whole numbers."""
+        """Apply a function to two whole numbers."""
 
         def of_left(a: Any, known: Known) -> Any:
             return self.each(lambda b, _: function(a, b), right, known)
@@ -319,7 +319,7 @@ class Conditions:
         return self.each(of_left, left, known)
 
     def real(self, value: Any, known: Known) -> Value:
-        """A whole number as a real one."""
+        """Convert a whole number to a real one."""
         value = self.simplified(value, known)
         if isinstance(value, Table):
             if value.results is None or all(at == result for at, result in value.results):
@@ -331,7 +331,7 @@ class Conditions:
         return self.graph.number(float(value))
 
     def select(self, condition: Value, first: Value, second: Value) -> Value:
-        """A choice between two real numbers."""
+        """Choose between two real numbers."""
         if condition.op == "number":
             return first if condition.number else second
         if condition.op == "not":

@@ -1,4 +1,4 @@
-"""What a campaign varies: a scenario on its model's FMU, or a variant of a system.
+"""Bases of campaigns: a scenario on its model's FMU, or a variant of a system.
 
 Both are opened here and made into components, values and wires that the loop takes; values with
 units in the file become numbers in the units of their variables.
@@ -112,7 +112,7 @@ class Base(ABC):
 
 
 class ScenarioBase(Base):
-    """A scenario; names are those of its model."""
+    """A scenario; names are its model's."""
 
     KIND = "model"
 

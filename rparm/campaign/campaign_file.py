@@ -71,7 +71,7 @@ class Distribution(_Table):
 
     @property
     def numbers(self) -> list[float]:
-        """What is given for it, once no text with a unit is left."""
+        """Given value, once no text with a unit is left."""
         return getattr(self, self.kind)
 
     @property
@@ -109,7 +109,7 @@ class Settling(_Table):
 
 
 class Crossings(_Table):
-    """How often a variable crosses a level upwards."""
+    """Count of upward crossings of a level by a variable."""
 
     variable: Name
     level: Quantity
@@ -125,7 +125,7 @@ class Tracking(_Table):
 
 
 class Keep(_Table):
-    """What is kept of each run, and of which runs everything."""
+    """Measures of each run, and the runs whose trajectories are kept."""
 
     start: list[Name] = []
     final: list[Name] = []
@@ -149,7 +149,7 @@ class Map(_Table):
 
 
 class Time(_Table):
-    """Times that replace those of the scenario or system, s."""
+    """Times that replace the scenario's or system's, s."""
 
     start: Seconds | None = None
     stop: Seconds | None = None
@@ -276,7 +276,7 @@ def checked(content: Mapping[str, Any], where: object) -> Campaign:
         raise UserError(f"{where}: {_explained(error)}") from None
 
 
-# what pydantic says in words of Python, by the type of the mistake
+# plain words for pydantic's, by the type of the mistake
 EXPECTED = {
     "dict_type": "expected a table",
     "list_type": "expected a list",
@@ -289,7 +289,7 @@ EXPECTED = {
 def _explained(error: ValidationError) -> str:
     """Explain the first mistake in one line: its place, what is expected, what is there."""
     first = error.errors()[0]
-    # what pydantic adds to say which member of a union it tried
+    # pydantic adds the members of a union that it tried
     place = [x for x in first["loc"] if x not in ("float", "bool", "str", "constrained-float")]
     where = _where(place)
     key = str(place[-1]) if place else ""

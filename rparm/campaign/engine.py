@@ -54,7 +54,7 @@ AHEAD = 3  # blocks under way for each thread of a worker
 COUNT_EVERY = 5000  # ms, between two looks at how many threads there are
 ATTEMPTS = 3  # to reach all workers: the scheduler may count one whose host is gone
 PATIENCE = 120  # s, without any worker later on
-FAREWELL = 5  # s, for workers to remove what they have got
+FAREWELL = 5  # s, for workers to remove their files
 CONNECTION = (OSError, FutureCancelledError, ClosedClientError)
 GONE = "the scheduler is gone"
 DIED = "the worker died in this run"
@@ -65,7 +65,7 @@ WAIT = 60  # s, for workers to start
 SETTINGS = {
     "distributed.scheduler.allowed-failures": KILLS,
     "distributed.comm.timeouts.connect": "20s",
-    # what watches workers many times a second takes three per cent of a core, for nothing here
+    # to watch workers many times a second takes three per cent of a core, for nothing here
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "500ms",
     "distributed.worker.memory.monitor-interval": "1s",
@@ -249,7 +249,7 @@ def opened_cluster(
     made on this machine: `workers` processes, by default one per core, with their files in
     `folder`. There, Dask shows its pages (`dashboard`) to all users, who can change nothing.
     """
-    logging.disable(logging.CRITICAL)  # what is wrong is said by the errors that are raised here
+    logging.disable(logging.CRITICAL)  # the errors that are raised here say it
     try:
         with dask.config.set(SETTINGS):
             start = (

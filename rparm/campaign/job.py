@@ -23,7 +23,7 @@ FINAL_INTEGER = "final_integer"
 
 @dataclass(frozen=True)
 class Recorded:
-    """What a run has recorded."""
+    """Recorded values of a run."""
 
     times: np.ndarray  # (n + 1,) s
     values: np.ndarray  # (n + 1, variables) in their units
@@ -169,7 +169,7 @@ class HeldInputs:
 
 @dataclass(frozen=True)
 class Target:
-    """Where a parameter of the campaign goes."""
+    """Variable that a parameter of the campaign sets."""
 
     component: int
     variable: str
@@ -188,7 +188,7 @@ class Job:
     reals: HeldInputs
     switches: HeldInputs
     propagates: bool  # outputs feed inputs
-    watched: tuple[str, ...]  # what is recorded
+    watched: tuple[str, ...]  # recorded variables
     columns: np.ndarray  # (watched,) of these, among the Reals of the loop
     integers: dict[str, tuple[int, str]]  # component and variable of those read at the end
     tangent: tuple[np.ndarray, ...] | None  # the first fields of loop.Tangent

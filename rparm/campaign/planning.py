@@ -183,7 +183,7 @@ class _Planner:
             else:
                 place, distribution = f"[parameters.{name}]", self.campaign.parameters[name]
                 numbers = [] if distribution.kind == "normal" else distribution.numbers
-            for number in filter(None, numbers):  # 0: that of the scenario
+            for number in filter(None, numbers):  # 0: the scenario's
                 with self.placed(place):
                     model.check_tolerance(number, component.values)
 
@@ -200,7 +200,7 @@ class _Planner:
                 result[component, variable.name] = value
         return result
 
-    # ---- What is kept ------------------------------------------------------------------------
+    # ---- Measures ------------------------------------------------------------------------------
 
     def measures(self) -> list[Measure]:
         keep = self.campaign.keep

@@ -32,13 +32,13 @@ from rparm.interruption import temporary_folder
 MANIFEST, BLOCKS, TRAJECTORIES = "manifest.json", "blocks", "trajectories"
 PACKAGES = ("dask", "distributed", "fmpy", "numba", "numpy", "pyarrow", "SALib", "scipy")
 WORKERS = ".{}.workers"  # with the number of the process
-DIGITS = len(str(MAX_RUNS))  # of numbers in names: the order of names is that of runs
+DIGITS = len(str(MAX_RUNS))  # of numbers in names: names sort like runs
 CAMPAIGN, PART, SHA256 = b"campaign", b"part", b"sha256"  # keys of metadata
 RESUMES = "the same command resumes it"
-ROOM = 1.1  # of the room that is needed: what Parquet adds
+ROOM = 1.1  # of the room for the numbers: Parquet adds the rest
 FILE, COLUMN = 4000, 400  # bytes of a file, and of each of its columns, besides the rows
 ROW_TEXT = 8  # bytes of a row besides its numbers
-DAMAGE = (OSError, ValueError, pa.ArrowException)  # what damaged Parquet files raise
+DAMAGE = (OSError, ValueError, pa.ArrowException)  # raised by damaged Parquet files
 
 
 class Results:

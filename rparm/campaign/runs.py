@@ -222,7 +222,7 @@ class Workshop:
 
 
 class Plugin(WorkerPlugin):
-    """FMUs and job of a campaign on a worker, which may have those of others, too."""
+    """FMUs and job of a campaign on a worker, which may serve others, too."""
 
     def __init__(self, name: str, job: Job, archives: Mapping[str, bytes]) -> None:
         self.name, self._job, self._archives = name, job, archives

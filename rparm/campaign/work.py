@@ -217,7 +217,7 @@ def _data(base: Base, job: Job, given: dict[str, float], record: np.ndarray) -> 
 def _recorded(
     base: Base, job: Job, given: dict[str, float], outputs: dict[str, np.ndarray]
 ) -> Recorded:
-    """Return outputs and inputs of each row: those of the step that ends there."""
+    """Return outputs and inputs of each row: of the step that ends there."""
     steps = np.maximum(np.arange(len(job.times)) - 1, 0)
     inputs = {
         name: values[steps]

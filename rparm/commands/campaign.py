@@ -83,7 +83,7 @@ def do_campaign(options: argparse.Namespace) -> Ended:
         raise UserError("expected the file of a campaign, or a name (--help explains)")
     file = project.campaign_file(options.file)
     project.check_installed(NEEDED, "campaign")
-    # imported here: what a campaign needs may not be installed
+    # imported here, as its packages may not be installed
     from rparm.campaign import page, planning, work
 
     security = _security(options)
@@ -171,7 +171,7 @@ def _run_missing(options: argparse.Namespace, security: "Security | None", made:
             with Progress(campaign.title, ahead, "runs") as progress:
                 made.run(client, blocks, progress)
             seconds = time.perf_counter() - begin
-    except BaseException:  # Dask may turn that of a signal into another one
+    except BaseException:  # Dask may turn a signal's exception into another one
         if arrived():
             print(f"stopped; {engine.RESUMES}", file=sys.stderr)
         raise

@@ -66,7 +66,7 @@ def do_federation(options: argparse.Namespace) -> Ended:
     network.check_address_is_free(address)
     if options.output:
         check_writable(options.output)
-    key()  # what is wrong with it is said before anything runs
+    key()  # a wrong one is refused before anything runs
     with ssp.unpacked(path) as system:
         _check_names(system, options)
         console.messages(str(path), system.notes)

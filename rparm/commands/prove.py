@@ -132,7 +132,7 @@ def _within(given: str | None, program: Prover, fmu: Fmu) -> dict[str, float]:
     for name in program.states:
         try:
             value = typed_quantity(given, fmu.model.variables[name].units)
-            found[name] = value * (1 + 2.0**-48)  # more than roundings took from what was typed
+            found[name] = value * (1 + 2.0**-48)  # more than roundings took from the typed value
         except WrongValueError as error:
             refusals.append(error)
     with placed("--within"):

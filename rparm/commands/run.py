@@ -1,4 +1,4 @@
-"""`run`: simulate scenarios, compare those of the project with references, write a report."""
+"""`run`: simulate scenarios, compare the project's with references, write a report."""
 
 import argparse
 import os
@@ -26,7 +26,9 @@ from rparm.runs.scenario import Scenario
 from rparm.units import counted, short
 
 SUFFIX = ".toml"
-FIRST, TWIN = VERSIONS  # of FMI: what runs, and what has to give the same bits
+FIRST, TWIN = (
+    VERSIONS  # versions of FMI: the one that runs, and the one that has to give the same bits
+)
 QUICK = 20.0  # s, longest sweep that runs by default for a named scenario
 
 

@@ -19,13 +19,13 @@ FUNCTIONS: dict[str, int | None] = dict.fromkeys(
 ) | {"atan2": 2, "min": None, "max": None}
 RELATIONS = ("<", "<=", ">", ">=")
 CONSTANTS = ("pi",)
-# what cannot be a name: operators, and words that other languages execute or give a value
+# not to be used as names: operators, and words that other languages execute or give a value
 WORDS = ("and", "or", "not", "if", "else")
 NO_NAMES = (*WORDS, "True", "False", "None", "lambda")
 Item = TypeVar("Item", bound=Any)  # hashable, with `arguments` of its own kind
 NUMBER, CONDITION = "a number", "a condition"
 LOGIC = ("and", "or", "not")
-DEEPEST = 100  # levels of brackets, and of what else nests
+DEEPEST = 100  # levels of brackets and other nesting
 SPACE = re.compile(r"\s*")
 TOKEN = re.compile(
     r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?![\w.])"
@@ -61,7 +61,7 @@ OPERATIONS |= {name: BUILT_IN.get(name) or getattr(math, name) for name in FUNCT
 
 
 class ExpressionError(ValueError):
-    """What is wrong with an expression, in one line that begins with the column (from 1)."""
+    """A mistake in an expression, in one line that begins with the column (from 1)."""
 
     def __init__(self, column: int, text: str) -> None:
         super().__init__(f"column {column}: {text}")
@@ -298,7 +298,7 @@ class Expression:
 
     @cached_property
     def names(self) -> frozenset[str]:
-        """What must be known for its value."""
+        """Names whose values it needs."""
         return names(self.tree)
 
     def value(self, values: Mapping[str, float]) -> float:

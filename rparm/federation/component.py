@@ -34,7 +34,7 @@ LEAVE = 2.0  # s, for work and processes to end after a failure
 
 @dataclass(frozen=True)
 class Source:
-    """Where an input comes from: value `index` of what the component `component` publishes."""
+    """Source of an input: value `index` of those that `component` publishes."""
 
     component: str
     index: int
@@ -52,7 +52,7 @@ class Part:
     constant: tuple[str, ...]  # outputs that feed an input which is no Real: they must not change
     rounds: int  # exchanges in initialization after which no output changes any more
     times: np.ndarray  # s, communication points
-    system: str  # variant and SHA-256 of the SSP: those of all processes must be the same
+    system: str  # variant and SHA-256 of the SSP, the same in all processes
 
     def check_same(self, other: str) -> None:
         """Refuse to step with a federation of another variant, or of another SSP."""

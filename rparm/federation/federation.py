@@ -24,7 +24,7 @@ RECORDER = "recorder"
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """What the components published at each communication point."""
+    """Published values of the components at each communication point."""
 
     names: tuple[str, ...]  # component.variable, of all Real outputs
     times: np.ndarray  # (rows,) s

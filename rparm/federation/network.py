@@ -26,15 +26,15 @@ from rparm.errors import UserError, one_line, reason
 
 LOCAL = "127.0.0.1"
 ATTEMPT_EVERY = 0.2  # s, before the next attempt to connect
-ENDED = "the federation ended"  # in what processes say that others have stopped
+ENDED = "the federation ended"  # in messages of processes that others have stopped
 ABSENT = "no federation at"  # the same of one that comes later
 ANSWER = 5.0  # s, for another process to answer
 JOIN = 25.0  # s, for the broker to answer
 JOINS = 5  # attempts, because a stranger who is refused may end one of them
-TOO_EARLY = "already moved to operating state"  # what HELICS says then
+TOO_EARLY = "already moved to operating state"  # message of HELICS then
 PAUSE = 0.05  # s, before the same question
 NOT_FOUND = 404  # HELICS's code of an answer
-SYSTEM = "system"  # what all must step, a global value of the federation
+SYSTEM = "system"  # the system that all must step, a global value of the federation
 KEY = "RPARM_FEDERATION_KEY"  # variable of the environment, which only its user can read
 QUIET = "--loglevel=none"
 # One port, the broker's: with "zmq" each process needs one, by its number, and "zmq_ss" drops
@@ -150,7 +150,7 @@ def key() -> str:
 
 
 class Broker(AbstractContextManager["Broker"]):
-    """What all `count` processes of a federation are connected to, at `address`."""
+    """Broker at `address`, to which all `count` processes of a federation connect."""
 
     def __init__(self, count: int, address: str) -> None:
         h = self._h = helics()
@@ -341,7 +341,6 @@ class Federate:
         """Read the values that sources published before the last exchange.
 
         UserError if none arrived.
-
         """
         values = {}
         for source, place in self._subscriptions.items():

@@ -31,7 +31,7 @@ def _call(_context, function, arguments):
         values = cgutils.unpack_tuple(builder, packed)
         kinds = [value.type for value in values]
         prototype = ir.FunctionType(ir.IntType(32), kinds).as_pointer()
-        # what C does with a bool
+        # as C extends a bool
         extended = {i: ("zeroext",) for i, kind in enumerate(kinds) if kind == ir.IntType(8)}
         return builder.call(builder.bitcast(function, prototype), values, arg_attrs=extended)
 

@@ -1,4 +1,4 @@
-"""Instances of FMUs for co-simulation: what those of all versions of FMI have in common.
+"""Instances of FMUs for co-simulation: all that the versions of FMI have in common.
 
 These modules, a class per version beside this one, are the only ones that call functions of an FMU.
 Functions that are called in long loops raise fmpy's FMICallException, which `failure` turns into
@@ -33,7 +33,7 @@ Call = Callable[[], object]  # of a function of an FMU; FMICallException if it f
 
 
 class UnpackedFmu(Protocol):
-    """What instances need to know of their FMU: `rparm.fmi.fmu_file.Fmu`."""
+    """FMU as instances see it: `rparm.fmi.fmu_file.Fmu`."""
 
     path: Path  # for messages
     folder: Path
@@ -109,7 +109,7 @@ class Instance(ABC):
     LIBRARY: ClassVar[type]  # fmpy's class for co-simulation
     INSTANTIATE: ClassVar[str]  # name of the function
     SETTERS: ClassVar[Mapping[str, str]]  # methods of LIBRARY, by type of the variable
-    MARKS: ClassVar[str]  # what in a message does not stand for itself, as a regular expression
+    MARKS: ClassVar[str]  # regular expression of marks in messages that do not stand for themselves
 
     def __init__(self, fmu: UnpackedFmu, name: str, smooth_inputs: Sequence[str] = ()) -> None:
         self.fmu = fmu

@@ -33,7 +33,7 @@ LARGEST_SYSTEM = 2**32  # bytes of all files in the FMUs of an SSP
 LARGEST_XML = 64_000_000  # bytes; parsed it takes some twenty times as much memory
 MOST_FILES = 10_000  # in an archive
 LONGEST_NAME = 400  # characters of a path in an archive, each other of which may be a folder
-# those of FMI and SSP; zipfile unpacks others without a limit of memory
+# of FMI and SSP; zipfile unpacks others without a limit of memory
 METHODS = {zipfile.ZIP_STORED: "stored", zipfile.ZIP_DEFLATED: "deflate"}
 ENCRYPTED = 0x1 | 0x40 | 0x2000  # flags: encrypted, strongly, with a hidden directory
 CONTROL = ("Cc", "Cs", "Zl", "Zp")  # categories of characters that end lines or control a terminal
@@ -250,7 +250,7 @@ def read_model(path: Path) -> Model:
 
 @dataclass(frozen=True)
 class Described:
-    """What is known of an FMU for co-simulation without its binary."""
+    """Description of an FMU for co-simulation, without its binary."""
 
     description: ModelDescription
     model: Model

@@ -25,13 +25,13 @@ from rparm.units import number as short_number
 Value = float | int | bool | str
 TURN = 2 * math.pi
 
-INTEGER = (-(2**31), 2**31 - 1)  # what an Integer of FMI 2.0 and an Int32 of FMI 3.0 hold
+INTEGER = (-(2**31), 2**31 - 1)  # range of an Integer of FMI 2.0 and an Int32 of FMI 3.0
 
-# what a scenario may set, by the name of its section
+# variables that a scenario may set, by the name of its section
 PARAMETERS, INITIAL, INPUTS = "parameters", "initial", "inputs"
 KINDS = {PARAMETERS: "a parameter", INITIAL: "a state", INPUTS: "an input"}
 
-# parameters of FMUs that bring their own integrator as those of this project do
+# parameters of FMUs that bring their own integrator, as this project's do
 METHOD, TOLERANCE = "solver_method", "relative_tolerance"
 # smallest relative tolerance of each method: below it, FMUs integrate as at this one
 SMALLEST_TOLERANCES = {"cvode_adams": 5e-12, "cvode_bdf": 5e-12, "erk": 1e-12, "taylor": 1e-13}
@@ -121,7 +121,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What an FMU proposes to simulate; None: nothing."""
+    """Default experiment of an FMU; None: it has no such value."""
 
     start: float | None = None  # s
     stop: float | None = None  # s
@@ -141,7 +141,7 @@ class Model:
     gives_directional_derivatives: bool
     # Versions of FMI name these differently, and list parameters or not: not compared.
     derivatives: tuple[str, ...] = field(default=(), compare=False)  # of `states`
-    # of outputs and derivatives: what each may depend on, by name; absent: on everything
+    # dependencies of outputs and derivatives, by name; absent: on everything
     dependencies: Mapping[str, tuple[str, ...]] = field(default_factory=dict, compare=False)
     experiment: Experiment = Experiment()
 
@@ -245,7 +245,7 @@ def _experiment(given: DefaultExperiment | None) -> Experiment:
     )
 
 
-# names of FMI 2.0 and FMI 3.0 -> that of `Variable`
+# types of FMI 2.0 and FMI 3.0 -> type of `Variable`
 TYPES = {
     "Real": "Real",
     "Integer": "Integer",

@@ -118,7 +118,7 @@ class Fmi3Instance(Instance):
     """An instance of an FMU of FMI 3.0.
 
     FMI 3.0 has no derivatives of inputs: in a step, the FMU asks for the values of the inputs at
-    times inside of it (intermediate update), and is given those of the polynomials or functions.
+    times inside of it (intermediate update), and gets them from the polynomials or functions.
     """
 
     PLATFORMS = (fmpy.platform_tuple,)
@@ -141,11 +141,13 @@ class Fmi3Instance(Instance):
             requiredIntermediateVariables=self._references(self.smooth_inputs) if smooth else None,
         )
         self._log_warnings()
-        self._inputs: Callable[[float], object] | None = None  # sets those of a time in a step, s
+        self._inputs: Callable[[float], object] | None = (
+            None  # sets the inputs at a time in a step, s
+        )
         self._start = 0.0  # s, of the present step
         self._raised: BaseException | None = None  # in a callback, where it would be lost
 
-        # what a step reports
+        # results of a step
         self._terminates = fmi3.fmi3Boolean()
         self._time = fmi3.fmi3Float64()  # that it has reached, s
         self._event, self._early = fmi3.fmi3Boolean(), fmi3.fmi3Boolean()

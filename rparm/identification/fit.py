@@ -30,20 +30,20 @@ from rparm.identification.logs import Segment
 from rparm.identification.request import DELAY, Parameters
 from rparm.identification.simulator import Simulator
 
-STEP, CENTRAL_STEP = 1e-6, 1e-5  # of differences, of the scale of what is changed
+STEP, CENTRAL_STEP = 1e-6, 1e-5  # of differences, relative to the scale of the changed number
 ROUNDING = 4 * np.finfo(float).eps  # of outputs, relative
 MOST_STEPS = 60
 LONGEST = 1.0  # step of a parameter: e times its distance from a limit, or once its scale
 FIRST_RIDGE, LEAST_RIDGE, MOST_RIDGE = 1e-3, 1e-10, 1e8
-NEGLIGIBLE = 1e-3  # what a step may still gain, in standard deviations squared
-ROUGH = 0.01  # of the cost: what a step gains where the first steps end
-FLAT = 0.05  # the same, what a step has gained: less ends the fit
+NEGLIGIBLE = 1e-3  # gain that a step may still have, in standard deviations squared
+ROUGH = 0.01  # of the cost: gain of a step at which the first steps end
+FLAT = 0.05  # of the cost: a smaller gain of a step ends the fit
 UNKNOWN = 1e-6  # singular value of a direction that the fit cannot know
 SMALLEST = 1e-3  # of the largest effect of a state: its weight in the ridge where it has none
 LEVEL = 0.95
 SUSPICIOUS = 1.5  # ratio of the standard deviations
 SMALL = 1e-8  # of the largest singular value of the states' columns: such a state has no effect
-FULL = 1 - 1e-9  # share of a segment in what is known: it cannot be checked by others
+FULL = 1 - 1e-9  # share of a segment in all knowledge: it cannot be checked by others
 NOTHING = 3e-6  # singular value of columns of length 1; differences leave 1e-7 where there is none
 COARSE = 1e-3  # the same at most, where rounding is seen
 EQUAL = 1e-3  # of two effects a unit, so that a sum of parameters is known
@@ -72,7 +72,7 @@ class Linear:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What is to be fitted.
+    """Segments and parameters to fit.
 
     Numbers of a point are `z` (parameters,) and `x` (segments, states), states in their scales.
     """
@@ -188,7 +188,7 @@ def _late(times: np.ndarray, values: np.ndarray, delay: float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Where the fit has ended."""
+    """Result of a fit."""
 
     z: np.ndarray  # (parameters,)
     x: np.ndarray  # (segments, states), of their scales
@@ -294,7 +294,7 @@ class Reduced:
 
     by_parameters: np.ndarray  # (rows, parameters)
     residuals: np.ndarray  # (rows,)
-    basis: np.ndarray  # (rows, n) orthonormal: what the states can explain
+    basis: np.ndarray  # (rows, n) orthonormal: residuals that the states can explain
 
 
 def reduced(linear: Linear) -> Reduced:
@@ -369,7 +369,7 @@ def covariances(segments: Sequence[Reduced], known: np.ndarray) -> Covariances:
 
 
 def _degrees(norms: np.ndarray, overlaps: np.ndarray) -> np.ndarray:
-    """Return degrees of freedom (known,): the first two moments are those of a chi-squared number.
+    """Return degrees of freedom (known,): two moments are a chi-squared number's.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ from rparm.identification.simulator import (
     state_names,
 )
 
-AWAY = 0.1  # of the range of what was measured: an error that is no longer followed
+AWAY = 0.1  # of the range of the measured values: an error that is no longer followed
 LEAD = 0.1  # of a segment: the longest delay
 WIDEST = np.log(1e6)  # of a distance from a limit: beyond, one end of an interval is not known
 FEWEST_SEGMENTS = 5  # for intervals by scatter
@@ -41,7 +41,7 @@ CAUSES = "usual causes are units, outliers, or a model that lacks something"
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """How a log is met that the parameters were not fitted to."""
+    """Comparison with a log that the parameters were not fitted to."""
 
     recording: Recording
     times: np.ndarray  # (rows,) s, of the part that is run in one go
@@ -86,7 +86,7 @@ def validate(
         guessed = admitted_start(simulator, segments, none, guessed)
         scales = start_scales(guessed)
         problem = Problem(simulator, none, segments, noise, scales, values.get(DELAY, 0.0))
-        # the first rows show what was before the start, later by the delay
+        # the first rows show values from before the start, later by the delay
         found = fit.fit(problem, guessed / scales)
         whole = _whole(recording, segments[0])
         try:
@@ -118,7 +118,7 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """What a fit has found."""
+    """Result of an identification."""
 
     fmu: Path
     model: str
@@ -154,7 +154,7 @@ class Identification:
 
     @property
     def misfit(self) -> str:
-        """What to say if chi2 of the logs, or of the second one, is far from 1; or nothing."""
+        """Warning if chi2 of the logs, or of the second one, is far from 1; or nothing."""
         second = None if self.validation is None else self.validation.chi2
         for name, chi2 in (("chi2", self.chi2), ("chi2 of the second log", second)):
             if chi2 is not None and not chi2 < SUSPICIOUS:
@@ -169,7 +169,7 @@ class Identification:
 
     @property
     def warnings(self) -> list[str]:
-        """What a reader of the results must know."""
+        """Warnings for a reader of the results."""
         texts = [text for recording in self.recordings for text in recording.warnings]
         if self.validation is not None:
             texts += self.validation.recording.warnings
@@ -199,7 +199,7 @@ class Identification:
 
 @dataclass(frozen=True, eq=False)
 class _Fitted:
-    """Where the fit has ended, and what is left there."""
+    """Result of a fit, and its residuals."""
 
     solution: fit.Solution
     start_states: np.ndarray  # (segments, states)
@@ -224,7 +224,7 @@ def identify(fmu: Fmu, request: Request) -> Identification:
     if request.with_delay:
         _check_delay(parameters.values(z)[parameters.names.index(DELAY)], lead)
 
-    # what is known
+    # the known parameters
     at_limit = parameters.at_limit(z)
     effects = np.vstack([piece.by_parameters for piece in fitted.pieces])
     effects = Effects(np.where(at_limit, 0.0, effects), fitted.rounding)

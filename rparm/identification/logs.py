@@ -18,7 +18,7 @@ MOST_ROWS = 2_000_000
 
 @dataclass(frozen=True)
 class Column:
-    """Where the values of a variable are: name in the log, and what 1 in it is."""
+    """Column of a variable's values: its name in the log, and the value of a 1 in it."""
 
     name: str
     scale: float = 1.0
@@ -26,7 +26,7 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What of a log is used, with rows put in where few are missing."""
+    """Used part of a log, with rows put in where few are missing."""
 
     path: Path
     times: np.ndarray  # (rows,) s since the first row, increasing
@@ -35,7 +35,7 @@ class Recording:
     measured: np.ndarray  # (rows, outputs); NaN in rows that were put in
     step: float  # s, the usual one
     first: float = 0.0  # s, time of the first row by the clock of the log
-    warnings: Sequence[str] = ()  # of what looks damaged
+    warnings: Sequence[str] = ()  # of seeming damages
 
 
 @dataclass(frozen=True, eq=False)

@@ -194,7 +194,7 @@ def correlations(covariance: np.ndarray) -> np.ndarray:
 def figure_of(
     tests: Mapping[str, Whiteness], names: Sequence[str], covariance: np.ndarray
 ) -> Figure:
-    """Draw both; `names` are those of the covariance's parameters."""
+    """Draw both; `names` are the covariance's parameters."""
     with mpl.rc_context(TEXTS):
         made = Figure(figsize=(11, 4.2), layout="constrained")
         left, right = made.subplots(1, 2)

@@ -22,10 +22,12 @@ from rparm.fmi.model import INITIAL, INPUTS, METHOD, PARAMETERS, Model, Value, V
 from rparm.identification.logs import LENGTH, Column
 from rparm.units import quantity
 
-CLOSEST = np.log(1e-6)  # to a limit, of the distance at the start: what comes here is at it
-LARGEST = 700.0  # whose exponential is a double: ends of intervals of what is hardly known
-DELAY = "delay"  # between the outputs and what was measured of them
-FASTEST = "taylor", "erk"  # methods of integration, for steps as short as those of logs
+CLOSEST = np.log(
+    1e-6
+)  # to a limit, of the distance at the start: from here on a parameter is at it
+LARGEST = 700.0  # whose exponential is a double: ends of very long intervals
+DELAY = "delay"  # between the outputs and their measured values
+FASTEST = "taylor", "erk"  # methods of integration, for steps as short as a log's
 ABOVE = ">"  # in "name>other": the parameter stays above the other one
 
 
@@ -143,7 +145,7 @@ class Parameters:
 
 @dataclass(frozen=True)
 class Request:
-    """What a user asks for; all names are those of variables of the FMU."""
+    """Request of a user; all names are variables of the FMU."""
 
     logs: Sequence[Path]
     parameters: Sequence[str]  # or "name>other"
@@ -354,7 +356,7 @@ class Demo:
 
     fmu: Path
     request: Request
-    true: Mapping[str, float]  # what is to be found
+    true: Mapping[str, float]  # true values of the parameters
 
 
 class Recipe(Protocol):

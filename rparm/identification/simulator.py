@@ -111,7 +111,7 @@ class _Runner:
             self._initialize(segment, values)
             return self._advance(segment)
         except UserError:
-            self.close()  # what has failed is not used again
+            self.close()  # a failed instance is not used again
             raise
 
     def _fresh(self) -> tuple[Instance, Reals]:

@@ -29,10 +29,10 @@ BISECTIONS = 60
 Held = tuple[np.ndarray, np.ndarray, np.ndarray]
 Source = tuple[str, int]  # component, and place among all outputs
 STEPS = 500
-EARLY = 100  # first steps, before the motion is that of the slowest eigenvalues
+EARLY = 100  # first steps, before the slowest eigenvalues dominate the motion
 SEEN = 1e-7  # of the largest: combinations of signals that are above rounding
 WITHIN = 0.005  # of the predicted step: where growth is measured
-MOVED = 1e-6  # in the unit of what is moved
+MOVED = 1e-6  # in the unit of the moved variable
 
 
 @dataclass(frozen=True)
@@ -198,7 +198,7 @@ class Limit:
 
     @property
     def measured(self) -> float:
-        """Where the logarithm of the growth is 0, s."""
+        """Step at which the logarithm of the growth is 0, s."""
         low, high = map(math.log, self.growths)
         return self.predicted * (1 + WITHIN * (low + high) / (low - high))
 

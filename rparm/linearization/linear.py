@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from control import StateSpace
 
 TERMS = 13  # of Taylor's series of an exponential
-CANCELLED = 1e-13  # of the terms of a sum: what rounding leaves if it is 0
+CANCELLED = 1e-13  # of the terms of a sum: rounding of a sum that is 0
 ROUNDING = 1e-15  # relative, for each row and column: of singular values that are 0
 SAMPLED = (
     "is sampled, which no linear model in continuous time can be: set its sample time to 0 if it "
@@ -418,7 +418,7 @@ def _depends_on_inputs(model: Model, name: str) -> bool:
 
 
 class Subject(Protocol):
-    """What can be linearized: an FMU or a system."""
+    """Subject to linearize: an FMU or a system."""
 
     def variable(self, name: str) -> Variable:
         """Return the variable as it is declared; UserError if there is none of that name."""

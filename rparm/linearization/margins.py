@@ -42,7 +42,7 @@ class Crossing:
 
 @dataclass(frozen=True)
 class Margins:
-    """What a loop bears; nan or inf if nothing of the kind makes it unstable.
+    """Margins of a loop; nan or inf if nothing of the kind makes it unstable.
 
     Attributes
     ----------

@@ -29,7 +29,7 @@ from rparm.report.pages import (
 )
 from rparm.units import milliseconds
 
-Picture = tuple[str, str]  # file without its suffix, and what it shows
+Picture = tuple[str, str]  # file without its suffix, and its description
 Part = tuple[Table, str, list[Picture]]
 NONE = "–"
 LISTED = 12  # names in a sentence
@@ -70,7 +70,7 @@ MOST_DRAWN = 2  # inputs and outputs that are drawn: with more, curves would sha
 ROUNDING = 1e-12  # of the largest response: less is none
 AROUND = 2.0  # decades beyond the poles that a Bode diagram shows
 SETTLED = 6.0  # time constants of the slowest pole that a step shows
-GROWN = 3.0  # those of the fastest one that grows
+GROWN = 3.0  # time constants of the fastest pole that grows
 FLATTEST = 0.1  # height of a picture of poles, of its width
 POINTS = 600
 MOST_DOTS = 10 * POINTS  # of samples, on one curve: more would only hide it

@@ -19,7 +19,7 @@ UNDAMPED = 1e-9  # damping below which a pole or zero is taken to have this one
 AT_ONCE = 10**6  # entries of matrices that are solved in one call
 Response = Callable[[np.ndarray], np.ndarray]
 Answers = tuple[np.ndarray, ...]
-NEGLIGIBLE = 1e-11  # relative, of what is 0
+NEGLIGIBLE = 1e-11  # relative: less is 0
 SPREAD = 1e-6  # relative, of poles that are equal, by rounding
 REFINEMENTS = 3  # of such a pole
 

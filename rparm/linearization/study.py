@@ -28,7 +28,7 @@ Document = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """What is asked for.
+    """Request for a linear model.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Request:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What is found.
+    """Linear model with all that was asked for.
 
     Attributes
     ----------

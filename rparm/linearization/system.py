@@ -1,4 +1,4 @@
-"""Linear models of systems: those of their FMUs, joined by the connections."""
+"""Linear models of systems: their FMUs' models, joined by the connections."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
@@ -309,7 +309,7 @@ def _refuse_algebraic_loop(outputs: Sequence[str], direct: np.ndarray) -> None:
 # ---- Loops ---------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Looped:
-    """What of a system lies on loops through its connections: the rest cannot be unstable by them.
+    """Part of a system on loops through its connections: the rest cannot be unstable by them.
 
     `parts` have only states, inputs and outputs on loops; components that have none are left out.
     """

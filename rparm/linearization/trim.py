@@ -17,7 +17,7 @@ from rparm.linearization.linear import Linear, Subject
 
 MOST_STEPS = 60
 MOST_HALVINGS = 30
-EXACT = 1e-10  # of the terms that cancel in an equation: what is left counts as 0
+EXACT = 1e-10  # of the terms that cancel in an equation: a smaller rest counts as 0
 SINGULAR = 1e-10  # of the largest singular value
 PROBE = 1e-6  # by so much of itself, or of 1, a free variable is moved to see whether it matters
 DOUBLINGS = 60

@@ -1,4 +1,4 @@
-"""What the player on a page animates of a run: a mechanism's motion and its geometry.
+"""Data that the player on a page animates: a mechanism's motion and its geometry.
 
 Which variables these are is known to the folder of the model or system. Its module animation.py has
 a function `animation` from `Recorded` to `Animation`; a folder without one has nothing to animate.
@@ -45,7 +45,7 @@ class Animation:
 
     columns: Mapping[str, np.ndarray | None]  # (rows,), or None: not there
     reference: Mapping[str, np.ndarray] | None  # (rows,): the motion that is drawn as a ghost
-    arm: Mapping[str, Any]  # lengths in m, limits, what surrounds it
+    arm: Mapping[str, Any]  # lengths in m, limits, surroundings
 
 
 def of_run(run: Run, rows: Rows = EVERY) -> dict | None:
@@ -61,7 +61,7 @@ def of_result(
     rows: Rows = EVERY,
 ) -> dict | None:
     """Return data for a run that may have stopped early, and may have no references."""
-    # a row holds the outputs at the end of a step, so the inputs too are those of this step
+    # a row holds the outputs at the end of a step, so the inputs are of this step, too
     steps = scenario.input_rows[: len(result.times)]
     inputs = {name: values[steps] for name, values in scenario.inputs.items()}
     outputs = dict(zip(result.names, result.values.T, strict=True))

@@ -41,7 +41,7 @@ class Entry:
     bound: float | None = None
     detail: str = ""  # which output is worst, or why the run failed
     line: str = ""  # path of the sparkline
-    line_text: str = ""  # what it shows
+    line_text: str = ""  # its description
     line_of: str = ""  # the variable of the sparkline
     source: str = ""  # file of a user
     line_scale: str = ""  # its smallest and largest value, and how long it is
@@ -91,7 +91,7 @@ def forget(report: Path, section: str, names: Collection[str] | None = None) -> 
 
 
 def read(report: Path, section: str) -> list[Entry]:
-    """Read the entries of a section; those of a file that nobody can read do not count."""
+    """Read the entries of a section; a file that nobody can read has none."""
     with suppress(OSError, ValueError, TypeError, RecursionError):
         content = json.loads((report / section / ENTRIES).read_text(encoding="utf-8"))
         return [Entry(**item) for item in content]

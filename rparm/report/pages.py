@@ -77,7 +77,7 @@ _templates.tests |= {
 
 
 class Command(str):
-    """What to type, as a cell of a table."""
+    """Command to type, as a cell of a table."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class RunPage:
     failures: Sequence[str] = ()
     csv: str = ""  # file name beside the page, if there is one
     csv_note: str = ""
-    diagram: tuple[str, str] | None = None  # file name beside the page, and what it shows
+    diagram: tuple[str, str] | None = None  # file name beside the page, and its description
     again: str = ""  # the command that runs it again
     overview: bool = True  # whether there is one
 

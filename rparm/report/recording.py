@@ -198,7 +198,7 @@ def _with_few_colours(drawn: "Sequence[Image]") -> "list[Image]":
     codes = np.stack([np.asarray(frame) @ np.array([1 << 16, 1 << 8, 1]) for frame in drawn])
     found, places, counts = np.unique(codes, return_inverse=True, return_counts=True)
     colours = np.stack([found >> 16, found >> 8 & 255, found & 255], axis=1)
-    # the most frequent ones, so that areas keep theirs; those of smoothed edges are near to one
+    # the most frequent ones, so that areas keep their colours; smoothed edges are near to one
     kept = colours[np.argsort(-counts, kind="stable")[:COLOURS]]
     distance = ((colours[:, None] - kept) ** 2).sum(axis=2)
     indices = distance.argmin(axis=1).astype(np.uint8)[places].reshape(codes.shape)

@@ -12,7 +12,7 @@ from rparm.runs.comparison import SMALLEST_SCALE
 
 MOST_ROWS = 800  # of a page, so that a report stays small
 FEWEST_PACKED = 8  # numbers; shorter lists stay as they are
-ROUNDING = 1e-12  # of a variable's scale: what is smaller is rounding of its computation
+ROUNDING = 1e-12  # of a variable's scale: less is rounding of its computation
 SEEN = 1e-6  # of a column's range: extremes that stand out by less are not seen
 
 
@@ -24,7 +24,7 @@ class Curve:
     values: np.ndarray  # (rows,)
     reference: np.ndarray | None = None  # (rows,), drawn below it
     steps: bool = False  # each row ends an interval of this value
-    limit: bool = False  # is not a result but what results stay below
+    limit: bool = False  # is not a result but a limit of results
 
     def at(self, rows: np.ndarray) -> "Curve":
         """Reduce to some of the rows."""
@@ -41,7 +41,7 @@ class Plot:
     curves: Sequence[Curve]
     log: bool = False
     levels: Sequence[tuple[str, float]] = ()  # dashed lines: name and value
-    note: str = ""  # what its values mean
+    note: str = ""  # meaning of its values
 
     @property
     def gaps(self) -> bool:
@@ -50,7 +50,7 @@ class Plot:
 
     @property
     def columns(self) -> list[np.ndarray]:
-        """What is drawn, (rows,) each; logarithms on a logarithmic axis."""
+        """Drawn curves, (rows,) each; logarithms on a logarithmic axis."""
         drawn = [values for x in self.curves for values in (x.values, x.reference)]
         found = [values for values in drawn if values is not None]
         if not self.log:
@@ -64,7 +64,7 @@ class Plot:
 
     @property
     def text(self) -> str:
-        """What it shows, for those who do not see it."""
+        """Description for readers who do not see it."""
         parts = []
         for curve in self.curves:
             finite = curve.values[np.isfinite(curve.values)]
@@ -135,7 +135,7 @@ def without_rounding(values: np.ndarray) -> np.ndarray:
 def result_curve(
     name: str, values: np.ndarray, reference: np.ndarray | None = None, steps: bool = False
 ) -> Curve:
-    """Return the values of a variable over those of its reference, without rounding."""
+    """Return the values of a variable over its reference's, without rounding."""
     below = None if reference is None else without_rounding(reference)
     return Curve(name, without_rounding(values), below, steps)
 

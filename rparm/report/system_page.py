@@ -36,7 +36,7 @@ class Section:
 
     @cached_property
     def study(self) -> Study:
-        """What its folder says of it."""
+        """Module study.py of its folder."""
         return load_study(self.folder)
 
     @property

@@ -60,7 +60,7 @@ class ReportWriter:
         progress: Callable[[int], object] = lambda _: None,
         failures: Sequence[Failure] = (),
     ) -> Path:
-        """Write all pages; return the one to open: that of a single file, or the overview.
+        """Write all pages; return the one to open: a single file's, or the overview.
 
         Of the runs of each scenario, the first one is drawn. `progress` is called with 1 after
         each.
@@ -197,7 +197,7 @@ def _write_study(folder: Path, page: RunPage, error: float, detail: str) -> Entr
     with np.errstate(divide="ignore"):
         line = sparkline(-np.log10(x), np.log10(errors))
     axis = f"{short(x[0])} to {short(x[-1])} {page.data.axis.unit}".strip()
-    return overview.write_page(  # without error and bound: those of studies cannot be compared
+    return overview.write_page(  # without error and bound, which cannot be compared
         folder,
         page.data.name,
         page,

@@ -200,7 +200,7 @@ class Run(Compared):
 
     @property
     def violation(self) -> str:
-        """Why the run has not passed, or nothing; an error that is only estimated has no bound."""
+        """Reason of a failure, or nothing; an error that is only estimated has no bound."""
         at = f"tolerance {short(self.result.tolerance)}:"
         if self.twin is not None and self.twin.differing:
             others = ", ".join(self.twin.differing)

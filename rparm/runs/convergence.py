@@ -30,7 +30,7 @@ from rparm.runs.scenario import Scenario
 
 FACTORS = (64, 32, 16, 8, 4, 2, 1)  # communication steps, in shortest steps of the problem
 ORDERS = (0, 1, 2, 3)  # of the highest input derivative that is set; 0: zero-order hold
-INTERMEDIATE_UPDATE = len(ORDERS)  # the case after those of the orders
+INTERMEDIATE_UPDATE = len(ORDERS)  # the case after the orders
 NAMES = (
     "inputs held",
     "1st derivatives",
@@ -66,7 +66,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class Row:
-    """What was found in one case."""
+    """Result of one case."""
 
     name: str
     errors: tuple[float, ...]  # relative, one per step
@@ -125,7 +125,7 @@ class Convergence:
 
     @property
     def violations(self) -> list[str]:
-        """What is not as it should be, one sentence each."""
+        """Broken rules, one sentence each."""
         return [
             f"{NAMES[i]}: slope {self.slopes[i]:.2f} over {self.fitted[i].sum()} steps whose "
             f"error is {CLEAR_OF_INTEGRATION:g} times that of the integration, expected {POWERS[i]}"

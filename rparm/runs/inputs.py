@@ -29,7 +29,7 @@ LARGEST_LOG = 50_000_000  # bytes
 DELIMITERS = ",;\t"
 MOST_SHOWN = 20  # columns in a message
 MOST_TRIED = 100  # rows, to choose the delimiter by
-LONGEST_STEP = 10 * (1 + 1e-9)  # usual steps: what is longer is a gap
+LONGEST_STEP = 10 * (1 + 1e-9)  # usual steps: a longer one is a gap
 MEASURED = "measured"  # section of a scenario
 CONSTANT, SINES, TABLE, FILE = "constant", "sines", "table", "file"  # shapes of an input
 # keys beside a shape, and which one takes them
@@ -110,7 +110,7 @@ class Sines:
     terms: tuple[tuple[float, float, float], ...]  # amplitude, frequency (Hz), phase (rad)
 
     def values(self, elapsed: np.ndarray) -> np.ndarray:
-        # numpy's sine of doubles depends on the processor; that of long doubles, rounded, does not
+        # numpy's sine of doubles depends on the processor; of long doubles, rounded, it does not
         t = elapsed.astype(np.longdouble)
         total = np.full(len(t), self.offset, t.dtype)
         for amplitude, frequency, phase in self.terms:
@@ -186,7 +186,7 @@ class Columns:
     """Columns of a log with their times, as exact as the file writes them."""
 
     first: float  # s, time of the first row
-    times: np.ndarray  # (rows,) s since what was asked for, increasing
+    times: np.ndarray  # (rows,) s since the requested time, increasing
     values: np.ndarray  # (rows, columns), finite
     lines: np.ndarray  # (rows,) of the file, each where a row ends
     joined: Sequence[tuple[int, int]]  # lines that are one row: first and last
@@ -364,7 +364,7 @@ class InputReader:
 
     @property
     def warnings(self) -> list[str]:
-        """What looks damaged in the logs that were read."""
+        """Damages that the logs seem to have."""
         return list(self._warnings)
 
     def inputs(self, content: Mapping[str, Any]) -> dict[str, Signal]:

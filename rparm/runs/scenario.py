@@ -64,7 +64,7 @@ class Scenario:
     """A run of one model: parameters, initial state, communication points and inputs (SI units).
 
     Only what the file gives is in `parameters`, `initial` and `inputs`; everything else has its
-    start value. Arrays are read-only; those of Boolean inputs hold Booleans.
+    start value. Arrays are read-only; Boolean inputs' hold Booleans.
     """
 
     name: str
@@ -167,7 +167,7 @@ def name_of(subject: Path) -> str:
 def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> Scenario:
     """Read and check the scenario at `path`, of the project or of a user.
 
-    Values of `times` replace those of section [time]. UserError if the file cannot be read, or if
+    Values of `times` replace section [time]'s. UserError if the file cannot be read, or if
     anything in it is wrong.
     """
     path = Path(path)
@@ -194,7 +194,7 @@ def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> 
     initial = reader.values(content, INITIAL, model)
     inputs = InputReader(reader, model, times, elapsed)
     signals = inputs.inputs(content)
-    logs = inputs.hashes  # without those of measurements, which no run follows from
+    logs = inputs.hashes  # without logs of measurements, which no run follows from
     measured = inputs.measured(content)
     return Scenario(
         name=path.stem,
@@ -246,7 +246,7 @@ class _Reader(Reader):
     def tolerances(self, tolerance: float, parameters: dict[str, Value], model: Model) -> None:
         """Refuse what the method of integration cannot reach."""
         given = [("tolerance", tolerance)]
-        if parameters.get(TOLERANCE):  # 0: that of the scenario
+        if parameters.get(TOLERANCE):  # 0: the scenario's
             given.append((f"[{PARAMETERS}] {TOLERANCE}", parameters[TOLERANCE]))
         for key, value in given:
             with self.placed(key):

@@ -60,7 +60,7 @@ def simulate(
 ) -> Result:
     """Run `scenario` on the FMU that it was checked against, and record its Real outputs.
 
-    The relative tolerance is that of the scenario if none is given. `progress` is called now and
+    The relative tolerance is the scenario's if none is given. `progress` is called now and
     then with the number of steps done since the last call. `compiled` uses the compiled loop, where
     numba is installed, even if it does not pay.
 
@@ -212,7 +212,7 @@ def _step_compiled(
 
 
 class _CompiledSteps:
-    """How far a run is: `done` of `count` steps."""
+    """Run of which `done` of `count` steps are made."""
 
     def __init__(self, instance: Instance, scenario: Scenario) -> None:
         from rparm.fmi.compiled_loop import Part, Stepper  # numba takes long
@@ -290,7 +290,6 @@ def communication_points(start: float, stop: float, step: float) -> np.ndarray:
     """Return communication points in s.
 
     UserError if the stop time is no whole number of steps on.
-
     """
     for name, value in (("start_time", start), ("stop_time", stop), ("step", step)):
         if not is_finite_number(value):

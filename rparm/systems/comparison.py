@@ -134,7 +134,7 @@ def _steps(ssp: Ssp, times: np.ndarray, wrong: files.Failure) -> np.ndarray:
 
 
 def _check_experiment(ssp: Ssp, experiment: tuple[float, float, float]) -> None:
-    """Check that the references are those of the system's times."""
+    """Check that the references are for the system's times."""
     system = ssp.system
     if not np.allclose((system.start, system.stop, system.step), experiment, rtol=1e-9, atol=0.0):
         start, stop, step = experiment
@@ -164,19 +164,19 @@ class Diagram:
 
     title: str
     curves: Sequence[str]
-    references: Mapping[str, str] = field(default_factory=dict)  # what a curve should follow
+    references: Mapping[str, str] = field(default_factory=dict)  # reference of a curve
 
 
 @dataclass(frozen=True)
 class Rest:
-    """Where a system rests, to find its largest stable steps; names are ``component.variable``."""
+    """State of rest, to find the largest stable steps; names are ``component.variable``."""
 
     variant: str
     moved: Sequence[str]  # states to begin a little off
     signals: Sequence[str]  # that show whether the deviation dies out
-    values: Mapping[str, float] = field(default_factory=dict)  # besides those of the variant
+    values: Mapping[str, float] = field(default_factory=dict)  # besides the variant's
     without: Sequence[str] = ()  # components to take as ideal
-    sequence: Sequence[str] = ()  # order of stepping; default: that of the SSP
+    sequence: Sequence[str] = ()  # order of stepping; default: as in the SSP
 
 
 class Study(Protocol):
@@ -194,7 +194,7 @@ class Study(Protocol):
 class CouplingStudy(Study, Protocol):
     """The module of a system that has a study of what the coupling costs."""
 
-    COUPLING_PICTURE: str  # file name of what it draws
+    COUPLING_PICTURE: str  # file name of its picture
 
     def study_coupling(self, ssp: Path, report: Path) -> dict[str, dict[str, object]]:
         """Print tables, write the picture; numbers by part, whether all is well is ``passed``."""

@@ -39,7 +39,7 @@ MESSAGE = re.compile(
     r"(?P<status>OK|Warning|Discard|Error|Fatal) (?P<text>.*)"
 )
 BAD = ("Discard", "Error", "Fatal")
-# what FMUs say of their solver at the end of a run, and how a table calls it
+# statistics of an FMU's solver at the end of a run, and their names in tables
 STATISTICS = {
     "solver_steps": "solver steps",
     "solver_rhs_evaluations": "evaluations",
@@ -59,7 +59,7 @@ class Run:
     values: np.ndarray  # (rows, len(names)) in the variables' units; Booleans are 0 or 1
     wall_time: float  # s, of the steps with the reading
     messages: tuple[str, ...]  # warnings of the components
-    # those of STATISTICS that components have, by component.variable
+    # of STATISTICS, if components have them, by component.variable
     statistics: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -117,7 +117,7 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     try:
         _check_values(ssp, variant, names, times, values)
         _check_messages(ssp, variant, times, messages)
-    except UserError as error:  # what was read after the last step is not to be trusted
+    except UserError as error:  # values that were read after the last step are not to be trusted
         before = replace(result, times=times[:-1], values=values[:-1], statistics={})
         raise StoppedError(str(error), before if len(times) > 1 else None) from None
     return result

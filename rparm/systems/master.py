@@ -231,7 +231,7 @@ class Master(AbstractContextManager["Master"]):
         also: Sequence[tuple[str, str]],
     ) -> None:
         """Lay out the system's values, and find the source of each input among them."""
-        # what is read, by component
+        # variables to read, by component
         outputs = {}
         for name, instance in instances.items():
             further = [variable for component, variable in also if component == name]
@@ -323,7 +323,7 @@ class Master(AbstractContextManager["Master"]):
         check_finite(component.name, component.outputs, "in initialization")
 
     def _propagate_slopes(self) -> None:
-        """Read slopes at one time: once per component, since those of inputs show in outputs'."""
+        """Read slopes at one time: once per component, since inputs' slopes show in outputs'."""
         when = f"for slopes at t = {self.time!r} s"
         for _ in self.components:
             for component in self.components.values():

@@ -54,7 +54,7 @@ SETTABLE = {
     "Boolean": ("Boolean",),
     "String": ("String",),
 }
-PARAMETERS = ("parameter", "input", "output")  # causalities of what has a start value
+PARAMETERS = ("parameter", "input", "output")  # causalities of variables with a start value
 
 
 # ---- Structure -----------------------------------------------------------------------------------
@@ -118,7 +118,7 @@ class System:
     # parameter sets ALONE is the only variant
     parameters: dict[str, dict[str, dict[str, Parameter]]]
     descriptions: Mapping[str, str] = field(default_factory=dict)  # of variants that have one
-    notes: tuple[str, ...] = ()  # what was chosen where the SSP says nothing
+    notes: tuple[str, ...] = ()  # choices where the SSP says nothing
 
     @property
     def parameter_sets(self) -> dict[str, dict[str, dict[str, Value]]]:
@@ -159,7 +159,7 @@ class Ssp:
     path: Path
     folder: Path  # where it is unpacked
     system: System
-    models: Mapping[str, Model]  # what the FMU of each component declares
+    models: Mapping[str, Model]  # description of each component's FMU
 
     def fmu(self, component: str) -> Path:
         return self.folder / self.system.component(component).source
@@ -177,7 +177,7 @@ class Ssp:
 
     @property
     def notes(self) -> list[str]:
-        """What holds in all runs and is not in the SSP."""
+        """Choices for all runs that the SSP does not make."""
         fed = {f"{c.end_component}.{c.end_connector}" for c in self.system.connections}
         alone = [
             f"{component}.{variable.name}"
@@ -220,7 +220,7 @@ class SspReader:
         self.path = path
         self.folder = folder
         self.descriptions: dict[str, str] = {}  # of parameter sets, by name
-        self.notes: list[str] = []  # what is chosen where the SSP says nothing
+        self.notes: list[str] = []  # choices where the SSP says nothing
 
     def fail(self, file: str, message: str, node: etree._Element | None = None) -> NoReturn:
         line = f", line {node.sourceline}" if node is not None else ""

@@ -32,10 +32,10 @@ SMALLEST_FACTOR, LARGEST_FACTOR = 0.2, 2.5  # from one step to the next
 
 @dataclass(frozen=True)
 class Control:
-    """What steps have to keep; the norm is the largest of `scales`, each signal by its own."""
+    """Tolerance of steps; the norm is the largest signal, each divided by its own of `scales`."""
 
     tolerance: float  # of the error that one accepted step makes, in the norm
-    scales: Mapping[str, float]  # "component.variable": what counts as 1, in its unit
+    scales: Mapping[str, float]  # value that counts as 1, in its unit, by "component.variable"
     first: float  # s
     shortest: float  # s
     longest: float  # s

@@ -162,14 +162,14 @@ def test_numbers_that_json_does_not_know_are_null() -> None:
 NOISE = """
 import os, subprocess, sys
 from rparm import __main__ as cli
-from rparm.commands import Ended
-from rparm.commands import list as command
+from rparm.command_line import Ended
+from rparm.commands import files
 def run(_):
     print("by Python")
     os.write(1, b"by compiled code\\n")
     subprocess.run([sys.executable, "-c", "print('by a child')"])
     return Ended(0, "verdict", {"x": 1})
-command.run = run
+files.do_list = run
 sys.exit(cli.main())
 """
 
