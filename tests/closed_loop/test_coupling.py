@@ -8,19 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rparm.models.closed_loop.coupling import delays, run_study, step_doubling, step_errors, tables
 from rparm.models.closed_loop.coupling import loop as closed_loop
+from rparm.models.closed_loop.coupling import report, study
 from rparm.models.closed_loop.coupling.loop import METHODS, REFERENCE_AHEAD, REFERENCES, ClosedLoop
-from rparm.models.closed_loop.coupling.payload import study_payload
-from rparm.models.closed_loop.coupling.step_doubling import (
+from rparm.models.closed_loop.coupling.study import (
     CORNERS,
     FAST,
     FAST_AND_SLOW,
     FAST_STOP,
     STATES,
     FastAndSlow,
+    StepErrors,
+    study_payload,
 )
-from rparm.models.closed_loop.coupling.step_errors import StepErrors
 
 from rparm.__main__ import main
 from rparm.errors import UserError
@@ -122,7 +122,7 @@ def test_every_law_meets_its_reference_at_the_limits_of_its_efforts(
 
 @pytest.fixture(scope="module")
 def convergence(loop: ClosedLoop) -> StepErrors:
-    return step_errors.study_step_errors(loop, (8e-3, 4e-3, 2e-3, 1e-3))
+    return study.study_step_errors(loop, (8e-3, 4e-3, 2e-3, 1e-3))
 
 
 def test_errors_and_energy_fall_with_the_order(convergence: StepErrors) -> None:
@@ -139,28 +139,28 @@ def test_a_slope_that_is_off_is_seen(convergence: StepErrors) -> None:
         convergence.methods, convergence.steps, errors, convergence.energies, convergence.calls
     )
     assert not any(changed.holds(i) for i in range(4))
-    assert "FAILED" in "\n".join(tables.step_error_lines(changed))
+    assert "FAILED" in "\n".join(report.step_error_lines(changed))
 
 
 def test_the_law_is_the_controllers_own(loop: ClosedLoop) -> None:
     """In a step-0 limit the efforts are the law's at the momentary motion."""
     columns, _ = loop.run(METHODS[3], STEP, stop=1.2)
-    efforts = step_errors.law(loop, columns)
+    efforts = study.law(loop, columns)
     applied = np.array([columns["controller.tau1"], columns["controller.f2"]])
     # the controller extrapolates the measurements over a step: second order
     assert np.abs(efforts - applied)[:, 1:].max() < 5e-5
     held, _ = loop.run(METHODS[0], STEP, stop=1.2)
-    assert np.abs(step_errors.law(loop, held)[0] - held["controller.tau1"]).max() > 3e-3
+    assert np.abs(study.law(loop, held)[0] - held["controller.tau1"]).max() > 3e-3
 
 
 def test_simpson_is_exact_for_cubics() -> None:
     t = np.linspace(0, 2, 9)
-    assert step_errors.simpson(t**3 - t, t[1]) == pytest.approx(2.0, rel=1e-14)
+    assert study.simpson(t**3 - t, t[1]) == pytest.approx(2.0, rel=1e-14)
 
 
 @pytest.mark.parametrize("step", [2e-3, 1e-3])
 def test_the_end_effectors_error_is_what_the_delays_predict(loop: ClosedLoop, step: float) -> None:
-    jacobi, gauss_seidel, ahead = tracking = delays.study_tracking(loop, step)
+    jacobi, gauss_seidel, ahead = tracking = closed_loop.study_tracking(loop, step)
     for found in tracking:
         assert abs(found.deviation) <= 0.1
         rms = np.sqrt(np.mean((found.measured - found.predicted) ** 2))
@@ -168,7 +168,7 @@ def test_the_end_effectors_error_is_what_the_delays_predict(loop: ClosedLoop, st
     assert jacobi.largest < 1e-3
     assert gauss_seidel.largest < jacobi.largest / 2
     assert ahead.largest > jacobi.largest
-    assert delays.tracking_passed(tracking)
+    assert closed_loop.tracking_passed(tracking)
 
 
 def test_integral_action_removes_what_the_payload_costs(loop: ClosedLoop) -> None:
@@ -207,7 +207,7 @@ def test_step_doubling_holds_the_local_error(motion: FastAndSlow, tolerance: flo
 
 
 def test_step_doubling_takes_fewer_steps(loop: ClosedLoop, motion: FastAndSlow) -> None:
-    (found,) = step_doubling.study_doubling(loop, [1e-5])
+    (found,) = study.study_doubling(loop, [1e-5])
     fixed = found.fixed_steps / (FAST_STOP / 0.1)
     assert motion.fixed_error(round(fixed)) <= found.error
     assert motion.fixed_error(round(0.9 * fixed)) > found.error
@@ -246,10 +246,10 @@ def test_tables_and_picture(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    doubling = step_doubling.study_doubling(loop, [1e-4])
-    monkeypatch.setattr(run_study, "opened", lambda _: nullcontext(loop))
-    monkeypatch.setattr(run_study, "study_step_errors", lambda _: convergence)
-    monkeypatch.setattr(run_study, "study_doubling", lambda _: doubling)
+    doubling = study.study_doubling(loop, [1e-4])
+    monkeypatch.setattr(report, "opened", lambda _: nullcontext(loop))
+    monkeypatch.setattr(report, "study_step_errors", lambda _: convergence)
+    monkeypatch.setattr(report, "study_doubling", lambda _: doubling)
     assert main(["coupling", "--report", str(tmp_path / "new")]) == 0
     assert (tmp_path / "new" / "coupling.png").stat().st_size > 50_000
     text = capsys.readouterr().out

@@ -1,7 +1,7 @@
 """Directional and output derivatives of the FMU against a sympy model that starts from positions.
 
 Every derivative must agree within 1e-11 of its exact value; where that is tiny or zero, within
-1e-14 of the largest in its row (rp_symbolic.Exact).
+1e-14 of the largest in its row (symbolic.Exact).
 """
 
 import ctypes
@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 import sympy as sp
 from fmpy.fmi2 import FMU2Model, FMU2Slave
-from tests.support.rp_symbolic import KNOWNS, Exact, Model, Values, random_arm
 
 from tests.support.instances import ERROR, INPUTS, STATES, Instance, LoadedFmu, status_of
+from tests.support.symbolic import KNOWNS, Exact, Model, Values, random_arm
 
 
 @pytest.fixture(scope="module")

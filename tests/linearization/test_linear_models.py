@@ -7,30 +7,30 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.linearization.exact_models import Exact
 
 from rparm.fmi.fmu_file import CO_SIMULATION, MODEL_EXCHANGE, Fmu
 from rparm.linearization.linear import FmuSubject, Linear
-from tests.linearization import exact_models
+from tests.support import symbolic
+from tests.support.symbolic import ExactModel
 
 BOUND = 1e-12  # of the largest entry of a matrix
 POINTS = 25
 CASES = {
-    "arm": ("RPManipulator", exact_models.arm_point),
-    "drives": ("RPActuator", exact_models.drives_point),
-    "controller": ("RPController", exact_models.controller_point),
+    "arm": ("RPManipulator", symbolic.arm_point),
+    "drives": ("RPActuator", symbolic.drives_point),
+    "controller": ("RPController", symbolic.controller_point),
 } | {
-    f"plant, {mode}": ("RPPlant", partial(exact_models.plant_point, mode))
-    for mode in exact_models.MODES
+    f"plant, {mode}": ("RPPlant", partial(symbolic.plant_point, mode))
+    for mode in symbolic.PLANT_MODES
 }
 
 
 @pytest.fixture(scope="module")
-def points() -> Callable[[str], list[Exact]]:
+def points() -> Callable[[str], list[ExactModel]]:
     """The exact models of a case, made once."""
-    made: dict[str, list[Exact]] = {}
+    made: dict[str, list[ExactModel]] = {}
 
-    def of(case: str) -> list[Exact]:
+    def of(case: str) -> list[ExactModel]:
         if case not in made:
             made[case] = [CASES[case][1](seed) for seed in range(POINTS)]
         return made[case]

@@ -7,7 +7,6 @@
 #include "run_instance.h"
 #include "value_references.h"
 
-
 void setUp(void) {
     create_instance();
 }

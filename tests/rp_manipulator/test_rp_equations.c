@@ -56,6 +56,8 @@ static void test_linear_jacobians_are_3(void) {
     for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
         double J1[2][2], J2[2][2];
         next_sample();
+        memset(J1, 0xff, sizeof J1);
+        memset(J2, 0xff, sizeof J2);
         arm_link1_jacobian(arm_at(s.q, s.dq), J1);
         arm_end_effector_jacobian(arm_at(s.q, s.dq), J2);
         double bound = 4 * EPS * (p.l1 + p.lc1 + fabs(q2) + fabs(p.a));
@@ -128,6 +130,7 @@ static void test_christoffel_symbols_are_their_definition(void) {
     for (int n = 0; n < RP_TEST_SAMPLES / 10; ++n) {
         double c[2][2][2];
         next_sample();
+        memset(c, 0xff, sizeof c); /* NaN: each is written */
         arm_christoffel(arm_at(s.q, s.dq), c);
         double bound = 32 * EPS * d11_scale(fabs(s.q[1]) + 4.0);
         for (int i = 0; i < 2; ++i) {

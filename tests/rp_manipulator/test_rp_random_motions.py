@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from tests.support.rp_symbolic import PARAMETERS
 
 from tests.rp_manipulator.random_motions import (
     ALLOWED,
@@ -14,6 +13,7 @@ from tests.rp_manipulator.random_motions import (
     simulate,
 )
 from tests.support.instances import DISCARD, OK, STATES, Instance, LoadedFmu, status_of
+from tests.support.symbolic import PARAMETERS
 
 ARM = (2.0, 1.0, 0.1, 0.05, 0.5, 0.25, 0.1, 9.81)
 WEIGHTLESS = (*ARM[:7], 0.0)

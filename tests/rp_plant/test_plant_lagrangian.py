@@ -5,10 +5,10 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
-from tests.support.rp_symbolic import SmoothPlant
 
 from tests.rp_plant.fmu.plant_runs import COMPLIANT
 from tests.rp_plant.plant_rows import FREE, STUCK, evaluate
+from tests.support.symbolic import SmoothPlant
 
 CASES = 400
 Case = dict[str, float]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from rparm.models.closed_loop.coupling.loop import STATES
-from rparm.models.closed_loop.coupling.step_doubling import FAST, FAST_AND_SLOW, FAST_STOP
+from rparm.models.closed_loop.coupling.study import FAST, FAST_AND_SLOW, FAST_STOP
 from rparm.models.closed_loop.experiment import STEPS_PER_SECOND, STOP
 from rparm.models.closed_loop.references.closed_loop import (
     COMPONENTS,
