@@ -2,10 +2,91 @@
  * CVodeReInit and CVode on N_Vector_Serial that a user of CVODE would write, at the same tolerance
  * as the FMU. All do the same work in turns. Figures are medians of the repeats, as JSON on
  * stdout; compare.py makes tables of them. */
+#define _POSIX_C_SOURCE 199309L // clock_gettime
+
 #include "bench.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sundials/sundials_config.h>
+#include <time.h>
+
+/* ---- Clock and median ------------------------------------------------------------------------ */
+
+double processor_time(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+double clock_cost(void) {
+    double cost[1001];
+    for (int i = 0; i < 1001; i++) {
+        const double begin = processor_time();
+        cost[i] = processor_time() - begin;
+    }
+    return median(cost, 1001);
+}
+
+static int by_value(const void *a, const void *b) {
+    const double x = *(const double *)a;
+    const double y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+double median(double values[], int count) {
+    qsort(values, (size_t)count, sizeof values[0], by_value);
+    return values[count / 2];
+}
+
+/* ---- Report ---------------------------------------------------------------------------------- */
+
+#ifdef __clang__
+#define COMPILER "clang " __clang_version__
+#else
+#define COMPILER "gcc " __VERSION__
+#endif
+
+void report_open(struct report *report, int repeats) {
+    report->has_rows = false;
+    printf("{\"machine\": {\"compiler\": \"%s\", \"sundials\": \"%s\", \"MuJoCo\": \"%s\"},\n",
+           COMPILER, SUNDIALS_VERSION, mujoco_version());
+    printf("\"repeats\": %d, \"rows\": [", repeats);
+}
+
+void report_close(struct report *report) {
+    (void)report;
+    printf("\n]}\n");
+    require(fflush(stdout) == 0, "the figures cannot be written");
+}
+
+void report_row(struct report *report, const char *group, const char *work, const char *run) {
+    printf("%s\n{\"group\": \"%s\", \"work\": \"%s\", \"run\": \"%s\"", report->has_rows ? "," : "",
+           group, work, run);
+    report->has_rows = true;
+}
+
+void report_number(struct report *report, const char *name, double value) {
+    (void)report;
+    require(isfinite(value), "a figure is not finite");
+    printf(", \"%s\": %.17g", name, value);
+}
+
+void report_row_end(struct report *report) {
+    (void)report;
+    putchar('}');
+}
+
+void report_judged(struct report *report, const char *name, double value, double most) {
+    report_number(report, name, value);
+    if (most > 0.0) {
+        printf(", \"judged\": \"%s\"", name);
+        report_number(report, "limit", most);
+    }
+}
+
+/* ---- Program --------------------------------------------------------------------------------- */
 
 static const char usage[] =
     "usage: bench RPManipulator.so RPManipulator.so-of-FMI-3.0 RPPlant.so [--repeats N] [--quick] "

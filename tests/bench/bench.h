@@ -1,10 +1,10 @@
-/* The measurements, and what they share: the report, and races. bench.c chooses. */
+/* The measurements, the report and races. bench.c chooses and reports. */
 #ifndef BENCH_H
 #define BENCH_H
 
 #include "solvers.h"
 
-/* ---- report.c: a JSON object on stdout */
+/* ---- bench.c: a JSON object on stdout */
 
 struct report {
     bool has_rows;
@@ -88,7 +88,7 @@ void measure_free_motion(struct bench *bench);
 /* plant.c: friction and stops, against the arm without them */
 void measure_plant(struct bench *bench);
 
-/* life.c: from fmi2Instantiate to fmi2FreeInstance, and memory */
+/* steps.c: from fmi2Instantiate to fmi2FreeInstance, and memory */
 void measure_life(struct bench *bench);
 
 #endif

@@ -12,7 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* ---- measure.c: clock, order statistics, and the end of a program that cannot measure */
+/* ---- bench.c: clock and median; the end of a program that cannot measure */
 
 /* Returns the s that a processor has worked for this thread: other programs disturb it less than
  * the time of day. */

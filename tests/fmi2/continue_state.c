@@ -1,7 +1,7 @@
 /* The other process of test_fmi2_serialization.c: continue_state FROM TO restores the serialized
  * state in a file and steps on; writes the values, and the state before the step, serialized again,
  * to another file. */
-#include "fmu_snapshots.h"
+#include "fmu_harness.h"
 
 #include <stdio.h>
 #include <unity.h>

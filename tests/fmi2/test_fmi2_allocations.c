@@ -2,8 +2,8 @@
  * setting or getting values, allocate nothing, with any method and after any failure. */
 #include "allocations.h"
 #include "each_method.h"
+#include "fmu_harness.h"
 #include "fmu_sequences.h"
-#include "fmu_snapshots.h"
 
 #include <math.h>
 #include <unity.h>

@@ -3,7 +3,7 @@
  * state. */
 #define _POSIX_C_SOURCE 200809L
 #include "each_method.h"
-#include "fmu_snapshots.h"
+#include "fmu_harness.h"
 
 #include <math.h>
 #include <stdint.h>

@@ -1,7 +1,6 @@
 /* Model Exchange: an importer integrates the model. FMI 2.0, chapter 3; which call works when is in
  * test_fmi2_states.c. */
-#include "fmu_model_exchange.h"
-#include "fmu_snapshots.h"
+#include "fmu_harness.h"
 
 #include <math.h>
 #include <stdlib.h>

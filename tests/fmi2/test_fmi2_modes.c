@@ -1,7 +1,6 @@
 /* Model Exchange: what may be set in which mode, and instances of both kinds side by side.
  * Rollback: test_fmi2_snapshots.c and test_faults_memory.c. FMI 2.0, section 3.2.3. */
-#include "fmu_model_exchange.h"
-#include "fmu_snapshots.h"
+#include "fmu_harness.h"
 #include "fmu_states.h"
 
 #include <math.h>

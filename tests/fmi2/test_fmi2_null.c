@@ -1,8 +1,7 @@
 /* A pointer that is NULL where a function needs one: one error that names the function, nothing is
  * written, and a state saved before leads back. Arrays of any length: test_fmi2_values.c,
  * test_fmi2_model_exchange.c. */
-#include "fmu_model_exchange.h"
-#include "fmu_snapshots.h"
+#include "fmu_harness.h"
 
 #include <unity.h>
 

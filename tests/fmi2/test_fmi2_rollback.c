@@ -1,8 +1,8 @@
 /* Rollback to a saved state is exact to the bit and leaves no trace, wherever and however often it
  * happens. FMI 2.0, section 2.1.8. */
 #include "each_method.h"
+#include "fmu_harness.h"
 #include "fmu_sequences.h"
-#include "fmu_snapshots.h"
 
 #include <stdio.h>
 #include <unity.h>

@@ -2,8 +2,8 @@
  * section 2.1.8. */
 #define _POSIX_C_SOURCE 200809L
 #include "each_method.h"
+#include "fmu_harness.h"
 #include "fmu_sequences.h"
-#include "fmu_snapshots.h"
 #include "fmu_states.h"
 
 #include <stdio.h>

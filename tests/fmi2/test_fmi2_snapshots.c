@@ -1,8 +1,7 @@
 /* Handles of FMU states: their contents in each state of an instance, their owner, and who frees
  * them. FMI 2.0, section 2.1.8. That rollback is exact: test_fmi2_rollback.c. */
 #include "each_method.h"
-#include "fmu_model_exchange.h"
-#include "fmu_snapshots.h"
+#include "fmu_harness.h"
 #include "fmu_states.h"
 
 #include <math.h>

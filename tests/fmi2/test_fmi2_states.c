@@ -1,6 +1,6 @@
 /* Which function works in which state: sections 4.2.4 (Co-Simulation) and 3.2.3 (Model Exchange) of
  * FMI 2.0. */
-#include "fmu_model_exchange.h"
+#include "fmu_harness.h"
 #include "fmu_states.h"
 
 #include <stdio.h>

@@ -1,13 +1,123 @@
 /* platform_host LIBRARY SCRIPT TRANSCRIPT [SCRIPT TRANSCRIPT ...]
  *
  * Loads the library of an FMU and runs scripts of FMI calls (script.h), several of them in as many
- * threads. One program for every platform: C17, and what system.h asks of the system. Ends with 0
+ * threads. One program for every platform: C17, libraries and threads. Ends with 0
  * if all scripts ran, whatever the FMU answered. */
 #include "script.h"
-#include "system.h"
 
 #include <stdlib.h>
 #include <string.h>
+
+/* Libraries and threads: system_open returns NULL, with a line on stderr, if a library cannot be
+ * loaded. system_find writes the address of an exported function to *function; false if there is
+ * none. system_run_threads calls run(items[i]) for each i in its own thread, all at the same time,
+ * and returns when all have ended; false if a thread could not be started. */
+
+#if defined(_WIN32)
+
+/* ---- Windows --------------------------------------------------------------------------------- */
+
+#define WIN32_LEAN_AND_MEAN
+#include <process.h>
+#include <windows.h>
+
+static void *system_open(const char *path) {
+    const HMODULE library = LoadLibraryA(path);
+    if (library == NULL) {
+        fprintf(stderr, "%s: error %lu\n", path, GetLastError());
+    }
+    return (void *)library;
+}
+
+static bool system_find(void *library, const char *name, void *function) {
+    const FARPROC found = GetProcAddress((HMODULE)library, name);
+    memcpy(function, &found, sizeof found);
+    return found != NULL;
+}
+
+struct thread {
+    void (*run)(void *item);
+    void *item;
+};
+
+static unsigned __stdcall run_thread(void *argument) {
+    const struct thread *thread = argument;
+    thread->run(thread->item);
+    return 0;
+}
+
+static bool system_run_threads(void (*run)(void *item), void *const *items, size_t count) {
+    enum { MOST = MAXIMUM_WAIT_OBJECTS };
+    struct thread threads[MOST];
+    HANDLE handles[MOST];
+    size_t started = 0;
+    for (; started < count && started < MOST; started++) {
+        threads[started] = (struct thread){run, items[started]};
+        handles[started] = (HANDLE)_beginthreadex(NULL, 0, run_thread, &threads[started], 0, NULL);
+        if (handles[started] == NULL) {
+            break;
+        }
+    }
+    for (size_t i = 0; i < started; i++) {
+        WaitForSingleObject(handles[i], INFINITE);
+        CloseHandle(handles[i]);
+    }
+    return started == count;
+}
+
+#else
+
+/* ---- POSIX ----------------------------------------------------------------------------------- */
+
+#include <dlfcn.h>
+#include <pthread.h>
+
+static void *system_open(const char *path) {
+    void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+    if (library == NULL) {
+        fprintf(stderr, "%s\n", dlerror());
+    }
+    return library;
+}
+
+static bool system_find(void *library, const char *name, void *function) {
+    void *found = dlsym(library, name);
+    // as POSIX has it: a function pointer is the bytes of the object pointer
+    memcpy(function, &found, sizeof found);
+    return found != NULL;
+}
+
+struct thread {
+    void (*run)(void *item);
+    void *item;
+    pthread_t handle;
+};
+
+static void *run_thread(void *argument) {
+    const struct thread *thread = argument;
+    thread->run(thread->item);
+    return NULL;
+}
+
+static bool system_run_threads(void (*run)(void *item), void *const *items, size_t count) {
+    enum { MOST = 64 };
+    struct thread threads[MOST];
+    size_t started = 0;
+    for (; started < count && started < MOST; started++) {
+        threads[started] = (struct thread){.run = run, .item = items[started]};
+        if (pthread_create(&threads[started].handle, NULL, run_thread, &threads[started]) != 0) {
+            break;
+        }
+    }
+    for (size_t i = 0; i < started; i++) {
+        pthread_join(threads[i].handle, NULL);
+    }
+    return started == count;
+}
+
+#endif
+
+/* ---- Jobs ------------------------------------------------------------------------------------ */
 
 enum { MOST_SCRIPTS = 64 };
 

@@ -24,7 +24,7 @@ NATIVE_HOST = (
 )
 # of builds for one platform, of the hosts, and of wine
 SCRATCH = BUILD / "platforms"
-HOST_SOURCES = ("platform_host.c", "script.c", "calls.c", "run.c", "system.c")
+HOST_SOURCES = ("platform_host.c", "script.c")
 TIME_LIMIT = 900.0  # s; zig makes its C library for Windows when it is asked for the first time
 
 

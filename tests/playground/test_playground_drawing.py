@@ -7,8 +7,7 @@ import pytest
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
-from tests.playground.controls import choose, click, type_number
-from tests.playground.opened_page import OpenedPage
+from tests.playground.opened_page import OpenedPage, choose, click, type_number
 from tests.support.browser import Browser
 
 # ---- Hands

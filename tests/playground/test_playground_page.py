@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.playground.controls import choose, click, find, type_number
-from tests.playground.opened_page import OpenedPage
+from tests.playground.opened_page import OpenedPage, choose, click, find, type_number
 from tests.support.browser import Browser
 from tests.support.paths import ROOT
 

@@ -5,9 +5,8 @@ import math
 import pytest
 from selenium.webdriver.common.keys import Keys
 
-from tests.playground.controls import choose, click, find, type_number
 from tests.playground.native import Native
-from tests.playground.opened_page import OpenedPage
+from tests.playground.opened_page import OpenedPage, choose, click, find, type_number
 
 # as the page's first scene has it
 FRICTION = {"coulomb_friction1": 0.4, "breakaway_friction1": 0.8, "stribeck_velocity1": 0.1}

@@ -4,8 +4,6 @@
 #include "allocator.h"
 #include "captured_stderr.h"
 #include "fmu_harness.h"
-#include "fmu_model_exchange.h"
-#include "fmu_snapshots.h"
 
 #include <stdio.h>
 #include <string.h>
