@@ -4,7 +4,7 @@ A mass m moves along the normal of a wall with stiffness k and damping d and sta
 master steps mass and wall with the communication step h. The force on the mass changes only at
 communication points ("held"), or is a straight line between them ("extrapolated"). So it is late,
 which acts as a negative damping; from a damping of the wall on, the motion dies out.
-models/rp_environment/stability.md derives these limits.
+README.md derives these limits.
 
 `order` and `inputs` are those of rparm/systems/master.py. In Gauss-Seidel order with extrapolated
 inputs the mass steps first; with held inputs either may.

@@ -28,7 +28,7 @@ CASES = [(order, inputs) for order in ORDERS for inputs in INPUTS]
 each_case = pytest.mark.parametrize(("order", "inputs"), CASES)
 each_order = pytest.mark.parametrize("order", ORDERS)
 
-PAGE = ROOT / "models" / "rp_environment" / "stability.md"
+PAGE = ROOT / "models" / "machine" / "README.md"
 CONTACT = Contact(mass=1.6, stiffness=1e4)
 STEP = 1e-3  # s
 FORCE = 400.0  # N, presses the mass against the wall
