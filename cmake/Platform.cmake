@@ -40,7 +40,7 @@ endif()
 set(CMAKE_C_VISIBILITY_PRESET hidden)
 
 # Fused multiply-adds would give other bits from one compiler to the next, and break the exact sums of
-# src/instance/clock.c.
+# src/instance/clock.h.
 set(language_options -ffp-contract=off)
 # Callbacks and functions of standards have parameters that not every implementation needs.
 set(warning_options -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wmissing-prototypes -Wno-unused-parameter -Werror)

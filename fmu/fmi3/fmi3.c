@@ -62,8 +62,8 @@ struct answer {
 };
 
 /* Calls the importer in intermediate update mode; an error there ends the step. */
-static enum status update(struct fmi3_component *component, double time, bool can_return_early,
-                          struct answer *answer) {
+static enum status call_importer(struct fmi3_component *component, double time,
+                                 bool can_return_early, struct answer *answer) {
     struct component *base = &component->base;
     *answer = (struct answer){.returns_early = fmi3False, .early_time = time};
     base->state = STATE_INTERMEDIATE_UPDATE;
@@ -81,7 +81,7 @@ static enum status ask_inputs(void *component_pointer, double time) {
     struct answer answer;
     component->can_set = true;
     component->can_get = false;
-    return update(component, time, false, &answer);
+    return call_importer(component, time, false, &answer);
 }
 
 /* Lets the importer get outputs after an internal step; it may ask for the end of the step. */
@@ -91,7 +91,7 @@ static enum status accept(void *component_pointer, double time, double *end) {
     struct answer answer;
     component->can_set = false;
     component->can_get = true;
-    const enum status status = update(component, time, can_return_early, &answer);
+    const enum status status = call_importer(component, time, can_return_early, &answer);
     if (can_return_early && answer.returns_early && answer.early_time < *end) {
         *end = answer.early_time;
     }

@@ -1,21 +1,5 @@
 #include "clock.h"
 
-#include <math.h>
-
-/* Largest part of a step that counts as a master's rounding. */
-static const double largest_part = 0.01;
-
-double clock_slack(double size, double step_size) {
-    return fmax(fmin(1e-9 * fmax(size, step_size), largest_part * step_size), clock_rounding(size));
-}
-
-double clock_tick_slack(double size, double step_size, double drift) {
-    const double rounding = clock_rounding(size);
-    return fmax(fmin(drift + rounding, largest_part * step_size), rounding);
-}
-
-/* ---- Polynomials ---------------------------------------------------------------------------- */
-
 double polynomial_value(const struct polynomial *polynomial, double t) {
     const double *d = polynomial->d;
     return d[0] + t * (d[1] + t / 2.0 * (d[2] + t / 3.0 * d[3]));

@@ -50,10 +50,16 @@ static inline double clock_rounding(double size) {
     return 4.0 * clock_spacing(size);
 }
 
+/* Largest part of a step that counts as a master's rounding. */
+#define CLOCK_LARGEST_PART 0.01
+
 /* Returns how far the communication point of a master may be from the time of the instance at the
  * begin of a step of step_size > 0: min(1e-9 max(size, step_size), step_size / 100), and never less
  * than clock_rounding. */
-double clock_slack(double size, double step_size);
+static inline double clock_slack(double size, double step_size) {
+    return fmax(fmin(1e-9 * fmax(size, step_size), CLOCK_LARGEST_PART * step_size),
+                clock_rounding(size));
+}
 
 /* Returns by how much a step adds to the drift of a master: the mismatch that was accepted at its
  * beginning or, if the master hides it, the rounding of a sum of times. */
@@ -65,7 +71,10 @@ static inline double clock_step_drift(double size, double mismatch) {
  * drift, summed over all steps, up to step_size / 100, and never less than clock_rounding. So a
  * master that adds up its steps meets each event at the intended step, and with exact times no
  * event comes early. */
-double clock_tick_slack(double size, double step_size, double drift);
+static inline double clock_tick_slack(double size, double step_size, double drift) {
+    const double rounding = clock_rounding(size);
+    return fmax(fmin(drift + rounding, CLOCK_LARGEST_PART * step_size), rounding);
+}
 
 /* ---- Polynomials ----------------------------------------------------------------------------
  * An input over a step: a Taylor polynomial of degree 3 from the beginning of the step. */

@@ -306,6 +306,25 @@ enum status instance_prepare_history(struct instance *instance, struct clock_tim
     return STATUS_OK;
 }
 
+bool instance_interpolate(struct instance *instance, double target) {
+    if (!integrator_interpolate(instance->integrator, target,
+                                doubles_of(instance->memory.values, instance->model->states))) {
+        return false;
+    }
+    instance->state.latest_time = target;
+    return true;
+}
+
+enum status instance_advance(struct instance *instance, struct clock_time end, int64_t steps_left) {
+    struct instance_state *state = &instance->state;
+    const enum status status =
+        integrator_advance(instance->integrator, clock_difference(end, state->restart_time),
+                           steps_left > 1 ? steps_left : 1, &state->latest_time,
+                           doubles_of(instance->memory.values, instance->model->states));
+    integrator_get_statistics(instance->integrator, &state->statistics);
+    return status;
+}
+
 enum status instance_rest(struct instance *instance, struct clock_time end, struct clock_time until,
                           bool meets_time_event, enum continuation continuation) {
     struct instance_state *state = &instance->state;
@@ -355,6 +374,5 @@ void instance_note_part(struct instance *instance, enum status status, bool is_w
     if (!state->has_history) {
         state->next_step = status == STATUS_OK ? integrator_next_step(instance->integrator) : 0.0;
     }
-    integrator_get_statistics(instance->integrator, &state->statistics);
     instance_write_statistics(&state->statistics, &state->own);
 }

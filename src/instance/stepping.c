@@ -256,31 +256,19 @@ static bool is_at_event(const struct instance *instance) {
 /* Advances to step->until, which may become earlier on the way. */
 static enum status advance(struct step *step) {
     struct instance *instance = step->instance;
-    struct instance_state *state = &instance->state;
-    double *x = doubles_of(instance->memory.values, instance->model->states);
-    if (step->options->accept != NULL) {
-        integrator_set_observer(instance->integrator, observe, step);
+    const struct instance_state *state = &instance->state;
+    if (step->options->accept == NULL) {
+        return instance_advance(instance, step->until, steps_left(step));
     }
-    double target = clock_difference(step->until, state->restart_time);
-    enum status status;
-    for (;;) {
-        const int64_t left = steps_left(step);
-        status = integrator_advance(instance->integrator, target, left > 1 ? left : 1,
-                                    &state->latest_time, x);
-        if (step->options->accept == NULL || status != STATUS_OK || step->is_over ||
-            is_at_event(instance)) {
-            break;
-        }
-        target = clock_difference(step->until, state->restart_time);
-        if (!(state->latest_time < target)) {
-            break;
-        }
-        // to the new end; the internal step that the observer cut short counts
-        integrator_get_statistics(instance->integrator, &state->statistics);
+    integrator_set_observer(instance->integrator, observe, step);
+    enum status status = STATUS_OK;
+    bool is_short = true; // of step->until: the observer has cut an internal step short
+    while (is_short) {
+        status = instance_advance(instance, step->until, steps_left(step));
+        is_short = status == STATUS_OK && !step->is_over && !is_at_event(instance) &&
+                   state->latest_time < clock_difference(step->until, state->restart_time);
     }
-    if (step->options->accept != NULL) {
-        integrator_set_observer(instance->integrator, NULL, NULL);
-    }
+    integrator_set_observer(instance->integrator, NULL, NULL);
     return status;
 }
 
@@ -449,26 +437,15 @@ static void end_at(const struct step *step, struct clock_time time) {
     }
 }
 
-/* Goes to a point that an internal step has passed already: then nothing can fail, and nothing is
- * counted. Returns false if no step has. */
-static bool interpolate(const struct step *step, double target) {
-    struct instance *instance = step->instance;
-    if (!integrator_interpolate(instance->integrator, target,
-                                doubles_of(instance->memory.values, instance->model->states))) {
-        return false;
-    }
-    instance->state.latest_time = target;
-    end_at(step, step->end);
-    return true;
-}
-
 static enum status integrate(struct step *step) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
     const double target = clock_difference(step->end, state->restart_time);
-    const enum continuation continuation = instance_continuation(instance, target);
     set_part(step);
-    if (continuation == CONTINUE_NOW && !step->meets_time_event && interpolate(step, target)) {
+    const enum continuation continuation = instance_continuation(instance, target);
+    if (continuation == CONTINUE_NOW && !step->meets_time_event &&
+        instance_interpolate(instance, target)) {
+        end_at(step, step->end);
         return STATUS_OK;
     }
     keep(step);

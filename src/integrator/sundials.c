@@ -177,7 +177,7 @@ void sundials_get_state(const struct sundials *sundials, double x[]) {
     memmove(x, small_vector_data(sundials->x), sundials->problem->ode.state_count * sizeof(double));
 }
 
-static enum status rest(double t, const double x[], double dx[], void *state_count) {
+static enum status rest_rhs(double t, const double x[], double dx[], void *state_count) {
     memset(dx, 0, *(const size_t *)state_count * sizeof(double));
     return STATUS_OK;
 }
@@ -202,7 +202,7 @@ enum status sundials_warm_up(void *memory) {
     N_VConst(1.0, sundials->work);
     *problem = (struct problem){
         .ode = {.state_count = state_count,
-                .rhs = rest,
+                .rhs = rest_rhs,
                 .jacobian = rest_jacobian,
                 .context = &state_count},
         .sink = wanted.sink,
