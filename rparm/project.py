@@ -47,9 +47,7 @@ PROGRAM = "rparm" if INSTALLED else "./run.sh"
 STRUCTURE = "SystemStructure.ssd"
 DIAGRAM = "system.svg"
 STUDY = "study"  # the module of a system's folder that rparm.systems.comparison describes
-IDENTIFICATION = (
-    "identification"  # the module of a system's folder for rparm.identification.request
-)
+IDENTIFICATION = "identification"  # module of a system's folder, read by identification.request
 ANIMATION = "animation"  # the module of a model's or system's folder for rparm.report.motion
 PROOF = "proof"  # folder of a model with the program that encloses its motions
 SCENARIO_FOLDERS = ("scenarios", "convergence")

@@ -53,9 +53,7 @@ COLUMNS = 3
 LONGEST_LINE = 40  # characters of a label below a column
 FEWEST = 6  # of these, below many bars
 COLOURS = "viridis"  # in order of brightness, also for the colour-blind
-NARROW = (
-    1e-3  # of a value: a smaller variation is drawn as a difference, which short numbers can write
-)
+NARROW = 1e-3  # of a value: a smaller variation is drawn as a difference, to be written short
 # names come from a user's file: no mathematics
 TEXTS = STYLE | {"text.parse_math": False}
 

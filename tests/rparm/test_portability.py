@@ -86,7 +86,7 @@ def _not_portable_call(call: ast.Call) -> Iterator[str]:
         yield f"{name} without encoding"
     if name == "os.open" or not re.search(r"(^|\.)(open|read_text|write_text)$", name):
         return
-    if name in ("read_text", "write_text"):  # rparm.files, rparm.files
+    if name in ("read_text", "write_text"):  # of rparm.files
         return
     mode = ""
     if name.endswith("open"):
