@@ -1,4 +1,4 @@
-"""What the modules that make references share: inputs, variants of systems, files.
+"""Inputs, variants of systems and files, for the modules that make references.
 
 The reference of a scenario is three files in the format of the FMI cross-check, in a folder of its
 name: MODEL_ref.csv with the outputs, MODEL_in.csv with the inputs, MODEL_ref.opt with the times.

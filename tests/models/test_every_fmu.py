@@ -1,5 +1,5 @@
-"""What every FMU promises, over all FMUs and their scenarios: scenarios meet their references, fmpy
-runs it, rollback leaves no trace, dependencies are those of the values, names have one unit."""
+"""Promises of every FMU, over all FMUs and their scenarios: scenarios meet their references, fmpy
+runs it, rollback leaves no trace, dependencies are found in values, names have one unit."""
 
 import math
 import random
@@ -88,7 +88,7 @@ JUMPS, AFTER = 8, 12  # saved states of a scenario, steps that are made again fr
 
 
 class Run:
-    """An instance on a scenario, with all that it shows; inputs are lines over each step."""
+    """An instance on a scenario, and all its values; inputs are lines over each step."""
 
     def __init__(self, instance: Instance, scenario: Scenario) -> None:
         self.instance, self.scenario = instance, scenario

@@ -1,9 +1,9 @@
 """Arm, plant, drives and controller in sympy, evaluated with 40 digits, at random points.
 
 Shares nothing with the C code: equations of motion and outputs are those of the references, from
-positions; joint loads are derived here by Newton's and Euler's laws. What is compared with FMUs:
-values and derivatives of the arm (Model), the plant's smooth terms (SmoothPlant), the controller's
-laws (law), and linear models (ExactModel).
+positions; joint loads are derived here by Newton's and Euler's laws. Tests compare values and
+derivatives of the arm (Model), the plant's smooth terms (SmoothPlant), the controller's laws (law)
+and linear models (ExactModel) with FMUs.
 """
 
 import functools
