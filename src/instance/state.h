@@ -38,7 +38,7 @@ struct instance_state {
 
     /* The integrator's history, from which it continues while nothing changes. A replay needs only
      * the restart and the first and the last advance since then (integrator_advance). Only
-     * history.c writes these fields. */
+     * history.c updates these fields. */
     bool has_history;
     struct clock_time restart_time;
     double horizon;     /* time that the integrator may not pass, s since the restart */

@@ -7,9 +7,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* The types of values, once for every function that exists for each of them.
+/* Types of values, listed once for all functions that exist for each type.
  *
- * X(name in functions, name in constants, element of an array): those that are kept as int.
+ * X(name in functions, name in constants, element of an array) for the types that are kept as int:
  *   integer       variables of type int32 and enumerations
  *   int32         variables of type int32
  *   enumeration   enumerations
