@@ -38,6 +38,7 @@ import platformdirs
 from rparm import fmu_tools, shipped
 from rparm.errors import UserError, did_you_mean, reason
 from rparm.files import is_file
+from rparm.needs import COMMANDS
 
 PACKAGE = Path(__file__).resolve().parent
 INSTALLED = shipped.SHARE.is_dir()  # else the package is in a checkout
@@ -341,8 +342,8 @@ def how_to_install(extra: str) -> str:
     """Return the command that installs the packages of an extra of the distribution."""
     if INSTALLED:
         return f'pip install "rparm[{extra}]"'
-    of_setup = extra in ("campaign", "control", "federation")
-    return f"./setup.sh --{extra}" if of_setup else "./setup.sh"
+    has_lock = any(command.lock == extra for command in COMMANDS.values())
+    return f"./setup.sh --{extra}" if has_lock else "./setup.sh"
 
 
 def not_installed(packages: str, extra: str) -> UserError:
