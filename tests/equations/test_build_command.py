@@ -15,7 +15,7 @@ import pytest
 
 import rparm
 from rparm.errors import UserError
-from tests.equations.compiled import Model, ModelFileError, read_text, runtime
+from tests.equations.compiled import Model, ModelFileError, building, read_text
 from tests.equations.examples import FOLDER, build, simulated
 from tests.support.paths import ROOT
 
@@ -81,10 +81,10 @@ def test_what_to_install_is_said_where_no_compiler_is(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.setattr(runtime, "find_spec", lambda _: None)
+    monkeypatch.setattr(building, "find_spec", lambda _: None)
     (tmp_path / "runtime.json").write_text(json.dumps({"compiler": [name]}))
     with pytest.raises(ModelFileError, match=r'^gcc, clang or zig: .* "rparm\[build\]" installs'):
-        runtime.Runtime.load(tmp_path / "runtime.json", of_this_machine=True)
+        building.Runtime.load(tmp_path / "runtime.json", of_this_machine=True)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs scripts")
@@ -93,7 +93,7 @@ def test_a_compiler_that_fails_is_named(tmp_path: Path) -> None:
     compiler.write_text("#!/bin/sh\necho cc: error: no assembler >&2\nexit 1\n")
     compiler.chmod(0o755)
     (tmp_path / "runtime.json").write_text(json.dumps({"compiler": [str(compiler)]}))
-    found = runtime.Runtime.load(tmp_path / "runtime.json", of_this_machine=True)
+    found = building.Runtime.load(tmp_path / "runtime.json", of_this_machine=True)
     with pytest.raises(ModelFileError, match=r"^.*/cc: cc: error: no assembler; [^\n]*install"):
         found.run(tmp_path)
 
