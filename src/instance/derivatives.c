@@ -196,9 +196,10 @@ static bool is_argument(const struct instance *instance, const struct variable *
            (variable->owner == VARIABLE_OF_MODEL && variable->causality == CAUSALITY_PARAMETER);
 }
 
-static enum status check_matrix(const struct instance *instance, enum known_kinds kinds,
-                                const unsigned unknowns[], size_t unknown_count,
-                                const unsigned knowns[], size_t known_count) {
+/* Checks the variables of rows and columns, and brings the outputs up to date. */
+static enum status prepare_matrix(struct instance *instance, enum known_kinds kinds,
+                                  const unsigned unknowns[], size_t unknown_count,
+                                  const unsigned knowns[], size_t known_count) {
     for (size_t i = 0; i < unknown_count; i++) {
         if (find_as(instance, unknowns[i], is_unknown, "an output, a local or a derivative") ==
             NULL) {
@@ -216,7 +217,7 @@ static enum status check_matrix(const struct instance *instance, enum known_kind
             return STATUS_INVALID_ARGUMENT;
         }
     }
-    return STATUS_OK;
+    return instance_update_outputs(instance);
 }
 
 static double *double_in(char *structure, const struct variable *variable) {
@@ -259,10 +260,7 @@ enum status instance_get_directional_derivative(struct instance *instance, enum 
                                                 const unsigned knowns[], size_t known_count,
                                                 const double v[], double result[]) {
     enum status status =
-        check_matrix(instance, kinds, unknowns, unknown_count, knowns, known_count);
-    if (status == STATUS_OK) {
-        status = instance_update_outputs(instance);
-    }
+        prepare_matrix(instance, kinds, unknowns, unknown_count, knowns, known_count);
     if (status != STATUS_OK) {
         return status;
     }
@@ -316,10 +314,7 @@ enum status instance_get_adjoint_derivative(struct instance *instance, enum know
                                             const unsigned knowns[], size_t known_count,
                                             const double v[], double result[]) {
     enum status status =
-        check_matrix(instance, kinds, unknowns, unknown_count, knowns, known_count);
-    if (status == STATUS_OK) {
-        status = instance_update_outputs(instance);
-    }
+        prepare_matrix(instance, kinds, unknowns, unknown_count, knowns, known_count);
     // nothing is written to result before all derivatives have succeeded
     double by_time = 0.0;
     for (size_t i = 0; status == STATUS_OK && i < known_count; i++) {
