@@ -131,7 +131,7 @@ class Runtime:
     def load(cls, path: Path, of_this_machine: bool) -> Runtime:
         """Load runtime.json; ModelFileError if it is not there, or no compiler for it.
 
-        For this machine, a compiler of its own comes before zig.
+        For this machine, gcc and clang come before zig.
         """
         try:
             content = json.loads(path.read_text(encoding="utf-8"))

@@ -66,7 +66,7 @@ def mathml(latex: str, display: str) -> str:
     """
     try:
         root = ET.fromstring(convert(latex, display=display))
-    except Exception as error:  # noqa: BLE001 (those of the converter have no common base)
+    except Exception as error:  # noqa: BLE001 (the converter's errors have no common base)
         raise FormulaError(str(error) or type(error).__name__) from None
     for element in root.iter():
         element.tag = element.tag.removeprefix(f"{{{NAMESPACE}}}")

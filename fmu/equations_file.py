@@ -466,7 +466,7 @@ def _in_order(file: ModelFile) -> list[Expression]:
 
 
 def _check_units(file: ModelFile) -> None:
-    """Check that units fit, and find those of [where]."""
+    """Check that units fit, and find the units of [where]."""
     declared = [v for v in file.variables.values() if v.section != "where"]
     units = {v.name: unit_of_exponents(v.exponents) for v in declared} | {"time": SECOND}
     for expression in file.order:

@@ -6,7 +6,7 @@ communication points ("held"), or is a straight line between them ("extrapolated
 which acts as a negative damping; from a damping of the wall on, the motion dies out.
 README.md derives these limits.
 
-`order` and `inputs` are those of rparm/systems/master.py. In Gauss-Seidel order with extrapolated
+rparm/systems/master.py explains `order` and `inputs`. In Gauss-Seidel order with extrapolated
 inputs the mass steps first; with held inputs either may.
 
     build/venv/bin/python -m rparm.models.machine.wall_limit

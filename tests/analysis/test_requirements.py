@@ -161,7 +161,7 @@ def imported(path: Path) -> set[str]:
 def own_modules() -> dict[str, list[Path]]:
     """The project's files by names to import, from the root or, of scripts, a folder."""
     found: dict[str, list[Path]] = {}
-    for top in ("rparm", "fmu", "models", "playground", "tests", "docs"):
+    for top in ("rparm", "fmu", "models", "playground", "tests"):
         for path in (ROOT / top).rglob("*.py"):
             parts = path.relative_to(ROOT).with_suffix("").parts
             parts = parts[:-1] if path.stem == "__init__" else parts

@@ -274,7 +274,7 @@ def predicted_error(loop: ClosedLoop, smooth: Columns, method: Method) -> np.nda
     forcing = np.linalg.solve(mass, lacking[:, :, None])[:, :, 0]
     error = _error_motion(forcing, gains, step)
 
-    # error of the end effector: J(q) times that of the joints
+    # error of the end effector: J(q) times the joints' error
     turn = np.array([-smooth["arm.ee_y"], smooth["arm.ee_x"]]) * error[:, 0]
     slide = np.array([np.cos(smooth["arm.q1"]), np.sin(smooth["arm.q1"])]) * error[:, 1]
     return np.hypot(*(turn + slide))
