@@ -126,25 +126,6 @@ def test_inputs_count_at_samples_only(sampled: Callable[..., Instance]) -> None:
     assert seen == [x for pair in zip(efforts, errors, strict=True) for x in pair]
 
 
-def test_the_payload_counts_at_samples_only(sampled: Callable[..., Instance]) -> None:
-    instance = sampled(0.25, 0.0625, payload_mass=2.0, payload_z=0.25)
-    loaded = instance.loaded
-    instance.fmi.setInteger([loaded.references["mode"]], [3])
-    attached = [loaded.references["payload_attached"]]
-
-    def unlimited_after(t: float, is_attached: bool) -> float:
-        instance.fmi.setBoolean(attached, [is_attached])
-        instance.step(t, 0.125)
-        return instance.get("tau1_unlimited")[0]
-
-    # samples at 0.25, 0.5, 0.75 s
-    without = [unlimited_after(t, t in (0.0, 0.25)) for t in (0.0, 0.125, 0.25, 0.375)]
-    assert without[0] == without[1]
-    light = unlimited_after(0.5, True)
-    assert unlimited_after(0.625, True) == light
-    assert unlimited_after(0.75, True) > light + 2.0 * 9.81 * 0.5
-
-
 def test_it_tends_to_the_continuous_form(sampled: Callable[..., Instance]) -> None:
     """Euler's error falls with the period, in proportion to it."""
     values = {"integral1": 150.0, "q1_ref": -0.1875}
