@@ -204,6 +204,15 @@ static void test_the_polynomials_satisfy_the_equations(void) {
             plant.modes.joint[n % 2] = RP_PLANT_STUCK;
         } else if (n % 3 == 1) {
             plant_test_random_contacts(&random_source, &plant);
+        } else if (n % 9 == 2) { // Coulomb friction alone: the manipulator's series
+            plant_test_random_arm(&random_source, &plant);
+            plant.parameters.coulomb_friction[0] = 2.0;
+            plant.parameters.coulomb_friction[1] = 3.0;
+            plant.modes.joint[0] = RP_PLANT_FORWARD;
+            plant.modes.joint[1] = RP_PLANT_BACKWARD;
+            plant.modes.payload = RP_PLANT_RELEASED;
+            next_inputs();
+            memset(inputs[2], 0, 3 * sizeof inputs[0]);
         }
         expand_far();
         assert_model_at(0.0);
