@@ -11,12 +11,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import mpmath
-import numpy as np
 import pytest
 import sympy as sp
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 
-from tests.support.instances import ERROR, INPUTS, STATES, Instance, LoadedFmu, status_of
+from tests.support.instances import INPUTS, STATES, Instance, LoadedFmu
 from tests.support.symbolic import KNOWNS, Exact, Model, Values, random_arm
 
 
@@ -195,71 +194,6 @@ def test_asking_changes_nothing(loaded: LoadedFmu, model: Model) -> None:
         assert instance.everything() == other.everything()
 
 
-# ---- Structure -----------------------------------------------------------------------------------
-
-
-def structure(unknowns: list) -> dict[str, set[str]]:
-    """Names of the dependencies of each entry of a section of ModelStructure."""
-    return {
-        unknown.variable.name: {known.name for known in unknown.dependencies}
-        for unknown in unknowns
-    }
-
-
-@pytest.mark.parametrize(
-    ("section", "enter", "knowns"),
-    [
-        ("outputs", between_steps, (*INPUTS, *STATES)),
-        ("outputs", in_continuous_time_mode, (*INPUTS, *STATES)),
-        ("derivatives", between_steps, (*INPUTS, *STATES)),
-        ("derivatives", in_continuous_time_mode, (*INPUTS, *STATES)),
-        ("initialUnknowns", in_initialization_mode, KNOWNS),
-    ],
-)
-@each_seed
-def test_model_structure_is_the_pattern_of_the_derivatives(
-    loaded: LoadedFmu, section: str, enter: Callable, knowns: tuple[str, ...], seed: int
-) -> None:
-    declared = structure(getattr(loaded.description, section))
-    found = {name: set() for name in declared}
-    with enter(loaded, seed) as instance:
-        for known in knowns:
-            for unknown, value in directional(instance, tuple(declared), {known: 1.0}).items():
-                if value != 0.0:
-                    found[unknown].add(known)
-    assert found == declared
-
-
-@pytest.mark.parametrize("enter", [between_steps, in_continuous_time_mode])
-def test_linearization(loaded: LoadedFmu, model: Model, enter: Callable) -> None:
-    """A, B, C and D, put together from the model description as an importer does."""
-    description = loaded.description
-    rates = [unknown.variable.name for unknown in description.derivatives]
-    rates = tuple(ALIASES.get(rate, rate) for rate in rates)
-    states = tuple(unknown.variable.derivative.name for unknown in description.derivatives)
-    outputs = tuple(unknown.variable.name for unknown in description.outputs)
-    inputs = tuple(v.name for v in description.modelVariables if v.causality == "input")
-    parts = {
-        "A": (rates, states),
-        "B": (rates, inputs),
-        "C": (outputs, states),
-        "D": (outputs, inputs),
-    }
-    with enter(loaded, 11) as instance:
-        exact = model.jacobian(point_of(instance), (*INPUTS, *STATES))
-        matrices = {
-            part: np.transpose(
-                [list(directional(instance, rows, {column: 1.0}).values()) for column in columns]
-            )
-            for part, (rows, columns) in parts.items()
-        }
-    assert [matrices[part].shape for part in "ABCD"] == [(4, 4), (4, 2), (14, 4), (14, 2)]
-    assert matrices["A"][:2].tolist() == [[0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
-    for part, (rows, columns) in parts.items():
-        for (i, row), (j, column) in itertools.product(enumerate(rows), enumerate(columns)):
-            exact[row, column].assert_is(matrices[part][i, j], (part, row, column))
-
-
 # ---- Output derivatives --------------------------------------------------------------------------
 
 
@@ -344,48 +278,3 @@ def test_input_derivatives_apply_to_one_step(loaded: LoadedFmu, model: Model, se
         t = instance.step(0.0, 0.01)
         t = instance.step(t, 0.01)
         assert_output_derivatives(instance, model, {}, NO_RATES)
-
-
-# ---- Bad input -----------------------------------------------------------------------------------
-
-
-def assert_refused(instance: Instance, words: str, call: Callable, *arguments: object) -> None:
-    """fmi2Error, and one message of it that says what is wrong."""
-    assert status_of(call, *arguments) == ERROR
-    errors = [message.text for message in instance.messages if message.status == ERROR]
-    assert len(errors) == 1
-    assert words in errors[0]
-
-
-DQ1, DDQ1, TAU1, D11, M1, NOWHERE = 12, 14, 20, 50, 1, 99
-UNKNOWN_CASES = {
-    "no such unknown": ([DDQ1, NOWHERE], [TAU1], "99"),
-    "no such known": ([DDQ1], [NOWHERE], "99"),
-    "an input as unknown": ([TAU1], [TAU1], "tau1"),
-    "a parameter as unknown": ([M1], [TAU1], "m1"),
-    "the time as unknown": ([0], [TAU1], "time"),
-    "a counter as unknown": ([80], [TAU1], "solver_steps"),
-    "a solver variable as unknown": ([84], [TAU1], "effective_relative_tolerance"),
-    "an output as known": ([DDQ1], [30], "ee_x"),
-    "an acceleration as known": ([DDQ1], [DDQ1], "ddq1"),
-    "a local as known": ([DDQ1], [TAU1, D11], "D11"),
-    "a solver parameter as known": ([DDQ1], [82], "relative_tolerance"),
-}
-
-
-@pytest.mark.parametrize(("unknowns", "knowns", "words"), UNKNOWN_CASES.values(), ids=UNKNOWN_CASES)
-@each_mode
-def test_wrong_unknowns_and_knowns_are_refused(
-    loaded: LoadedFmu, enter: Callable, unknowns: list[int], knowns: list[int], words: str
-) -> None:
-    with enter(loaded, 0) as instance:
-        call = instance.fmi.getDirectionalDerivative
-        assert_refused(instance, words, call, unknowns, knowns, [1.0] * len(knowns))
-
-
-@pytest.mark.parametrize("enter", list(MODES.values())[1:], ids=list(MODES)[1:])
-def test_parameters_are_no_knowns_after_the_initialization(
-    loaded: LoadedFmu, enter: Callable
-) -> None:
-    with enter(loaded, 0) as instance:
-        assert_refused(instance, "m1", instance.fmi.getDirectionalDerivative, [DDQ1], [M1], [1.0])

@@ -1,43 +1,11 @@
-/* Instances of the FMU: a whole run, what Instantiate refuses, and free and reset. Many
- * instances at once: robustness/threads.c.
- * FMI 2.0, sections 2.1.5 and 2.1.6. Values are in test_fmi2_values.c, time in test_fmi2_time.c. */
+/* Instances of the FMU: what Instantiate refuses, and free and reset. Many instances at once:
+ * robustness/threads.c. FMI 2.0, sections 2.1.5 and 2.1.6. */
 #include "fmu_harness.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unity.h>
-
-/* ---- A whole run ---------------------------------------------------------------------------- */
-
-/* The inputs are held over a step: their work in it is tau1 dq1 + f2 dq2 of the displacements. */
-static void test_energy_is_the_work_of_the_inputs(void) {
-    const double h = 1e-3;
-    const fmi2Component c = fmu_instantiate(&messages, false);
-    fmu_set(c, RP_MANIPULATOR_q1, 0.4);
-    fmu_initialize(c, 0.0, 0.0);
-
-    const double energy_at_start = fmu_get(c, RP_MANIPULATOR_total_energy);
-    double work = 0.0;
-    double largest = fabs(energy_at_start);
-    for (int i = 0; i < 1000; i++) {
-        const double tau1 = 8.0 * cos(5.0 * i * h);
-        const double f2 = 12.0 * sin(3.0 * i * h);
-        const double q1 = fmu_get(c, RP_MANIPULATOR_q1);
-        const double q2 = fmu_get(c, RP_MANIPULATOR_q2);
-        fmu_set(c, RP_MANIPULATOR_tau1, tau1);
-        fmu_set(c, RP_MANIPULATOR_f2, f2);
-        ASSERT_OK(fmu.DoStep(c, i * h, h, fmi2True));
-        work += tau1 * (fmu_get(c, RP_MANIPULATOR_q1) - q1);
-        work += f2 * (fmu_get(c, RP_MANIPULATOR_q2) - q2);
-        largest = fmax(largest, fabs(fmu_get(c, RP_MANIPULATOR_kinetic_energy)));
-    }
-    TEST_ASSERT_TRUE(fabs(fmu_get(c, RP_MANIPULATOR_q1) - 0.4) > 0.1); // it has moved
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7 * largest, energy_at_start + work,
-                              fmu_get(c, RP_MANIPULATOR_total_energy));
-    ASSERT_OK(fmu.Terminate(c));
-    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, fmu_log_total(&messages), messages.texts);
-}
 
 /* ---- Instantiate ---------------------------------------------------------------------------- */
 

@@ -72,14 +72,6 @@ EACH_METHOD static void test_the_order_is_one_of_the_method(void) {
                                      fmu_get_integer(c, RP_MANIPULATOR_solver_last_order));
 }
 
-EACH_METHOD static void test_a_reset_brings_the_default_method_back(void) {
-    const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
-    TEST_ASSERT_EQUAL_INT(method, fmu_get_integer(c, RP_MANIPULATOR_solver_method));
-    ASSERT_OK(fmu.DoStep(c, 0.0, 0.1, fmi2True));
-    fmu_assert_reset_is_fresh(c, "after another method");
-    TEST_ASSERT_EQUAL_INT(FMU_CVODE_ADAMS, fmu_get_integer(c, RP_MANIPULATOR_solver_method));
-}
-
 /* A reset solver keeps nothing: the same method again, after failed steps of all kinds. */
 EACH_METHOD static void test_a_reset_leaves_nothing_of_what_failed(void) {
     static const struct {

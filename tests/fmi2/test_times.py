@@ -120,15 +120,6 @@ def counters(instance: Instance) -> dict[str, int]:
     return {name: instance.count(name) for name in (*COUNTERS, "solver_last_order")}
 
 
-def test_solver_variables_are_declared(loaded: LoadedFmu) -> None:
-    declared = {
-        v.name: v for v in loaded.description.modelVariables if v.name.startswith("solver_")
-    }
-    assert [v.valueReference for v in declared.values()] == [80, 81, 85, 86, 87, 88, 90]
-    for name in (*COUNTERS, "solver_last_step", "solver_last_order"):
-        assert declared[name].causality == "local" and declared[name].variability == "discrete"
-
-
 def test_before_the_first_step_nothing_is_counted(loaded: LoadedFmu) -> None:
     with Instance(loaded) as instance:
         for _ in range(2):

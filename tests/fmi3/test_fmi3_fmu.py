@@ -126,17 +126,3 @@ def test_intermediate_updates_are_of_continuous_inputs_and_outputs(root: ET.Elem
 
 def test_the_token_is_not_the_guid(root: ET.Element, fmi2_root: ET.Element) -> None:
     assert root.get("instantiationToken") != fmi2_root.get("guid")
-
-
-@pytest.mark.parametrize("known", ["parameters", "states"])
-def test_parameters_are_knowns_of_outputs(known: str) -> None:
-    """Unlike in FMI 2.0."""
-    path = FMUS["rp_manipulator"]
-    with zipfile.ZipFile(path.parent / "fmi3" / path.name) as archive:
-        root = ET.fromstring(archive.read("modelDescription.xml"))
-    elements = variables(root)
-    output = elements["potential_energy"].get("valueReference")
-    (structure,) = [e for e in root.iter("Output") if e.get("valueReference") == output]
-    expected = {"parameters": ["m1", "m2", "l1", "lc1", "a", "g"], "states": ["q1", "q2"]}[known]
-    dependencies = structure.get("dependencies").split()
-    assert {elements[name].get("valueReference") for name in expected} <= set(dependencies)

@@ -179,19 +179,6 @@ static void test_a_wrong_one_shows_in_the_evaluations(void) {
     TEST_ASSERT_GREATER_THAN_INT(right * 5 / 4, evaluations(no_jacobian));
 }
 
-/* ---- The oscillator's own ------------------------------------------------------------------- */
-
-static void test_that_of_the_oscillator_is_what_propagation_gives(void) {
-    const struct oscillator_values at = {.omega = 3.0, .gain = 7.0, .u = 0.5, .x = 1.25, .v = -2.0};
-    double J[2][2];
-    ASSERT_OK(oscillator_model.jacobian(&at, 0.0, &at.x, &at.u, J[0]));
-    for (int j = 0; j < 2; j++) {
-        struct oscillator_values first = {.x = j == 0, .v = j == 1};
-        ASSERT_OK(oscillator_model.propagate(&at, 0.0, 0.0, &first, NULL));
-        TEST_ASSERT_TRUE(J[j][0] == first.v && J[j][1] == first.a);
-    }
-}
-
 /* The Jacobian is that of its own time: inputs are evaluated there, not where the right-hand side
  * was asked for last. */
 static void test_inputs_are_those_of_the_jacobians_time(void) {

@@ -32,29 +32,7 @@ static int multiply(double c[], int degree, double root) {
     return degree + 1;
 }
 
-static double before(double s) {
-    return nextafter(s, 0.0);
-}
-
 /* ---- Changes of sign ------------------------------------------------------------------------ */
-
-static void test_linear_polynomials(void) {
-    for (int i = 1; i <= 1000; i++) {
-        const double c[] = {i, -1000.0};
-        const double rising[] = {-i, 1000.0};
-        const double s = i / 1000.0;
-        TEST_ASSERT_EQUAL_INT(1, find(c, 1));
-        TEST_ASSERT_DOUBLE_WITHIN(DBL_EPSILON * s, s, roots[0].s);
-        // the first double at which p is 0 or below
-        TEST_ASSERT_TRUE(i - 1000.0L * roots[0].s <= 0.0L);
-        TEST_ASSERT_TRUE(i - 1000.0L * before(roots[0].s) > 0.0L);
-        TEST_ASSERT_EQUAL_INT(ROOT_FALLS, roots[0].kind);
-        TEST_ASSERT_TRUE(first(c, 1, 0.0) == roots[0].s);
-        const double falls = roots[0].s;
-        TEST_ASSERT_EQUAL_INT(1, find(rising, 1));
-        assert_root(falls, ROOT_RISES, &roots[0]);
-    }
-}
 
 /* All degrees with roots at 1/8 to 7/8, or some of them: the coefficients are exact. */
 static void test_products_of_exact_factors(void) {
@@ -77,29 +55,6 @@ static void test_products_of_exact_factors(void) {
         c[degree + 1] = 0.0;
         c[degree + 2] = 0.0;
         TEST_ASSERT_EQUAL_INT(degree, find(c, degree + 2));
-    }
-}
-
-/* T_n(1 - 2 s) is 0 at sin^2((2 k - 1) pi / (4 n)). Values of degree 20 lose 15 digits. */
-static void test_chebyshev_polynomials(void) {
-    const long double pi = 3.14159265358979323846264338327950288L;
-    double before_last[ROOTS_LENGTH] = {1.0};
-    double c[ROOTS_LENGTH] = {1.0, -2.0};
-    for (int n = 2; n <= 20; n++) {
-        double next[ROOTS_LENGTH] = {0.0};
-        for (int k = 0; k <= n; k++) {
-            next[k] = 2.0 * c[k] - (k > 0 ? 4.0 * c[k - 1] : 0.0) - before_last[k];
-        }
-        memcpy(before_last, c, sizeof c);
-        memcpy(c, next, sizeof c);
-        TEST_ASSERT_EQUAL_INT(n, find(c, n));
-        for (int k = 1; k <= n; k++) {
-            const long double root = sinl((2 * k - 1) * pi / (4 * n));
-            const double s = (double)(root * root);
-            TEST_ASSERT_DOUBLE_WITHIN(DBL_EPSILON * s, s, roots[k - 1].s);
-            TEST_ASSERT_EQUAL_INT(k % 2 == 1 ? ROOT_FALLS : ROOT_RISES, roots[k - 1].kind);
-        }
-        TEST_ASSERT_TRUE(first(c, n, 0.0) == roots[0].s);
     }
 }
 
@@ -140,63 +95,6 @@ static void test_roots_near_the_start(void) {
 
 /* ---- Roots that are no changes of sign, or nearly none -------------------------------------- */
 
-static void test_a_double_root_is_a_touch(void) {
-    for (int i = 1; i < 64; i++) {
-        const double s = i / 64.0;
-        const double above[] = {s * s, -2.0 * s, 1.0};
-        const double below[] = {-s * s, 2.0 * s, -1.0};
-        TEST_ASSERT_EQUAL_INT(1, find(above, 2));
-        assert_root(s, ROOT_TOUCHES, &roots[0]);
-        TEST_ASSERT_TRUE(first(above, 2, 0.0) == s);
-        TEST_ASSERT_EQUAL_INT(1, find(below, 2));
-        assert_root(s, ROOT_TOUCHES, &roots[0]);
-    }
-}
-
-/* (s - 1/2)^2 (s - 1/4) (s + 2), and with the factors twice and three times. */
-static void test_multiple_roots_between_others(void) {
-    for (int times = 1; times <= 3; times++) {
-        double c[ROOTS_LENGTH] = {1.0};
-        int degree = multiply(c, 0, -2.0);
-        for (int i = 0; i < times; i++) {
-            degree = multiply(c, degree, 0.5);
-        }
-        degree = multiply(c, degree, 0.25);
-        TEST_ASSERT_EQUAL_INT(2, find(c, degree));
-        assert_root(0.25, times % 2 == 1 ? ROOT_FALLS : ROOT_RISES, &roots[0]);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, roots[1].s);
-        TEST_ASSERT_EQUAL_INT(times == 2 ? ROOT_TOUCHES : ROOT_RISES, roots[1].kind);
-    }
-}
-
-static void test_a_triple_root_changes_the_sign(void) {
-    for (int i = 1; i < 16; i++) {
-        double c[ROOTS_LENGTH] = {1.0};
-        int degree = 0;
-        for (int k = 0; k < 3; k++) {
-            degree = multiply(c, degree, i / 16.0);
-        }
-        TEST_ASSERT_EQUAL_INT(1, find(c, degree));
-        assert_root(i / 16.0, ROOT_RISES, &roots[0]);
-    }
-}
-
-/* Two double roots, with next to nothing between them. */
-static void test_extrema_within_rounding_of_each_other_are_one_touch(void) {
-    for (int i = 10; i < 90; i++) {
-        const double root = i / 100.0;
-        double c[ROOTS_LENGTH] = {1.0};
-        int degree = 0;
-        for (int k = 0; k < 4; k++) {
-            degree = multiply(c, degree, root * (k % 2 == 0 ? 1.0 - 2e-4 : 1.0 + 2e-4));
-        }
-        c[0] += 4 * 0x1p-53 * 16.0 * c[0];
-        TEST_ASSERT_EQUAL_INT(1, find(c, degree));
-        TEST_ASSERT_EQUAL_INT(ROOT_TOUCHES, roots[0].kind);
-        TEST_ASSERT_DOUBLE_WITHIN(5e-4 * root, root, roots[0].s);
-    }
-}
-
 /* (s - 1/2)^2 + gap, of which the coefficients are exact. */
 static void test_near_double_roots(void) {
     const double rounding = 8 * 0x1p-53 * 1.0; // at s = 1/2
@@ -219,14 +117,6 @@ static void test_near_double_roots(void) {
             TEST_ASSERT_TRUE(first(below, 2, 0.0) == roots[0].s);
         }
     }
-}
-
-/* A parabola that passes a stop by 1e-7 of a step's way, or by as much in front of it. */
-static void test_grazing(void) {
-    const double passes[] = {0.3 * 0.3 - 1e-7, -0.6, 1.0, 1e-9, -1e-11};
-    const double misses[] = {0.3 * 0.3 + 1e-7, -0.6, 1.0, 1e-9, -1e-11};
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, 0.3 - sqrt(1e-7), first(passes, 4, 0.0));
-    TEST_ASSERT_TRUE(first(misses, 4, 0.0) == INFINITY);
 }
 
 /* ---- Ends ----------------------------------------------------------------------------------- */

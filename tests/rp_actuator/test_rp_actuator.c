@@ -1,7 +1,5 @@
-/* The drives by closed forms, through the instance and the integrator: step response, limits,
- * torque-speed line; ends of the numbers and refusals. test_actuator.py compares values with the
- * equations. */
-#include "derivatives.h"
+/* The drives: step response, braking, limited currents, ends of the numbers and refusals.
+ * test_actuator.py compares values with the equations. */
 #include "model_test.h"
 #include "rp_actuator_equations.h"
 #include "rp_actuator_model.h"
@@ -61,69 +59,7 @@ static void test_steps_of_the_command_are_answered_in_first_order(void) {
     }
 }
 
-/* cmd = nk r t by its derivative: i = r (t - T + T exp(-t/T)) until the command meets the limit,
- * which is inside the step. */
-static void test_a_ramp_meets_the_limit_inside_a_step(void) {
-    const double r = 2000.0, hit = i_max / r;
-    const unsigned reference = RP_ACTUATOR_tau1_cmd;
-    const int order = 1;
-    const double derivative = nk * r;
-    start_at(0.0);
-    ASSERT_OK(instance_set_input_derivatives(instance, &reference, 1, &order, &derivative));
-    step_to(2.5 * hit);
-    const double at_hit = r * (hit - T + T * exp(-hit / T));
-    ASSERT_CLOSE(first_order(at_hit, i_max, 1.5 * hit), get(RP_ACTUATOR_current1), 1e-9);
-}
-
-/* Full command, and a velocity that grows by its derivative from the corner of the torque-speed
- * line on: the limited current falls as i_max - s t, and the current follows by the same law, until
- * -i_max is met, in the second case inside the step. */
-static void test_a_speed_that_grows_leads_along_the_line_inside_a_step(void) {
-    const double acceleration = 300.0, s = nk * acceleration / R, hit = 2.0 * i_max / s;
-    const unsigned reference = RP_ACTUATOR_dq1;
-    const int order = 1;
-    const double before = 0.75 * hit, after = 1.5 * hit;
-    const double ends[] = {before, after};
-    const double at_hit = i_max - s * (hit - T + T * exp(-hit / T));
-    const double expected[] = {i_max - s * (before - T + T * exp(-before / T)),
-                               first_order(at_hit, -i_max, after - hit)};
-    for (int i = 0; i < 2; i++) {
-        instance_reset(instance);
-        set(RP_ACTUATOR_tau1_cmd, 1e6);
-        set(RP_ACTUATOR_dq1, (u_max - R * i_max) / nk);
-        start_at(i_max);
-        ASSERT_OK(instance_set_input_derivatives(instance, &reference, 1, &order, &acceleration));
-        step_to(ends[i]);
-        ASSERT_CLOSE(expected[i], get(RP_ACTUATOR_current1), 1e-9);
-    }
-}
-
 /* ---- Limits --------------------------------------------------------------------------------- */
-
-/* Largest effort at a velocity: n k i_max up to the corner, then on the line that falls to 0 at the
- * no-load speed u_max / (n k), and continues below it. */
-static double torque_speed_line(double dq) {
-    return nk * fmax(fmin(i_max, (u_max - nk * dq) / R), -i_max);
-}
-
-static void test_large_commands_end_on_the_torque_speed_line(void) {
-    const double no_load = u_max / nk, corner = (u_max - R * i_max) / nk;
-    const double speeds[] = {-1.0,    0.0,          0.9 * corner, corner, 0.5 * (corner + no_load),
-                             no_load, 1.1 * no_load};
-    for (size_t i = 0; i < sizeof speeds / sizeof speeds[0]; i++) {
-        for (int side = -1; side <= 1; side += 2) {
-            instance_reset(instance);
-            set(RP_ACTUATOR_tau1_cmd, side * 1e6);
-            set(RP_ACTUATOR_dq1, side * speeds[i]);
-            start_at(0.0);
-            step_to(40.0 * T);
-            ASSERT_CLOSE(side * torque_speed_line(speeds[i]), get(RP_ACTUATOR_tau1), 1e-8);
-            TEST_ASSERT_TRUE(fabs(get(RP_ACTUATOR_voltage1)) <= u_max + 1e-9);
-            TEST_ASSERT_TRUE(fabs(get(RP_ACTUATOR_current1)) <= i_max + 1e-9);
-        }
-    }
-    TEST_ASSERT_TRUE(torque_speed_line(no_load) == 0.0);
-}
 
 /* Beyond the no-load speed no voltage of the drive holds the current at 0: it brakes. Once even
  * i_max is too small for the range of the voltage, the current stays at i_max and the voltage is
@@ -179,63 +115,6 @@ static void test_limited_currents_are_the_nearest_that_are_allowed(void) {
             }
             ASSERT_CLOSE(best, drive_limited_current(&p, &in, i), p.current_max[i] / 256.0);
         }
-    }
-}
-
-/* The time from the end of an exaggerated command until the current has come down to `half` is
- * T ln((i_max - low) / (half - low)), however long and by however much the command was too large.
- */
-static void test_limits_leave_no_windup(void) {
-    const double low = 1.0, half = 4.0;
-    const double excess[] = {1.5, 1e6}, duration[] = {0.1, 4.0};
-    for (int i = 0; i < 4; i++) {
-        instance_reset(instance);
-        set(RP_ACTUATOR_tau1_cmd, excess[i % 2] * nk * i_max);
-        start_at(0.0);
-        step_to(duration[i / 2]);
-        ASSERT_CLOSE(i_max, get(RP_ACTUATOR_current1), 1e-9);
-        set(RP_ACTUATOR_tau1_cmd, nk * low);
-        TEST_ASSERT_TRUE(get(RP_ACTUATOR_dcurrent1) < 0.0);
-        step_to(duration[i / 2] + T * log((i_max - low) / (half - low)));
-        ASSERT_CLOSE(half, get(RP_ACTUATOR_current1), 2e-9);
-    }
-}
-
-/* The same at the limit of the voltage, which is left because the arm slows down. */
-static void test_the_voltage_limit_leaves_no_windup(void) {
-    const double dq = 5.5, at_limit = (u_max - nk * dq) / R, half = 5.0;
-    set(RP_ACTUATOR_tau1_cmd, nk * 7.0);
-    set(RP_ACTUATOR_dq1, dq);
-    start_at(0.0);
-    step_to(3.0);
-    ASSERT_CLOSE(at_limit, get(RP_ACTUATOR_current1), 1e-9);
-    ASSERT_CLOSE(u_max, get(RP_ACTUATOR_voltage1), 1e-9);
-    set(RP_ACTUATOR_dq1, 0.0);
-    step_to(3.0 + T * log((7.0 - at_limit) / (7.0 - half)));
-    ASSERT_CLOSE(half, get(RP_ACTUATOR_current1), 2e-9);
-}
-
-/* A speed that jumps leaves the current behind: what the voltage is too high by decays with T. */
-static void test_excess_voltage_decays_with_the_time_constant(void) {
-    set(RP_ACTUATOR_tau1_cmd, nk * 7.0);
-    start_at(7.0);
-    set(RP_ACTUATOR_dq1, 5.5);
-    const double excess = R * 7.0 + nk * 5.5 - u_max;
-    TEST_ASSERT_TRUE(excess > 3.0);
-    for (int i = 0; i <= 20; i++) {
-        ASSERT_CLOSE(excess * exp(-instance_time(instance) / T), get(RP_ACTUATOR_voltage1) - u_max,
-                     1e-9);
-        step_to((i + 1) * 0.5e-3);
-    }
-}
-
-static void test_currents_within_their_limit_stay_there(void) {
-    start_at(i_max);
-    for (int i = 0; i < 2000; i++) {
-        set(RP_ACTUATOR_tau1_cmd, rp_test_uniform(&random_source, -90.0, 90.0));
-        set(RP_ACTUATOR_dq1, rp_test_uniform(&random_source, -12.0, 12.0));
-        step_to((i + 1) * 1e-3);
-        TEST_ASSERT_TRUE(fabs(get(RP_ACTUATOR_current1)) <= i_max + 1e-9);
     }
 }
 

@@ -11,10 +11,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from fmpy.fmi2 import FMU2Model
 
 from rparm.runs import comparison
-from tests.support.instances import ERROR, OK, Instance, LoadedFmu, status_of
+from tests.support.instances import ERROR, Instance, LoadedFmu, status_of
 from tests.support.rparm_project import declared, load
 
 UNIT = "RPController"
@@ -127,25 +126,6 @@ def test_inputs_count_at_samples_only(sampled: Callable[..., Instance]) -> None:
     assert seen == [x for pair in zip(efforts, errors, strict=True) for x in pair]
 
 
-def test_the_payload_counts_at_samples_only(sampled: Callable[..., Instance]) -> None:
-    instance = sampled(0.25, 0.0625, payload_mass=2.0, payload_z=0.25)
-    loaded = instance.loaded
-    instance.fmi.setInteger([loaded.references["mode"]], [3])
-    attached = [loaded.references["payload_attached"]]
-
-    def unlimited_after(t: float, is_attached: bool) -> float:
-        instance.fmi.setBoolean(attached, [is_attached])
-        instance.step(t, 0.125)
-        return instance.get("tau1_unlimited")[0]
-
-    # samples at 0.25, 0.5, 0.75 s
-    without = [unlimited_after(t, t in (0.0, 0.25)) for t in (0.0, 0.125, 0.25, 0.375)]
-    assert without[0] == without[1]
-    light = unlimited_after(0.5, True)
-    assert unlimited_after(0.625, True) == light
-    assert unlimited_after(0.75, True) > light + 2.0 * 9.81 * 0.5
-
-
 def test_it_tends_to_the_continuous_form(sampled: Callable[..., Instance]) -> None:
     """Euler's error falls with the period, in proportion to it."""
     values = {"integral1": 150.0, "q1_ref": -0.1875}
@@ -172,25 +152,6 @@ def test_output_derivatives_are_those_of_held_efforts(sampled: Callable[..., Ins
 
 
 @each_times
-def test_same_bits_for_all_communication_steps(
-    sampled: Callable[..., Instance], period: float, delay: float
-) -> None:
-    def seen(every: int) -> list[bytes]:
-        """All variables at each 10 ms."""
-        instance = sampled(period, delay, integral1=2.0)
-        found = []
-        for i in range(0, 300, every):
-            instance.step(i / 1000, (i + every) / 1000 - i / 1000)
-            if (i + every) % 10 == 0:
-                found.append(instance.everything())
-        return found
-
-    once = seen(10)
-    assert len(set(once)) == 30
-    assert seen(1) == seen(2) == once
-
-
-@each_times
 def test_same_bits_along_the_same_polynomial(
     sampled: Callable[..., Instance], period: float, delay: float
 ) -> None:
@@ -213,58 +174,7 @@ def test_same_bits_along_the_same_polynomial(
     assert seen(1) == seen(2) == once
 
 
-def test_rollback_across_samples_is_exact(sampled: Callable[..., Instance]) -> None:
-    instance, other = sampled(0.0037, 0.0019), sampled(0.0037, 0.0019)
-    source = random.Random(8)
-    t, states = 0.0, []
-    steps = [source.choice((0.0005, 0.004, 0.02)) for _ in range(60)]
-
-    def run(instance: Instance, first: int, t: float) -> list[bytes]:
-        found = []
-        for i in range(first, len(steps)):
-            instance.set(q1=0.0625 + 0.01 * (i % 5))
-            t = instance.step(t, steps[i])
-            found.append(instance.everything())
-        return found
-
-    once = run(sampled(0.0037, 0.0019), 0, 0.0)
-    for i in range(len(steps)):
-        states.append((i, t, instance.fmi.getFMUstate()))
-        instance.set(q1=0.0625 + 0.01 * (i % 5))
-        t = instance.step(t, steps[i])
-        assert instance.everything() == once[i]
-    for i, t, state in source.sample(states, 12):
-        instance.fmi.setFMUstate(state)
-        assert run(instance, i, t) == once[i:]
-        content = instance.fmi.serializeFMUstate(state)
-        other.fmi.setFMUstate(other.fmi.deSerializeFMUstate(content))
-        assert run(other, i, t) == once[i:]
-    for *_, state in states:
-        assert status_of(instance.fmi.freeFMUstate, state) == OK
-
-
 # ---- Other interfaces ----------------------------------------------------------------------------
-
-
-def test_model_exchange_has_the_samples_as_time_events(loaded: LoadedFmu) -> None:
-    period, delay = 0.0037, 0.0011
-    expected = samples(period, 2.0, 40)
-    with Instance(loaded, kind=FMU2Model) as instance:
-        instance.fmi.setInteger([loaded.references["mode"]], [PD])
-        times = {"sample_time": period, "delay": delay, "integral1": 2.0, "tau1_max": LIMIT}
-        instance.initialize(**(GAINS | MOTION | times))
-        _, _, _, has_jumped, is_defined, next_time = instance.fmi.newDiscreteStates()
-        for k in range(1, len(expected)):
-            for due, jumps in ((period * k, True), (period * k + delay, False)):
-                assert is_defined and next_time == pytest.approx(due, rel=1e-15)
-                instance.fmi.enterContinuousTimeMode()
-                instance.fmi.setTime(next_time)
-                assert instance.get("tau1")[0] == expected[k - 1][0]
-                instance.fmi.enterEventMode()
-                *_, has_jumped, is_defined, next_time = instance.fmi.newDiscreteStates()
-                assert bool(has_jumped) == jumps
-                assert instance.get("integral1")[0] == expected[k][1]
-            assert instance.get("tau1")[0] == expected[k][0]
 
 
 def test_the_scenario_meets_its_limits() -> None:

@@ -1,6 +1,5 @@
 /* The controller: limits, and the integral part through the instance and the integrator.
  * test_controller.py compares values with sympy. */
-#include "derivatives.h"
 #include "rp_controller_law.h"
 #include "rp_controller_model.h"
 #include "rp_test_support.h"
@@ -47,46 +46,10 @@ static void start(double gain, double tracking_time, double w) {
     initialize(1e-11);
 }
 
-/* Below the limit w' = Ki e: a ramp. At w = edge the effort meets the limit; from there on
+/* Returns the w at which the effort meets the limit. Below it w' = Ki e; from there on
  * w' = Ki e - (w - edge) / Tt, which ends at edge + Ki e Tt. */
 static double edge_of(double error) {
     return limit / M - Kp * error - Kd * de;
-}
-
-static double into_the_limit(double w, double t) {
-    const double edge = edge_of(e);
-    const double hit = (edge - w) / (Ki * e);
-    return t < hit ? w + Ki * e * t : edge + Ki * e * Tt * -expm1(-(t - hit) / Tt);
-}
-
-static double out_of_the_limit(double w, double t) {
-    const double edge = edge_of(-e);
-    const double rest = edge - Ki * e * Tt;
-    const double left = Tt * log((w - rest) / (edge - rest));
-    return t < left ? rest + (w - rest) * exp(-t / Tt) : edge - Ki * e * (t - left);
-}
-
-static void test_integral_ramps_up_and_meets_the_limit(void) {
-    start(Ki, Tt, 2.0);
-    for (int i = 1; i <= 100; i++) {
-        step_to(0.0137 * i);
-        const double w = get(RP_CONTROLLER_integral1);
-        ASSERT_CLOSE(into_the_limit(2.0, instance_time(instance)), w, 1e-9);
-        const double unlimited = M * (Kp * e + Kd * de + w);
-        ASSERT_CLOSE(unlimited, get(RP_CONTROLLER_tau1_unlimited), 1e-13);
-        TEST_ASSERT_TRUE(get(RP_CONTROLLER_tau1) == fmin(get(RP_CONTROLLER_tau1_unlimited), limit));
-    }
-}
-
-static void test_integral_decays_out_of_the_limit_and_ramps_down(void) {
-    start(Ki, Tt, 150.0);
-    set(RP_CONTROLLER_q1_ref, -e);
-    for (int i = 1; i <= 100; i++) {
-        step_to(0.0137 * i);
-        ASSERT_CLOSE(out_of_the_limit(150.0, instance_time(instance)), get(RP_CONTROLLER_integral1),
-                     1e-9);
-    }
-    TEST_ASSERT_TRUE(get(RP_CONTROLLER_tau1) < limit);
 }
 
 /* After 5 s at the limit the error changes its sign. With back-calculation the effort leaves the
@@ -110,36 +73,6 @@ static void test_effort_leaves_the_limit_without_delay(void) {
     TEST_ASSERT_TRUE(get(RP_CONTROLLER_tau1) == limit);
     step_to(5.0 + 1.001 * delay);
     TEST_ASSERT_TRUE(get(RP_CONTROLLER_tau1) < limit);
-}
-
-static void test_integral_rests_without_gain(void) {
-    const double held[] = {0.1, 1234.5}; // below the limit and beyond it
-    for (int k = 0; k < 2; k++) {
-        instance_reset(instance);
-        set(RP_CONTROLLER_Ki2, 100.0); // the other joint moves
-        set(RP_CONTROLLER_q2_ref, 1.0);
-        start(0.0, Tt, held[k]);
-        for (int i = 1; i <= 20; i++) {
-            step_to(0.05 * i);
-            TEST_ASSERT_TRUE(get(RP_CONTROLLER_integral1) == held[k]);
-            TEST_ASSERT_TRUE(get(RP_CONTROLLER_dintegral1) == 0.0);
-        }
-        TEST_ASSERT_TRUE(fabs(get(RP_CONTROLLER_integral2)) > 1.0);
-    }
-}
-
-/* The error runs as e + r t + b t^2 / 2 over the step, by derivatives of two inputs. */
-static void test_integral_follows_extrapolated_inputs(void) {
-    const double r = 0.5, b = -3.0, h = 0.25;
-    start(Ki, Tt, 1.0);
-    set(RP_CONTROLLER_tau1_max, 1e6);
-    const unsigned references[] = {RP_CONTROLLER_q1_ref, RP_CONTROLLER_q1_ref, RP_CONTROLLER_q1};
-    const int orders[] = {1, 2, 1};
-    const double derivatives[] = {r - 1.0, b, -1.0};
-    ASSERT_OK(instance_set_input_derivatives(instance, references, 3, orders, derivatives));
-    step_to(h);
-    ASSERT_CLOSE(1.0 + Ki * (e * h + r * h * h / 2.0 + b * h * h * h / 6.0),
-                 get(RP_CONTROLLER_integral1), 1e-10);
 }
 
 /* A master that adds up milliseconds is 1e-9 s off after 334 585 of them: the effort is that of the

@@ -212,14 +212,6 @@ def test_a_force_beyond_all_numbers_is_discarded(loaded: LoadedFmu) -> None:
         assert "wall_force" in instance.messages[-1].text
 
 
-def test_parameters_change_between_steps(loaded: LoadedFmu) -> None:
-    with running(loaded, {"position": 0.0, "ee_x": -0.01, "damping": 0.0}) as instance:
-        for i, stiffness in enumerate((1e4, 2e4, 0.0)):
-            instance.set(stiffness=stiffness)
-            instance.step(0.1 * i, 0.1)
-            assert instance.get("wall_force") == [pytest.approx(0.01 * stiffness, abs=1e-10)]
-
-
 # ---- References ----------------------------------------------------------------------------------
 
 

@@ -201,3 +201,27 @@ def test_equations_agree_with_the_notes() -> None:
     second = -a * m2 * ddq1 + m2 * ddq2 - c211 * dq1**2 + m2 * g * s - f2
     assert sp.simplify(first) == 0
     assert sp.simplify(second) == 0
+
+
+# ---- Scenarios -----------------------------------------------------------------------------------
+
+
+def test_every_parameter_is_off_its_start_value_somewhere() -> None:
+    given = {name for run in SCENARIOS.values() for name in run.parameters}
+    assert given >= {"m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g"}
+
+
+def test_constant_effort_in_500_steps_and_in_one() -> None:
+    many, one = SCENARIOS["constant_effort"], SCENARIOS["constant_effort_single_step"]
+    assert (len(many.times), len(one.times)) == (501, 2)
+    assert (many.parameters, many.initial) == (one.parameters, one.initial)
+    assert (many.start, many.stop) == (one.start, one.stop)
+    for name in ("tau1", "f2"):
+        assert set(many.inputs[name]) == set(one.inputs[name]) != {0.0}
+
+
+def test_times_are_late_early_and_irregular() -> None:
+    assert (SCENARIOS["late_start"].start, SCENARIOS["early_start"].start) == (1e6, -0.5)
+    lengths = np.diff(SCENARIOS["irregular_steps"].times)
+    assert lengths.min() == pytest.approx(1e-6, rel=1e-6)
+    assert lengths.max() == pytest.approx(0.1)

@@ -120,29 +120,6 @@ static void test_no_allowed_acceleration_is_better(void) {
     }
 }
 
-/* Each joint judged by itself, from the forces while both stick. */
-static void test_judging_each_joint_by_itself_is_often_wrong(void) {
-    int wrong = 0;
-    for (int n = 0; n < CASES; n++) {
-        struct rp_plant_rest rest;
-        struct rp_plant_outcome outcome;
-        next_case(&rest);
-        for (int i = 0; i < 2; i++) {
-            rest.at_rest[i] = true;
-            rest.closed[i] = 0;
-        }
-        rp_plant_rest_decide(&rest, &outcome);
-        bool alike = true;
-        for (int i = 0; i < 2; i++) {
-            const bool leaves = fabs(rest.forces[i]) > rest.breakaway[i];
-            const int judged = leaves ? (rest.forces[i] > 0.0 ? 1 : -1) : 0;
-            alike = alike && judged == outcome.pattern[i];
-        }
-        wrong += !alike;
-    }
-    TEST_ASSERT_GREATER_THAN_INT(CASES / 20, wrong);
-}
-
 /* A force exactly at the limit does not move the joint; the next double does. */
 static void test_at_the_limit_the_joint_stays(void) {
     struct rp_plant_rest rest = {

@@ -1,9 +1,7 @@
-/* The series of the plant against its right-hand side, its indicators, and the manipulator's
- * series. */
+/* The series of the plant against its right-hand side and its indicators. test_plant_fmu.py has the
+ * manipulator's bits. */
 #include "last_text.h"
 #include "plant_test_support.h"
-#include "rp_model.h"
-#include "rp_series.h"
 #include "unity.h"
 
 #include <float.h>
@@ -61,29 +59,6 @@ static void extend(const struct series *series, const void *values, int first, i
     };
     TEST_ASSERT_LESS_OR_EQUAL_size_t(MAX_ROWS, series->row_count);
     ASSERT_OK(series->extend(&origin, first, last, all));
-}
-
-/* With every feature off it is the manipulator's. */
-static void test_start_values_give_the_bits_of_the_manipulator(void) {
-    static row of_arm[MAX_ROWS];
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        plant_test_random_arm(&random_source, &plant);
-        plant.payload_attached = n % 2;
-        plant.parameters.payload_x = rp_test_uniform(&random_source, -1.0, 1.0);
-        if (n % 4 < 2) {
-            plant_test_update(&plant, -1);
-        }
-        next_inputs();
-        memset(inputs[2], 0, 3 * sizeof inputs[0]);
-        struct rp_values arm;
-        memset(&arm, 0xff, sizeof arm);
-        arm.parameters = plant.parameters.arm;
-        clear(rows);
-        clear(of_arm);
-        extend(&rp_plant_series, &plant, 0, SERIES_LENGTH - 1, rows);
-        extend(&rp_series, &arm, 0, SERIES_LENGTH - 1, of_arm);
-        TEST_ASSERT_EQUAL_MEMORY(of_arm, rows, PLANT_STATES * sizeof rows[0]);
-    }
 }
 
 /* Each feature that is on adds to the series what it adds to the right-hand side. */
@@ -229,6 +204,15 @@ static void test_the_polynomials_satisfy_the_equations(void) {
             plant.modes.joint[n % 2] = RP_PLANT_STUCK;
         } else if (n % 3 == 1) {
             plant_test_random_contacts(&random_source, &plant);
+        } else if (n % 9 == 2) { // Coulomb friction alone: the manipulator's series
+            plant_test_random_arm(&random_source, &plant);
+            plant.parameters.coulomb_friction[0] = 2.0;
+            plant.parameters.coulomb_friction[1] = 3.0;
+            plant.modes.joint[0] = RP_PLANT_FORWARD;
+            plant.modes.joint[1] = RP_PLANT_BACKWARD;
+            plant.modes.payload = RP_PLANT_RELEASED;
+            next_inputs();
+            memset(inputs[2], 0, 3 * sizeof inputs[0]);
         }
         expand_far();
         assert_model_at(0.0);

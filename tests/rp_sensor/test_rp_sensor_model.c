@@ -168,11 +168,6 @@ static void test_resolutions_that_give_no_finite_velocity_are_refused(void) {
                        "of 2^32 counts in one sample time is not finite");
 }
 
-static void test_there_is_no_continuous_state(void) {
-    TEST_ASSERT_EQUAL_UINT64(0, rp_sensor_model.states.size);
-    ASSERT_OK(rp_sensor_model.right_hand_side(&v, 0.0, NULL, NULL, NULL));
-}
-
 /* ---- Modes of saved states ------------------------------------------------------------------ */
 
 static void assert_possible(bool expected) {

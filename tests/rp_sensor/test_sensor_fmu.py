@@ -1,4 +1,4 @@
-"""RPSensor.fmu: what is refused, Model Exchange by time events, event mode, references."""
+"""RPSensor.fmu: what is refused, event mode, scenarios."""
 
 from pathlib import Path
 
@@ -51,7 +51,7 @@ def test_positions_that_overflow_within_a_step(fmu: Path, tmp_path: Path) -> Non
         instance.step(0.01, 10.0)
 
 
-# ---- Model Exchange ----------------------------------------------------------------------------
+# ---- FMI 3.0's event mode ----------------------------------------------------------------------
 
 STILL = {"q1": 0.4, "q2": -0.01}
 
@@ -67,48 +67,6 @@ def assert_counts(result: np.ndarray, values: dict[str, float]) -> None:
         ticks = t / 0.00737
         if abs(ticks - round(ticks)) > 1e-6:  # at a tick both rows are right
             assert counts == expected[int(ticks)], t
-
-
-@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
-def test_fmpy_simulates_it(sensor: Fmu, kind: str) -> None:
-    """In Model Exchange, ticks are time events at which the inputs are those of the time itself."""
-    values = {"sample_time": 0.00737, "noise1": 0.01, "seed": 4, "latency": 1}
-    result = fmpy.simulate_fmu(
-        str(sensor.path),
-        fmi_type=kind,
-        stop_time=0.5,
-        output_interval=0.01,
-        start_values=values | STILL,
-        output=COUNTS,
-    )
-    assert len(result) >= 51
-    assert_counts(result, values)
-
-
-def test_in_model_exchange_ticks_sample_the_inputs_of_their_time(sensor: Fmu) -> None:
-    """The position is the time: what is measured is the time of the tick."""
-    ramp = np.array([(0.0, 0.0), (1.0, 1.0)], dtype=[("time", float), ("q1", float)])
-    for latency in (0, 1):
-        result = fmpy.simulate_fmu(
-            str(sensor.path),
-            fmi_type="ModelExchange",
-            stop_time=0.3,
-            output_interval=0.01,
-            start_values={"sample_time": 0.00737, "resolution1": 1e-9, "latency": latency},
-            input=ramp,
-            output=["q1_measured"],
-        )
-        checked = 0
-        for t, measured in result:
-            ticks = t / 0.00737
-            if abs(ticks - round(ticks)) > 1e-6:  # at a tick both rows are right
-                sampled = max(int(ticks) - latency, 0) * 0.00737
-                assert abs(measured - sampled) <= 1e-9
-                checked += 1
-        assert checked >= 30
-
-
-# ---- FMI 3.0's event mode ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("event_mode", [False, True])
@@ -154,7 +112,7 @@ def test_inputs_set_at_a_tick_in_event_mode_are_sampled(fmu: Path) -> None:
             sensor.enterStepMode()
 
 
-# ---- References --------------------------------------------------------------------------------
+# ---- Scenarios --------------------------------------------------------------------------------
 
 
 def test_scenarios_cover_the_parameters() -> None:

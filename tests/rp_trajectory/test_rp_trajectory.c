@@ -93,30 +93,6 @@ static void set_kind(int kind) {
 
 /* ---- Geometry ------------------------------------------------------------------------------- */
 
-static void test_the_start_is_the_principal_solution(void) {
-    for (int kind = 1; kind < KINDS; kind++) {
-        for (int i = 0; i < 24; i++) {
-            set_kind(kind);
-            const double turn = i * pi / 12.0;
-            const double c = cos(turn);
-            const double s = sin(turn);
-            double *const points[] = {p.ee_from, p.ee_to, p.center};
-            for (size_t j = 0; j < COUNT(points); j++) {
-                const double x = points[j][0];
-                points[j][0] = c * x - s * points[j][1];
-                points[j][1] = s * x + c * points[j][1];
-            }
-            const struct sample point = at(p.start_time);
-            const double x = point.ee[0].position.value, y = point.ee[1].position.value;
-            const double reach = sqrt(x * x + y * y - p.a * p.a);
-            const double L = p.branch == RP_TRAJECTORY_FORWARD ? reach : -reach;
-            const double q1 = remainder(atan2(y, x) - atan2(p.a, L), 2.0 * pi);
-            TEST_ASSERT_DOUBLE_WITHIN(1e-14, q1, point.q[0].position.value);
-            TEST_ASSERT_DOUBLE_WITHIN(1e-14, L - p.l1, point.q[1].position.value);
-        }
-    }
-}
-
 /* Near an end the way that is left has all its digits: s(x) = 10 x^3 - 15 x^4 + 6 x^5 of 1e-10. */
 static void test_small_ways_near_an_end_keep_their_digits(void) {
     const double duration = 100.0;
@@ -152,17 +128,6 @@ static void test_ends_are_reached_exactly(void) {
     p.turns = 2.25;
     TEST_ASSERT_DOUBLE_WITHIN(2e-16, p.center[0], at(end_time()).ee[0].position.value);
     TEST_ASSERT_DOUBLE_WITHIN(2e-16, p.center[1] + p.radius, at(end_time()).ee[1].position.value);
-}
-
-/* A coordinate that does not change rests exactly, also one that is no short binary number. */
-static void test_a_line_along_an_axis_keeps_the_other_coordinate(void) {
-    p.motion = RP_TRAJECTORY_LINE;
-    p.ee_to[1] = p.ee_from[1];
-    for (int i = 0; i < 100; i++) {
-        const struct moving y = at(i * 0.02).ee[1];
-        TEST_ASSERT_TRUE(y.position.value == p.ee_from[1]);
-        TEST_ASSERT_TRUE(y.velocity.value == 0.0 && y.acceleration.value == 0.0);
-    }
 }
 
 /* ---- Time ----------------------------------------------------------------------------------- */
@@ -235,25 +200,6 @@ static void test_distance_of_a_line(void) {
     p.ee_from[0] = p.ee_to[0]; // a line of no length
     p.ee_from[1] = p.ee_to[1];
     TEST_ASSERT_DOUBLE_WITHIN(1e-16, 0.5, rp_trajectory_distance(&p, nearest));
-}
-
-/* The foot of the perpendicular, for lines in all directions: on the line, and at right angles to
- * it. */
-static void test_the_nearest_point_of_a_line_is_its_foot(void) {
-    for (int i = 0; i < 16; i++) {
-        const double angle = 0.1 + i * 0.4;
-        const double normal[2] = {cos(angle), sin(angle)};
-        p.motion = RP_TRAJECTORY_LINE;
-        for (int k = 0; k < 2; k++) {
-            const double along = k == 0 ? -normal[1] : normal[0];
-            p.ee_from[k] = 0.4 * normal[k] - 0.3 * along;
-            p.ee_to[k] = 0.4 * normal[k] + 0.2 * along;
-        }
-        double nearest[2];
-        TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.4, rp_trajectory_distance(&p, nearest));
-        TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.4 * normal[0], nearest[0]);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.4 * normal[1], nearest[1]);
-    }
 }
 
 /* Against the nearest of many points of the swept arc. */

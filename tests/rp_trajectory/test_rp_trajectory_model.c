@@ -19,11 +19,6 @@ void setUp(void) {
     v.parameters.start_angle = 0.25;
 }
 
-static void test_there_is_no_state(void) {
-    TEST_ASSERT_EQUAL_UINT64(0, rp_trajectory_model.states.size);
-    ASSERT_OK(rp_trajectory_model.right_hand_side(&v, 0.0, NULL, NULL, NULL));
-}
-
 /* ---- The payload ---------------------------------------------------------------------------- */
 
 /* Before initialization ends, from the time itself. */

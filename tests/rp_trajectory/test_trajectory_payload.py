@@ -43,26 +43,6 @@ def test_initialization_knows_it(loaded: LoadedFmu, start: float, expected: bool
         assert is_attached(instance) == expected
 
 
-def test_rollback_over_grasp_and_release(loaded: LoadedFmu) -> None:
-    with Instance(loaded) as instance, Instance(loaded) as other:
-        instance.initialize(**GRASPED)
-        other.initialize()
-        states = []
-        for t, expected in ((0.0, False), (0.25, True), (0.5, False)):
-            states.append((t, instance.fmi.getFMUstate(), expected))
-            instance.step(t, 0.25)
-            assert is_attached(instance) == expected
-        for t, state, expected in reversed(states):
-            instance.fmi.setFMUstate(state)
-            content = instance.fmi.serializeFMUstate(state)
-            other.fmi.setFMUstate(other.fmi.deSerializeFMUstate(content))
-            for one in (instance, other):
-                one.step(t, 0.25)
-                assert is_attached(one) == expected
-        for _, state, _ in states:
-            instance.fmi.freeFMUstate(state)
-
-
 def test_grasp_and_release_are_time_events_in_model_exchange(loaded: LoadedFmu) -> None:
     with Instance(loaded, kind=FMU2Model) as instance:
         instance.initialize(**GRASPED)

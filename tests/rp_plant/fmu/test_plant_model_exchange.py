@@ -1,7 +1,6 @@
-"""The plant in Model Exchange: inputs that break joints away, event mode, scenarios under CVode.
+"""The plant in Model Exchange: event mode, and Euler's method, which passes events by up to a step.
 
-random_motions.py has random ones. Euler's method passes events by up to a step; its error falls
-with it.
+random_motions.py has motions under CVode.
 """
 
 from pathlib import Path
@@ -11,22 +10,15 @@ import fmpy
 import numpy as np
 import pytest
 
-from rparm import project
 from rparm.fmi.fmu_file import Fmu
-from rparm.runs.comparison import error_bound
-from rparm.runs.scenario import load
-from rparm.runs.simulation import initialize
 from tests.rp_plant.fmu.plant_model_exchange import STATES, model
 from tests.rp_plant.fmu.plant_runs import (
     BOUNCY_STOPS,
-    FIRM,
     FRICTION,
     RIGID,
-    read,
 )
 
 STEP = 0.01  # s
-TIGHT = 1e-10  # relative tolerance of CVode
 OUTPUTS = [*STATES, "event_count", "mode1", "mode2"]
 
 # that of the plant, which ends bouncing where CVode can still follow it
@@ -55,33 +47,7 @@ def simulate(
     )
 
 
-# ---- Efforts that move -----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("rate", [3.0, -3.0, 1e3, 0.3])
-@pytest.mark.parametrize("joint", [1, 2])
-def test_a_joint_breaks_away_from_a_ramp(plant: Fmu, joint: int, rate: float) -> None:
-    """At F / r, where round numbers let root finders end at 0; then m q'' = r t - F."""
-    friction, effort = 3.0, "tau1" if joint == 1 else "f2"
-    values = {"g": 0.0, "a": 0.0, f"coulomb_friction{joint}": friction}
-    values[f"coulomb_friction{3 - joint}"] = FIRM
-    begin = friction / abs(rate)
-    names = (f"dq{joint}", f"mode{joint}", "event_count", "last_event_time")
-    times = np.array([0.0, 2 * begin])
-    with model(plant.path, **values) as instance:
-        inertia = instance.get("D11" if joint == 1 else "D22")
-        dq, *found = instance.simulate(times, {}, TIGHT, names, lambda t: {effort: rate * t})[-1]
-    assert dq == pytest.approx(rate * begin**2 / 2 / inertia, rel=1e-6)
-    assert found == [np.sign(rate), 1, pytest.approx(begin, rel=1e-8)]
-
-
-def test_fmpys_own_inputs_break_a_joint_away(plant: Fmu) -> None:
-    """Its right-hand side sees the inputs late, so that the velocity is less exact."""
-    ramp = np.array([(0, 0), (2, 6)], dtype=[("time", float), ("f2", float)])
-    values = {"g": 0, "a": 0, "coulomb_friction2": 3}
-    found = simulate(plant.path, "ModelExchange", 2.0, values, 1 / 64, input=ramp)[-1]
-    assert found["dq2"] == pytest.approx(1.5, abs=0.01)
-    assert (found["event_count"], found["mode2"]) == (1, 1)
+# ---- Event mode ------------------------------------------------------------------------------
 
 
 def test_what_is_set_in_event_mode_is_no_event(plant: Fmu) -> None:
@@ -118,37 +84,6 @@ def test_a_saved_state_holds_the_event_that_is_due(plant: Fmu) -> None:
             fmu.setFMUState(fmu.deserializeFMUState(due))
             instance.update({"f2": f2})
             assert (instance.get("mode2"), instance.get("event_count")) == (mode, 1)
-
-
-# ---- Scenarios -------------------------------------------------------------------------------
-
-SCENARIOS = sorted(project.model("rp_plant").glob("scenarios/*.toml"))
-
-
-@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
-@pytest.mark.parametrize("version", ["fmi2"], indirect=True)  # thousands of events take seconds
-def test_cvode_on_the_scenarios(plant: Fmu, path: Path) -> None:
-    """Those without a Boolean input end as in Co-Simulation, within the bound of their report."""
-    scenario = load(path, plant.model)
-    if any(values.dtype == bool for values in scenario.inputs.values()):
-        pytest.skip("fmpy's loop could not set the gripper")
-    changes, held = {}, {}
-    for i, time in enumerate(scenario.times[:-1]):
-        now = {name: values[i] for name, values in scenario.inputs.items()}
-        if now != held:
-            changes[time], held = now, now
-    values = scenario.parameters | scenario.initial | changes.pop(0.0, {})
-    with model(plant.path, **values) as instance:
-        found = instance.simulate(scenario.times[-1:], changes, TIGHT, (*STATES, "event_count"))
-    with plant.instance("plant") as instance:
-        initialize(instance, scenario, scenario.tolerance)
-        inputs = instance.reals(list(scenario.inputs))
-        for i, step in enumerate(np.diff(scenario.times)):
-            inputs.view[:] = [values[i] for values in scenario.inputs.values()]
-            inputs.set()
-            instance.do_step(scenario.times[i], step)
-        expected = [*read(instance, *STATES), instance.integer("event_count")]
-    np.testing.assert_allclose(found[0], expected, rtol=0, atol=error_bound(scenario.tolerance))
 
 
 def test_a_joint_past_its_stop_that_leaves_is_no_event(plant: Fmu) -> None:

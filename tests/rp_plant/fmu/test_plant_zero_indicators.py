@@ -13,7 +13,6 @@ import pytest
 
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
-from tests.fmi2.rollback_sequences import times
 from tests.rp_plant.fmu.plant_model_exchange import STATES, PlantModel, model
 from tests.rp_plant.fmu.plant_runs import (
     COMPLIANT,
@@ -28,7 +27,6 @@ from tests.rp_plant.fmu.plant_runs import (
     read,
     started,
 )
-from tests.rp_plant.fmu.test_plant_rollback import busy, sequence
 
 # ---- At communication points, and after long internal steps --------------------------------------
 
@@ -65,19 +63,6 @@ def test_a_motion_continues_after_an_impact_that_ends_a_long_step(plant: Fmu, me
 
 
 @each_method
-@pytest.mark.parametrize("seed", ["cvode_adams", 56])
-def test_joints_that_kick_each_other_off_their_stops_come_to_rest(
-    plant: Fmu, method: str, seed: str | int
-) -> None:
-    """From random sequences: bounces lower than the rounding of a position, which never ended."""
-    moves = sequence(150, random.Random(seed))
-    with busy(plant, method) as run:
-        for t, move in zip(times(moves), moves, strict=False):
-            run.do(t, move)
-        assert last_event(run.instance).count > 50
-
-
-@each_method
 @pytest.mark.parametrize("e", [0.0, 0.5])
 def test_two_joints_pushed_onto_their_stops_come_to_rest(plant: Fmu, method: str, e: float) -> None:
     """Each impact of one kicks the other off its stop, and it comes back."""
@@ -106,29 +91,6 @@ def ramp(instance: Instance, begin: dict[str, float], rates: dict[str, float]) -
     polynomials = instance.input_polynomials(list(begin), 1)
     polynomials.view[:] = [list(begin.values()), [rates.get(name, 0.0) for name in begin]]
     polynomials.set()
-
-
-@each_method
-@pytest.mark.parametrize("tolerance", [1e-12, 1e-9])
-@pytest.mark.parametrize("joint_1", [{"coulomb_friction1": 1e6, "a": 0.0}, {"dq1": 1.5}])
-def test_a_slide_pulled_out_of_a_damped_stop(
-    plant: Fmu, method: str, tolerance: float, joint_1: dict[str, float]
-) -> None:
-    """It begins to touch, the stop lets go at 1 / c, the slide is out."""
-    c, f, m = 1.5, -200.0, 1.0
-    stop = {"stops2": COMPLIANT, "lower2": -0.2, "upper2": 0.2, "dq2": 2.0}
-    soft = {"stop_stiffness2": 2e3, "stop_damping2": c}
-    with started(plant, method, tolerance, g=0.0, **stop, **soft, **joint_1) as instance:
-        instance.do_step(0.0, 0.12)
-        instance.set("f2", f)
-        instance.do_step(0.12, 0.01)
-        count, time = last_event(instance)
-        assert count == 2
-        dq2 = read(instance, "dq2")[0]
-        if "a" in joint_1:
-            assert dq2 == pytest.approx(-1 / c + f / m * (0.13 - time), rel=0, abs=1e-8)
-        instance.do_step(0.13, 0.01)
-        assert last_event(instance).count == 3
 
 
 @each_method
