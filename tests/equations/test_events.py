@@ -240,6 +240,7 @@ def test_a_relation_of_time_switches_at_its_time(folder: Path, method: int) -> N
     run = simulated(fmu, 2.0, 0.2, {"solver_method": method}, relative_tolerance=1e-8)
     expected = np.clip(run["time"] - 0.73, 0.0, 0.73)
     np.testing.assert_allclose(run["x"], expected, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(run["y"], 1.0 - np.cos(run["time"]), rtol=0, atol=1e-7)
 
 
 def test_a_relation_of_inputs_switches_where_they_are_set(folder: Path, tmp_path: Path) -> None:

@@ -194,6 +194,11 @@ static void test_a_step_along_a_solution_has_its_limits(void) {
     advance(0.125, x);
     TEST_ASSERT_TRUE(integrator_passed_time(integrator) == 0.375);
     TEST_ASSERT_TRUE(statistics().last_step == 0.375);
+
+    // only the first step is long: the next one ends where the advance does
+    restart(1.0, 0.0, INFINITY, true);
+    advance(0.5, x);
+    TEST_ASSERT_TRUE(integrator_passed_time(integrator) == 0.5);
 }
 
 static void test_the_longest_step_divides_an_advance_into_equal_parts(void) {
