@@ -79,10 +79,10 @@ static bool update_modes(const struct call *call, bool is_exact) {
     return changes;
 }
 
-/* Repeats update_modes until no mode changes. Modes may depend on each other in a circle: then the
- * last ones stay. */
+/* Repeats update_modes until no mode changes. Relations depend on each other in no circle, so that
+ * each round decides at least one more for good. */
 static void update_modes_until_stable(const struct call *call, bool is_exact) {
-    for (int count = 0; count <= call->model->relation_count && update_modes(call, is_exact);
+    for (int count = 0; count < call->model->relation_count && update_modes(call, is_exact);
          count++) {
     }
 }

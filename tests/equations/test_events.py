@@ -6,7 +6,7 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi2 import _FMU2, FMU2Model, FMU2Slave
 
 from tests.equations.examples import METHODS, build, example, simulated
 
@@ -240,6 +240,7 @@ def test_a_relation_of_time_switches_at_its_time(folder: Path, method: int) -> N
     run = simulated(fmu, 2.0, 0.2, {"solver_method": method}, relative_tolerance=1e-8)
     expected = np.clip(run["time"] - 0.73, 0.0, 0.73)
     np.testing.assert_allclose(run["x"], expected, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(run["y"], 1.0 - np.cos(run["time"]), rtol=0, atol=1e-7)
 
 
 def test_a_relation_of_inputs_switches_where_they_are_set(folder: Path, tmp_path: Path) -> None:
@@ -255,9 +256,25 @@ def test_a_relation_of_inputs_switches_where_they_are_set(folder: Path, tmp_path
     unit.freeInstance()
 
 
-def opened(fmu: Path, folder: Path) -> FMU2Slave:
+def test_relations_that_decide_each_other_switch_in_one_event(folder: Path, tmp_path: Path) -> None:
+    """An input decides the first one, each the next."""
+    text = '[inputs]\nu = {}\n[where]\na0 = "u"\n'
+    text += "".join(f'a{i} = "u if a{i - 1} > 0 else -1"\n' for i in range(1, 9))
+    text += '[states]\nx = { derivative = "a8" }\n[outputs]\ny = { value = "a8" }\n'
+    fmu = made(folder / "decide", text)
+    unit = opened(fmu, tmp_path, FMU2Model)
+    unit.exitInitializationMode()
+    for value in (-1.0, 1.0):
+        unit.enterEventMode()
+        unit.setReal([reference(fmu, "u")], [value])
+        unit.newDiscreteStates()
+        assert unit.getReal([reference(fmu, "y")]) == [value]
+    unit.freeInstance()
+
+
+def opened(fmu: Path, folder: Path, kind: type[_FMU2] = FMU2Slave) -> _FMU2:
     description = fmpy.read_model_description(fmu)
-    unit = FMU2Slave(
+    unit = kind(
         guid=description.guid,
         unzipDirectory=fmpy.extract(str(fmu), str(folder)),
         modelIdentifier=description.coSimulation.modelIdentifier,

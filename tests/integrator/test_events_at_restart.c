@@ -5,10 +5,12 @@
 static const double below = -1e-6;
 static const size_t row_of_indicator[1] = {0};
 static double rate;
+static bool is_curved; // true if the indicator is sin x - 0.01, false if it is x
 static struct integrator *integrator;
 
 void setUp(void) {
     integrator = NULL;
+    is_curved = false;
 }
 
 void tearDown(void) {
@@ -36,7 +38,7 @@ static enum status series(double t, double time_scale, int first, int last,
 }
 
 static enum status indicators(double t, const double x[], double z[], void *context) {
-    z[0] = x[0];
+    z[0] = is_curved ? sin(x[0]) - 0.01 : x[0];
     return STATUS_OK;
 }
 
@@ -79,5 +81,16 @@ static void test_only_a_fall_from_where_it_was_counts(void) {
             const double fallen = run(method, kinds[k]);
             TEST_ASSERT_TRUE(fallen > 1e-9 && fallen < 1.001e-5);
         }
+    }
+}
+
+/* How far below 0 an indicator begins is no error of its later falls. */
+static void test_later_falls_are_located_exactly(void) {
+    const double pi = 3.141592653589793;
+    is_curved = true;
+    rate = 4.0;
+    for (int method = 1; method < INTEGRATOR_METHODS; method++) {
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, (pi - asin(0.01) - below) / rate,
+                                  run(method, INDICATOR_OF_MODEL));
     }
 }

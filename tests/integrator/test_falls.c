@@ -56,3 +56,32 @@ static void test_a_fall_up_to_the_latest_is_located_to_the_same_bit(void) {
     TEST_ASSERT_TRUE(located > 10000);
     TEST_ASSERT_TRUE(left_out > 10000);
 }
+
+/* p = -s (1 - 4 s) (1 - s / 0.9) / 10: the first fall counts only because p has been above the
+ * noise before, between 0.4 and 0.9. */
+static void test_an_indicator_that_rises_above_its_noise_is_armed(void) {
+    const double c[ROOTS_LENGTH] = {0.0, -0.1, 0.4 + 0.1 / 0.9, -0.4 / 0.9};
+    bool is_armed = false;
+    double noise = 0.02;
+    const double s = fall_first(
+        &(struct roots_polynomial){c, 3, -1.0},
+        &(struct fall){
+            .latest = INFINITY, .is_restart = true, .is_armed = &is_armed, .noise = &noise});
+    TEST_ASSERT_DOUBLE_WITHIN(1e-14, 0.9, s);
+    TEST_ASSERT_TRUE(is_armed);
+}
+
+/* p = (s - 0.5)^2 - 1e-6 */
+static void test_a_dip_within_the_touch_is_no_fall(void) {
+    const double c[ROOTS_LENGTH] = {0.25 - 1e-6, -1.0, 1.0};
+    for (int k = 0; k < 2; k++) {
+        bool is_armed = true;
+        double noise = 0.0;
+        const double s = fall_first(&(struct roots_polynomial){c, 2, -1.0},
+                                    &(struct fall){.touch = k == 0 ? 1e-7 : 1e-5,
+                                                   .latest = INFINITY,
+                                                   .is_armed = &is_armed,
+                                                   .noise = &noise});
+        TEST_ASSERT_TRUE(k == 0 ? fabs(s - 0.499) < 1e-12 : s == INFINITY);
+    }
+}

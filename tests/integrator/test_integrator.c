@@ -253,12 +253,19 @@ EACH_METHOD static void test_a_right_hand_side_that_fails_on_the_way_ends_the_st
 EACH_METHOD static void test_a_right_hand_side_that_fails_at_once_leaves_the_state(void) {
     double x[2];
     double reached;
+    struct integrator_statistics before;
+    struct integrator_statistics after;
+    restart(INFINITY);
+    advance(1.0, x);
+    integrator_get_statistics(integrator, &before);
     circle.failing_from = 0.0;
     restart(INFINITY);
     TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE,
                           integrator_advance(integrator, 2.0, step_limit, &reached, x));
     TEST_ASSERT_EQUAL_DOUBLE(0.0, reached);
     TEST_ASSERT_EQUAL_MEMORY(start, x, sizeof start);
+    integrator_get_statistics(integrator, &after);
+    TEST_ASSERT_EQUAL_DOUBLE(before.last_step, after.last_step); // the last that was taken
 
     integrator_destroy(integrator);
     create(always_failing, series_always_failing);

@@ -194,6 +194,11 @@ static void test_a_step_along_a_solution_has_its_limits(void) {
     advance(0.125, x);
     TEST_ASSERT_TRUE(integrator_passed_time(integrator) == 0.375);
     TEST_ASSERT_TRUE(statistics().last_step == 0.375);
+
+    // only the first step is long: the next one ends where the advance does
+    restart(1.0, 0.0, INFINITY, true);
+    advance(0.5, x);
+    TEST_ASSERT_TRUE(integrator_passed_time(integrator) == 0.5);
 }
 
 static void test_the_longest_step_divides_an_advance_into_equal_parts(void) {
@@ -206,6 +211,14 @@ static void test_the_longest_step_divides_an_advance_into_equal_parts(void) {
     advance(0.0205, x);
     TEST_ASSERT_TRUE(statistics().steps == 21);
     TEST_ASSERT_DOUBLE_WITHIN(usual_tolerance, driven_circle(0.0205), x[0]);
+}
+
+static void test_no_tolerance_takes_more_orders_than_a_row_has(void) {
+    double x[2];
+    create_at(square_rhs, square_series, 0.0, 1e-40);
+    restart(0.0, 0.0, INFINITY, true);
+    advance(1e-3, x);
+    TEST_ASSERT_EQUAL_INT(SERIES_LENGTH - 1, statistics().last_order);
 }
 
 static void test_rest_stays_rest(void) {

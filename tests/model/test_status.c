@@ -98,7 +98,7 @@ static void test_other_words_stay(void) {
 
 static void test_names_and_whole_numbers_stay(void) {
     static const char *const texts[] = {"v0.80000000000000004", "1.2.80000000000000004", "0.", "1e",
-                                        "18014398509481984"};
+                                        "18014398509481984",    "1234567890123450.0"};
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
         TEST_ASSERT_EQUAL_STRING(texts[i], written(texts[i]));
     }

@@ -168,7 +168,8 @@ class Workshop:
         """Hash of a test's program, of the files in its command, and of the FMUs that it names."""
         files = [Path(part) for part in test.command if part.startswith("/")]
         parts = [file.read_bytes() for file in files if file.is_file()]
-        libraries = sorted(build.glob("fmu/**/*.so"))
+        folders = (build / "fmu", *build.glob("tests/*/fmu"))
+        libraries = sorted(file for folder in folders for file in folder.rglob("*.so"))
         parts += [each.read_bytes() for each in libraries if str(each).encode() in parts[0]]
         return hashlib.sha256(b"".join(parts)).hexdigest()
 

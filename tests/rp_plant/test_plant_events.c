@@ -259,6 +259,21 @@ static void test_what_triggers_counts_only_where_forces_have_not_jumped(void) {
     assert_modes(RP_PLANT_STUCK, RP_PLANT_STUCK);
 }
 
+/* The rotation would throw the slide out, but ends at the stop of joint 1 at the same time. */
+static void test_what_triggers_does_not_count_where_an_impact_ends_the_rotation(void) {
+    const double m2L = v.parameters.arm.m2 * v.parameters.arm.l1;
+    v.dq[0] = sqrt(v.parameters.coulomb_friction[1] / m2L);
+    v.modes.joint[0] = RP_PLANT_FORWARD;
+    v.parameters.stops[0] = RP_PLANT_STOPS_RIGID;
+    v.parameters.lower[0] = v.q[0] - 1.0;
+    v.parameters.upper[0] = v.q[0];
+    bool triggered[RP_PLANT_INDICATORS] = {false};
+    triggered[UPPER1] = triggered[FORWARD2] = true;
+    plant_test_update_with(&v, triggered, NULL);
+    TEST_ASSERT_TRUE(v.dq[0] == 0.0);
+    assert_modes(RP_PLANT_STUCK, RP_PLANT_STUCK);
+}
+
 /* The load that would have drawn the slide down is let go at the same time. */
 static void test_what_triggers_does_not_count_where_the_payload_is_released(void) {
     v.parameters.arm.g = 2.0;

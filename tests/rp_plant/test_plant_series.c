@@ -63,13 +63,17 @@ static void extend(const struct series *series, const void *values, int first, i
 
 /* Each feature that is on adds to the series what it adds to the right-hand side. */
 static void test_each_feature_counts(void) {
-    double *const features[] = {
-        &plant.parameters.armature[0],     &plant.parameters.armature[1],
-        &plant.parameters.damping[0],      &plant.parameters.damping[1],
-        &plant.inputs.wrench[0],           &plant.inputs.wrench[1],
-        &plant.inputs.wrench[2],           &plant.parameters.payload_mass,
-        &plant.parameters.payload_inertia,
-    };
+    double *const features[] = {&plant.parameters.armature[0],
+                                &plant.parameters.armature[1],
+                                &plant.parameters.damping[0],
+                                &plant.parameters.damping[1],
+                                &plant.inputs.wrench[0],
+                                &plant.inputs.wrench[1],
+                                &plant.inputs.wrench[2],
+                                &plant.parameters.payload_mass,
+                                &plant.parameters.payload_inertia,
+                                &plant.parameters.coulomb_friction[0],
+                                &plant.parameters.coulomb_friction[1]};
     for (size_t i = 0; i < sizeof features / sizeof features[0]; i++) {
         double expected[PLANT_STATES];
         plant_test_random_arm(&random_source, &plant);
