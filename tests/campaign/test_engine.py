@@ -1,7 +1,4 @@
-"""Campaigns that were stopped or killed resume, and give the table of an undisturbed one.
-
-cluster/long_kills.py kills workers and fills the disk.
-"""
+"""Campaigns that were stopped or killed resume, and give the table of an undisturbed one."""
 
 import errno
 import os

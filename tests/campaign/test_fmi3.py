@@ -2,22 +2,17 @@
 
 import re
 import zipfile
-from ctypes import CFUNCTYPE, POINTER, c_bool, c_double, c_int, c_size_t, c_uint32, c_void_p, cast
+from ctypes import CFUNCTYPE, POINTER, c_bool, c_double, c_int, c_void_p, cast
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 
 from rparm.campaign.job import LYAPUNOV
 from rparm.campaign.runs import Rows
-from rparm.fmi.compiled_fmi3 import ADDRESSES
-from rparm.fmi.compiled_loop import COLUMNS, DERIVATIVE, DO_STEP
-from tests.campaign.cluster.processes import completed
-from tests.campaign.files import ARM, HEAD, campaign, commands, write
+from rparm.fmi.compiled_loop import COLUMNS, DO_STEP
+from tests.campaign.files import ARM, HEAD, campaign, write
 from tests.campaign.runners import rows, runner
-from tests.support.paths import ROOT
 from tests.support.rparm_project import BUILD, FMUS, Console, fmi3_fmu, repacked
 
 ARM2 = FMUS["rp_manipulator"]
@@ -92,30 +87,6 @@ def test_both_versions_in_one_system(tmp_path: Path) -> None:
         assert_same_bits(made(tmp_path / min(newer), MACHINE, path), expected)
 
 
-def test_the_command_replays_what_its_page_says(
-    tmp_path: Path, console: Console, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(ROOT)  # commands of pages are for the project's folder
-    file = write(tmp_path, changes=[("seed = 3", 'seed = 3\nworst = ["maximum(dq1)"]')])
-    tables = [
-        completed(file, tmp_path / name, "--workers", 1, "--fmu", fmu)
-        for name, fmu in (("2", ARM2), ("3", ARM3))
-    ]
-    assert tables[0] == tables[1]
-    page = (tmp_path / "3" / "index.html").read_text(encoding="utf-8")
-    again = next(command for command in commands(page) if "--replay" in command)
-    code, out, _ = console(*again[1:])
-    assert code == 0
-    printed = dict(line.split(" = ") for line in out.splitlines() if " = " in line)
-    run = int(again[-1])
-    table = pq.read_table(tmp_path / "3" / "blocks", filters=[("run", "=", run)])
-    row = table.to_pylist()[0]
-    assert row.keys() - printed.keys() == {"run", "failure"}
-    assert all(float(value) == row[name] for name, value in printed.items())
-    replayed = (tmp_path / "3" / "replays" / f"run_{run}.html").read_text(encoding="utf-8")
-    assert again in commands(replayed) and '"motion"' in replayed
-
-
 # ---- Failures ------------------------------------------------------------------------------------
 
 
@@ -169,35 +140,3 @@ def test_an_exponent_needs_directional_derivatives(tmp_path: Path, console: Cons
     file = write(tmp_path, changes=[("[keep]", f"[keep]\n{LYAPUNOV} = true")])
     expected = "[keep] lyapunov: the FMU gives no directional derivatives\n"
     assert console.refused("campaign", file, "--fmu", fmu).endswith(expected)
-
-
-# ---- The adapter of a derivative -----------------------------------------------------------------
-
-
-INSTANCE = 0x1234
-COUNT = 3
-REALS = POINTER(c_double)
-SIZED = (POINTER(c_uint32), c_size_t)
-DERIVATIVE_2 = CFUNCTYPE(c_int, c_void_p, *SIZED, *SIZED, REALS, REALS)
-DERIVATIVE_3 = CFUNCTYPE(c_int, c_void_p, *SIZED, *SIZED, REALS, c_size_t, REALS, c_size_t)
-
-
-def test_sizes_of_a_derivative() -> None:
-    @DERIVATIVE_3
-    def derive(instance: int, unknowns: Any, n: int, knowns: Any, m: int, *rest: Any) -> int:
-        seed, seeds, sensitivity, sensitivities = rest
-        if (instance, n, m, seeds, sensitivities) != (INSTANCE, 2, COUNT, COUNT, 2):
-            return 3
-        total = sum(a * x for a, x in zip(knowns[:m], seed[:m], strict=True))
-        for i in range(n):
-            sensitivity[i] = unknowns[i] * total
-        return 0
-
-    result = (c_double * 2)()
-    adapter = DERIVATIVE_2(ADDRESSES[DERIVATIVE])
-    knowns, unknowns = (c_uint32 * COUNT)(1, 2, 4), (c_uint32 * 2)(3, 5)
-    direction = (c_double * COUNT)(0.5, 0.25, 2.0)
-    given = (c_void_p * (1 + len(ADDRESSES)))(INSTANCE)  # in place of a component
-    given[1 + DERIVATIVE] = cast(derive, c_void_p)
-    assert adapter(given, unknowns, 2, knowns, COUNT, direction, result) == 0
-    assert list(result) == [27.0, 45.0]

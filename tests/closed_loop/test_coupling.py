@@ -12,11 +12,8 @@ from rparm.models.closed_loop.coupling import loop as closed_loop
 from rparm.models.closed_loop.coupling import report, study
 from rparm.models.closed_loop.coupling.loop import METHODS, REFERENCE_AHEAD, REFERENCES, ClosedLoop
 from rparm.models.closed_loop.coupling.study import (
-    CORNERS,
-    FAST,
     FAST_AND_SLOW,
     FAST_STOP,
-    STATES,
     FastAndSlow,
     StepErrors,
     study_payload,
@@ -30,7 +27,6 @@ from tests.support.systems import CLOSED_LOOP
 STEP = 1e-3  # s, of the sampled references
 BOUND = 1e-7  # relative, at the relative tolerance of the variants, 1e-11
 SMALLEST_SCALE = 1e-3
-INTEGRALS = ("controller.integral1", "controller.integral2")
 
 
 @pytest.fixture(scope="module")
@@ -181,29 +177,6 @@ def test_integral_action_removes_what_the_payload_costs(loop: ClosedLoop) -> Non
 
 
 # ---- Step doubling -------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("tolerance", [1e-4, 1e-5])
-def test_step_doubling_holds_the_local_error(motion: FastAndSlow, tolerance: float) -> None:
-    """Against the continuous loop, started from every accepted state."""
-    from rparm.models.closed_loop.references.closed_loop import monolithic
-
-    run, local, names = motion.controlled(tolerance)
-    columns = [names.index(name) for name in STATES]
-    states = run.values[:, columns]
-    exact = []
-    for begin, end, state in zip(run.times[:-1], run.times[1:], states, strict=False):
-        found = monolithic(flat(FAST), [begin, end], [*state, 0.0, 0.0])
-        exact.append([float(found[name][1]) for name in STATES])
-    errors = np.abs(states[1:] - np.array(exact)).max(axis=1)
-    assert errors.max() <= 3 * tolerance
-    assert np.median(errors[~run.limited]) >= tolerance / 3
-    assert np.abs(errors - local).max() <= 0.05 * tolerance  # what the study measures by itself
-    assert run.times[-1] == FAST_STOP
-    assert set(CORNERS) <= set(run.times)
-    whole = monolithic(flat(FAST), run.times)
-    found = np.array([whole[name] for name in STATES], float).T
-    assert np.abs(found - motion.states(run.times)).max() <= 1e-2 * np.abs(found - states).max()
 
 
 def test_step_doubling_takes_fewer_steps(loop: ClosedLoop, motion: FastAndSlow) -> None:

@@ -1,10 +1,6 @@
 """The closed loop in Ecos is what the references say; failures leave nothing."""
 
 import html
-import os
-import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -203,25 +199,6 @@ def test_ecos_that_crashes_is_reported(tmp_path: Path, console: Console) -> None
     path = edited(SSP, tmp_path / "crash.ssp", {"resources/RPController.fmu": fmu_edit})
     err = fails(path, "nominal", tmp_path, console)
     assert "Ecos failed" in err
-
-
-def test_an_interrupted_run_leaves_nothing(tmp_path: Path) -> None:
-    report = tmp_path / "report"
-    command = [sys.executable, "-m", "rparm", "system", "--report", str(report)]
-    environment = os.environ | {"TMPDIR": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
-    with subprocess.Popen(
-        command,
-        cwd=ROOT,
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
-        assert any(line.startswith("variant") for line in process.stdout)  # the runs begin
-        process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=30)
-    assert (process.returncode, err) == (130, "interrupted\n")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_damaged_reference_is_refused(tmp_path: Path) -> None:

@@ -55,14 +55,6 @@ def test_the_ball_bounces_eleven_times_and_rests(folder: Path, method: int) -> N
     assert run["last_event_time"][-1] == pytest.approx(flights(1.0)[-1][0], abs=1e-11)
 
 
-def test_the_ball_in_model_exchange(folder: Path) -> None:
-    run = simulated(
-        example("bouncing_ball", folder), 3.0, 0.013, {}, fmi_type="ModelExchange",
-        relative_tolerance=1e-10, also=["resting"],
-    )  # fmt: skip
-    assert np.max(np.abs(run["h"] - ball(run["time"]))) < 1e-7 and run["resting"][-1]
-
-
 @EACH_METHOD
 def test_the_thermostat_switches_when_its_exponentials_do(folder: Path, method: int) -> None:
     run = simulated(
@@ -351,32 +343,6 @@ def test_events_without_end_are_an_error(folder: Path) -> None:
     text += 'reinit = { x = "-x" }\n[events.f]\nwhen = "x < 0"\nreinit = { x = "-x" }\n'
     with pytest.raises(fmpy.fmi1.FMICallException):
         simulated(made(folder / "endless", text), 1.0, 0.1, {})
-
-
-def test_a_state_that_is_restored_bounces_the_same(folder: Path, tmp_path: Path) -> None:
-    """FMU states and serialized ones, taken between and after impacts."""
-    fmu = example("bouncing_ball", folder)
-    unit = opened(fmu, tmp_path)
-    unit.exitInitializationMode()
-    outputs = [reference(fmu, name) for name in ("h", "v", "energy")]
-
-    def run(begin: int) -> list[list[float]]:
-        rows = []
-        for step in range(begin, 60):
-            unit.doStep(step * 0.05, 0.05)
-            rows.append(unit.getReal(outputs))
-        return rows
-
-    states = []
-    for step in range(60):
-        states.append(unit.getFMUState())
-        unit.doStep(step * 0.05, 0.05)
-    unit.setFMUState(states[0])
-    expected = run(0)
-    for begin in (7, 9, 30, 49, 50, 55, 3):
-        unit.setFMUState(unit.deSerializeFMUstate(unit.serializeFMUstate(states[begin])))
-        assert run(begin) == expected[begin:]
-    unit.freeInstance()
 
 
 def test_a_model_without_states_has_modes(folder: Path, tmp_path: Path) -> None:

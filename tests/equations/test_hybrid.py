@@ -83,26 +83,6 @@ reinit = {{ h = "{floor}", v = "0.2 - v" }}
 """
 
 
-@pytest.mark.parametrize("floor", ["0.1 * time", "g", "f"])
-@pytest.mark.parametrize(
-    ("kind", "step"),
-    [*((method, step) for method in METHODS for step in (0.01, 0.003)), ("model_exchange", 0.01)],
-)
-def test_a_ball_does_not_fall_through_a_rising_floor(
-    unit: Callable, kind: str, step: float, floor: str
-) -> None:
-    """Above the floor it flies with the same speed after each impact."""
-    rising, inputs = unit(RISING.format(floor=floor)), {"f": Polynomial(0.0, 0.1, 0.0)}
-    run = run_of(rising, kind, step, round(3 / step), inputs)
-    speed = np.sqrt(0.1**2 + 2 * G)
-    impacts = [(speed - 0.1) / G + 2 * speed / G * k for k in range(3)]
-    assert impacts == pytest.approx([0.4414, 1.3447, 2.2480], abs=1e-4)
-    assert not run.failure
-    assert run.counts == [sum(impact < t for impact in impacts) for t in run.times]
-    assert run.x[-1][0] == pytest.approx(0.857995, abs=1e-6)
-    assert run.last_event == pytest.approx(impacts[-1], abs=1e-7)
-
-
 BOUNCING = """name = "Ball"
 [states]
 h = {{ start = {unit!r}, derivative = "v", nominal = {unit!r} }}

@@ -94,18 +94,6 @@ def test_fmpy_simulates_it_by_default(fmu: Path, tmp_path: Path) -> None:
     assert np.ptp(rows["q1"]) > 1.0
 
 
-def test_inputs_of_a_user_drive_it(fmu: Path) -> None:
-    """At rest in the horizontal plane, a force on link 2 only accelerates it uniformly."""
-    signals = np.array([(0.0, 3.0), (1.0, 3.0)], dtype=[("time", float), ("f2", float)])
-    result = fmpy.simulate_fmu(
-        str(fmu), stop_time=1.0, step_size=0.01, start_values={"g": 0.0, "a": 0.0, "m2": 1.5},
-        input=signals, output=["q1", "q2", "dq2"],
-    )  # fmt: skip
-    np.testing.assert_allclose(result["q2"], 0.5 * 2.0 * result["time"] ** 2, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(result["dq2"], 2.0 * result["time"], rtol=0, atol=1e-9)
-    assert np.all(result["q1"] == 0.0)
-
-
 def test_the_sample_of_the_readme_runs(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shown = []
     monkeypatch.setattr(fmpy, "plot_result", shown.append)

@@ -12,9 +12,8 @@ from fmpy.validation import validate_fmu
 import rparm
 from rparm import project, shipped
 from rparm.errors import UserError
-from tests.platforms import scripts
+from tests.platforms.model import CHANGED, METHODS
 from tests.platforms.platforms import PLATFORMS, Missing, Platform, Runner, emulator_of, finish
-from tests.platforms.scripts import METHODS, Model, Script, joined
 from tests.platforms.transcript import first_difference
 from tests.prove import problems
 from tests.support.installed import RELEASE, Installed, wheel_of_release
@@ -72,20 +71,19 @@ def test_fmus_are_valid_and_their_values_those_of_the_checkout(
     command = [sys.executable, "-P", "-m", "rparm", "build", model, "--output", output]
     environment = project.child_environment()
     subprocess.run(command, cwd=ROOT, env=environment, check=True, stdout=subprocess.DEVNULL)
-    script = by_all_methods(Runner(None, NAME, fmu, tmp_path).model)
     # each in turn: the libraries have the same place
     first, second = (
-        Runner(None, NAME, each, tmp_path).run(script)[0] for each in (fmu, output / fmu.name)
+        by_all_methods(Runner(None, NAME, each, tmp_path)) for each in (fmu, output / fmu.name)
     )
-    assert first_difference(script, first, second) is None
+    assert first_difference(first, second) is None
 
 
-def by_all_methods(model: Model) -> Script:
+def by_all_methods(runner: Runner) -> bytes:
     """Steps with rollback, a variant of the run for each method of integration."""
     with pytest.MonkeyPatch.context() as patch:
         changed = {"phi": 0.75, "v": 0.5, "solver_method": list(METHODS)}
-        patch.setitem(scripts.CHANGED, model.name, changed)
-        return joined(*(scripts.co_simulation(model, variant) for variant in METHODS))
+        patch.setitem(CHANGED, NAME, changed)
+        return b"".join(runner.run(*(f"steps:{variant}:0" for variant in METHODS)))
 
 
 @each_platform
@@ -95,10 +93,9 @@ def test_every_platform_gives_the_same_bits(for_all: Path, row: Platform, tmp_pa
         other = Runner(row, NAME, for_all, tmp_path, archive=for_all)
     except Missing as error:
         missing(f"missing: {error}")
-    script = by_all_methods(native.model)
-    (expected,), (actual,) = native.run(script), other.run(script)
+    expected, actual = by_all_methods(native), by_all_methods(other)
     assert len(expected) > 10_000
-    assert first_difference(script, expected, actual) is None
+    assert first_difference(expected, actual) is None
 
 
 def for_this_machine(fmu: Path, folder: Path) -> Path:

@@ -136,12 +136,3 @@ def test_the_command_runs_it(tmp_path: Path, console: Console) -> None:
     rows = np.rint(written["time"] * STEPS_PER_SECOND).astype(int)  # those that the page draws
     for name, values in run("stick_slip").items():
         np.testing.assert_allclose(written[name], values[rows], rtol=1e-11)  # twelve digits
-
-
-def test_systems_are_listed_with_their_variants(console: Console) -> None:
-    lines = console("system", "--list")[1].splitlines()
-    at = lines.index("machine")
-    assert lines[0] == "closed_loop"
-    assert lines[at + 1 : at + 1 + len(MACHINE.variants)] == [
-        f"  {name}" for name in MACHINE.variants
-    ]

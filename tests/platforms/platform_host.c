@@ -1,9 +1,9 @@
-/* platform_host LIBRARY SCRIPT TRANSCRIPT [SCRIPT TRANSCRIPT ...]
+/* platform_host LIBRARY MODEL RUN TRANSCRIPT [RUN TRANSCRIPT ...]
  *
- * Loads the library of an FMU and runs scripts of FMI calls (script.h), several of them in as many
- * threads. One program for every platform: C17, libraries and threads. Ends with 0
- * if all scripts ran, whatever the FMU answered. */
-#include "script.h"
+ * Loads the library of an FMU and makes runs of FMI calls (runs.h), several of them in as many
+ * threads. One program for every platform: C17, libraries and threads. MODEL is a file about the
+ * model, by model.py. Ends with 0 if every status is the expected one. */
+#include "runs.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -119,51 +119,25 @@ static bool system_run_threads(void (*run)(void *item), void *const *items, size
 
 /* ---- Jobs ------------------------------------------------------------------------------------ */
 
-enum { MOST_SCRIPTS = 64 };
+enum { MOST_RUNS = 64 };
 
 struct job {
     const struct fmu_functions *fmi;
-    const char *script;
+    const struct model *model;
+    const char *run;
     const char *transcript;
-    bool succeeded;
+    bool has_succeeded;
 };
-
-/* The text of a file, which the caller frees, or NULL. */
-static char *read_file(const char *path) {
-    FILE *file = fopen(path, "rb");
-    if (file == NULL) {
-        return NULL;
-    }
-    char *text = NULL;
-    size_t size = 0;
-    size_t capacity = 1 << 16;
-    do {
-        capacity *= 2;
-        char *larger = realloc(text, capacity);
-        if (larger == NULL) {
-            break;
-        }
-        text = larger;
-        size += fread(text + size, 1, capacity - 1 - size, file);
-        text[size] = '\0';
-    } while (size == capacity - 1);
-    fclose(file);
-    return text;
-}
 
 static void run_job(void *item) {
     struct job *job = item;
-    char *text = read_file(job->script);
     FILE *transcript = fopen(job->transcript, "wb"); // binary: the same ends of lines everywhere
-    if (text == NULL || transcript == NULL) {
-        fprintf(stderr, "%s or %s cannot be opened\n", job->script, job->transcript);
-    } else {
-        job->succeeded = script_run(job->fmi, text, transcript) && !ferror(transcript);
+    if (transcript == NULL) {
+        fprintf(stderr, "%s cannot be written\n", job->transcript);
+        return;
     }
-    if (transcript != NULL) {
-        job->succeeded = fclose(transcript) == 0 && job->succeeded;
-    }
-    free(text);
+    job->has_succeeded = runs_make(job->fmi, job->model, job->run, transcript);
+    job->has_succeeded = fclose(transcript) == 0 && job->has_succeeded;
 }
 
 static bool find_functions(void *library, struct fmu_functions *fmi) {
@@ -178,27 +152,30 @@ static bool find_functions(void *library, struct fmu_functions *fmi) {
 }
 
 int main(int argument_count, char *arguments[]) {
-    if (argument_count < 4 || argument_count % 2 != 0 || argument_count > 2 + 2 * MOST_SCRIPTS) {
-        fprintf(stderr, "usage: platform_host LIBRARY SCRIPT TRANSCRIPT [SCRIPT TRANSCRIPT ...]\n");
+    struct model *model = NULL;
+    if (argument_count < 5 || argument_count % 2 != 1 || argument_count > 3 + 2 * MOST_RUNS) {
+        fprintf(stderr, "usage: platform_host LIBRARY MODEL RUN TRANSCRIPT [RUN TRANSCRIPT ...]\n");
         return 2;
     }
     struct fmu_functions fmi;
     void *library = system_open(arguments[1]);
-    if (library == NULL || !find_functions(library, &fmi)) {
+    if (library == NULL || !find_functions(library, &fmi) ||
+        (model = runs_read_model(arguments[2])) == NULL) {
         return 2;
     }
 
-    struct job jobs[MOST_SCRIPTS];
-    void *items[MOST_SCRIPTS];
+    struct job jobs[MOST_RUNS];
+    void *items[MOST_RUNS];
     size_t count = 0;
-    for (int i = 2; i < argument_count; i += 2) {
-        jobs[count] = (struct job){&fmi, arguments[i], arguments[i + 1], false};
+    for (int i = 3; i < argument_count; i += 2) {
+        jobs[count] = (struct job){&fmi, model, arguments[i], arguments[i + 1], false};
         items[count] = &jobs[count];
         count++;
     }
-    bool succeeded = system_run_threads(run_job, items, count);
+    bool has_succeeded = system_run_threads(run_job, items, count);
     for (size_t i = 0; i < count; i++) {
-        succeeded = succeeded && jobs[i].succeeded;
+        has_succeeded = has_succeeded && jobs[i].has_succeeded;
     }
-    return succeeded ? 0 : 1;
+    free(model);
+    return has_succeeded ? 0 : 1;
 }

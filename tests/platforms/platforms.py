@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.equations.examples import build
-from tests.platforms.scripts import Model, Script, read_model
+from tests.platforms.model import Model, read_model
 from tests.support.missing import missing
 from tests.support.paths import EXAMPLES, FMI_HEADERS, ROOT
 
@@ -24,7 +24,7 @@ NATIVE_HOST = (
 )
 # of builds for one platform, of the hosts, and of wine
 SCRATCH = BUILD / "platforms"
-HOST_SOURCES = ("platform_host.c", "script.c")
+HOST_SOURCES = ("platform_host.c", "runs.c")
 TIME_LIMIT = 900.0  # s; zig makes its C library for Windows when it is asked for the first time
 
 
@@ -187,7 +187,7 @@ class Runner:
     def __init__(
         self, row: Platform | None, name: str, fmu: Path, folder: Path, archive: Path | None = None
     ) -> None:
-        """`fmu` is the native one; `folder` takes libraries, scripts and transcripts.
+        """`fmu` is the native one; `folder` takes libraries and transcripts.
 
         `archive` has the library of the row: that of the release if it is not given.
         """
@@ -228,14 +228,12 @@ class Runner:
         (self.folder / self.library).unlink()
         finish([row.compiler, "-shared", "-o", f"../{self.library}", *objects], sources)
 
-    def run(self, *scripts: Script) -> list[bytes]:
-        """Transcripts of scripts, each run in a separate thread."""
-        arguments = []
-        for i, script in enumerate(scripts):
-            (self.folder / f"{i}.script").write_bytes(script.text.encode())
-            arguments += [f"{i}.script", f"{i}.transcript"]
-        finish([*self.command, self.library, *arguments], self.folder)
-        return [(self.folder / f"{i}.transcript").read_bytes() for i in range(len(scripts))]
+    def run(self, *runs: str) -> list[bytes]:
+        """Transcripts of runs that platform_host.c knows, each made in a separate thread."""
+        (self.folder / "model").write_text(self.model.text(), encoding="utf-8", newline="\n")
+        arguments = [word for i, run in enumerate(runs) for word in (run, f"{i}.transcript")]
+        finish([*self.command, self.library, "model", *arguments], self.folder)
+        return [(self.folder / f"{i}.transcript").read_bytes() for i in range(len(runs))]
 
 
 def native_member(fmu: Path) -> str:

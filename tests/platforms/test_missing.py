@@ -54,16 +54,6 @@ def test_without_a_compiler(row: Platform, monkeypatch: pytest.MonkeyPatch) -> N
         platforms.compiler_of(row)
 
 
-def test_a_release_is_found(row: Platform, release: Path) -> None:
-    assert platforms.archive_with(row, NAME) == release
-
-
-def test_a_release_without_this_platform(row: Platform, release: Path) -> None:
-    row = dataclasses.replace(row, folder="moon64")
-    with pytest.raises(Missing, match="no FMU with a library for moon: ./release.sh"):
-        platforms.archive_with(row, NAME)
-
-
 def test_a_build_for_one_platform_is_found(row: Platform, release: Path) -> None:
     only = platforms.SCRATCH / row.preset / release.name
     only.parent.mkdir(parents=True)

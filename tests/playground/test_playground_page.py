@@ -98,25 +98,6 @@ def test_reset_brings_all_back(opened: OpenedPage) -> None:
     assert opened.run(motion) == moved
 
 
-def test_benchmark(opened: OpenedPage, capsys: pytest.CaptureFixture[str]) -> None:
-    """It measures, and leaves everything as it was; the figure is printed."""
-    lines = []
-    # without friction nothing comes to rest, where a step costs nothing
-    choose(opened, "#setting", "Without friction")
-    for text in ("off", "computed_torque"):
-        choose(opened, "#law", text)
-        before = opened.run("return [simulation.time, plant.get('q1'), plant.get('solver_steps')]")
-        result = opened.run("return window.tested.benchmark()")
-        after = opened.run("return [simulation.time, plant.get('q1'), plant.get('solver_steps')]")
-        assert before == after
-        assert result["factor"] == pytest.approx(1e-3 / result["step"])
-        lines.append(f"controller {text}: {result['factor']:.0f} times real time")
-    with capsys.disabled():
-        print(f"\nplayground, steps of 1 ms in Chromium, without drawing: {'; '.join(lines)}")
-    click(opened, "#measure")
-    assert "times real time" in opened.text("#factor")
-
-
 def test_a_benchmark_that_fails(opened: OpenedPage) -> None:
     """Some steps on, the force is too large: all is as before, and nothing leaks."""
     click(opened, "#reset")

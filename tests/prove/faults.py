@@ -1,16 +1,11 @@
 """Faults planted in the program that encloses motions: each has to be noticed by the checkers.
 
-python -m tests.prove.faults [--random COUNT] [--seed SEED]
+python -m tests.prove.faults
 """
 
-import argparse
-import itertools
-import json
-import random
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,15 +19,9 @@ from tests.prove.problems import (
     enclosures,
     run,
 )
-from tests.support.paths import ROOT
-
-sys.path.insert(0, str(ROOT / "tests" / "mutation"))
-import sites  # noqa: E402
 
 COMPILE = ("cc", "-std=c17", "-O1", "-ffp-contract=off", "-w")
 UNCOMPILABLE = "does not compile"
-FILES = ("ball.h", "arm_series.h", "step.h", "arm_outputs.h")
-SAMPLE = Path(__file__).with_name("random_faults.json")
 WIDEST = 1e-26  # radius of free motion
 
 
@@ -130,67 +119,6 @@ PLANTED = (
 )  # fmt: skip
 
 
-# functions that choose a frame, an order or the length of a step: any choice is good
-CHOICES = {
-    "frame_along", "reflect", "dot", "expand_centre",
-}  # fmt: skip
-# statements whose mutants change no bound, and why
-MASKED = {
-    "if (!expand_centre(problem, before, efforts, step))":
-        "a longer step has to pass the same checks",
-    "for (double size = fabs(x.hi); size >= 0x1p-4; size *= 0.5)": "any x below 1 will do",
-    "rest[i] = (rest[i] + TINY) * OUTWARD": "TINY is far below OUTWARD's part of the rest",
-    "const double middle = x[0].hi + half.hi": "any box will do",
-    "step->box[i] = ball_around(middle, reached[i] * (1.0 + ROOM) + ACCURATE)": "any box will do",
-    "inside = inside && (reached[i] + size) * (1.0 + CONFIRMED) < step->box[i].radius":
-        "a remainder that is accurate fits into the room of every box, far above 2^-12 of it",
-    "for (int d = 0; d < problem->directions; d++)": "one more, which nothing reads",
-    "if (i < directions)": "one more, which nothing reads",
-    "const double share = inverts ? deviation / ((1.0 - deviation) * INWARD) : (double)INFINITY":
-        "the deviation adds up all rows, and is far below 1, which check.py confirms",
-    "coordinates[i] = (coordinates[i] + share * all * OUTWARD) * OUTWARD":
-        "the deviation adds up all rows: OUTWARD of it is far below that room",
-    "coordinates[i] = (sum + TINY) * OUTWARD":
-        "the OUTWARD that follows covers the sum's roundings, and TINY is far below them",
-    "quotient.radius = divides ? (remainder / smallest + TINY) * OUTWARD : (double)INFINITY":
-        "the bounds that are divided have room for this rounding",
-    "const double shifted = 134217729.0 * a":
-        "only products of the lower halves are rounded then, below 8 HALF_ULP^2 of the whole",
-    "step->more_orders -= step->more_orders > 0 ? 1 : 0": "any order is good",
-    "const bool more = inside && !accurate && step->order < LAST_ORDER - 1": "any order is good",
-    "finite = finite && ball_largest(after->centre[i]) + after->radius[i] <= DBL_MAX":
-        "a certificate with numbers that are not finite is refused",
-    "for (int i = 0; i <= n; i += 16)": "OUTWARD is for 32 roundings, these are 17 and a few",
-    "for (int j = 3; j >= k; j--)": "a fourth derivative would be below 2^-1000",
-    "const struct step_times when = {.length = ball_exact(1.0), .within = ball_exact(0.0), "
-    ".elapsed = ball_of_sum(point, -problem->start),}": "order 0 does not depend on the length",
-    "for (int e = 0; e < EFFORTS; e++)": "one more, which nothing reads",
-    "for (int i = 0; i < OUTPUTS; i++)": "one more, which nothing reads",
-}  # fmt: skip
-
-
-def random_faults(seed: int) -> Iterator[sites.Mutant]:
-    """Random mutants of what is calculated, without those of choices."""
-    every = [mutant for name in FILES for mutant in sites.mutants_of(name, text_of(name))]
-    random.Random(seed).shuffle(every)
-    yield from (mutant for mutant in every if mutant.function not in CHOICES)
-
-
-def sample() -> list[sites.Mutant]:
-    """The random mutants that the tests plant."""
-    return [sites.Mutant(**entry) for entry in json.loads(SAMPLE.read_text())]
-
-
-def source_of(fault: Fault | sites.Mutant) -> str:
-    """The file with the fault in it."""
-    text = text_of(fault.file)
-    return fault.source(text) if isinstance(fault, Fault) else sites.mutated(fault, text)
-
-
-def text_of(name: str) -> str:
-    return (SOURCES / name).read_text()
-
-
 def built(folder: Path, file: str, source: str) -> Path | None:
     """The program with another source for one file; None: it does not compile."""
     for path in SOURCES.glob("*.[ch]"):
@@ -234,36 +162,20 @@ def certified(problem: Problem, program: Path) -> tuple[int, str]:
     return answer.returncode, ""
 
 
-def verdict(file: str, source: str) -> str | None:
+def verdict(fault: Fault) -> str | None:
     """How a fault is noticed; None: it is not."""
     with tempfile.TemporaryDirectory() as folder:
-        program = built(Path(folder), file, source)
+        source = fault.source((SOURCES / fault.file).read_text())
+        program = built(Path(folder), fault.file, source)
         return UNCOMPILABLE if program is None else noticed(program)
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description="Plants faults; the checkers must notice each.")
-    parser.add_argument("--random", type=int, default=0, metavar="COUNT", help="draw a new sample")
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
-    faults: list[Fault | sites.Mutant] = list(PLANTED)
-    if options.random:
-        faults = list(itertools.islice(random_faults(options.seed), options.random))
     alive = 0
-    drawn = []
-    for fault in faults:
-        how = verdict(fault.file, source_of(fault))
-        name, statement = (
-            (fault.name, "") if isinstance(fault, Fault) else (fault.description(), fault.statement)
-        )
-        if how is None and statement in MASKED:
-            how = f"masked: {MASKED[statement]}"
+    for fault in PLANTED:
+        how = verdict(fault)
         alive += how is None
-        print(f"{'ALIVE' if how is None else 'dead '} {name}: {how}", flush=True)
-        if isinstance(fault, sites.Mutant) and how != UNCOMPILABLE:
-            drawn.append(fault.as_dict())
-    if options.random:
-        SAMPLE.write_text("[\n" + ",\n".join(map(json.dumps, drawn)) + "\n]\n")
+        print(f"{'ALIVE' if how is None else 'dead '} {fault.name}: {how}", flush=True)
     return int(alive > 0)
 
 

@@ -2,17 +2,12 @@
 
 import os
 import re
-import shutil
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from rparm import files
 from rparm.commands import run as run_command
 from tests.support.paths import ROOT
 from tests.support.rparm_project import (
@@ -21,7 +16,6 @@ from tests.support.rparm_project import (
     NAMES,
     SHORT,
     Console,
-    edit,
     fmi3_fmu,
     load,
     reference_file,
@@ -135,29 +129,6 @@ def test_report_in_a_folder_that_takes_no_files(
         closed.mkdir(mode=0o500)
     error = console.refused(*command, "--report", folder.format(closed))
     assert "cannot be written" in error
-
-
-def test_runs_as_a_module_and_stops_at_once_on_ctrl_c(project: Path, fmu: Path) -> None:
-    path = project / f"models/rp_manipulator/scenarios/{LONG}.toml"
-    edit(path, "step = 0.01", "step = 5e-7")
-    edit(path, "tolerance = 1e-8", "tolerance = 1e-8\nreference_every = 20000")
-    file = reference_file(project, LONG)
-    rows = np.loadtxt(file, delimiter=",", skiprows=1)
-    rows[:, 0] = load(LONG, project).times[load(LONG, project).reference_rows]
-    names = [name.strip('"') for name in file.read_text().splitlines()[0].split(",")]
-    files.write_trajectory(file, rows[:, 0], names[1:], rows[:, 1:])
-
-    shutil.copytree(ROOT / "rparm", project / "rparm")
-    command = [sys.executable, "-u", "-m", "rparm", "run", LONG, "--fmu", str(fmu)]
-    with subprocess.Popen(
-        command, cwd=project, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        process.stdout.readline()  # the head of the table: everything is imported and read
-        time.sleep(0.2)  # into the steps, which take seconds
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=10)
-    assert process.returncode == 130
-    assert err == "interrupted\n" and "Traceback" not in out
 
 
 def test_runs_from_anywhere(tmp_path: Path) -> None:

@@ -7,15 +7,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from rparm import project
 from rparm.errors import UserError, WrongValueError
 from rparm.fmi.fmu_file import Fmu, read_model
 from rparm.fmi.model import Variable
-from rparm.runs import convergence, simulation
+from rparm.runs import simulation
 from tests.support.rparm_project import FMUS, SHORT, declared, fmi3_fmu, load, repacked
 
 
@@ -39,39 +37,6 @@ def test_the_models_are_the_same(path: Path) -> None:
     empty = {"variables": {}, "fmi_version": ""}
     assert replace(first, **empty) == replace(second, **empty)
     assert first.real_outputs == second.real_outputs
-
-
-@pytest.mark.parametrize("order", convergence.ORDERS)
-def test_polynomials_of_inputs_have_the_same_effect(opened: Fmu, opened3: Fmu, order: int) -> None:
-    """By derivatives of inputs in FMI 2.0; in 3.0 by values at four times, exact for a cubic."""
-    (path,) = project.convergence_files()
-    problem = convergence.load(path, opened.model)
-    first, second = (convergence.final_state(fmu, problem, order, 16) for fmu in (opened, opened3))
-    for name, value in first.items():
-        assert second[name] == pytest.approx(value, abs=1e-8 * problem.largest[name])
-    if order:  # so the test sees them
-        held = convergence.final_state(opened3, problem, 0, 16)
-        assert max(abs(held[name] - second[name]) for name in held) > 1e-4
-
-
-def test_a_state_brings_an_instance_back(opened3: Fmu) -> None:
-    loaded = load(SHORT)
-    with opened3.instance("one") as instance:
-        simulation.initialize(instance, loaded, 1e-8)
-        outputs = instance.reals(opened3.model.real_outputs)
-        instance.do_step(loaded.start, 0.1)
-        state = instance.saved_state()
-        state.take()
-        rows = []
-        for _ in range(2):
-            instance.do_step(loaded.start + 0.1, 0.1, goes_back=True)
-            outputs.get()
-            rows.append(outputs.view.copy())
-            state.restore()
-        outputs.get()
-        assert np.array_equal(*rows) and not np.array_equal(rows[0], outputs.view)
-        state.free()
-        state.free()  # nothing is left to free
 
 
 # ---- failures ------------------------------------------------------------------------------------

@@ -224,11 +224,6 @@ def test_fmu_of_a_model_without_scenarios(project: Path, fmu: Path, console: Con
     assert words in console.refused("run", "--fmu", other)
 
 
-def test_what_is_not_built_can_be_given(project: Path, console: Console) -> None:
-    words = "has no FMU of rp_manipulator: ./run.sh builds it, --fmu PATH takes another one"
-    assert words in console.refused("run", SHORT)
-
-
 # ---- Binaries ------------------------------------------------------------------------------------
 
 

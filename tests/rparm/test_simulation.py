@@ -31,11 +31,6 @@ def test_rows_are_what_an_importer_reads(opened: Fmu) -> None:
     np.testing.assert_allclose(column["actuator_power"], power, rtol=1e-12, atol=1e-12)
 
 
-def test_the_same_run_gives_the_same_bits(opened: Fmu) -> None:
-    first, second = (simulation.simulate(opened, load(LONG)) for _ in range(2))
-    assert np.array_equal(first.values, second.values)
-
-
 def test_progress_counts_all_steps(opened: Fmu, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(simulation, "PROGRESS_EVERY", 0.0)
     counted: list[int] = []
