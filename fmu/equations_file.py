@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -29,6 +29,7 @@ from rparm.expressions.expression import (
     ExpressionError,
     Node,
     check_kinds,
+    evaluated,
     finite_number,
     in_order,
     names,
@@ -52,12 +53,17 @@ SECTIONS = {  # keys of their entries, and the one that each needs
     "parameters": (OF_ALL, "start"),
     "inputs": (OF_ALL, ""),
     "states": ((*OF_ALL, "nominal", "derivative"), "derivative"),
+    "discrete": (("start", "unit", "description"), ""),
     "where": ((), ""),  # they are expressions
     "outputs": (("value", "unit", "description"), "value"),
 }
-HEAD = ("name", "description", "experiment", "modes", "units", "events", "check", *SECTIONS)
+HEAD = (
+    *("name", "description", "experiment", "modes", "units", "sampled", "events", "check"),
+    *SECTIONS,
+)
 EXPERIMENT = {"stop": 10.0, "step": 0.01, "tolerance": 1e-8}
 EVENT = ("when", "while", "reinit", "set")
+SAMPLER = ("every", "offset", "while", "reinit", "set")
 # what other languages have, by what it looks like, and what to do instead
 INSTEAD = {
     r"\[": "arrays are not supported: give each element a name and write sums out",
@@ -65,14 +71,13 @@ INSTEAD = {
         "equations in implicit form are not supported: solve them for the derivative of each state"
     ),
     r"\b(?:sample[rds]?|pre|previous|hold|clock|interval)\s*(?:\(|$)": (
-        "samplers are not supported: set an input at the communication points, or write the model "
-        "in C"
+        "samplers are written as [sampled.NAME] with every and set, which see the values before"
     ),
     r"\b(?:noise|random|rand|randn|gauss|normal|uniform)\s*(?:\(|$)": (
         "noise is not supported: make it outside and give it to an input"
     ),
 }
-TABLES = ("experiment", "units", "events", "check", "reinit", "set", *SECTIONS)
+TABLES = ("experiment", "units", "sampled", "events", "check", "reinit", "set", *SECTIONS)
 QUOTES = r"[\s\"']"
 SECOND = unit_of_exponents({"s": 1})
 
@@ -88,7 +93,7 @@ class Expression:
     place: tuple[str, ...]
     text: str
     kind: str = NUMBER
-    target: str = ""  # the variable or mode that it is assigned to
+    target: str = ""  # the variable or mode that it is assigned to; of a period: time
     is_rate: bool = False  # of the target
     event: str = ""  # "when" one happens, or "then"
     tree: Node = field(init=False)
@@ -118,7 +123,7 @@ class Variable:
     exponents: dict[str, int] = field(default_factory=dict)  # of the base units and rad
     description: str = ""
     expression: Expression | None = None  # derivative of a state, value of others
-    leaf: Any = None  # what a generator makes of a parameter, input or state
+    leaf: Any = None  # what a generator makes of a parameter, input, state or discrete variable
     arguments: tuple[Variable, ...] = ()  # those of [where] and [outputs] that it names
 
     @property
@@ -128,20 +133,53 @@ class Variable:
 
 
 @dataclass
-class Event:
-    """An event of the file."""
+class Change:
+    """New values, which an event or a sampler gives."""
 
     name: str
-    when: Expression
     during: Expression | None  # `while`
     reinit: dict[str, Expression]  # by state
-    set: dict[str, Expression]  # by mode
+    set: dict[str, Expression]  # by mode or discrete variable
+
+    @property
+    def given(self) -> dict[str, Expression]:
+        """New values by variable or mode."""
+        return self.reinit | self.set
+
+    @property
+    def conditions(self) -> list[Expression]:
+        """Conditions on which it happens."""
+        return [] if self.during is None else [self.during]
 
     @property
     def expressions(self) -> list[Expression]:
         """All of them."""
-        first = [self.when] if self.during is None else [self.when, self.during]
-        return [*first, *self.reinit.values(), *self.set.values()]
+        return [*self.conditions, *self.given.values()]
+
+
+@dataclass
+class Event(Change):
+    """An event of the file."""
+
+    when: Expression
+
+    @property
+    def conditions(self) -> list[Expression]:
+        """Conditions on which it happens."""
+        return [self.when, *super().conditions]
+
+
+@dataclass
+class Sampler(Change):
+    """A sampler of the file; its periods follow from parameters."""
+
+    every: Expression
+    offset: Expression
+
+    @property
+    def periods(self) -> list[Expression]:
+        """Its times, in s."""
+        return [self.every, self.offset]
 
 
 @dataclass
@@ -157,6 +195,7 @@ class ModelFile:
     units: dict[str, dict[str, int]] = field(default_factory=dict)  # exponents, of [units]
     modes: list[str] = field(default_factory=list)
     variables: dict[str, Variable] = field(default_factory=dict)
+    sampled: list[Sampler] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     checks: dict[str, Expression] = field(default_factory=dict)  # conditions by message
     order: list[Expression] = field(default_factory=list)  # each after those that it names
@@ -168,10 +207,20 @@ class ModelFile:
         return any(variable.unit for variable in self.variables.values())
 
     @property
+    def changes(self) -> list[Change]:
+        """Samplers and events, in the order in which they happen at one instant."""
+        return [*self.sampled, *self.events]
+
+    @property
     def assigned(self) -> list[Expression]:
-        """All expressions but conditions on parameters."""
+        """All expressions that may read everything."""
         found = [variable.expression for variable in self.of("states", "where", "outputs")]
-        return found + [expression for event in self.events for expression in event.expressions]
+        return found + [expression for change in self.changes for expression in change.expressions]
+
+    @property
+    def constant(self) -> list[Expression]:
+        """All expressions of parameters only."""
+        return [*(e for s in self.sampled for e in s.periods), *self.checks.values()]
 
     def of(self, *sections: str) -> list[Variable]:
         """Return variables of these sections, in the order of the file."""
@@ -295,6 +344,8 @@ def read_tables(
         with placed("modes", shown(mode)):
             _check_name(mode, file)
         file.modes.append(mode)
+    for name, entry in head.get("sampled", {}).items():
+        _read_sampler(file, name, entry)
     for name, entry in head.get("events", {}).items():
         _read_event(file, name, entry)
     for message, condition in head.get("check", {}).items():
@@ -322,7 +373,7 @@ def _read_variable(file: ModelFile, section: str, name: str, entry: object) -> N
     place = (f"[{section}]", name if NAME.fullmatch(name) else shown(name))
     with placed(*place):
         _check_name(name, file)
-        given = {"start": 0.0} if section in ("inputs", "states") else {}
+        given = {"start": 0.0} if section in ("inputs", "states", "discrete") else {}
         if section == "where":
             texts = {"": entry}
         else:
@@ -348,8 +399,10 @@ def _check_name(name: str, file: ModelFile) -> None:
         raise ModelFileError(f"this name is in [{file.variables[name].section}] already")
     if name in file.modes:
         raise ModelFileError("this name is in modes already")
-    if len(file.variables) + len(file.modes) + len(file.events) >= MOST_VARIABLES:
-        raise ModelFileError(f"has more than {MOST_VARIABLES} variables, modes and events")
+    if len(file.variables) + len(file.modes) + len(file.changes) >= MOST_VARIABLES:
+        raise ModelFileError(
+            f"has more than {MOST_VARIABLES} variables, modes, samplers and events"
+        )
 
 
 def _check_range(variable: Variable) -> None:
@@ -362,27 +415,56 @@ def _check_range(variable: Variable) -> None:
 
 
 def _read_event(file: ModelFile, name: str, entry: object) -> None:
-    place = f"[events.{name if NAME.fullmatch(name) else shown(name)}]"
+    place, given = _change(file, "events", name, entry, EVENT)
+    when = Expression((place, "when"), given["when"], CONDITION, event="when")
+    if when.tree.op not in RELATIONS:
+        raise ModelFileError(f"{place}: when: expected one relation such as h < 0")
+    file.events.append(Event(name, *_given(file, place, given, ""), when))
+
+
+def _read_sampler(file: ModelFile, name: str, entry: object) -> None:
+    place, given = _change(file, "sampled", name, entry, SAMPLER)
+    every, offset = (
+        Expression((place, key), given.get(key, "0"), NUMBER, "time") for key in ("every", "offset")
+    )
+    if not ("set" in given or "reinit" in given):
+        raise ModelFileError(f"{place}: expected set or reinit: what it does")
+    file.sampled.append(Sampler(name, *_given(file, place, given, "then"), every, offset))
+
+
+def _change(
+    file: ModelFile, section: str, name: str, entry: object, keys: tuple[str, ...]
+) -> tuple[str, dict[str, Any]]:
+    """Return the place of an event or sampler, and its entries; it needs the first of its keys."""
+    place = f"[{section}.{name if NAME.fullmatch(name) else shown(name)}]"
     with placed(place):
         _check_name(name, file)
-        given = _entries(entry, EVENT, "when")
+        return place, _entries(entry, keys, keys[0])
 
-    def changes(key: str, kind: str, known: Collection[str], what: str) -> dict[str, Expression]:
-        found = {}
+
+def _given(
+    file: ModelFile, place: str, given: dict[str, Any], event: str
+) -> tuple[Expression | None, dict[str, Expression], dict[str, Expression]]:
+    """Return `while`, `reinit` and `set`; event: of the expression of `while`."""
+    states, discrete = ({v.name for v in file.of(section)} for section in ("states", "discrete"))
+    kinds = {
+        "reinit": (dict.fromkeys(states, NUMBER), "a state"),
+        "set": (
+            dict.fromkeys(discrete, NUMBER) | dict.fromkeys(file.modes, CONDITION),
+            "one of modes or of [discrete]",
+        ),
+    }
+    found: dict[str, dict[str, Expression]] = {"reinit": {}, "set": {}}
+    for key, (known, what) in kinds.items():
         for target, text in given.get(key, {}).items():
             if target not in known:
                 raise ModelFileError(f"{place}: {key}: expected {what}, got {shown(target)}")
             whole = (place, f"{key}: {target}")
-            found[target] = Expression(whole, text, kind, target, event="then")
-        return found
-
-    when = Expression((place, "when"), given["when"], CONDITION, event="when")
-    if when.tree.op not in RELATIONS:
-        raise ModelFileError(f"{place}: when: expected one relation such as h < 0")
-    during = Expression((place, "while"), given["while"], CONDITION) if "while" in given else None
-    reinit = changes("reinit", NUMBER, [state.name for state in file.of("states")], "a state")
-    modes = changes("set", CONDITION, file.modes, "one of modes")
-    file.events.append(Event(name, when, during, reinit, modes))
+            found[key][target] = Expression(whole, text, known[target], target, event="then")
+    during = None
+    if "while" in given:
+        during = Expression((place, "while"), given["while"], CONDITION, event=event)
+    return during, found["reinit"], found["set"]
 
 
 def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
@@ -396,6 +478,7 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
             file = read_tables(path, text, tables, solver_names)
             _check_names(file)
             file.order = _in_order(file)
+            _check_periods(file)
             if file.has_units:
                 _check_units(file)
         except ModelFileError as error:
@@ -433,7 +516,7 @@ def _check_names(file: ModelFile) -> None:
     parameters = {variable.name for variable in file.of("parameters")} | {*CONSTANTS}
     for expressions, allowed, mistake in (
         (file.assigned, known, "unknown name {}"),
-        (file.checks.values(), parameters, "{} is no parameter"),
+        (file.constant, parameters, "{} is no parameter"),
     ):
         for expression in expressions:
             with placed(*expression.place):
@@ -461,8 +544,32 @@ def _in_order(file: ModelFile) -> list[Expression]:
             "solve these equations for one of them first"
         ) from None
     variables = [*in_order(entries.values()), *file.of("states")]
-    happening = [expression for event in file.events for expression in event.expressions]
-    return [*(v.expression for v in variables), *happening, *file.checks.values()]
+    happening = [expression for change in file.changes for expression in change.expressions]
+    return [*(v.expression for v in variables), *happening, *file.constant]
+
+
+def _check_periods(file: ModelFile) -> None:
+    """Check that samplers tick with the start values of the parameters."""
+    starts = {variable.name: variable.start for variable in file.of("parameters")}
+    for sampler in file.sampled:
+        every, offset = (
+            _number(expression, starts) if names(expression.tree) <= starts.keys() else 1.0
+            for expression in sampler.periods
+        )
+        with placed(*sampler.every.place):
+            if not every > 0:
+                raise ModelFileError(f"is {every:g} s at the start values, expected more than 0")
+        with placed(*sampler.offset.place):
+            if not offset >= 0:
+                raise ModelFileError(f"is {offset:g} s at the start values, expected 0 or more")
+
+
+def _number(expression: Expression, values: Mapping[str, float]) -> float:
+    """Evaluate an expression; nan if it has no value."""
+    try:
+        return evaluated(expression.tree, values)
+    except (ArithmeticError, ValueError):
+        return math.nan
 
 
 def _check_units(file: ModelFile) -> None:

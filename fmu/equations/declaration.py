@@ -2,6 +2,7 @@
 
 import re
 import string
+from collections.abc import Collection, Iterable
 from typing import Any
 
 from declaration.load import UNITS
@@ -17,12 +18,15 @@ INSTANCE = UNITS.parents[2] / "src" / "instance"
 TIME = INSTANCE / "time_variable.toml"
 SOLVER = INSTANCE / "solver_variables.toml"
 EVENTS = INSTANCE / "event_variables.toml"
+TIME_EVENTS = INSTANCE / "time_event_variables.toml"
 
 Key = tuple[str, str]  # name and kind of a variable
+Leaf = tuple[str, str]  # of the graph: operation and name
 CAUSALITIES = {
     "parameters": "parameter",
     "inputs": "input",
     "states": "output",
+    "discrete": "output",
     "where": "local",
     "outputs": "output",
 }
@@ -78,7 +82,7 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
             **_dependencies(state.value, file),
             "description": f"Derivative of {state.name} by the time",
         }
-    for mode in file.modes if relations else ():
+    for mode in file.modes if relations or file.sampled else ():
         own = {"type": "boolean", "variability": "discrete", "description": f"Mode {mode}"}
         tables[mode] = _local(MODE.format(mode)) | own
     for name, relation in indicators.items():
@@ -95,9 +99,10 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
         "values": c_model.STRUCTURE,
         "symbol": c_model.SYMBOL,
         "event_indicators": [*indicators],
-        "time_events": len(indicators) < len(relations),
+        "time_events": len(indicators) < len(relations) or bool(file.sampled),
     }
-    includes = [TIME, *([SOLVER] if states else []), *([EVENTS] if relations else [])]
+    includes = [TIME, *([EVENTS] if relations else [])]
+    includes += [SOLVER] if states else [TIME_EVENTS] if file.sampled else []
     helpers = {variable.name for variable in file.of("where")}  # last, if shown at all
     return {
         "include": [str(path) for path in includes],
@@ -132,10 +137,15 @@ def _entries_of(
     causality = CAUSALITIES[variable.section]
     entries = _local(FIELD.format(variable.name)) | {"causality": causality}
     if causality == "parameter":
-        entries["variability"] = "tunable"
+        fixed = frozenset().union(*(e.value.leaves for s in file.sampled for e in s.periods))
+        is_fixed = ("parameter", variable.name) in fixed
+        entries["variability"] = "fixed" if is_fixed else "tunable"
     if variable.section == "states":
         entries |= {"initial": "exact", "dependencies": [variable.name]}
-        entries["reinit"] = any(variable.name in event.reinit for event in file.events)
+        entries["reinit"] = any(variable.name in change.reinit for change in file.changes)
+    if variable.section == "discrete":
+        entries |= {"variability": "discrete", "initial": "exact"}
+        entries |= _known_of({("discrete", variable.name)}, file)
     with placed(file.path, f"[{variable.section}]", variable.name, "unit"):
         entries["unit"] = _unit(units, variable.exponents, variable.unit)
     numbers = {key: getattr(variable, key) for key in NUMBERS}
@@ -158,38 +168,45 @@ def _unit(units: dict[str, dict[str, int]], exponents: dict[str, int], name: str
 
 def _dependencies(value: Value, file: ModelFile) -> dict[str, list[str]]:
     """What a calculated variable follows from, by the keys of variables.toml."""
-    leaves, todo = set(), list(value.leaves)
-    while todo:
-        leaf = todo.pop()
-        if leaf not in leaves and leaf[1] in file.graph.relations:
-            todo += file.graph.relations[leaf[1]].distance.leaves
-        leaves.add(leaf)
-    moving = {name for op, name in leaves if op in MOVING}
-    parameters = {name for op, name in leaves if op == "parameter"}
-    known = {
-        "dependencies": [name or "time" for name in ("", *file.variables) if name in moving],
-        "parameters": [name for name in file.variables if name in parameters],
-    }
+    leaves = _reached(value.leaves, file, ["discrete"])
+    known = _known_of(leaves, file)
     return known | _initially(leaves, known, file)
 
 
-def _initially(
-    leaves: set[tuple[str, str]], known: dict[str, list[str]], file: ModelFile
-) -> dict[str, list[str]]:
-    """What it follows from at the end of the initialization, when events may happen."""
+def _known_of(leaves: set[Leaf], file: ModelFile) -> dict[str, list[str]]:
+    """Dependencies and parameters among what these leaves follow from."""
+    leaves = _reached(leaves, file, ["discrete"])
+    moving = {name for op, name in leaves if op in MOVING}
+    parameters = {name for op, name in leaves if op == "parameter"}
+    return {
+        "dependencies": [name or "time" for name in ("", *file.variables) if name in moving],
+        "parameters": [name for name in file.variables if name in parameters],
+    }
+
+
+def _reached(leaves: Iterable[Leaf], file: ModelFile, changed: Collection[str]) -> set[Leaf]:
+    """All leaves that these follow from by relations and, if of a kind in `changed`, by changes."""
     found, todo = set(), list(leaves)
     while todo:
         leaf = todo.pop()
         if leaf in found:
             continue
         found.add(leaf)
-        if leaf[1] in file.graph.relations:
-            todo += file.graph.relations[leaf[1]].distance.leaves
-        for event in file.events:
-            if leaf[0] in ("state", "mode") and leaf[1] in (event.reinit | event.set):
-                during = [] if event.during is None else [event.during]
-                for expression in (event.when, *during, (event.reinit | event.set)[leaf[1]]):
-                    todo += expression.value.leaves
+        op, name = leaf
+        if name in file.graph.relations:
+            todo += file.graph.relations[name].distance.leaves
+        for change in file.changes if op in changed else ():
+            if name in change.given:
+                own = [*change.conditions, change.given[name]]
+                todo += [leaf for expression in own for leaf in expression.value.leaves]
+    return found
+
+
+def _initially(
+    leaves: set[Leaf], known: dict[str, list[str]], file: ModelFile
+) -> dict[str, list[str]]:
+    """What it follows from at the end of the initialization, when events may happen."""
+    found = _reached(leaves, file, ["state", "mode", "discrete"])
     names = {name or "time" for op, name in found if op in (*MOVING, "parameter")}
     if names == {*known["dependencies"], *known["parameters"]}:
         return {}

@@ -10,7 +10,12 @@ from equations_file import ModelFile, ModelFileError
 from equations.graph import Graph
 
 __all__ = ["ModelFile", "ModelFileError", "read"]
-LEAVES = {"parameters": "parameter", "inputs": "input", "states": "state"}
+LEAVES = {
+    "parameters": "parameter",
+    "inputs": "input",
+    "states": "state",
+    "discrete": "discrete",
+}
 
 
 def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:

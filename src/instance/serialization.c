@@ -207,13 +207,14 @@ static void transfer_statistics(struct codec *codec, struct integrator_statistic
     codec_int(codec, "last_order", &statistics->last_order);
 }
 
-/* Transfers the values of the model that are not calculated: parameters, inputs and states. */
+/* Transfers parameters, inputs and states. */
 static void transfer_values(struct codec *codec, const struct model_description *description,
                             char *values) {
     for (size_t i = 0; i < description->variable_count; i++) {
         const struct variable *variable = &description->variables[i];
         void *field = values + variable->offset;
-        if (variable->owner != VARIABLE_OF_MODEL || variable->initial == INITIAL_CALCULATED) {
+        if (variable->owner != VARIABLE_OF_MODEL || variable->initial == INITIAL_CALCULATED ||
+            variable_is_discrete_state(variable)) { // transfer_kept has these
             continue;
         }
         if (variable->type == VARIABLE_FLOAT64) {
