@@ -139,6 +139,8 @@ class Graph:
             match node.op:
                 case "number":
                     value = self.number(node.value)
+                case "literal":
+                    value = self.value("<", self.number(0.0), self.number(node.value))
                 case "name":
                     value = names[node.name]
                 case "**":

@@ -19,9 +19,10 @@ FUNCTIONS: dict[str, int | None] = dict.fromkeys(
 ) | {"atan2": 2, "min": None, "max": None}
 RELATIONS = ("<", "<=", ">", ">=")
 CONSTANTS = ("pi",)
+LITERALS = {"true": 1.0, "false": 0.0}
 # not to be used as names: operators, and words that other languages execute or give a value
 WORDS = ("and", "or", "not", "if", "else")
-NO_NAMES = (*WORDS, "True", "False", "None", "lambda")
+NO_NAMES = (*WORDS, *LITERALS, "True", "False", "None", "lambda")
 Item = TypeVar("Item", bound=Any)  # hashable, with `arguments` of its own kind
 NUMBER, CONDITION = "a number", "a condition"
 LOGIC = ("and", "or", "not")
@@ -71,9 +72,10 @@ class ExpressionError(ValueError):
 class Node:
     """An operation, a number or a name.
 
-    op is "number" (then `value` counts), "name" (then `name`), an operator of `RELATIONS`, + - * /
-    **, "negative", "and", "or", "not", "if" (arguments: condition, value if true, otherwise), or a
-    name of `FUNCTIONS`. min and max have two arguments here.
+    op is "number" (then `value` counts), "literal" (a condition: whether `value` is 1), "name"
+    (then `name`), an operator of `RELATIONS`, + - * / **, "negative", "and", "or", "not", "if"
+    (arguments: condition, value if true, otherwise), or a name of `FUNCTIONS`. min and max have two
+    arguments here.
     """
 
     op: str
@@ -136,12 +138,13 @@ def check_kinds(root: Node, expected: str = NUMBER, conditions: Collection[str] 
 
 
 def _check(node: Node, expected: str, conditions: Collection[str]) -> None:
-    is_condition = node.op in (*LOGIC, *RELATIONS) or (
+    is_condition = node.op in ("literal", *LOGIC, *RELATIONS) or (
         node.op == "name" and node.name in conditions
     )
     found = CONDITION if is_condition else NUMBER
     if found != expected:
-        what = node.name or ("the number" if node.op == "number" else repr(node.op))
+        constants = {"number": "the number", "literal": "true" if node.value else "false"}
+        what = node.name or constants.get(node.op, repr(node.op))
         raise ExpressionError(node.column, f"expected {expected}, {what} gives {found}")
 
 
@@ -235,6 +238,9 @@ class _Parser:
         token = self.token
         if token.kind == "number":
             return self.number()
+        if token.text in LITERALS:
+            self.take()
+            return Node("literal", token.column, value=LITERALS[token.text])
         if token.kind == "name" and token.text not in NO_NAMES:
             self.take()
             if self.token.text == "(":
@@ -350,6 +356,8 @@ def evaluated(root: Node, values: Mapping[str, float]) -> float:
 def _operation(node: Node, arguments: list[float], values: Mapping[str, float]) -> float:
     if node.op == "number":
         return node.value
+    if node.op == "literal":
+        return node.value > 0.0
     if node.op == "name":
         return math.pi if node.name == "pi" else values[node.name]
     return OPERATIONS[node.op](*arguments)

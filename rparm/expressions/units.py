@@ -30,8 +30,8 @@ def times(a: Unit, b: Unit, power: Fraction = Fraction(1)) -> Unit:
 # units with a symbol, as products of those before
 DERIVED = {
     "Hz": "1/s", "N": "kg.m/s2", "Pa": "N/(m.m)", "J": "N.m", "W": "J/s", "C": "A.s", "V": "W/A",
-    "F": "C/V", "ohm": "V/A", "S": "A/V", "Wb": "V.s", "T": "Wb/(m.m)", "H": "Wb/A", "lm": "cd",
-    "lx": "lm/(m.m)", "Bq": "1/s", "Gy": "J/kg", "Sv": "J/kg", "kat": "mol/s",
+    "F": "C/V", "ohm": "V/A", "Ohm": "V/A", "S": "A/V", "Wb": "V.s", "T": "Wb/(m.m)", "H": "Wb/A",
+    "lm": "cd", "lx": "lm/(m.m)", "Bq": "1/s", "Gy": "J/kg", "Sv": "J/kg", "kat": "mol/s",
 }  # fmt: skip
 SYMBOLS: dict[str, dict[str, int]] = {base: {base: 1} for base in (*BASE, ANGLE)}
 FACTOR = re.compile(r"([A-Za-z]+)(-?[1-9])?", re.ASCII)

@@ -28,6 +28,7 @@ EXAMPLES = [
 ]
 HEAD = 'name = "M"\n'
 STATE = HEAD + '[states]\nx = { derivative = "-x" }\n'
+SAMPLED = STATE + "[discrete]\nu = {}\n[sampled.s]\n"
 
 MISTAKES = {
     "no TOML": ("name = ", "is not valid TOML"),
@@ -137,7 +138,41 @@ MISTAKES = {
         STATE + '[where]\na = "x == 1"', "equations in implicit form are not supported: solve them",
     ),
     "residuals": (STATE + "[algebraic]\n", "equations in implicit form are not supported: solve"),
-    "sampler": (STATE + '[where]\na = "sample(x)"', "samplers are not supported: set an input"),
+    "sampler": (STATE + '[where]\na = "sample(x)"', "samplers are written as [sampled.NAME]"),
+    "no period": (SAMPLED + "set = { u = '1' }", "line 6: [sampled.s]: every is missing"),
+    "sampler without effect": (SAMPLED + 'every = "1"', "[sampled.s]: expected set or reinit"),
+    "sampler key": (SAMPLED + 'every = "1"\nwhen = "x < 0"', "[sampled.s]: unknown key 'when'"),
+    "period of a state": (
+        SAMPLED + 'every = "x"\nset = { u = "1" }', "every: column 1: 'x' is no parameter",
+    ),
+    "period of 0": (
+        SAMPLED + 'every = "1 - 1"\nset = { u = "1" }',
+        "[sampled.s]: every: is 0 s at the start values, expected more than 0",
+    ),
+    "period without value": (
+        SAMPLED + 'every = "1 / (1 - 1)"\nset = { u = "1" }', "every: is nan s at the start values",
+    ),
+    "offset below 0": (
+        SAMPLED + 'every = "1"\noffset = "-1"\nset = { u = "1" }', "offset: is -1 s at the start",
+    ),
+    "unit of a period": (
+        HEAD + '[discrete]\nu = {}\n[parameters]\nT = { start = 1, unit = "m" }\n'
+        '[sampled.s]\nevery = "T"\nset = { u = "1" }',
+        "[sampled.s]: every: column 1: expected unit s, got m",
+    ),
+    "sampled parameter": (
+        SAMPLED + 'every = "1"\nset = { p = "1" }', "one of modes or of [discrete], got 'p'",
+    ),
+    "sampled state": (
+        SAMPLED + 'every = "1"\nset = { x = "1" }', "one of modes or of [discrete], got 'x'",
+    ),
+    "sampled condition": (
+        SAMPLED + 'every = "1"\nset = { u = "x < 1" }', "set: u: column 3: expected a number",
+    ),
+    "sampler of a name that is taken": (SAMPLED.replace(".s]", ".u]"), "is in [discrete] already"),
+    "limits of a discrete one": (STATE + "[discrete]\nu = { min = 0 }", "unknown key 'min'"),
+    "literal as a name": (STATE + "[inputs]\ntrue = {}", "true: this name is reserved"),
+    "literal as a number": (STATE + '[where]\na = "x + true"', "expected a number, true gives"),
     "noise": (STATE + '[where]\na = "x + noise()"', "noise is not supported: make it outside and"),
     "line": (STATE + "[parameters]\na = { start = 1 }\n\nb = { }", "line 7: [parameters]: b"),
     "line of a table": (STATE + "[inputs.u]\nmin = 1", "line 4: [inputs]: u: start = 0"),
