@@ -49,6 +49,7 @@ CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\u
 RESERVED = {*FUNCTIONS, *NO_NAMES, "pi", "time", "GUID", "NAME", "TOKEN_FMI3"}
 NUMBERS = ("start", "min", "max", "nominal")
 OF_ALL = ("start", "unit", "min", "max", "description")
+FOLLOWS = "calculated"  # section of parameters that follow from others
 SECTIONS = {  # keys of their entries, and the one that each needs
     "parameters": (OF_ALL, "start"),
     "inputs": (OF_ALL, ""),
@@ -57,6 +58,7 @@ SECTIONS = {  # keys of their entries, and the one that each needs
     "where": ((), ""),  # they are expressions
     "outputs": (("value", "unit", "description"), "value"),
 }
+KEYS_OF_FOLLOWING = (("value", "unit", "description"), "value")
 HEAD = (
     *("name", "description", "experiment", "modes", "units", "sampled", "events", "check"),
     *SECTIONS,
@@ -86,7 +88,7 @@ class ModelFileError(Exception):
     """What is wrong with the file, in one line."""
 
 
-@dataclass
+@dataclass(eq=False)
 class Expression:
     """An expression of the file."""
 
@@ -123,6 +125,7 @@ class Variable:
     exponents: dict[str, int] = field(default_factory=dict)  # of the base units and rad
     description: str = ""
     expression: Expression | None = None  # derivative of a state, value of others
+    initial: Expression | None = None  # start value that follows from parameters
     leaf: Any = None  # what a generator makes of a parameter, input, state or discrete variable
     arguments: tuple[Variable, ...] = ()  # those of [where] and [outputs] that it names
 
@@ -130,6 +133,11 @@ class Variable:
     def value(self) -> Any:
         """What the expression calculates."""
         return self.expression.value
+
+    @property
+    def place(self) -> str:
+        """The section where the file has it."""
+        return f"[{'parameters' if self.section == FOLLOWS else self.section}]"
 
 
 @dataclass
@@ -212,6 +220,16 @@ class ModelFile:
         return [*self.sampled, *self.events]
 
     @property
+    def calculated(self) -> list[Variable]:
+        """Variables that follow from others at any time."""
+        return self.of(FOLLOWS, "where", "outputs")
+
+    @property
+    def started(self) -> list[Variable]:
+        """States and discrete variables whose start values follow from parameters."""
+        return [v for v in self.of("states", "discrete") if v.initial is not None]
+
+    @property
     def assigned(self) -> list[Expression]:
         """All expressions that may read everything."""
         found = [variable.expression for variable in self.of("states", "where", "outputs")]
@@ -220,7 +238,8 @@ class ModelFile:
     @property
     def constant(self) -> list[Expression]:
         """All expressions of parameters only."""
-        return [*(e for s in self.sampled for e in s.periods), *self.checks.values()]
+        found = [v.expression for v in self.of(FOLLOWS)] + [v.initial for v in self.started]
+        return found + [e for s in self.sampled for e in s.periods] + [*self.checks.values()]
 
     def of(self, *sections: str) -> list[Variable]:
         """Return variables of these sections, in the order of the file."""
@@ -377,8 +396,12 @@ def _read_variable(file: ModelFile, section: str, name: str, entry: object) -> N
         if section == "where":
             texts = {"": entry}
         else:
-            given |= _entries(entry, *SECTIONS[section])
-            texts = {key: given.pop(key) for key in ("derivative", "value") if key in given}
+            section, entry, texts = _texts_of(section, entry)
+            given = {} if "start" in texts else given
+            given |= _entries(
+                entry, *KEYS_OF_FOLLOWING if section == FOLLOWS else SECTIONS[section]
+            )
+            texts |= {key: given.pop(key) for key in ("derivative", "value") if key in given}
         variable = Variable(name, section, **given)
         with placed("unit"):
             unit = variable.unit or "1"
@@ -386,8 +409,23 @@ def _read_variable(file: ModelFile, section: str, name: str, entry: object) -> N
         _check_range(variable)
     for key, text in texts.items():
         whole = (*place, key) if key else place
-        variable.expression = Expression(whole, text, NUMBER, name, key == "derivative")
+        expression = Expression(whole, text, NUMBER, name, key == "derivative")
+        if key == "start":
+            variable.initial = expression
+        else:
+            variable.expression = expression
     file.variables[name] = variable
+
+
+def _texts_of(section: str, entry: object) -> tuple[str, object, dict[str, object]]:
+    """Take a start value that is an expression from an entry; return its section and the rest."""
+    if not isinstance(entry, dict):
+        return section, entry, {}
+    if section == "parameters" and "value" in entry:
+        return FOLLOWS, entry, {}
+    if section in ("states", "discrete") and isinstance(entry.get("start"), str):
+        return section, {k: v for k, v in entry.items() if k != "start"}, {"start": entry["start"]}
+    return section, entry, {}
 
 
 def _check_name(name: str, file: ModelFile) -> None:
@@ -396,7 +434,7 @@ def _check_name(name: str, file: ModelFile) -> None:
     if name in file.reserved or name.startswith("der_"):
         raise ModelFileError("this name is reserved, choose another one")
     if name in file.variables:
-        raise ModelFileError(f"this name is in [{file.variables[name].section}] already")
+        raise ModelFileError(f"this name is in {file.variables[name].place} already")
     if name in file.modes:
         raise ModelFileError("this name is in modes already")
     if len(file.variables) + len(file.modes) + len(file.changes) >= MOST_VARIABLES:
@@ -513,7 +551,7 @@ def _line(text: str, message: str) -> str:
 def _check_names(file: ModelFile) -> None:
     """Check the names and kinds in all expressions."""
     known = {*file.variables, *file.modes, "time", *CONSTANTS}
-    parameters = {variable.name for variable in file.of("parameters")} | {*CONSTANTS}
+    parameters = {variable.name for variable in file.of("parameters", FOLLOWS)} | {*CONSTANTS}
     for expressions, allowed, mistake in (
         (file.assigned, known, "unknown name {}"),
         (file.constant, parameters, "{} is no parameter"),
@@ -530,7 +568,7 @@ def _check_names(file: ModelFile) -> None:
 
 def _in_order(file: ModelFile) -> list[Expression]:
     """Order all expressions: [where] and [outputs] first, each after those that it names."""
-    entries = {variable.name: variable for variable in file.of("where", "outputs")}
+    entries = {variable.name: variable for variable in file.calculated}
     for variable in entries.values():
         used = names(variable.expression.tree) & entries.keys()
         variable.arguments = tuple(entries[name] for name in sorted(used))
@@ -540,22 +578,24 @@ def _in_order(file: ModelFile) -> list[Expression]:
         loop = error.args[1][::-1]
         way = shown(" -> ".join(variable.name for variable in loop))
         raise ModelFileError(
-            f"[{loop[0].section}]: {loop[0].name}: algebraic loop {way}: "
+            f"{loop[0].place}: {loop[0].name}: algebraic loop {way}: "
             "solve these equations for one of them first"
         ) from None
     variables = [*in_order(entries.values()), *file.of("states")]
     happening = [expression for change in file.changes for expression in change.expressions]
-    return [*(v.expression for v in variables), *happening, *file.constant]
+    constant = [e for e in file.constant if e.target not in entries]
+    return [*(v.expression for v in variables), *happening, *constant]
 
 
 def _check_periods(file: ModelFile) -> None:
     """Check that samplers tick with the start values of the parameters."""
     starts = {variable.name: variable.start for variable in file.of("parameters")}
+    follows = {variable.expression for variable in file.of(FOLLOWS)}
+    for expression in file.order:
+        if expression in follows:
+            starts[expression.target] = _number(expression, starts)
     for sampler in file.sampled:
-        every, offset = (
-            _number(expression, starts) if names(expression.tree) <= starts.keys() else 1.0
-            for expression in sampler.periods
-        )
+        every, offset = (_number(expression, starts) for expression in sampler.periods)
         with placed(*sampler.every.place):
             if not every > 0:
                 raise ModelFileError(f"is {every:g} s at the start values, expected more than 0")

@@ -61,7 +61,7 @@ class Events:
         self.located = graph.located
 
     def __bool__(self) -> bool:
-        return bool(self.relations or self.file.sampled or self.discrete)
+        return bool(self.relations or self.discrete or self.file.started)
 
     @property
     def discrete(self) -> list[str]:
@@ -136,6 +136,9 @@ class Events:
             else "0, 0",
             discrete_names=", ".join([text(v.name) for v in file.of("discrete")] or ["NULL"]),
             periods=self._periods(),
+            write_start=self._starts() if file.started else [],
+            starts=[".start = start,"] if file.started else [],
+            starts_follow=[".starts_follow = true,"] if file.started else [],
             located=len(self.located),
             next_time=NEXT_TIME if timed or file.sampled else [],
             timed=[".next_time = next_time,"] if timed or file.sampled else [],
@@ -184,6 +187,16 @@ class Events:
             during = "" if event.during is None else f" && {code.of(event.during.value)}"
             code.lines.append(f"due[{i}] = {code.of(event.when.value)}{during};")
         return code.lines
+
+    def _starts(self) -> list[str]:
+        new = {f"values->{FIELD.format(v.name)}": v.initial.value for v in self.file.started}
+        return [
+            "static void start(void *values_pointer) {",
+            "    struct equations_values *values = values_pointer;",
+            *indented(Code(leaves(self.file)).assign(new).lines),
+            "}",
+            "",
+        ]
 
     def _periods(self) -> list[str]:
         code = Code(leaves(self.file))

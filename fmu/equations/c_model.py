@@ -5,7 +5,7 @@ from itertools import chain
 
 from equations_file import ModelFile
 
-from equations.c_code import Code, filled, text
+from equations.c_code import Code, filled, indented, text
 from equations.c_events import FIELD, Events, arrays, leaves
 from equations.c_series import Series
 from equations.graph import FALLIBLE, Value
@@ -21,7 +21,7 @@ def header(file: ModelFile) -> str:
     """Text of equations.h."""
     events = Events(file)
     groups = _ranges(file) | {
-        "calculated": [FIELD.format(v.name) for v in file.of("where", "outputs")],
+        "calculated": [FIELD.format(v.name) for v in file.calculated],
         "event indicators": list(events.indicators()),
     }
     fields = []
@@ -109,7 +109,7 @@ def _domains(
         names = ("domains_header", "domains_declared", "domains")
         return {"in_domain": "", **{name: [] for name in names}}
     ranges = _ranges(file)
-    calculated = ranges["derivatives"] + [FIELD.format(v.name) for v in file.of("where", "outputs")]
+    calculated = ranges["derivatives"] + [FIELD.format(v.name) for v in file.calculated]
     groups = {key: ranges[key] for key in ("states", "inputs")}
     groups |= {"calculated": calculated, "indicators": list(events.indicators())}
     distances = {f"distance[{i}]": r.distance for i, r in enumerate(events.relations)}
@@ -139,7 +139,7 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, list[str]]:
     """Calculated fields and their derivatives along a curve."""
     graph = file.graph
     fields = {RATE.format(state.name): state.value for state in file.of("states")}
-    fields |= {FIELD.format(v.name): v.value for v in file.of("where", "outputs")}
+    fields |= {FIELD.format(v.name): v.value for v in file.calculated}
     fields |= events.indicators()
     seeds = {graph.value("time"): graph.value("first")}  # it has no second derivative
     for variable in file.of("parameters", "inputs", "states"):
@@ -151,11 +151,26 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, list[str]]:
     curve.assign({f"d->{name}": value for name, value in zip(fields, firsts, strict=True)})
     split = len(curve.lines)
     curve.assign({f"dd->{name}": value for name, value in zip(fields, seconds, strict=True)})
+    started = {f"->{FIELD.format(v.name)} += ": v.initial.value for v in file.started}
+    start_firsts = graph.derivatives(started.values(), seeds)
+    start_seconds = graph.derivatives(start_firsts, seeds)
     return {
+        "started": _at_start(file, "d", dict(zip(started, start_firsts, strict=True))),
+        "started_twice": _at_start(file, "dd", dict(zip(started, start_seconds, strict=True))),
         "outputs": Code(leaves(file)).assign({f"to->{n}": v for n, v in fields.items()}).lines,
         "derivatives": curve.lines[:split],
         "second_derivatives": curve.lines[split:],
     }
+
+
+def _at_start(file: ModelFile, structure: str, derivatives: Mapping[str, Value]) -> list[str]:
+    """Add derivatives of start values to those of the states, until the initialization ends."""
+    if not derivatives:
+        return []
+    code = Code(leaves(file))
+    code.lines += [f"{structure}{to}{code.of(value)};" for to, value in derivatives.items()]
+    condition = "!values->is_begun" + (" && dd != NULL" if structure == "dd" else "")
+    return [f"if ({condition}) {{", *indented(code.lines), "}"]
 
 
 def _checks(file: ModelFile) -> list[str]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from declaration.load import UNITS
 from declaration.load import read as read_declaration
-from equations_file import NUMBERS, ModelFile, Variable, placed
+from equations_file import FOLLOWS, NUMBERS, ModelFile, Variable, placed
 
 from equations import c_model
 from equations.c_events import FIELD, INDICATOR, MODE
@@ -24,6 +24,7 @@ Key = tuple[str, str]  # name and kind of a variable
 Leaf = tuple[str, str]  # of the graph: operation and name
 CAUSALITIES = {
     "parameters": "parameter",
+    FOLLOWS: "calculatedParameter",
     "inputs": "input",
     "states": "output",
     "discrete": "output",
@@ -137,22 +138,33 @@ def _entries_of(
     causality = CAUSALITIES[variable.section]
     entries = _local(FIELD.format(variable.name)) | {"causality": causality}
     if causality == "parameter":
-        fixed = frozenset().union(*(e.value.leaves for s in file.sampled for e in s.periods))
-        is_fixed = ("parameter", variable.name) in fixed
+        is_fixed = ("parameter", variable.name) in _fixed(file)
         entries["variability"] = "fixed" if is_fixed else "tunable"
+    if variable.section == FOLLOWS:
+        is_fixed = variable.value.leaves <= _fixed(file)
+        entries |= {"variability": "fixed" if is_fixed else "tunable"}
+        entries |= _dependencies(variable.value, file)
     if variable.section == "states":
         entries |= {"initial": "exact", "dependencies": [variable.name]}
         entries["reinit"] = any(variable.name in change.reinit for change in file.changes)
     if variable.section == "discrete":
         entries |= {"variability": "discrete", "initial": "exact"}
         entries |= _known_of({("discrete", variable.name)}, file)
-    with placed(file.path, f"[{variable.section}]", variable.name, "unit"):
+    if variable.initial is not None:
+        op = variable.leaf.op
+        entries |= {"initial": "calculated", **_initially({(op, variable.name)}, {}, file)}
+    with placed(file.path, variable.place, variable.name, "unit"):
         entries["unit"] = _unit(units, variable.exponents, variable.unit)
     numbers = {key: getattr(variable, key) for key in NUMBERS}
     entries |= {key: number for key, number in numbers.items() if number is not None}
     if variable.section == "outputs":
         entries |= _dependencies(variable.value, file)
     return entries | {"description": variable.description or variable.name}
+
+
+def _fixed(file: ModelFile) -> frozenset[Leaf]:
+    """Leaves that periods follow from, which must not change."""
+    return frozenset().union(*(e.value.leaves for s in file.sampled for e in s.periods))
 
 
 def _unit(units: dict[str, dict[str, int]], exponents: dict[str, int], name: str = "") -> str:
@@ -195,6 +207,10 @@ def _reached(leaves: Iterable[Leaf], file: ModelFile, changed: Collection[str]) 
         op, name = leaf
         if name in file.graph.relations:
             todo += file.graph.relations[name].distance.leaves
+        if "state" in changed:
+            todo += [
+                leaf for v in file.started if v.name == name for leaf in v.initial.value.leaves
+            ]
         for change in file.changes if op in changed else ():
             if name in change.given:
                 own = [*change.conditions, change.given[name]]
@@ -207,7 +223,8 @@ def _initially(
 ) -> dict[str, list[str]]:
     """What it follows from at the end of the initialization, when events may happen."""
     found = _reached(leaves, file, ["state", "mode", "discrete"])
-    names = {name or "time" for op, name in found if op in (*MOVING, "parameter")}
-    if names == {*known["dependencies"], *known["parameters"]}:
+    started = {variable.name for variable in file.started}
+    names = {name or "time" for op, name in found if op in (*MOVING, "parameter")} - started
+    if known and names == {*known["dependencies"], *known["parameters"]}:
         return {}
     return {"initially": [name for name in ("time", *file.variables) if name in names]}

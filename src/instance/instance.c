@@ -41,11 +41,13 @@ static bool lies_in(struct range range, const struct variable *variable) {
     return variable->offset >= range.offset && variable->offset - range.offset < range.size;
 }
 
-/* True if only events write the value: a mode or a discrete state. */
+/* True if, by initialization, only events write the value: a mode, a discrete state or a state
+ * whose start value is calculated. */
 static bool is_kept_by_events(const struct model *model, const struct variable *variable) {
     const struct model_events events = events_of(model);
     return variable->owner == VARIABLE_OF_MODEL &&
-           (lies_in(events.modes, variable) || lies_in(events.discrete_states, variable));
+           (lies_in(events.modes, variable) || lies_in(events.discrete_states, variable) ||
+            (events.starts_follow && lies_in(model->states, variable)));
 }
 
 /* True if the variable is bound to a field of its own kind. Modes (ints) are calculated and
@@ -57,10 +59,11 @@ static bool is_bound_well(const struct model *model, const struct variable *vari
     const bool is_input = variable->causality == CAUSALITY_INPUT;
     const bool is_exact = !is_parameter && variable->initial == INITIAL_EXACT;
     const bool is_discrete = variable->variability == VARIABILITY_DISCRETE;
+    const bool is_started = events.starts_follow && variable->initial == INITIAL_CALCULATED;
     return is_parameter == lies_in(model->parameters, variable) &&
            (is_input && is_real) == lies_in(model->inputs, variable) &&
            (is_input && !is_real) == lies_in(events.discrete_inputs, variable) &&
-           (is_exact && !is_discrete) == lies_in(model->states, variable) &&
+           (is_exact && !is_discrete) == (lies_in(model->states, variable) && !is_started) &&
            (!lies_in(events.modes, variable) || (is_discrete && !is_exact && !is_real)) &&
            (!lies_in(events.discrete_states, variable) || (is_discrete && is_real)) &&
            (!(is_exact && is_discrete) || lies_in(events.discrete_states, variable));

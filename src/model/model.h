@@ -69,6 +69,8 @@ struct model_events {
     struct range discrete_states; /* double[]: sums over events, samples; written like modes, except
                                      those that are variables with start values */
     struct range discrete_inputs; /* int[]: Boolean inputs */
+    bool starts_follow; /* true if start values of states may be calculated: the first update writes
+                           these states */
 
     /* Returns the time of the next time event, s, or INFINITY if there is none. It depends on
      * parameters, modes and discrete states, and becomes later by update. NULL if the model has no

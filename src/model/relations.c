@@ -111,6 +111,9 @@ const void *relations_followed(const struct relations *model, struct relations_r
         return values;
     }
     memcpy(copy, values, model->values_size);
+    if (!is_begun && model->start != NULL) {
+        model->start(copy);
+    }
     const struct call call = call_of(model, room, copy, t, room.zeros);
     set_modes_from_values(&call, is_begun);
     return copy;
@@ -320,6 +323,9 @@ enum status relations_update(const struct relations *model, struct relations_roo
     double *tolerance = room.tolerance;
     const int was_begun = *call.is_begun;
     if (!was_begun) {
+        if (model->start != NULL) {
+            model->start(values);
+        }
         const enum status status = start_samplers(&call, event);
         if (status != STATUS_OK) {
             return status;

@@ -51,6 +51,9 @@ struct relations {
     const char *const *sampler_names;
     const char *const *discrete_names;  /* of the discrete variables */
 
+    /* Writes the states and discrete variables whose start values follow from parameters. NULL if
+     * there are none. */
+    void (*start)(void *values);
     void (*compare)(const void *values, double t, const struct given *given,
                     struct compared compared[]);
     /* Writes the time of each timed relation, s. */

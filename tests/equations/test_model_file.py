@@ -173,6 +173,32 @@ MISTAKES = {
     "limits of a discrete one": (STATE + "[discrete]\nu = { min = 0 }", "unknown key 'min'"),
     "literal as a name": (STATE + "[inputs]\ntrue = {}", "true: this name is reserved"),
     "literal as a number": (STATE + '[where]\na = "x + true"', "expected a number, true gives"),
+    "value and start": (
+        HEAD + '[parameters]\np = { start = 1, value = "2" }', "p: unknown key 'start'",
+    ),
+    "loop of parameters": (
+        HEAD + '[parameters]\na = { value = "b" }\nb = { value = "2 * a" }',
+        "[parameters]: a: algebraic loop 'a -> b -> a'",
+    ),
+    "parameter of a state": (
+        STATE + '[parameters]\np = { value = "x" }', "p: value: column 1: 'x' is no parameter",
+    ),
+    "start of a state": (
+        HEAD + '[states]\nx = { start = "y", derivative = "1" }\ny = { derivative = "1" }',
+        "[states]: x: start: column 1: 'y' is no parameter",
+    ),
+    "start in quotes": (
+        HEAD + '[inputs]\nu = { start = "1" }', "[inputs]: u: start: expected a number, got '1'",
+    ),
+    "unit of a start": (
+        HEAD + '[parameters]\np = { start = 1, unit = "s" }\n'
+        '[discrete]\nu = { start = "p", unit = "m" }',
+        "[discrete]: u: start: column 1: expected unit m, got s",
+    ),
+    "unit of a parameter that follows": (
+        HEAD + '[parameters]\np = { start = 1, unit = "s" }\nq = { value = "p**2", unit = "s" }',
+        "[parameters]: q: value: column 2: expected unit s, got s2",
+    ),
     "noise": (STATE + '[where]\na = "x + noise()"', "noise is not supported: make it outside and"),
     "line": (STATE + "[parameters]\na = { start = 1 }\n\nb = { }", "line 7: [parameters]: b"),
     "line of a table": (STATE + "[inputs.u]\nmin = 1", "line 4: [inputs]: u: start = 0"),
