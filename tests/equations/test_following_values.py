@@ -8,6 +8,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 
+from rparm import api
 from tests.equations.examples import METHODS, build, simulated
 from tests.support.rparm_project import Console
 
@@ -129,3 +130,13 @@ def test_a_scenario_does_not_set_it(
     )
     code, _, err = console(str(path))
     assert code == 2 and message in err and err.count("\n") == 1
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_a_linear_model_is_made_at_states_that_are_given(fmu: Path, version: str) -> None:
+    path = fmu if version == "2.0" else fmu.parent / "fmi3" / fmu.name
+    found = api.linearize(path, at={"x": 0.7, "v": 0.1, "l0": 2.0})
+    assert found.at["x"] == 0.7 and found.at["v"] == 0.1
+    assert found.A.tolist() == [[0.0, 1.0], [-9.81 / 2.0, 0.0]]
+    energy = found.C[found.outputs.index("energy")]
+    assert energy == pytest.approx([2 * 9.81 / 2.0 * 0.7, 2.0 * 0.1], rel=1e-14)
