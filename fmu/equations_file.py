@@ -23,12 +23,14 @@ from rparm.expressions.expression import (
     CONDITION,
     CONSTANTS,
     FUNCTIONS,
+    FURTHER,
     NO_NAMES,
     NUMBER,
-    RELATIONS,
     ExpressionError,
+    Function,
     Node,
     check_kinds,
+    derivative_of,
     evaluated,
     finite_number,
     in_order,
@@ -46,6 +48,7 @@ NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,99}", re.ASCII)
 # files that Windows cannot have, with any suffix
 DEVICE = re.compile("(?i:con|prn|aux|nul|com[1-9]|lpt[1-9])")
 CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
+LATER = ("sum", "der", "floor", "ceil", "round", "mod")
 RESERVED = {*FUNCTIONS, *NO_NAMES, "pi", "time", "GUID", "NAME", "TOKEN_FMI3"}
 NUMBERS = ("start", "min", "max", "nominal")
 OF_ALL = ("start", "unit", "min", "max", "description")
@@ -60,7 +63,8 @@ SECTIONS = {  # keys of their entries, and the one that each needs
 }
 KEYS_OF_FOLLOWING = (("value", "unit", "description"), "value")
 HEAD = (
-    *("name", "description", "experiment", "modes", "units", "sampled", "events", "check"),
+    *("name", "description", "experiment", "modes", "units", "functions"),
+    *("sampled", "events", "check"),
     *SECTIONS,
 )
 EXPERIMENT = {"stop": 10.0, "step": 0.01, "tolerance": 1e-8}
@@ -69,7 +73,7 @@ SAMPLER = ("every", "offset", "while", "reinit", "set")
 # what other languages have, by what it looks like, and what to do instead
 INSTEAD = {
     r"\[": "arrays are not supported: give each element a name and write sums out",
-    r"==|\bder\s*\(|^(?:equations?|algebraic|residuals?|dae)$": (
+    r"==|^(?:equations?|algebraic|residuals?|dae)$": (
         "equations in implicit form are not supported: solve them for the derivative of each state"
     ),
     r"\b(?:sample[rds]?|pre|previous|hold|clock|interval)\s*(?:\(|$)": (
@@ -79,7 +83,17 @@ INSTEAD = {
         "noise is not supported: make it outside and give it to an input"
     ),
 }
-TABLES = ("experiment", "units", "sampled", "events", "check", "reinit", "set", *SECTIONS)
+TABLES = (
+    "experiment",
+    "units",
+    "functions",
+    "sampled",
+    "events",
+    "check",
+    "reinit",
+    "set",
+    *SECTIONS,
+)
 QUOTES = r"[\s\"']"
 SECOND = unit_of_exponents({"s": 1})
 
@@ -98,6 +112,7 @@ class Expression:
     target: str = ""  # the variable or mode that it is assigned to; of a period: time
     is_rate: bool = False  # of the target
     event: str = ""  # "when" one happens, or "then"
+    functions: Mapping[str, Function] = field(default_factory=dict)  # of the file
     tree: Node = field(init=False)
     value: Any = field(init=False)  # what a generator makes of it
 
@@ -106,7 +121,7 @@ class Expression:
             if not isinstance(self.text, str):
                 raise ModelFileError(f"expected an expression in quotes, got {shown(self.text)}")
             try:
-                self.tree = parse(self.text)
+                self.tree = parse(self.text, self.functions)
             except ValueError as error:
                 raise ModelFileError(f"{error}{_instead(self.text)}") from None
 
@@ -201,6 +216,7 @@ class ModelFile:
     text: str
     reserved: set[str]  # names that it must not give
     units: dict[str, dict[str, int]] = field(default_factory=dict)  # exponents, of [units]
+    functions: dict[str, Function] = field(default_factory=dict)
     modes: list[str] = field(default_factory=list)
     variables: dict[str, Variable] = field(default_factory=dict)
     sampled: list[Sampler] = field(default_factory=list)
@@ -208,6 +224,10 @@ class ModelFile:
     checks: dict[str, Expression] = field(default_factory=dict)  # conditions by message
     order: list[Expression] = field(default_factory=list)  # each after those that it names
     graph: Any = None  # what a generator makes of it
+
+    def expression(self, *given: Any, **more: Any) -> Expression:
+        """Read an expression that may call the file's functions."""
+        return Expression(*given, **more, functions=self.functions)
 
     @property
     def has_units(self) -> bool:
@@ -304,13 +324,14 @@ TEXT = _expect(
 )
 
 
+LIST = _expect("a list of names", list, lambda names: all(type(name) is str for name in names))
 READ = {
     **dict.fromkeys((*NUMBERS, *EXPERIMENT), finite_number),
     **dict.fromkeys(("unit", "description"), _text),
     **dict.fromkeys(TABLES, _expect("a table", dict, lambda _: True)),
     **dict.fromkeys((*BASE, ANGLE), _expect("a whole exponent", int, lambda e: abs(e) < 100)),
     "name": _expect("a letter, then letters, digits, _", str, NAME.fullmatch),
-    "modes": _expect("a list of names", list, lambda m: all(type(name) is str for name in m)),
+    **dict.fromkeys(("modes", "arguments"), LIST),
 }  # how values of keys are read; others are expressions
 
 
@@ -354,6 +375,7 @@ def read_tables(
     for symbol, given in head.get("units", {}).items():
         with placed("[units]", shown(symbol)):
             file.units[symbol] = _entries(given, (*BASE, ANGLE), what="base unit")
+    _read_functions(file, head.get("functions", {}))
     for section in SECTIONS:
         for name, entry in head.get(section, {}).items():
             _read_variable(file, section, name, entry)
@@ -373,8 +395,27 @@ def read_tables(
             message = _text(message)
             if len(message.encode()) > LONGEST_MESSAGE:
                 raise ModelFileError(f"expected a message of at most {LONGEST_MESSAGE} bytes")
-        file.checks[message] = Expression(place, condition, CONDITION)
+        file.checks[message] = file.expression(place, condition, CONDITION)
     return file
+
+
+def _read_functions(file: ModelFile, entries: dict[str, object]) -> None:
+    """Read the functions, each of which may call those before it."""
+    for name, entry in entries.items():
+        place = ("[functions]", name if NAME.fullmatch(name) else shown(name))
+        with placed(*place):
+            if not NAME.fullmatch(name) or name in (*RESERVED, *FURTHER, *LATER):
+                raise ModelFileError("expected a name that is no function already")
+            given = _entries(entry, ("arguments", "value"), "value")
+            arguments = given.get("arguments", [])
+            if not arguments or len({*arguments}) < len(arguments):
+                raise ModelFileError("arguments: expected names, each once")
+            value = file.expression(("value",), given["value"])
+            for node in in_order([value.tree]):
+                if node.name and node.name not in (*arguments, *CONSTANTS):
+                    raise ExpressionError(node.column, f"{shown(node.name)} is no argument")
+            check_kinds(value.tree)
+        file.functions[name] = Function(tuple(arguments), value.tree)
 
 
 def _experiment(given: dict[str, float]) -> dict[str, float]:
@@ -409,7 +450,7 @@ def _read_variable(file: ModelFile, section: str, name: str, entry: object) -> N
         _check_range(variable)
     for key, text in texts.items():
         whole = (*place, key) if key else place
-        expression = Expression(whole, text, NUMBER, name, key == "derivative")
+        expression = file.expression(whole, text, NUMBER, name, key == "derivative")
         if key == "start":
             variable.initial = expression
         else:
@@ -454,16 +495,15 @@ def _check_range(variable: Variable) -> None:
 
 def _read_event(file: ModelFile, name: str, entry: object) -> None:
     place, given = _change(file, "events", name, entry, EVENT)
-    when = Expression((place, "when"), given["when"], CONDITION, event="when")
-    if when.tree.op not in RELATIONS:
-        raise ModelFileError(f"{place}: when: expected one relation such as h < 0")
+    when = file.expression((place, "when"), given["when"], CONDITION, event="when")
     file.events.append(Event(name, *_given(file, place, given, ""), when))
 
 
 def _read_sampler(file: ModelFile, name: str, entry: object) -> None:
     place, given = _change(file, "sampled", name, entry, SAMPLER)
     every, offset = (
-        Expression((place, key), given.get(key, "0"), NUMBER, "time") for key in ("every", "offset")
+        file.expression((place, key), given.get(key, "0"), NUMBER, "time")
+        for key in ("every", "offset")
     )
     if not ("set" in given or "reinit" in given):
         raise ModelFileError(f"{place}: expected set or reinit: what it does")
@@ -498,10 +538,10 @@ def _given(
             if target not in known:
                 raise ModelFileError(f"{place}: {key}: expected {what}, got {shown(target)}")
             whole = (place, f"{key}: {target}")
-            found[key][target] = Expression(whole, text, known[target], target, event="then")
+            found[key][target] = file.expression(whole, text, known[target], target, event="then")
     during = None
     if "while" in given:
-        during = Expression((place, "while"), given["while"], CONDITION, event=event)
+        during = file.expression((place, "while"), given["while"], CONDITION, event=event)
     return during, found["reinit"], found["set"]
 
 
@@ -550,7 +590,8 @@ def _line(text: str, message: str) -> str:
 
 def _check_names(file: ModelFile) -> None:
     """Check the names and kinds in all expressions."""
-    known = {*file.variables, *file.modes, "time", *CONSTANTS}
+    rates = [derivative_of(state.name) for state in file.of("states")]
+    known = {*file.variables, *file.modes, "time", *CONSTANTS, *rates}
     parameters = {variable.name for variable in file.of("parameters", FOLLOWS)} | {*CONSTANTS}
     for expressions, allowed, mistake in (
         (file.assigned, known, "unknown name {}"),
@@ -569,6 +610,7 @@ def _check_names(file: ModelFile) -> None:
 def _in_order(file: ModelFile) -> list[Expression]:
     """Order all expressions: [where] and [outputs] first, each after those that it names."""
     entries = {variable.name: variable for variable in file.calculated}
+    entries |= {derivative_of(state.name): state for state in file.of("states")}
     for variable in entries.values():
         used = names(variable.expression.tree) & entries.keys()
         variable.arguments = tuple(entries[name] for name in sorted(used))
@@ -581,7 +623,7 @@ def _in_order(file: ModelFile) -> list[Expression]:
             f"{loop[0].place}: {loop[0].name}: algebraic loop {way}: "
             "solve these equations for one of them first"
         ) from None
-    variables = [*in_order(entries.values()), *file.of("states")]
+    variables = in_order(entries.values())
     happening = [expression for change in file.changes for expression in change.expressions]
     constant = [e for e in file.constant if e.target not in entries]
     return [*(v.expression for v in variables), *happening, *constant]
@@ -616,6 +658,8 @@ def _check_units(file: ModelFile) -> None:
     """Check that units fit, and find the units of [where]."""
     declared = [v for v in file.variables.values() if v.section != "where"]
     units = {v.name: unit_of_exponents(v.exponents) for v in declared} | {"time": SECOND}
+    for state in file.of("states"):
+        units[derivative_of(state.name)] = times(units[state.name], SECOND, -1)
     for expression in file.order:
         with placed(*expression.place):
             expected = units.get(expression.target)

@@ -6,8 +6,8 @@ Nothing of the text is ever executed as Python. The parser climbs precedences.
 import math
 import operator
 import re
-from collections.abc import Callable, Collection, Container, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from typing import Any, TypeVar
 
@@ -27,6 +27,7 @@ Item = TypeVar("Item", bound=Any)  # hashable, with `arguments` of its own kind
 NUMBER, CONDITION = "a number", "a condition"
 LOGIC = ("and", "or", "not")
 DEEPEST = 100  # levels of brackets and other nesting
+DERIVATIVE = "der"  # of a state, in front of a bracket
 SPACE = re.compile(r"\s*")
 TOKEN = re.compile(
     r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?![\w.])"
@@ -165,9 +166,32 @@ class Token:
         return repr(self.text[:SHOWN]) if self.text else "the end"
 
 
-def parse(text: str) -> Node:
-    """Parse an expression; ExpressionError says what is wrong with it."""
-    parser = _Parser(_tokens(text))
+@dataclass(frozen=True)
+class Function:
+    """A function that stands for an expression of its arguments."""
+
+    arguments: tuple[str, ...]
+    body: Node
+
+    def of(self, given: Sequence[Node], column: int) -> Node:
+        """Return its expression for these arguments; mistakes in it are at this column."""
+        known = dict(zip(self.arguments, given, strict=True))
+        found: dict[Node, Node] = {}
+        for node in in_order([self.body]):
+            if node.op == "name" and node.name in known:
+                found[node] = known[node.name]
+            else:
+                arguments = tuple(found[argument] for argument in node.arguments)
+                found[node] = replace(node, column=column, arguments=arguments)
+        return found[self.body]
+
+
+def parse(text: str, functions: Mapping[str, Function] | None = None) -> Node:
+    """Parse an expression; ExpressionError says what is wrong with it.
+
+    functions: further ones, by name.
+    """
+    parser = _Parser(_tokens(text), {**FURTHER, **(functions or {})})
     root = parser.expression(CONDITIONAL)
     if parser.token.kind != "end":
         raise parser.unexpected("an operator")
@@ -190,8 +214,8 @@ def _tokens(text: str) -> list[Token]:
 
 
 class _Parser:
-    def __init__(self, tokens: list[Token]) -> None:
-        self._tokens = iter(tokens)
+    def __init__(self, tokens: list[Token], functions: Mapping[str, Function]) -> None:
+        self._tokens, self._functions = iter(tokens), functions
         self.token = next(self._tokens)
         self._depth = 0
 
@@ -269,8 +293,11 @@ class _Parser:
 
     def call(self, function: Token) -> Node:
         """Parse the arguments of a function."""
-        if function.text not in FUNCTIONS:
-            known = ", ".join(FUNCTIONS)
+        if function.text == DERIVATIVE:
+            return self.derivative(function)
+        further = self._functions.get(function.text)
+        if function.text not in FUNCTIONS and further is None:
+            known = ", ".join([*FUNCTIONS, *self._functions, DERIVATIVE])
             raise ExpressionError(function.column, f"no function {function.shown} (known: {known})")
         arguments = []
         separator = "("
@@ -279,7 +306,7 @@ class _Parser:
             arguments.append(self.expression(CONDITIONAL))
             separator = ","
         self.expect(")")
-        count = FUNCTIONS[function.text]
+        count = len(further.arguments) if further else FUNCTIONS[function.text]
         if len(arguments) != (count or max(2, len(arguments))):
             wanted = count or "2 or more"
             raise ExpressionError(
@@ -287,9 +314,36 @@ class _Parser:
                 f"{function.text}: expected {wanted} argument{'s' * (count != 1)}, "
                 f"got {len(arguments)}",
             )
+        if further:
+            return further.of(arguments, function.column)
         if count:
             return Node(function.text, function.column, tuple(arguments))
         return reduce(lambda a, b: Node(function.text, function.column, (a, b)), arguments)
+
+    def derivative(self, function: Token) -> Node:
+        """Parse the state whose derivative is meant."""
+        self.expect("(")
+        state = self.take()
+        if state.kind != "name":
+            raise ExpressionError(state.column, f"expected a state, got {state.shown}")
+        self.expect(")")
+        return Node("name", function.column, name=derivative_of(state.text))
+
+
+def derivative_of(state: str) -> str:
+    """Return the name that expressions have for the derivative of a state."""
+    return f"{DERIVATIVE}({state})"
+
+
+# functions that are no operations of their own; their names are free for variables
+FURTHER: dict[str, Function] = {}
+for _name, _arguments, _body in (
+    ("sign", "x", "1 if x > 0 else -1 if x < 0 else 0"),
+    ("hypot", "x y", "sqrt(x**2 + y**2)"),
+    ("log10", "x", f"log(x) / {math.log(10)!r}"),
+    ("cbrt", "x", f"x**{1 / 3!r} if x >= 0 else -(-x)**{1 / 3!r}"),
+):
+    FURTHER[_name] = Function(tuple(_arguments.split()), parse(_body))
 
 
 # ---- Values --------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ BASE = ("kg", "m", "s", "A", "K", "mol", "cd")
 ANGLE = "rad"
 
 Unit = tuple[Fraction, ...]  # exponents, in the order of BASE
+LARGEST_ROOT = 100  # 0.3333333333333333 is 1/3
 ONE: Unit = (Fraction(0),) * len(BASE)
 
 
@@ -150,7 +151,7 @@ def _power(node: Node, given: list[Unit | None]) -> Unit | None:
         raise ExpressionError(
             node.column, f"'**': expected a number as exponent of what has unit {shown(base)}"
         )
-    return times(ONE, base, value)
+    return times(ONE, base, value.limit_denominator(LARGEST_ROOT))
 
 
 def _literal(node: Node) -> Fraction | None:

@@ -83,8 +83,42 @@ MISTAKES = {
     ),
     "event": (STATE + "[events.e]\n", "[events.e]: when is missing"),
     "event key": (STATE + '[events.e]\nwhen = "x < 0"\nthen = 1', "[events.e]: unknown key 'then'"),
-    "no relation": (
-        STATE + '[events.e]\nwhen = "x < 0 and x > 1"', "[events.e]: when: expected one relation",
+    "no condition": (
+        STATE + '[events.e]\nwhen = "x - 1"', "[events.e]: when: column 3: expected a condition",
+    ),
+    "derivative of a derivative": (
+        STATE + '[where]\na = "der(der(x))"', "column 8: expected ')', got '('",
+    ),
+    "derivative of a number": (STATE + '[where]\na = "der(2)"', "column 5: expected a state, got"),
+    "derivative of no state": (
+        STATE + '[inputs]\nu = {}\n[where]\na = "der(u)"', "unknown name 'der(u)', did you mean",
+    ),
+    "derivative in a loop": (
+        HEAD + '[states]\nx = { derivative = "-der(x)" }', "[states]: x: algebraic loop 'x -> x'",
+    ),
+    "function twice": (
+        STATE + '[functions]\nsin = { arguments = ["a"], value = "a" }', "expected a name that is",
+    ),
+    "arguments twice": (
+        STATE + '[functions]\nf = { arguments = ["a", "a"], value = "a" }', "arguments: expected",
+    ),
+    "function of a variable": (
+        STATE + '[functions]\nf = { arguments = ["a"], value = "a * x" }', "'x' is no argument",
+    ),
+    "recursion": (
+        STATE + '[functions]\nf = { arguments = ["a"], value = "f(a - 1)" }', "no function 'f'",
+    ),
+    "arguments of the file's function": (
+        STATE + '[functions]\nf = { arguments = ["a"], value = "a" }\n[where]\nb = "f(x, 1)"',
+        "[where]: b: column 1: f: expected 1 argument, got 2",
+    ),
+    "unit in a function": (
+        HEAD + '[functions]\nf = { arguments = ["a", "b"], value = "a + b" }\n'
+        '[inputs]\nu = { unit = "m" }\nw = { unit = "s" }\n[where]\nb = "f(u, w)"',
+        "b: column 1: '+': units m and s do not fit",
+    ),
+    "function without value": (
+        STATE + '[functions]\nf = { arguments = ["a"] }', "[functions]: f: value is missing",
     ),
     "reinit": (
         STATE + '[events.e]\nwhen = "x < 0"\nreinit = { y = "1" }',
