@@ -217,7 +217,7 @@ class ModelFile:
     reserved: set[str]  # names that it must not give
     units: dict[str, dict[str, int]] = field(default_factory=dict)  # exponents, of [units]
     functions: dict[str, Function] = field(default_factory=dict)
-    modes: list[str] = field(default_factory=list)
+    modes: dict[str, bool] = field(default_factory=dict)  # with their values at the start
     variables: dict[str, Variable] = field(default_factory=dict)
     sampled: list[Sampler] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
@@ -325,13 +325,26 @@ TEXT = _expect(
 
 
 LIST = _expect("a list of names", list, lambda names: all(type(name) is str for name in names))
+
+
+def _modes(value: Any) -> dict[str, bool]:
+    """Return the modes with their values at the start."""
+    if isinstance(value, dict) and all(type(start) is bool for start in value.values()):
+        return value
+    try:
+        return dict.fromkeys(LIST(value), False)
+    except ValueError:
+        raise ValueError("expected a list of names, or a table of true and false") from None
+
+
 READ = {
     **dict.fromkeys((*NUMBERS, *EXPERIMENT), finite_number),
     **dict.fromkeys(("unit", "description"), _text),
     **dict.fromkeys(TABLES, _expect("a table", dict, lambda _: True)),
     **dict.fromkeys((*BASE, ANGLE), _expect("a whole exponent", int, lambda e: abs(e) < 100)),
     "name": _expect("a letter, then letters, digits, _", str, NAME.fullmatch),
-    **dict.fromkeys(("modes", "arguments"), LIST),
+    "modes": _modes,
+    "arguments": LIST,
 }  # how values of keys are read; others are expressions
 
 
@@ -381,10 +394,10 @@ def read_tables(
             _read_variable(file, section, name, entry)
     if not file.variables:
         raise ModelFileError("has no variables, expected a section such as [states]")
-    for mode in head.get("modes", ()):
+    for mode, start in head.get("modes", {}).items():
         with placed("modes", shown(mode)):
             _check_name(mode, file)
-        file.modes.append(mode)
+        file.modes[mode] = start
     for name, entry in head.get("sampled", {}).items():
         _read_sampler(file, name, entry)
     for name, entry in head.get("events", {}).items():

@@ -1,4 +1,4 @@
-/* Operations on Taylor coefficients, from which a model makes its series (series.h): the rows of
+/* Operations on Taylor coefficients, from which a model makes its series (model.h): the rows of
  * the series hold its states and, of each equation, the factors and intermediate results.
  *
  * A jet is the array of the coefficients of a quantity. Each function gives coefficient k of a

@@ -61,7 +61,11 @@ class Events:
         self.located = graph.located
 
     def __bool__(self) -> bool:
-        return bool(self.relations or self.discrete or self.file.started)
+        return bool(self.relations or self.discrete or self._has_starts)
+
+    @property
+    def _has_starts(self) -> bool:
+        return bool(self.file.started or any(self.file.modes.values()))
 
     @property
     def discrete(self) -> list[str]:
@@ -136,8 +140,8 @@ class Events:
             else "0, 0",
             discrete_names=", ".join([text(v.name) for v in file.of("discrete")] or ["NULL"]),
             periods=self._periods(),
-            write_start=self._starts() if file.started else [],
-            starts=[".start = start,"] if file.started else [],
+            write_start=self._starts() if self._has_starts else [],
+            starts=[".start = start,"] if self._has_starts else [],
             starts_follow=[".starts_follow = true,"] if file.started else [],
             located=len(self.located),
             next_time=NEXT_TIME if timed or file.sampled else [],
@@ -190,9 +194,11 @@ class Events:
 
     def _starts(self) -> list[str]:
         new = {f"values->{FIELD.format(v.name)}": v.initial.value for v in self.file.started}
+        modes = self.file.modes.items()
         return [
             "static void start(void *values_pointer) {",
             "    struct equations_values *values = values_pointer;",
+            *(f"    values->{MODE.format(mode)} = {start:d};" for mode, start in modes),
             *indented(Code(leaves(self.file)).assign(new).lines),
             "}",
             "",

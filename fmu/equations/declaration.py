@@ -9,7 +9,7 @@ from declaration.load import UNITS
 from declaration.load import read as read_declaration
 from equations_file import FOLLOWS, NUMBERS, ModelFile, Variable, placed
 
-from equations import c_model
+from equations import c_events, c_model
 from equations.c_events import FIELD, INDICATOR, MODE
 from equations.graph import MOVING, Relation, Value
 from rparm.expressions.units import shown
@@ -83,7 +83,7 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
             **_dependencies(state.value, file),
             "description": f"Derivative of {state.name} by the time",
         }
-    for mode in file.modes if relations or file.sampled else ():
+    for mode in file.modes if c_events.Events(file) else ():
         own = {"type": "boolean", "variability": "discrete", "description": f"Mode {mode}"}
         tables[mode] = _local(MODE.format(mode)) | own
     for name, relation in indicators.items():

@@ -51,8 +51,8 @@ struct relations {
     const char *const *sampler_names;
     const char *const *discrete_names;  /* of the discrete variables */
 
-    /* Writes the states and discrete variables whose start values follow from parameters. NULL if
-     * there are none. */
+    /* Writes the start values of modes, and of states and discrete variables that follow from
+     * parameters. NULL if there are none. */
     void (*start)(void *values);
     void (*compare)(const void *values, double t, const struct given *given,
                     struct compared compared[]);

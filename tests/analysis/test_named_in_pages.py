@@ -19,7 +19,7 @@ SOURCE = {".c", ".cmake", ".h", ".js", ".md", ".py", ".sh", ".toml", ".txt"}
 CODE = SOURCE - {".md"} | {".css", ".html", ".in", ".ini", ".xml"}
 WRITTEN = {"value_references.h", "benchmark.md"}  # by the generator and the benchmark
 # what the reader makes
-PLACEHOLDERS = {"my_scenario", "my_model", "MyModel", "Name", "name", "pendulum_values"}
+PLACEHOLDERS = {"my_scenario", "my_model", "MyModel", "Name", "name"}
 # names in programs of others
 ELSEWHERE = {"step_until", "SystemGeometry", "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES"}
 ELSEWHERE |= {"OMSimulator", "system_sc", "system_wc", "importFMU", "load_fmu", "final_time"}

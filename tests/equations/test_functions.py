@@ -87,14 +87,14 @@ def test_sign_of_a_velocity_switches_where_it_turns(tmp_path: Path, method: int)
 
 GATE = """
 name = "Gate"
-modes = ["open", "armed"]
+modes = { open = true, armed = false }
 [states]
 x = { derivative = "cos(time)" }
 n = { derivative = "0" }
 [discrete]
 passed = {}
 [events.arm]
-when = "x > 0.5 and x < 0.9 and not armed"
+when = "x > 0.5 and x < 0.9 and not armed and open"
 set = { armed = "true" }
 [events.leave]
 when = "(x < -0.5 or x > 0.95) and armed"
@@ -109,7 +109,8 @@ def test_an_event_of_several_relations_happens_when_the_whole_comes_true(
     """x = sin t: armed above 0.5, left above 0.95; armed again below 0.9, left below -0.5."""
     (tmp_path / "Gate.toml").write_text(GATE)
     fmu = build(tmp_path / "Gate.toml", tmp_path)
-    run = simulated(fmu, 12.0, 0.01, {"solver_method": method}, also=["armed"])
+    run = simulated(fmu, 12.0, 0.01, {"solver_method": method}, also=["armed", "open"])
+    assert np.all(run["open"])
     t = run["time"]
     up, top, back = np.arcsin(0.5), np.arcsin(0.95), np.pi - np.arcsin(0.9)
     low = np.pi + np.arcsin(0.5)

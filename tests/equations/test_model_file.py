@@ -76,7 +76,8 @@ MISTAKES = {
         STATE + '[where]\na = "b + x"\nb = "c"\nc = "2 * a"', "algebraic loop 'a -> b -> c -> a'",
     ),
     "loop of one": (STATE + '[where]\na = "a"', "[where]: a: algebraic loop 'a -> a'"),
-    "modes": ("modes = 3\n" + STATE, "modes: expected a list of names"),
+    "modes": ("modes = 3\n" + STATE, "modes: expected a list of names, or a table of true and"),
+    "mode as a number": ("modes = { a = 1 }\n" + STATE, "modes: expected a list of names, or a t"),
     "mode twice": ('modes = ["a", "a"]\n' + STATE, "modes: 'a': this name is in modes"),
     "mode as number": (
         'modes = ["a"]\n' + STATE + '[where]\nb = "a"', "column 1: expected a number",
