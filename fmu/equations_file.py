@@ -327,12 +327,12 @@ TEXT = _expect(
 LIST = _expect("a list of names", list, lambda names: all(type(name) is str for name in names))
 
 
-def _modes(value: Any) -> dict[str, bool]:
+def _modes(value: Any) -> list[tuple[str, bool]]:
     """Return the modes with their values at the start."""
     if isinstance(value, dict) and all(type(start) is bool for start in value.values()):
-        return value
+        return [*value.items()]
     try:
-        return dict.fromkeys(LIST(value), False)
+        return [(name, False) for name in LIST(value)]
     except ValueError:
         raise ValueError("expected a list of names, or a table of true and false") from None
 
@@ -394,7 +394,7 @@ def read_tables(
             _read_variable(file, section, name, entry)
     if not file.variables:
         raise ModelFileError("has no variables, expected a section such as [states]")
-    for mode, start in head.get("modes", {}).items():
+    for mode, start in head.get("modes", []):
         with placed("modes", shown(mode)):
             _check_name(mode, file)
         file.modes[mode] = start
