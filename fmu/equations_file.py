@@ -53,15 +53,26 @@ RESERVED = {*FUNCTIONS, *NO_NAMES, "pi", "time", "GUID", "NAME", "TOKEN_FMI3"}
 NUMBERS = ("start", "min", "max", "nominal")
 OF_ALL = ("start", "unit", "min", "max", "description")
 FOLLOWS = "calculated"  # section of parameters that follow from others
+OPTIONS, SWITCHES = "options", "switches"  # of parameters and inputs that are Booleans
+WRITTEN = {
+    FOLLOWS: "parameters",
+    OPTIONS: "parameters",
+    SWITCHES: "inputs",
+}  # where files have them
+BOOLEAN = "Boolean"
 SECTIONS = {  # keys of their entries, and the one that each needs
-    "parameters": (OF_ALL, "start"),
-    "inputs": (OF_ALL, ""),
+    "parameters": ((*OF_ALL, "type"), "start"),
+    "inputs": ((*OF_ALL, "type"), ""),
     "states": ((*OF_ALL, "nominal", "derivative"), "derivative"),
     "discrete": (("start", "unit", "description"), ""),
     "where": ((), ""),  # they are expressions
     "outputs": (("value", "unit", "description"), "value"),
 }
-KEYS_OF_FOLLOWING = (("value", "unit", "description"), "value")
+OWN_KEYS = {
+    FOLLOWS: (("value", "unit", "description"), "value"),
+    OPTIONS: (("type", "start", "description"), "start"),
+    SWITCHES: (("type", "start", "description"), ""),
+}
 HEAD = (
     *("name", "description", "experiment", "modes", "units", "functions"),
     *("sampled", "events", "check"),
@@ -132,7 +143,7 @@ class Variable:
 
     name: str
     section: str
-    start: float | None = None
+    start: float | bool | None = None
     min: float | None = None
     max: float | None = None
     nominal: float | None = None
@@ -152,7 +163,12 @@ class Variable:
     @property
     def place(self) -> str:
         """The section where the file has it."""
-        return f"[{'parameters' if self.section == FOLLOWS else self.section}]"
+        return f"[{WRITTEN.get(self.section, self.section)}]"
+
+    @property
+    def is_boolean(self) -> bool:
+        """Whether it is a condition."""
+        return self.section in (OPTIONS, SWITCHES)
 
 
 @dataclass
@@ -238,6 +254,11 @@ class ModelFile:
     def changes(self) -> list[Change]:
         """Samplers and events, in the order in which they happen at one instant."""
         return [*self.sampled, *self.events]
+
+    @property
+    def conditions(self) -> set[str]:
+        """Names that are true or false."""
+        return {*self.modes, *(v.name for v in self.variables.values() if v.is_boolean)}
 
     @property
     def calculated(self) -> list[Variable]:
@@ -339,6 +360,8 @@ def _modes(value: Any) -> list[tuple[str, bool]]:
 
 READ = {
     **dict.fromkeys((*NUMBERS, *EXPERIMENT), finite_number),
+    "start": lambda given: given if type(given) is bool else finite_number(given),
+    "type": _expect(f'"{BOOLEAN}"', str, lambda name: name == BOOLEAN),
     **dict.fromkeys(("unit", "description"), _text),
     **dict.fromkeys(TABLES, _expect("a table", dict, lambda _: True)),
     **dict.fromkeys((*BASE, ANGLE), _expect("a whole exponent", int, lambda e: abs(e) < 100)),
@@ -452,9 +475,8 @@ def _read_variable(file: ModelFile, section: str, name: str, entry: object) -> N
         else:
             section, entry, texts = _texts_of(section, entry)
             given = {} if "start" in texts else given
-            given |= _entries(
-                entry, *KEYS_OF_FOLLOWING if section == FOLLOWS else SECTIONS[section]
-            )
+            given |= _entries(entry, *(OWN_KEYS | SECTIONS)[section])
+            _check_type(given, section)
             texts |= {key: given.pop(key) for key in ("derivative", "value") if key in given}
         variable = Variable(name, section, **given)
         with placed("unit"):
@@ -471,12 +493,24 @@ def _read_variable(file: ModelFile, section: str, name: str, entry: object) -> N
     file.variables[name] = variable
 
 
+def _check_type(given: dict[str, Any], section: str) -> None:
+    """Check that the start value is of the type, which is no key of a variable."""
+    is_boolean = given.pop("type", None) == BOOLEAN
+    if section == SWITCHES:
+        given["start"] = given["start"] or False
+    if "start" in given and is_boolean != (type(given["start"]) is bool):
+        what = "true or false" if is_boolean else "a number"
+        raise ModelFileError(f"start: expected {what}, got {shown(given['start'])}")
+
+
 def _texts_of(section: str, entry: object) -> tuple[str, object, dict[str, object]]:
     """Take a start value that is an expression from an entry; return its section and the rest."""
     if not isinstance(entry, dict):
         return section, entry, {}
     if section == "parameters" and "value" in entry:
         return FOLLOWS, entry, {}
+    if entry.get("type") == BOOLEAN and section in ("parameters", "inputs"):
+        return OPTIONS if section == "parameters" else SWITCHES, entry, {}
     if section in ("states", "discrete") and isinstance(entry.get("start"), str):
         return section, {k: v for k, v in entry.items() if k != "start"}, {"start": entry["start"]}
     return section, entry, {}
@@ -605,7 +639,7 @@ def _check_names(file: ModelFile) -> None:
     """Check the names and kinds in all expressions."""
     rates = [derivative_of(state.name) for state in file.of("states")]
     known = {*file.variables, *file.modes, "time", *CONSTANTS, *rates}
-    parameters = {variable.name for variable in file.of("parameters", FOLLOWS)} | {*CONSTANTS}
+    parameters = {v.name for v in file.of("parameters", FOLLOWS, OPTIONS)} | {*CONSTANTS}
     for expressions, allowed, mistake in (
         (file.assigned, known, "unknown name {}"),
         (file.constant, parameters, "{} is no parameter"),
@@ -617,7 +651,7 @@ def _check_names(file: ModelFile) -> None:
                         meant = get_close_matches(node.name, allowed, n=1)
                         hint = f", did you mean {meant[0]!r}?" if meant else ""
                         raise ExpressionError(node.column, mistake.format(shown(node.name)) + hint)
-                check_kinds(expression.tree, expression.kind, file.modes)
+                check_kinds(expression.tree, expression.kind, file.conditions)
 
 
 def _in_order(file: ModelFile) -> list[Expression]:
@@ -644,7 +678,7 @@ def _in_order(file: ModelFile) -> list[Expression]:
 
 def _check_periods(file: ModelFile) -> None:
     """Check that samplers tick with the start values of the parameters."""
-    starts = {variable.name: variable.start for variable in file.of("parameters")}
+    starts = {variable.name: variable.start for variable in file.of("parameters", OPTIONS)}
     follows = {variable.expression for variable in file.of(FOLLOWS)}
     for expression in file.order:
         if expression in follows:

@@ -7,7 +7,7 @@ comes to hold in its modes. What all models do with that is in src/model/relatio
 
 from collections.abc import Iterable
 
-from equations_file import Change, ModelFile, Sampler
+from equations_file import SWITCHES, Change, ModelFile, Sampler
 
 from equations.c_code import Code, Leaves, filled, indented, text
 from equations.errors import NONE, Errors
@@ -33,7 +33,7 @@ def leaves(file: ModelFile) -> Leaves:
     for v in file.of("parameters", "inputs", "states", "discrete"):
         for op, structure in ((v.leaf.op, "values"), ("first", "d"), ("second", "dd")):
             found[op, v.name] = f"{structure}->{FIELD.format(v.name)}"
-    found |= {("mode", mode): f"values->{MODE.format(mode)}" for mode in file.modes}
+    found |= {("mode", name): f"values->{MODE.format(name)}" for name in file.conditions}
     relations = enumerate(file.graph.relations)
     return found | {("mode", name): f"values->relations[{i}]" for i, name in relations}
 
@@ -61,7 +61,8 @@ class Events:
         self.located = graph.located
 
     def __bool__(self) -> bool:
-        return bool(self.relations or self.discrete or self._has_starts)
+        switches = self.file.of(SWITCHES)
+        return bool(self.relations or self.discrete or self._has_starts or switches)
 
     @property
     def _has_starts(self) -> bool:
@@ -95,6 +96,7 @@ class Events:
         return [
             *(["/* discrete states */"] if self.discrete else []),
             *(f"double {field};" for field in self.discrete),
+            *(f"int {MODE.format(v.name)}; /* input */" for v in self.file.of(SWITCHES)),
             "/* modes; C has no empty arrays */",
             "int is_begun;",
             f"int relations[{len(self.relations) or 1}];",
@@ -142,6 +144,7 @@ class Events:
             periods=self._periods(),
             write_start=self._starts() if self._has_starts else [],
             starts=[".start = start,"] if self._has_starts else [],
+            switches=self._switches(),
             starts_follow=[".starts_follow = true,"] if file.started else [],
             located=len(self.located),
             next_time=NEXT_TIME if timed or file.sampled else [],
@@ -191,6 +194,13 @@ class Events:
             during = "" if event.during is None else f" && {code.of(event.during.value)}"
             code.lines.append(f"due[{i}] = {code.of(event.when.value)}{during};")
         return code.lines
+
+    def _switches(self) -> list[str]:
+        fields = [MODE.format(v.name) for v in self.file.of(SWITCHES)]
+        if not fields:
+            return []
+        begin = f"offsetof(struct equations_values, {fields[0]})"
+        return [f".discrete_inputs = {{{begin}, {len(fields)} * sizeof(int)}},"]
 
     def _starts(self) -> list[str]:
         new = {f"values->{FIELD.format(v.name)}": v.initial.value for v in self.file.started}

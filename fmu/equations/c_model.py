@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from itertools import chain
 
-from equations_file import ModelFile
+from equations_file import OPTIONS, ModelFile
 
 from equations.c_code import Code, filled, indented, text
-from equations.c_events import FIELD, Events, arrays, leaves
+from equations.c_events import FIELD, MODE, Events, arrays, leaves
 from equations.c_series import Series
 from equations.graph import FALLIBLE, Value
 from rparm.expressions.expression import in_order
@@ -27,6 +27,8 @@ def header(file: ModelFile) -> str:
     fields = []
     for title, names in groups.items():
         fields += [f"/* {title} */", *(f"double {name};" for name in names)] if names else []
+        if title == "parameters":
+            fields += [f"int {name};" for name in _options(file)]
     return filled("equations.h.in", fields=fields + events.fields())
 
 
@@ -44,7 +46,10 @@ def source(file: ModelFile) -> str:
         events=events.functions("_in_domain" * has_domains),
         followed=[f"{STRUCTURE} copy;", f"values = {FOLLOWED};"] if events else [],
         checks=_checks(file),
-        ranges=_range_lines(_ranges(file)),
+        ranges=[
+            *_parameter_lines(file),
+            *_range_lines({k: v for k, v in _ranges(file).items() if k != "parameters"}),
+        ],
         model_events=[".events = &events,"] if events else [],
     )
 
@@ -56,6 +61,21 @@ def _ranges(file: ModelFile) -> dict[str, list[str]]:
         for section in ("parameters", "inputs", "states")
     }
     return ranges | {"derivatives": [RATE.format(state.name) for state in file.of("states")]}
+
+
+def _options(file: ModelFile) -> list[str]:
+    """Fields of Boolean parameters, ints behind the others, in pairs: there are no gaps."""
+    names = [MODE.format(v.name) for v in file.of(OPTIONS)]
+    return [*names, "unused"] if len(names) % 2 else names
+
+
+def _parameter_lines(file: ModelFile) -> list[str]:
+    doubles, ints = _ranges(file)["parameters"], _options(file)
+    if not ints:
+        return _range_lines({"parameters": doubles})
+    first = [*doubles, *ints][0]
+    size = f"{len(doubles)} * sizeof(double) + {len(ints)} * sizeof(int)"
+    return [f".parameters = {{offsetof({STRUCTURE}, {first}), {size}}},"]
 
 
 def _range_lines(ranges: Mapping[str, list[str]]) -> list[str]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from declaration.load import UNITS
 from declaration.load import read as read_declaration
-from equations_file import FOLLOWS, NUMBERS, ModelFile, Variable, placed
+from equations_file import FOLLOWS, NUMBERS, OPTIONS, SWITCHES, ModelFile, Variable, placed
 
 from equations import c_events, c_model
 from equations.c_events import FIELD, INDICATOR, MODE
@@ -25,6 +25,8 @@ Leaf = tuple[str, str]  # of the graph: operation and name
 CAUSALITIES = {
     "parameters": "parameter",
     FOLLOWS: "calculatedParameter",
+    OPTIONS: "parameter",
+    SWITCHES: "input",
     "inputs": "input",
     "states": "output",
     "discrete": "output",
@@ -136,6 +138,15 @@ def _entries_of(
 ) -> dict[str, object]:
     """Table of a variable of the file."""
     causality = CAUSALITIES[variable.section]
+    if variable.is_boolean:
+        return {
+            "field": MODE.format(variable.name),
+            "type": "boolean",
+            "causality": causality,
+            "variability": "tunable" if variable.section == OPTIONS else "discrete",
+            "start": variable.start,
+            "description": variable.description or variable.name,
+        }
     entries = _local(FIELD.format(variable.name)) | {"causality": causality}
     if causality == "parameter":
         is_fixed = ("parameter", variable.name) in _fixed(file)
@@ -188,12 +199,16 @@ def _dependencies(value: Value, file: ModelFile) -> dict[str, list[str]]:
 def _known_of(leaves: set[Leaf], file: ModelFile) -> dict[str, list[str]]:
     """Dependencies and parameters among what these leaves follow from."""
     leaves = _reached(leaves, file, ["discrete"])
-    moving = {name for op, name in leaves if op in MOVING}
-    parameters = {name for op, name in leaves if op == "parameter"}
+    moving = {name for op, name in leaves if op in MOVING or _is_in(file, name, SWITCHES)}
+    parameters = {name for op, name in leaves if op == "parameter" or _is_in(file, name, OPTIONS)}
     return {
         "dependencies": [name or "time" for name in ("", *file.variables) if name in moving],
         "parameters": [name for name in file.variables if name in parameters],
     }
+
+
+def _is_in(file: ModelFile, name: str, *sections: str) -> bool:
+    return name in file.variables and file.variables[name].section in sections
 
 
 def _reached(leaves: Iterable[Leaf], file: ModelFile, changed: Collection[str]) -> set[Leaf]:
@@ -224,7 +239,9 @@ def _initially(
     """What it follows from at the end of the initialization, when events may happen."""
     found = _reached(leaves, file, ["state", "mode", "discrete"])
     started = {variable.name for variable in file.started}
-    names = {name or "time" for op, name in found if op in (*MOVING, "parameter")} - started
+    known_here = {name or "time" for op, name in found if op in (*MOVING, "parameter")}
+    known_here |= {name for _, name in found if _is_in(file, name, OPTIONS, SWITCHES)}
+    names = known_here - started
     if known and names == {*known["dependencies"], *known["parameters"]}:
         return {}
     return {"initially": [name for name in ("time", *file.variables) if name in names]}

@@ -121,3 +121,62 @@ def test_an_event_of_several_relations_happens_when_the_whole_comes_true(
         passed += 1.0 * (t > top + turn) + (t > low + turn)
     assert np.array_equal(run["armed"] != 0, armed)
     assert np.array_equal(run["passed"], passed)
+
+
+ROOM = """
+name = "Room"
+modes = ["heating"]
+[parameters]
+low = { start = 19.0 }
+high = { start = 21.0 }
+enabled = { type = "Boolean", start = true }
+[inputs]
+open = { type = "Boolean", description = "The window is open" }
+[states]
+T = { start = 18.0, derivative = "(30 * heat - (4 if open else 1) * (T - 5)) / 50" }
+[where]
+heat = "1 if heating and enabled and not open else 0"
+[events.cold]
+when = "T < low and not open"
+set = { heating = "true" }
+[events.warm]
+when = "T > high or open"
+set = { heating = "false" }
+"""
+
+
+def room(stop: float, is_enabled: bool) -> np.ndarray:
+    """Temperature each second: exponentials from switch to switch; open from 30 s to 40 s."""
+    T, t, heating, found = 18.0, 0.0, True, [18.0]
+    for second in range(int(stop)):
+        while t < second + 1:
+            is_open = 30 <= t < 40
+            heating = heating and not is_open
+            rate = (4 if is_open else 1) / 50
+            goal = 5 + (30 if heating and is_enabled else 0)
+            limit = 21.0 if heating else 19.0
+            there = second + 1.0
+            is_ahead = not is_open and (limit - T) * (goal - limit) > 0
+            if is_ahead:
+                there = min(there, t + np.log((T - goal) / (limit - goal)) / rate)
+            if not is_open and not heating and T < 19.0:
+                heating = True
+                continue
+            switches = is_ahead and there < second + 1.0
+            T = limit if switches else goal + (T - goal) * np.exp(-rate * (there - t))
+            t, heating = there, heating != switches
+        found.append(T)
+    return np.array(found)
+
+
+@EACH_METHOD
+@pytest.mark.parametrize("is_enabled", [True, False])
+def test_a_thermostat_sees_an_open_window(tmp_path: Path, method: int, is_enabled: bool) -> None:
+    (tmp_path / "Room.toml").write_text(ROOM)
+    fmu = build(tmp_path / "Room.toml", tmp_path)
+    times = [(0.0, 0), (30.0, 0), (30.0, 1), (40.0, 1), (40.0, 0), (100.0, 0)]
+    run = simulated(
+        fmu, 100.0, 1.0, {"solver_method": method, "enabled": is_enabled},
+        input=np.array(times, [("time", "f8"), ("open", "?")]), relative_tolerance=1e-10,
+    )  # fmt: skip
+    assert np.max(np.abs(run["T"] - room(100.0, is_enabled))) < 1e-8

@@ -234,6 +234,19 @@ MISTAKES = {
         HEAD + '[parameters]\np = { start = 1, unit = "s" }\nq = { value = "p**2", unit = "s" }',
         "[parameters]: q: value: column 2: expected unit s, got s2",
     ),
+    "type": (HEAD + '[inputs]\nu = { type = "Real" }', "u: type: expected \"Boolean\", got 'Real'"),
+    "type of a state": (
+        HEAD + '[states]\nx = { type = "Boolean", derivative = "1" }', "x: unknown key 'type'",
+    ),
+    "limits of a Boolean": (
+        HEAD + '[inputs]\nu = { type = "Boolean", min = 0 }', "u: unknown key 'min', expected one",
+    ),
+    "number as a Boolean": (
+        HEAD + '[inputs]\nu = { type = "Boolean", start = 1 }', "start: expected true or false",
+    ),
+    "Boolean as a number": (
+        HEAD + '[inputs]\nu = { type = "Boolean" }\n[where]\na = "u + 1"', "u gives a condition",
+    ),
     "noise": (STATE + '[where]\na = "x + noise()"', "noise is not supported: make it outside and"),
     "line": (STATE + "[parameters]\na = { start = 1 }\n\nb = { }", "line 7: [parameters]: b"),
     "line of a table": (STATE + "[inputs.u]\nmin = 1", "line 4: [inputs]: u: start = 0"),
