@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -23,12 +23,15 @@ from rparm.expressions.expression import (
     CONDITION,
     CONSTANTS,
     FUNCTIONS,
+    FURTHER,
     NO_NAMES,
     NUMBER,
-    RELATIONS,
     ExpressionError,
+    Function,
     Node,
     check_kinds,
+    derivative_of,
+    evaluated,
     finite_number,
     in_order,
     names,
@@ -45,34 +48,63 @@ NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,99}", re.ASCII)
 # files that Windows cannot have, with any suffix
 DEVICE = re.compile("(?i:con|prn|aux|nul|com[1-9]|lpt[1-9])")
 CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
+LATER = ("sum", "der", "floor", "ceil", "round", "mod")
 RESERVED = {*FUNCTIONS, *NO_NAMES, "pi", "time", "GUID", "NAME", "TOKEN_FMI3"}
 NUMBERS = ("start", "min", "max", "nominal")
 OF_ALL = ("start", "unit", "min", "max", "description")
+FOLLOWS = "calculated"  # section of parameters that follow from others
+OPTIONS, SWITCHES = "options", "switches"  # of parameters and inputs that are Booleans
+WRITTEN = {
+    FOLLOWS: "parameters",
+    OPTIONS: "parameters",
+    SWITCHES: "inputs",
+}  # where files have them
+BOOLEAN = "Boolean"
 SECTIONS = {  # keys of their entries, and the one that each needs
-    "parameters": (OF_ALL, "start"),
-    "inputs": (OF_ALL, ""),
+    "parameters": ((*OF_ALL, "type"), "start"),
+    "inputs": ((*OF_ALL, "type"), ""),
     "states": ((*OF_ALL, "nominal", "derivative"), "derivative"),
+    "discrete": (("start", "unit", "description"), ""),
     "where": ((), ""),  # they are expressions
     "outputs": (("value", "unit", "description"), "value"),
 }
-HEAD = ("name", "description", "experiment", "modes", "units", "events", "check", *SECTIONS)
+OWN_KEYS = {
+    FOLLOWS: (("value", "unit", "description"), "value"),
+    OPTIONS: (("type", "start", "description"), "start"),
+    SWITCHES: (("type", "start", "description"), ""),
+}
+HEAD = (
+    *("name", "description", "experiment", "modes", "units", "functions"),
+    *("sampled", "events", "check"),
+    *SECTIONS,
+)
 EXPERIMENT = {"stop": 10.0, "step": 0.01, "tolerance": 1e-8}
 EVENT = ("when", "while", "reinit", "set")
+SAMPLER = ("every", "offset", "while", "reinit", "set")
 # what other languages have, by what it looks like, and what to do instead
 INSTEAD = {
     r"\[": "arrays are not supported: give each element a name and write sums out",
-    r"==|\bder\s*\(|^(?:equations?|algebraic|residuals?|dae)$": (
+    r"==|^(?:equations?|algebraic|residuals?|dae)$": (
         "equations in implicit form are not supported: solve them for the derivative of each state"
     ),
     r"\b(?:sample[rds]?|pre|previous|hold|clock|interval)\s*(?:\(|$)": (
-        "samplers are not supported: set an input at the communication points, or write the model "
-        "in C"
+        "samplers are written as [sampled.NAME] with every and set, which see the values before"
     ),
     r"\b(?:noise|random|rand|randn|gauss|normal|uniform)\s*(?:\(|$)": (
         "noise is not supported: make it outside and give it to an input"
     ),
 }
-TABLES = ("experiment", "units", "events", "check", "reinit", "set", *SECTIONS)
+TABLES = (
+    "experiment",
+    "units",
+    "functions",
+    "sampled",
+    "events",
+    "check",
+    "reinit",
+    "set",
+    *SECTIONS,
+)
 QUOTES = r"[\s\"']"
 SECOND = unit_of_exponents({"s": 1})
 
@@ -81,16 +113,17 @@ class ModelFileError(Exception):
     """What is wrong with the file, in one line."""
 
 
-@dataclass
+@dataclass(eq=False)
 class Expression:
     """An expression of the file."""
 
     place: tuple[str, ...]
     text: str
     kind: str = NUMBER
-    target: str = ""  # the variable or mode that it is assigned to
+    target: str = ""  # the variable or mode that it is assigned to; of a period: time
     is_rate: bool = False  # of the target
     event: str = ""  # "when" one happens, or "then"
+    functions: Mapping[str, Function] = field(default_factory=dict)  # of the file
     tree: Node = field(init=False)
     value: Any = field(init=False)  # what a generator makes of it
 
@@ -99,7 +132,7 @@ class Expression:
             if not isinstance(self.text, str):
                 raise ModelFileError(f"expected an expression in quotes, got {shown(self.text)}")
             try:
-                self.tree = parse(self.text)
+                self.tree = parse(self.text, self.functions)
             except ValueError as error:
                 raise ModelFileError(f"{error}{_instead(self.text)}") from None
 
@@ -110,7 +143,7 @@ class Variable:
 
     name: str
     section: str
-    start: float | None = None
+    start: float | bool | None = None
     min: float | None = None
     max: float | None = None
     nominal: float | None = None
@@ -118,7 +151,8 @@ class Variable:
     exponents: dict[str, int] = field(default_factory=dict)  # of the base units and rad
     description: str = ""
     expression: Expression | None = None  # derivative of a state, value of others
-    leaf: Any = None  # what a generator makes of a parameter, input or state
+    initial: Expression | None = None  # start value that follows from parameters
+    leaf: Any = None  # what a generator makes of a parameter, input, state or discrete variable
     arguments: tuple[Variable, ...] = ()  # those of [where] and [outputs] that it names
 
     @property
@@ -126,22 +160,65 @@ class Variable:
         """What the expression calculates."""
         return self.expression.value
 
+    @property
+    def place(self) -> str:
+        """The section where the file has it."""
+        return f"[{WRITTEN.get(self.section, self.section)}]"
+
+    @property
+    def is_boolean(self) -> bool:
+        """Whether it is a condition."""
+        return self.section in (OPTIONS, SWITCHES)
+
 
 @dataclass
-class Event:
-    """An event of the file."""
+class Change:
+    """New values, which an event or a sampler gives."""
 
     name: str
-    when: Expression
     during: Expression | None  # `while`
     reinit: dict[str, Expression]  # by state
-    set: dict[str, Expression]  # by mode
+    set: dict[str, Expression]  # by mode or discrete variable
+
+    @property
+    def given(self) -> dict[str, Expression]:
+        """New values by variable or mode."""
+        return self.reinit | self.set
+
+    @property
+    def conditions(self) -> list[Expression]:
+        """Conditions on which it happens."""
+        return [] if self.during is None else [self.during]
 
     @property
     def expressions(self) -> list[Expression]:
         """All of them."""
-        first = [self.when] if self.during is None else [self.when, self.during]
-        return [*first, *self.reinit.values(), *self.set.values()]
+        return [*self.conditions, *self.given.values()]
+
+
+@dataclass
+class Event(Change):
+    """An event of the file."""
+
+    when: Expression
+
+    @property
+    def conditions(self) -> list[Expression]:
+        """Conditions on which it happens."""
+        return [self.when, *super().conditions]
+
+
+@dataclass
+class Sampler(Change):
+    """A sampler of the file; its periods follow from parameters."""
+
+    every: Expression
+    offset: Expression
+
+    @property
+    def periods(self) -> list[Expression]:
+        """Its times, in s."""
+        return [self.every, self.offset]
 
 
 @dataclass
@@ -155,12 +232,18 @@ class ModelFile:
     text: str
     reserved: set[str]  # names that it must not give
     units: dict[str, dict[str, int]] = field(default_factory=dict)  # exponents, of [units]
-    modes: list[str] = field(default_factory=list)
+    functions: dict[str, Function] = field(default_factory=dict)
+    modes: dict[str, bool] = field(default_factory=dict)  # with their values at the start
     variables: dict[str, Variable] = field(default_factory=dict)
+    sampled: list[Sampler] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     checks: dict[str, Expression] = field(default_factory=dict)  # conditions by message
     order: list[Expression] = field(default_factory=list)  # each after those that it names
     graph: Any = None  # what a generator makes of it
+
+    def expression(self, *given: Any, **more: Any) -> Expression:
+        """Read an expression that may call the file's functions."""
+        return Expression(*given, **more, functions=self.functions)
 
     @property
     def has_units(self) -> bool:
@@ -168,10 +251,36 @@ class ModelFile:
         return any(variable.unit for variable in self.variables.values())
 
     @property
+    def changes(self) -> list[Change]:
+        """Samplers and events, in the order in which they happen at one instant."""
+        return [*self.sampled, *self.events]
+
+    @property
+    def conditions(self) -> set[str]:
+        """Names that are true or false."""
+        return {*self.modes, *(v.name for v in self.variables.values() if v.is_boolean)}
+
+    @property
+    def calculated(self) -> list[Variable]:
+        """Variables that follow from others at any time."""
+        return self.of(FOLLOWS, "where", "outputs")
+
+    @property
+    def started(self) -> list[Variable]:
+        """States and discrete variables whose start values follow from parameters."""
+        return [v for v in self.of("states", "discrete") if v.initial is not None]
+
+    @property
     def assigned(self) -> list[Expression]:
-        """All expressions but conditions on parameters."""
+        """All expressions that may read everything."""
         found = [variable.expression for variable in self.of("states", "where", "outputs")]
-        return found + [expression for event in self.events for expression in event.expressions]
+        return found + [expression for change in self.changes for expression in change.expressions]
+
+    @property
+    def constant(self) -> list[Expression]:
+        """All expressions of parameters only."""
+        found = [v.expression for v in self.of(FOLLOWS)] + [v.initial for v in self.started]
+        return found + [e for s in self.sampled for e in s.periods] + [*self.checks.values()]
 
     def of(self, *sections: str) -> list[Variable]:
         """Return variables of these sections, in the order of the file."""
@@ -236,13 +345,29 @@ TEXT = _expect(
 )
 
 
+LIST = _expect("a list of names", list, lambda names: all(type(name) is str for name in names))
+
+
+def _modes(value: Any) -> list[tuple[str, bool]]:
+    """Return the modes with their values at the start."""
+    if isinstance(value, dict) and all(type(start) is bool for start in value.values()):
+        return [*value.items()]
+    try:
+        return [(name, False) for name in LIST(value)]
+    except ValueError:
+        raise ValueError("expected a list of names, or a table of true and false") from None
+
+
 READ = {
     **dict.fromkeys((*NUMBERS, *EXPERIMENT), finite_number),
+    "start": lambda given: given if type(given) is bool else finite_number(given),
+    "type": _expect(f'"{BOOLEAN}"', str, lambda name: name == BOOLEAN),
     **dict.fromkeys(("unit", "description"), _text),
     **dict.fromkeys(TABLES, _expect("a table", dict, lambda _: True)),
     **dict.fromkeys((*BASE, ANGLE), _expect("a whole exponent", int, lambda e: abs(e) < 100)),
     "name": _expect("a letter, then letters, digits, _", str, NAME.fullmatch),
-    "modes": _expect("a list of names", list, lambda m: all(type(name) is str for name in m)),
+    "modes": _modes,
+    "arguments": LIST,
 }  # how values of keys are read; others are expressions
 
 
@@ -286,15 +411,18 @@ def read_tables(
     for symbol, given in head.get("units", {}).items():
         with placed("[units]", shown(symbol)):
             file.units[symbol] = _entries(given, (*BASE, ANGLE), what="base unit")
+    _read_functions(file, head.get("functions", {}))
     for section in SECTIONS:
         for name, entry in head.get(section, {}).items():
             _read_variable(file, section, name, entry)
     if not file.variables:
         raise ModelFileError("has no variables, expected a section such as [states]")
-    for mode in head.get("modes", ()):
+    for mode, start in head.get("modes", []):
         with placed("modes", shown(mode)):
             _check_name(mode, file)
-        file.modes.append(mode)
+        file.modes[mode] = start
+    for name, entry in head.get("sampled", {}).items():
+        _read_sampler(file, name, entry)
     for name, entry in head.get("events", {}).items():
         _read_event(file, name, entry)
     for message, condition in head.get("check", {}).items():
@@ -303,8 +431,27 @@ def read_tables(
             message = _text(message)
             if len(message.encode()) > LONGEST_MESSAGE:
                 raise ModelFileError(f"expected a message of at most {LONGEST_MESSAGE} bytes")
-        file.checks[message] = Expression(place, condition, CONDITION)
+        file.checks[message] = file.expression(place, condition, CONDITION)
     return file
+
+
+def _read_functions(file: ModelFile, entries: dict[str, object]) -> None:
+    """Read the functions, each of which may call those before it."""
+    for name, entry in entries.items():
+        place = ("[functions]", name if NAME.fullmatch(name) else shown(name))
+        with placed(*place):
+            if not NAME.fullmatch(name) or name in (*RESERVED, *FURTHER, *LATER):
+                raise ModelFileError("expected a name that is no function already")
+            given = _entries(entry, ("arguments", "value"), "value")
+            arguments = given.get("arguments", [])
+            if not arguments or len({*arguments}) < len(arguments):
+                raise ModelFileError("arguments: expected names, each once")
+            value = file.expression(("value",), given["value"])
+            for node in in_order([value.tree]):
+                if node.name and node.name not in (*arguments, *CONSTANTS):
+                    raise ExpressionError(node.column, f"{shown(node.name)} is no argument")
+            check_kinds(value.tree)
+        file.functions[name] = Function(tuple(arguments), value.tree)
 
 
 def _experiment(given: dict[str, float]) -> dict[str, float]:
@@ -322,12 +469,15 @@ def _read_variable(file: ModelFile, section: str, name: str, entry: object) -> N
     place = (f"[{section}]", name if NAME.fullmatch(name) else shown(name))
     with placed(*place):
         _check_name(name, file)
-        given = {"start": 0.0} if section in ("inputs", "states") else {}
+        given = {"start": 0.0} if section in ("inputs", "states", "discrete") else {}
         if section == "where":
             texts = {"": entry}
         else:
-            given |= _entries(entry, *SECTIONS[section])
-            texts = {key: given.pop(key) for key in ("derivative", "value") if key in given}
+            section, entry, texts = _texts_of(section, entry)
+            given = {} if "start" in texts else given
+            given |= _entries(entry, *(OWN_KEYS | SECTIONS)[section])
+            _check_type(given, section)
+            texts |= {key: given.pop(key) for key in ("derivative", "value") if key in given}
         variable = Variable(name, section, **given)
         with placed("unit"):
             unit = variable.unit or "1"
@@ -335,8 +485,35 @@ def _read_variable(file: ModelFile, section: str, name: str, entry: object) -> N
         _check_range(variable)
     for key, text in texts.items():
         whole = (*place, key) if key else place
-        variable.expression = Expression(whole, text, NUMBER, name, key == "derivative")
+        expression = file.expression(whole, text, NUMBER, name, key == "derivative")
+        if key == "start":
+            variable.initial = expression
+        else:
+            variable.expression = expression
     file.variables[name] = variable
+
+
+def _check_type(given: dict[str, Any], section: str) -> None:
+    """Check that the start value is of the type, which is no key of a variable."""
+    is_boolean = given.pop("type", None) == BOOLEAN
+    if section == SWITCHES:
+        given["start"] = given["start"] or False
+    if "start" in given and is_boolean != (type(given["start"]) is bool):
+        what = "true or false" if is_boolean else "a number"
+        raise ModelFileError(f"start: expected {what}, got {shown(given['start'])}")
+
+
+def _texts_of(section: str, entry: object) -> tuple[str, object, dict[str, object]]:
+    """Take a start value that is an expression from an entry; return its section and the rest."""
+    if not isinstance(entry, dict):
+        return section, entry, {}
+    if section == "parameters" and "value" in entry:
+        return FOLLOWS, entry, {}
+    if entry.get("type") == BOOLEAN and section in ("parameters", "inputs"):
+        return OPTIONS if section == "parameters" else SWITCHES, entry, {}
+    if section in ("states", "discrete") and isinstance(entry.get("start"), str):
+        return section, {k: v for k, v in entry.items() if k != "start"}, {"start": entry["start"]}
+    return section, entry, {}
 
 
 def _check_name(name: str, file: ModelFile) -> None:
@@ -345,11 +522,13 @@ def _check_name(name: str, file: ModelFile) -> None:
     if name in file.reserved or name.startswith("der_"):
         raise ModelFileError("this name is reserved, choose another one")
     if name in file.variables:
-        raise ModelFileError(f"this name is in [{file.variables[name].section}] already")
+        raise ModelFileError(f"this name is in {file.variables[name].place} already")
     if name in file.modes:
         raise ModelFileError("this name is in modes already")
-    if len(file.variables) + len(file.modes) + len(file.events) >= MOST_VARIABLES:
-        raise ModelFileError(f"has more than {MOST_VARIABLES} variables, modes and events")
+    if len(file.variables) + len(file.modes) + len(file.changes) >= MOST_VARIABLES:
+        raise ModelFileError(
+            f"has more than {MOST_VARIABLES} variables, modes, samplers and events"
+        )
 
 
 def _check_range(variable: Variable) -> None:
@@ -362,27 +541,55 @@ def _check_range(variable: Variable) -> None:
 
 
 def _read_event(file: ModelFile, name: str, entry: object) -> None:
-    place = f"[events.{name if NAME.fullmatch(name) else shown(name)}]"
+    place, given = _change(file, "events", name, entry, EVENT)
+    when = file.expression((place, "when"), given["when"], CONDITION, event="when")
+    file.events.append(Event(name, *_given(file, place, given, ""), when))
+
+
+def _read_sampler(file: ModelFile, name: str, entry: object) -> None:
+    place, given = _change(file, "sampled", name, entry, SAMPLER)
+    every, offset = (
+        file.expression((place, key), given.get(key, "0"), NUMBER, "time")
+        for key in ("every", "offset")
+    )
+    if not ("set" in given or "reinit" in given):
+        raise ModelFileError(f"{place}: expected set or reinit: what it does")
+    file.sampled.append(Sampler(name, *_given(file, place, given, "then"), every, offset))
+
+
+def _change(
+    file: ModelFile, section: str, name: str, entry: object, keys: tuple[str, ...]
+) -> tuple[str, dict[str, Any]]:
+    """Return the place of an event or sampler, and its entries; it needs the first of its keys."""
+    place = f"[{section}.{name if NAME.fullmatch(name) else shown(name)}]"
     with placed(place):
         _check_name(name, file)
-        given = _entries(entry, EVENT, "when")
+        return place, _entries(entry, keys, keys[0])
 
-    def changes(key: str, kind: str, known: Collection[str], what: str) -> dict[str, Expression]:
-        found = {}
+
+def _given(
+    file: ModelFile, place: str, given: dict[str, Any], event: str
+) -> tuple[Expression | None, dict[str, Expression], dict[str, Expression]]:
+    """Return `while`, `reinit` and `set`; event: of the expression of `while`."""
+    states, discrete = ({v.name for v in file.of(section)} for section in ("states", "discrete"))
+    kinds = {
+        "reinit": (dict.fromkeys(states, NUMBER), "a state"),
+        "set": (
+            dict.fromkeys(discrete, NUMBER) | dict.fromkeys(file.modes, CONDITION),
+            "one of modes or of [discrete]",
+        ),
+    }
+    found: dict[str, dict[str, Expression]] = {"reinit": {}, "set": {}}
+    for key, (known, what) in kinds.items():
         for target, text in given.get(key, {}).items():
             if target not in known:
                 raise ModelFileError(f"{place}: {key}: expected {what}, got {shown(target)}")
             whole = (place, f"{key}: {target}")
-            found[target] = Expression(whole, text, kind, target, event="then")
-        return found
-
-    when = Expression((place, "when"), given["when"], CONDITION, event="when")
-    if when.tree.op not in RELATIONS:
-        raise ModelFileError(f"{place}: when: expected one relation such as h < 0")
-    during = Expression((place, "while"), given["while"], CONDITION) if "while" in given else None
-    reinit = changes("reinit", NUMBER, [state.name for state in file.of("states")], "a state")
-    modes = changes("set", CONDITION, file.modes, "one of modes")
-    file.events.append(Event(name, when, during, reinit, modes))
+            found[key][target] = file.expression(whole, text, known[target], target, event="then")
+    during = None
+    if "while" in given:
+        during = file.expression((place, "while"), given["while"], CONDITION, event=event)
+    return during, found["reinit"], found["set"]
 
 
 def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
@@ -396,6 +603,7 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
             file = read_tables(path, text, tables, solver_names)
             _check_names(file)
             file.order = _in_order(file)
+            _check_periods(file)
             if file.has_units:
                 _check_units(file)
         except ModelFileError as error:
@@ -429,11 +637,12 @@ def _line(text: str, message: str) -> str:
 
 def _check_names(file: ModelFile) -> None:
     """Check the names and kinds in all expressions."""
-    known = {*file.variables, *file.modes, "time", *CONSTANTS}
-    parameters = {variable.name for variable in file.of("parameters")} | {*CONSTANTS}
+    rates = [derivative_of(state.name) for state in file.of("states")]
+    known = {*file.variables, *file.modes, "time", *CONSTANTS, *rates}
+    parameters = {v.name for v in file.of("parameters", FOLLOWS, OPTIONS)} | {*CONSTANTS}
     for expressions, allowed, mistake in (
         (file.assigned, known, "unknown name {}"),
-        (file.checks.values(), parameters, "{} is no parameter"),
+        (file.constant, parameters, "{} is no parameter"),
     ):
         for expression in expressions:
             with placed(*expression.place):
@@ -442,12 +651,13 @@ def _check_names(file: ModelFile) -> None:
                         meant = get_close_matches(node.name, allowed, n=1)
                         hint = f", did you mean {meant[0]!r}?" if meant else ""
                         raise ExpressionError(node.column, mistake.format(shown(node.name)) + hint)
-                check_kinds(expression.tree, expression.kind, file.modes)
+                check_kinds(expression.tree, expression.kind, file.conditions)
 
 
 def _in_order(file: ModelFile) -> list[Expression]:
     """Order all expressions: [where] and [outputs] first, each after those that it names."""
-    entries = {variable.name: variable for variable in file.of("where", "outputs")}
+    entries = {variable.name: variable for variable in file.calculated}
+    entries |= {derivative_of(state.name): state for state in file.of("states")}
     for variable in entries.values():
         used = names(variable.expression.tree) & entries.keys()
         variable.arguments = tuple(entries[name] for name in sorted(used))
@@ -457,18 +667,46 @@ def _in_order(file: ModelFile) -> list[Expression]:
         loop = error.args[1][::-1]
         way = shown(" -> ".join(variable.name for variable in loop))
         raise ModelFileError(
-            f"[{loop[0].section}]: {loop[0].name}: algebraic loop {way}: "
+            f"{loop[0].place}: {loop[0].name}: algebraic loop {way}: "
             "solve these equations for one of them first"
         ) from None
-    variables = [*in_order(entries.values()), *file.of("states")]
-    happening = [expression for event in file.events for expression in event.expressions]
-    return [*(v.expression for v in variables), *happening, *file.checks.values()]
+    variables = in_order(entries.values())
+    happening = [expression for change in file.changes for expression in change.expressions]
+    constant = [e for e in file.constant if e.target not in entries]
+    return [*(v.expression for v in variables), *happening, *constant]
+
+
+def _check_periods(file: ModelFile) -> None:
+    """Check that samplers tick with the start values of the parameters."""
+    starts = {variable.name: variable.start for variable in file.of("parameters", OPTIONS)}
+    follows = {variable.expression for variable in file.of(FOLLOWS)}
+    for expression in file.order:
+        if expression in follows:
+            starts[expression.target] = _number(expression, starts)
+    for sampler in file.sampled:
+        every, offset = (_number(expression, starts) for expression in sampler.periods)
+        with placed(*sampler.every.place):
+            if not every > 0:
+                raise ModelFileError(f"is {every:g} s at the start values, expected more than 0")
+        with placed(*sampler.offset.place):
+            if not offset >= 0:
+                raise ModelFileError(f"is {offset:g} s at the start values, expected 0 or more")
+
+
+def _number(expression: Expression, values: Mapping[str, float]) -> float:
+    """Evaluate an expression; nan if it has no value."""
+    try:
+        return evaluated(expression.tree, values)
+    except (ArithmeticError, ValueError):
+        return math.nan
 
 
 def _check_units(file: ModelFile) -> None:
     """Check that units fit, and find the units of [where]."""
     declared = [v for v in file.variables.values() if v.section != "where"]
     units = {v.name: unit_of_exponents(v.exponents) for v in declared} | {"time": SECOND}
+    for state in file.of("states"):
+        units[derivative_of(state.name)] = times(units[state.name], SECOND, -1)
     for expression in file.order:
         with placed(*expression.place):
             expected = units.get(expression.target)

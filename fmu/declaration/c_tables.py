@@ -5,6 +5,8 @@ from __future__ import annotations
 from declaration.load import Declaration
 from declaration.schema import Enumeration, Variable
 
+# C sets and reads calculated parameters like locals
+CAUSALITIES = {"calculatedParameter": "LOCAL"}
 C_TYPES = {"float64": "double", "int32": "int", "enumeration": "int", "boolean": "int"}
 
 
@@ -120,7 +122,7 @@ def table_row(name: str, variable: Variable, structure: str) -> str:
     return (
         f'    {{{variable.reference}, "{name}", VARIABLE_{variable.type.upper()}, '
         f"VARIABLE_OF_{variable.owner.upper()}, offsetof({structure}, {variable.field}),\n"
-        f"     CAUSALITY_{variable.causality.upper()}, "
+        f"     CAUSALITY_{CAUSALITIES.get(variable.causality, variable.causality.upper())}, "
         f"VARIABILITY_{variable.variability.upper()}, "
         f"INITIAL_{(variable.initial or 'none').upper()},\n"
         f"     {c_number(variable.start, '0.0')}, {c_number(variable.min, '-INFINITY')}, "

@@ -69,6 +69,8 @@ from pydantic import (
 INITIALS = {
     ("parameter", "fixed"): ("exact",),
     ("parameter", "tunable"): ("exact",),
+    ("calculatedParameter", "fixed"): ("calculated",),
+    ("calculatedParameter", "tunable"): ("calculated",),
     ("input", "discrete"): (None,),
     ("input", "continuous"): (None,),
     ("output", "discrete"): ("calculated", "exact"),
@@ -174,7 +176,9 @@ class Variable(Table):
     reference: int = Field(ge=0, le=9999)
     owner: Literal["model", "instance"] = "model"
     field: str
-    causality: Literal["parameter", "input", "output", "local", "independent"]
+    causality: Literal[
+        "parameter", "calculatedParameter", "input", "output", "local", "independent"
+    ]
     variability: Literal["fixed", "tunable", "discrete", "continuous"]
     initial: Literal["exact", "calculated"] | None = Field(default_factory=usual_initial)
     description: str
@@ -198,7 +202,8 @@ class Variable(Table):
     @property
     def is_unknown(self) -> bool:
         """Whether the model structure lists the variable."""
-        return self.causality == "output" or self.derivative_of is not None
+        is_listed = self.causality in ("output", "calculatedParameter")
+        return is_listed or self.derivative_of is not None
 
     @property
     def interface(self) -> dict[str, Any]:

@@ -7,7 +7,7 @@ comes to hold in its modes. What all models do with that is in src/model/relatio
 
 from collections.abc import Iterable
 
-from equations_file import Event, ModelFile
+from equations_file import SWITCHES, Change, ModelFile, Sampler
 
 from equations.c_code import Code, Leaves, filled, indented, text
 from equations.errors import NONE, Errors
@@ -30,10 +30,10 @@ NEXT_TIME = [
 def leaves(file: ModelFile) -> Leaves:
     """Where functions of value structures have the leaves, and their derivatives along a curve."""
     found = {("time", ""): "t", ("first", ""): "dt"}
-    for v in file.of("parameters", "inputs", "states"):
+    for v in file.of("parameters", "inputs", "states", "discrete"):
         for op, structure in ((v.leaf.op, "values"), ("first", "d"), ("second", "dd")):
             found[op, v.name] = f"{structure}->{FIELD.format(v.name)}"
-    found |= {("mode", mode): f"values->{MODE.format(mode)}" for mode in file.modes}
+    found |= {("mode", name): f"values->{MODE.format(name)}" for name in file.conditions}
     relations = enumerate(file.graph.relations)
     return found | {("mode", name): f"values->relations[{i}]" for i, name in relations}
 
@@ -61,7 +61,19 @@ class Events:
         self.located = graph.located
 
     def __bool__(self) -> bool:
-        return bool(self.relations)
+        switches = self.file.of(SWITCHES)
+        return bool(self.relations or self.discrete or self._has_starts or switches)
+
+    @property
+    def _has_starts(self) -> bool:
+        return bool(self.file.started or any(self.file.modes.values()))
+
+    @property
+    def discrete(self) -> list[str]:
+        """Fields of discrete states: times of samplers, and the discrete variables."""
+        ticks = [f"ticks_{sampler.name}" for sampler in self.file.sampled]
+        variables = [FIELD.format(v.name) for v in self.file.of("discrete")]
+        return [*(["start", *ticks] if ticks else []), *variables]
 
     def indicators(self) -> dict[str, Value]:
         """Indicators by their fields: signed distances, or 1."""
@@ -78,13 +90,16 @@ class Events:
         return self.graph.value("if", relation.mode, relation.distance, opposite)
 
     def fields(self) -> list[str]:
-        """Fields of the value structure: ints without gaps."""
+        """Fields of the value structure: doubles and ints without gaps."""
         if not self:
             return []
         return [
+            *(["/* discrete states */"] if self.discrete else []),
+            *(f"double {field};" for field in self.discrete),
+            *(f"int {MODE.format(v.name)}; /* input */" for v in self.file.of(SWITCHES)),
             "/* modes; C has no empty arrays */",
             "int is_begun;",
-            f"int relations[{len(self.relations)}];",
+            f"int relations[{len(self.relations) or 1}];",
             f"int active[{len(self.file.events) + 1}];",
             *(f"int {MODE.format(mode)};" for mode in self.file.modes),
         ]
@@ -116,18 +131,34 @@ class Events:
             if states
             else "0",
             has_inputs=int(any(r.is_of_inputs for r in self.relations)),
-            modes=2 + len(self.relations) + len(file.events) + len(file.modes),
+            modes=2 + (len(self.relations) or 1) + len(file.events) + len(file.modes),
+            samplers=len(file.sampled),
+            sampler_names=", ".join([text(s.name) for s in file.sampled] or ["NULL"]),
+            discrete=", ".join(
+                [f"offsetof(struct equations_values, {self.discrete[0]})"]
+                + [f"{len(self.discrete)} * sizeof(double)"]
+            )
+            if self.discrete
+            else "0, 0",
+            discrete_names=", ".join([text(v.name) for v in file.of("discrete")] or ["NULL"]),
+            periods=self._periods(),
+            write_start=self._starts() if self._has_starts else [],
+            starts=[".start = start,"] if self._has_starts else [],
+            switches=self._switches(),
+            starts_follow=[".starts_follow = true,"] if file.started else [],
             located=len(self.located),
-            next_time=NEXT_TIME if timed else [],
-            timed=[".next_time = next_time,"] if timed else [],
-            table=table,
+            next_time=NEXT_TIME if timed or file.sampled else [],
+            timed=[".next_time = next_time,"] if timed or file.sampled else [],
+            table=table or ["{0},"],
             nominal=", ".join(str(float(v.nominal or 1.0)) for v in states) or "1.0",
             indicators=Code(arrays(file)).assign(indicators).lines,
             compare=self._compare(),
             times=Code(leaves(file)).assign(times).lines,
             due=self._due(),
             changes=[
-                line for i, event in enumerate(file.events) for line in self._change(i, event)
+                line
+                for i, change in enumerate([*file.events, *file.sampled])
+                for line in self._change(i, change)
             ],
             descriptions=self._describe(),
             names=", ".join([text(f"indicator {r.name}") for r in self.located] or ["NULL"]),
@@ -164,15 +195,44 @@ class Events:
             code.lines.append(f"due[{i}] = {code.of(event.when.value)}{during};")
         return code.lines
 
-    def _change(self, index: int, event: Event) -> list[str]:
-        """What an event of the file does."""
-        states = [state.name for state in self.file.of("states")]
+    def _switches(self) -> list[str]:
+        fields = [MODE.format(v.name) for v in self.file.of(SWITCHES)]
+        if not fields:
+            return []
+        begin = f"offsetof(struct equations_values, {fields[0]})"
+        return [f".discrete_inputs = {{{begin}, {len(fields)} * sizeof(int)}},"]
+
+    def _starts(self) -> list[str]:
+        new = {f"values->{FIELD.format(v.name)}": v.initial.value for v in self.file.started}
+        modes = self.file.modes.items()
+        return [
+            "static void start(void *values_pointer) {",
+            "    struct equations_values *values = values_pointer;",
+            *(f"    values->{MODE.format(mode)} = {start:d};" for mode, start in modes),
+            *indented(Code(leaves(self.file)).assign(new).lines),
+            "}",
+            "",
+        ]
+
+    def _periods(self) -> list[str]:
         code = Code(leaves(self.file))
-        new = {FIELD.format(n): code.constant(code.of(e.value)) for n, e in event.reinit.items()}
-        for name, condition in event.set.items():
-            new[MODE.format(name)] = code.constant(f"{code.of(condition.value)} != 0", "int")
+        for i, sampler in enumerate(self.file.sampled):
+            code.assign({f"every[{i}]": sampler.every.value, f"offset[{i}]": sampler.offset.value})
+        return code.lines
+
+    def _change(self, index: int, change: Change) -> list[str]:
+        """What an event or a sampler of the file does."""
+        states = [state.name for state in self.file.of("states")]
+        code, new = Code(leaves(self.file)), {}
+        for name, given in change.given.items():
+            if name in self.file.modes:
+                new[MODE.format(name)] = code.constant(f"{code.of(given.value)} != 0", "int")
+            else:
+                new[FIELD.format(name)] = code.constant(code.of(given.value))
         lines = [f"values->{field} = {value};" for field, value in new.items()]
-        lines += [f"tolerance[{states.index(name)}] = 0.0;" for name in event.reinit]
+        lines += [f"tolerance[{states.index(name)}] = 0.0;" for name in change.reinit]
+        if isinstance(change, Sampler) and change.during is not None:
+            lines = [f"if ({code.of(change.during.value)}) {{", *indented(lines), "}"]
         return [f"if (event == {index}) {{", *indented(code.lines + lines), "}"]
 
     def _describe(self) -> list[str]:

@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from itertools import chain
 
-from equations_file import ModelFile
+from equations_file import OPTIONS, ModelFile
 
-from equations.c_code import Code, filled, text
-from equations.c_events import FIELD, Events, arrays, leaves
+from equations.c_code import Code, filled, indented, text
+from equations.c_events import FIELD, MODE, Events, arrays, leaves
 from equations.c_series import Series
 from equations.graph import FALLIBLE, Value
 from rparm.expressions.expression import in_order
@@ -21,12 +21,14 @@ def header(file: ModelFile) -> str:
     """Text of equations.h."""
     events = Events(file)
     groups = _ranges(file) | {
-        "calculated": [FIELD.format(v.name) for v in file.of("where", "outputs")],
+        "calculated": [FIELD.format(v.name) for v in file.calculated],
         "event indicators": list(events.indicators()),
     }
     fields = []
     for title, names in groups.items():
         fields += [f"/* {title} */", *(f"double {name};" for name in names)] if names else []
+        if title == "parameters":
+            fields += [f"int {name};" for name in _options(file)]
     return filled("equations.h.in", fields=fields + events.fields())
 
 
@@ -44,7 +46,10 @@ def source(file: ModelFile) -> str:
         events=events.functions("_in_domain" * has_domains),
         followed=[f"{STRUCTURE} copy;", f"values = {FOLLOWED};"] if events else [],
         checks=_checks(file),
-        ranges=_range_lines(_ranges(file)),
+        ranges=[
+            *_parameter_lines(file),
+            *_range_lines({k: v for k, v in _ranges(file).items() if k != "parameters"}),
+        ],
         model_events=[".events = &events,"] if events else [],
     )
 
@@ -56,6 +61,21 @@ def _ranges(file: ModelFile) -> dict[str, list[str]]:
         for section in ("parameters", "inputs", "states")
     }
     return ranges | {"derivatives": [RATE.format(state.name) for state in file.of("states")]}
+
+
+def _options(file: ModelFile) -> list[str]:
+    """Fields of Boolean parameters, ints behind the others, in pairs: there are no gaps."""
+    names = [MODE.format(v.name) for v in file.of(OPTIONS)]
+    return [*names, "unused"] if len(names) % 2 else names
+
+
+def _parameter_lines(file: ModelFile) -> list[str]:
+    doubles, ints = _ranges(file)["parameters"], _options(file)
+    if not ints:
+        return _range_lines({"parameters": doubles})
+    first = [*doubles, *ints][0]
+    size = f"{len(doubles)} * sizeof(double) + {len(ints)} * sizeof(int)"
+    return [f".parameters = {{offsetof({STRUCTURE}, {first}), {size}}},"]
 
 
 def _range_lines(ranges: Mapping[str, list[str]]) -> list[str]:
@@ -109,7 +129,7 @@ def _domains(
         names = ("domains_header", "domains_declared", "domains")
         return {"in_domain": "", **{name: [] for name in names}}
     ranges = _ranges(file)
-    calculated = ranges["derivatives"] + [FIELD.format(v.name) for v in file.of("where", "outputs")]
+    calculated = ranges["derivatives"] + [FIELD.format(v.name) for v in file.calculated]
     groups = {key: ranges[key] for key in ("states", "inputs")}
     groups |= {"calculated": calculated, "indicators": list(events.indicators())}
     distances = {f"distance[{i}]": r.distance for i, r in enumerate(events.relations)}
@@ -139,7 +159,7 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, list[str]]:
     """Calculated fields and their derivatives along a curve."""
     graph = file.graph
     fields = {RATE.format(state.name): state.value for state in file.of("states")}
-    fields |= {FIELD.format(v.name): v.value for v in file.of("where", "outputs")}
+    fields |= {FIELD.format(v.name): v.value for v in file.calculated}
     fields |= events.indicators()
     seeds = {graph.value("time"): graph.value("first")}  # it has no second derivative
     for variable in file.of("parameters", "inputs", "states"):
@@ -151,11 +171,26 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, list[str]]:
     curve.assign({f"d->{name}": value for name, value in zip(fields, firsts, strict=True)})
     split = len(curve.lines)
     curve.assign({f"dd->{name}": value for name, value in zip(fields, seconds, strict=True)})
+    started = {f"->{FIELD.format(v.name)} += ": v.initial.value for v in file.started}
+    start_firsts = graph.derivatives(started.values(), seeds)
+    start_seconds = graph.derivatives(start_firsts, seeds)
     return {
+        "started": _at_start(file, "d", dict(zip(started, start_firsts, strict=True))),
+        "started_twice": _at_start(file, "dd", dict(zip(started, start_seconds, strict=True))),
         "outputs": Code(leaves(file)).assign({f"to->{n}": v for n, v in fields.items()}).lines,
         "derivatives": curve.lines[:split],
         "second_derivatives": curve.lines[split:],
     }
+
+
+def _at_start(file: ModelFile, structure: str, derivatives: Mapping[str, Value]) -> list[str]:
+    """Add derivatives of start values to those of the states, until the initialization ends."""
+    if not derivatives:
+        return []
+    code = Code(leaves(file))
+    code.lines += [f"{structure}{to}{code.of(value)};" for to, value in derivatives.items()]
+    condition = "!values->is_begun" + (" && dd != NULL" if structure == "dd" else "")
+    return [f"if ({condition}) {{", *indented(code.lines), "}"]
 
 
 def _checks(file: ModelFile) -> list[str]:

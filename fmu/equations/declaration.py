@@ -2,13 +2,14 @@
 
 import re
 import string
+from collections.abc import Collection, Iterable
 from typing import Any
 
 from declaration.load import UNITS
 from declaration.load import read as read_declaration
-from equations_file import NUMBERS, ModelFile, Variable, placed
+from equations_file import FOLLOWS, NUMBERS, OPTIONS, SWITCHES, ModelFile, Variable, placed
 
-from equations import c_model
+from equations import c_events, c_model
 from equations.c_events import FIELD, INDICATOR, MODE
 from equations.graph import MOVING, Relation, Value
 from rparm.expressions.units import shown
@@ -17,12 +18,18 @@ INSTANCE = UNITS.parents[2] / "src" / "instance"
 TIME = INSTANCE / "time_variable.toml"
 SOLVER = INSTANCE / "solver_variables.toml"
 EVENTS = INSTANCE / "event_variables.toml"
+TIME_EVENTS = INSTANCE / "time_event_variables.toml"
 
 Key = tuple[str, str]  # name and kind of a variable
+Leaf = tuple[str, str]  # of the graph: operation and name
 CAUSALITIES = {
     "parameters": "parameter",
+    FOLLOWS: "calculatedParameter",
+    OPTIONS: "parameter",
+    SWITCHES: "input",
     "inputs": "input",
     "states": "output",
+    "discrete": "output",
     "where": "local",
     "outputs": "output",
 }
@@ -78,7 +85,7 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
             **_dependencies(state.value, file),
             "description": f"Derivative of {state.name} by the time",
         }
-    for mode in file.modes if relations else ():
+    for mode in file.modes if c_events.Events(file) else ():
         own = {"type": "boolean", "variability": "discrete", "description": f"Mode {mode}"}
         tables[mode] = _local(MODE.format(mode)) | own
     for name, relation in indicators.items():
@@ -95,9 +102,10 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
         "values": c_model.STRUCTURE,
         "symbol": c_model.SYMBOL,
         "event_indicators": [*indicators],
-        "time_events": len(indicators) < len(relations),
+        "time_events": len(indicators) < len(relations) or bool(file.sampled),
     }
-    includes = [TIME, *([SOLVER] if states else []), *([EVENTS] if relations else [])]
+    includes = [TIME, *([EVENTS] if relations else [])]
+    includes += [SOLVER] if states else [TIME_EVENTS] if file.sampled else []
     helpers = {variable.name for variable in file.of("where")}  # last, if shown at all
     return {
         "include": [str(path) for path in includes],
@@ -130,19 +138,44 @@ def _entries_of(
 ) -> dict[str, object]:
     """Table of a variable of the file."""
     causality = CAUSALITIES[variable.section]
+    if variable.is_boolean:
+        return {
+            "field": MODE.format(variable.name),
+            "type": "boolean",
+            "causality": causality,
+            "variability": "tunable" if variable.section == OPTIONS else "discrete",
+            "start": variable.start,
+            "description": variable.description or variable.name,
+        }
     entries = _local(FIELD.format(variable.name)) | {"causality": causality}
     if causality == "parameter":
-        entries["variability"] = "tunable"
+        is_fixed = ("parameter", variable.name) in _fixed(file)
+        entries["variability"] = "fixed" if is_fixed else "tunable"
+    if variable.section == FOLLOWS:
+        is_fixed = variable.value.leaves <= _fixed(file)
+        entries |= {"variability": "fixed" if is_fixed else "tunable"}
+        entries |= _dependencies(variable.value, file)
     if variable.section == "states":
         entries |= {"initial": "exact", "dependencies": [variable.name]}
-        entries["reinit"] = any(variable.name in event.reinit for event in file.events)
-    with placed(file.path, f"[{variable.section}]", variable.name, "unit"):
+        entries["reinit"] = any(variable.name in change.reinit for change in file.changes)
+    if variable.section == "discrete":
+        entries |= {"variability": "discrete", "initial": "exact"}
+        entries |= _known_of({("discrete", variable.name)}, file)
+    if variable.initial is not None:
+        op = variable.leaf.op
+        entries |= {"initial": "calculated", **_initially({(op, variable.name)}, {}, file)}
+    with placed(file.path, variable.place, variable.name, "unit"):
         entries["unit"] = _unit(units, variable.exponents, variable.unit)
     numbers = {key: getattr(variable, key) for key in NUMBERS}
     entries |= {key: number for key, number in numbers.items() if number is not None}
     if variable.section == "outputs":
         entries |= _dependencies(variable.value, file)
     return entries | {"description": variable.description or variable.name}
+
+
+def _fixed(file: ModelFile) -> frozenset[Leaf]:
+    """Leaves that periods follow from, which must not change."""
+    return frozenset().union(*(e.value.leaves for s in file.sampled for e in s.periods))
 
 
 def _unit(units: dict[str, dict[str, int]], exponents: dict[str, int], name: str = "") -> str:
@@ -158,39 +191,57 @@ def _unit(units: dict[str, dict[str, int]], exponents: dict[str, int], name: str
 
 def _dependencies(value: Value, file: ModelFile) -> dict[str, list[str]]:
     """What a calculated variable follows from, by the keys of variables.toml."""
-    leaves, todo = set(), list(value.leaves)
-    while todo:
-        leaf = todo.pop()
-        if leaf not in leaves and leaf[1] in file.graph.relations:
-            todo += file.graph.relations[leaf[1]].distance.leaves
-        leaves.add(leaf)
-    moving = {name for op, name in leaves if op in MOVING}
-    parameters = {name for op, name in leaves if op == "parameter"}
-    known = {
-        "dependencies": [name or "time" for name in ("", *file.variables) if name in moving],
-        "parameters": [name for name in file.variables if name in parameters],
-    }
+    leaves = _reached(value.leaves, file, ["discrete"])
+    known = _known_of(leaves, file)
     return known | _initially(leaves, known, file)
 
 
-def _initially(
-    leaves: set[tuple[str, str]], known: dict[str, list[str]], file: ModelFile
-) -> dict[str, list[str]]:
-    """What it follows from at the end of the initialization, when events may happen."""
+def _known_of(leaves: set[Leaf], file: ModelFile) -> dict[str, list[str]]:
+    """Dependencies and parameters among what these leaves follow from."""
+    leaves = _reached(leaves, file, ["discrete"])
+    moving = {name for op, name in leaves if op in MOVING or _is_in(file, name, SWITCHES)}
+    parameters = {name for op, name in leaves if op == "parameter" or _is_in(file, name, OPTIONS)}
+    return {
+        "dependencies": [name or "time" for name in ("", *file.variables) if name in moving],
+        "parameters": [name for name in file.variables if name in parameters],
+    }
+
+
+def _is_in(file: ModelFile, name: str, *sections: str) -> bool:
+    return name in file.variables and file.variables[name].section in sections
+
+
+def _reached(leaves: Iterable[Leaf], file: ModelFile, changed: Collection[str]) -> set[Leaf]:
+    """All leaves that these follow from by relations and, if of a kind in `changed`, by changes."""
     found, todo = set(), list(leaves)
     while todo:
         leaf = todo.pop()
         if leaf in found:
             continue
         found.add(leaf)
-        if leaf[1] in file.graph.relations:
-            todo += file.graph.relations[leaf[1]].distance.leaves
-        for event in file.events:
-            if leaf[0] in ("state", "mode") and leaf[1] in (event.reinit | event.set):
-                during = [] if event.during is None else [event.during]
-                for expression in (event.when, *during, (event.reinit | event.set)[leaf[1]]):
-                    todo += expression.value.leaves
-    names = {name or "time" for op, name in found if op in (*MOVING, "parameter")}
-    if names == {*known["dependencies"], *known["parameters"]}:
+        op, name = leaf
+        if name in file.graph.relations:
+            todo += file.graph.relations[name].distance.leaves
+        if "state" in changed:
+            todo += [
+                leaf for v in file.started if v.name == name for leaf in v.initial.value.leaves
+            ]
+        for change in file.changes if op in changed else ():
+            if name in change.given:
+                own = [*change.conditions, change.given[name]]
+                todo += [leaf for expression in own for leaf in expression.value.leaves]
+    return found
+
+
+def _initially(
+    leaves: set[Leaf], known: dict[str, list[str]], file: ModelFile
+) -> dict[str, list[str]]:
+    """What it follows from at the end of the initialization, when events may happen."""
+    found = _reached(leaves, file, ["state", "mode", "discrete"])
+    started = {variable.name for variable in file.started}
+    known_here = {name or "time" for op, name in found if op in (*MOVING, "parameter")}
+    known_here |= {name for _, name in found if _is_in(file, name, OPTIONS, SWITCHES)}
+    names = known_here - started
+    if known and names == {*known["dependencies"], *known["parameters"]}:
         return {}
     return {"initially": [name for name in ("time", *file.variables) if name in names]}

@@ -17,7 +17,10 @@ from functools import partial, reduce
 from rparm.expressions.expression import RELATIONS, Node, in_order, parse
 
 # along a curve, "first" and "second" are the derivatives of the other leaves
-LEAVES = ("parameter", "input", "state", "time", "mode", "integer", "first", "second")
+LEAVES = (
+    *("parameter", "input", "state", "discrete", "time", "mode", "integer"),
+    *("first", "second"),
+)
 MOVING = ("input", "state", "time")
 RUNTIME = ("first", "second")  # derivatives that may be 0 in one call and not in another
 CONDITIONS = ("mode", "and", "or", "not", "isnan", "isfinite", "==", *RELATIONS)
@@ -136,6 +139,8 @@ class Graph:
             match node.op:
                 case "number":
                     value = self.number(node.value)
+                case "literal":
+                    value = self.value("<", self.number(0.0), self.number(node.value))
                 case "name":
                     value = names[node.name]
                 case "**":

@@ -5,12 +5,20 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import equations_file
-from equations_file import ModelFile, ModelFileError
+from equations_file import OPTIONS, SWITCHES, ModelFile, ModelFileError
 
 from equations.graph import Graph
+from rparm.expressions.expression import RELATIONS, derivative_of
 
 __all__ = ["ModelFile", "ModelFileError", "read"]
-LEAVES = {"parameters": "parameter", "inputs": "input", "states": "state"}
+LEAVES = {
+    "parameters": "parameter",
+    "inputs": "input",
+    "states": "state",
+    "discrete": "discrete",
+    OPTIONS: "mode",
+    SWITCHES: "mode",
+}
 
 
 def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
@@ -28,11 +36,13 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     known |= {"time": graph.value("time"), "pi": graph.number(math.pi)}
     for expression in file.order:
         tree = expression.tree
-        if expression.event == "when":
+        if expression.event == "when" and tree.op in RELATIONS:
             sides = [graph.of_tree(side, known) for side in tree.arguments]
             expression.value = graph.switch(tree.op, *sides)
         else:
             expression.value = graph.of_tree(tree, known, expression.event == "then")
-        if expression.target:
+        if expression.is_rate:
+            known[derivative_of(expression.target)] = expression.value
+        elif expression.target:
             known.setdefault(expression.target, expression.value)
     return file

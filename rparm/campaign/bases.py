@@ -90,6 +90,8 @@ class Base(ABC):
         WrongValueError if there is none of that name.
         """
         component, variable = self.variable(name)
+        if variable.follows:
+            raise WrongValueError(variable.why_it_follows)
         if not variable.can_start:
             raise WrongValueError(f"{name!r} is not a parameter or the start value of a state")
         return component, variable

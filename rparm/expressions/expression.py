@@ -6,8 +6,8 @@ Nothing of the text is ever executed as Python. The parser climbs precedences.
 import math
 import operator
 import re
-from collections.abc import Callable, Collection, Container, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from typing import Any, TypeVar
 
@@ -19,13 +19,15 @@ FUNCTIONS: dict[str, int | None] = dict.fromkeys(
 ) | {"atan2": 2, "min": None, "max": None}
 RELATIONS = ("<", "<=", ">", ">=")
 CONSTANTS = ("pi",)
+LITERALS = {"true": 1.0, "false": 0.0}
 # not to be used as names: operators, and words that other languages execute or give a value
 WORDS = ("and", "or", "not", "if", "else")
-NO_NAMES = (*WORDS, "True", "False", "None", "lambda")
+NO_NAMES = (*WORDS, *LITERALS, "True", "False", "None", "lambda")
 Item = TypeVar("Item", bound=Any)  # hashable, with `arguments` of its own kind
 NUMBER, CONDITION = "a number", "a condition"
 LOGIC = ("and", "or", "not")
 DEEPEST = 100  # levels of brackets and other nesting
+DERIVATIVE = "der"  # of a state, in front of a bracket
 SPACE = re.compile(r"\s*")
 TOKEN = re.compile(
     r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?![\w.])"
@@ -71,9 +73,10 @@ class ExpressionError(ValueError):
 class Node:
     """An operation, a number or a name.
 
-    op is "number" (then `value` counts), "name" (then `name`), an operator of `RELATIONS`, + - * /
-    **, "negative", "and", "or", "not", "if" (arguments: condition, value if true, otherwise), or a
-    name of `FUNCTIONS`. min and max have two arguments here.
+    op is "number" (then `value` counts), "literal" (a condition: whether `value` is 1), "name"
+    (then `name`), an operator of `RELATIONS`, + - * / **, "negative", "and", "or", "not", "if"
+    (arguments: condition, value if true, otherwise), or a name of `FUNCTIONS`. min and max have two
+    arguments here.
     """
 
     op: str
@@ -136,12 +139,13 @@ def check_kinds(root: Node, expected: str = NUMBER, conditions: Collection[str] 
 
 
 def _check(node: Node, expected: str, conditions: Collection[str]) -> None:
-    is_condition = node.op in (*LOGIC, *RELATIONS) or (
+    is_condition = node.op in ("literal", *LOGIC, *RELATIONS) or (
         node.op == "name" and node.name in conditions
     )
     found = CONDITION if is_condition else NUMBER
     if found != expected:
-        what = node.name or ("the number" if node.op == "number" else repr(node.op))
+        constants = {"number": "the number", "literal": "true" if node.value else "false"}
+        what = node.name or constants.get(node.op, repr(node.op))
         raise ExpressionError(node.column, f"expected {expected}, {what} gives {found}")
 
 
@@ -162,9 +166,32 @@ class Token:
         return repr(self.text[:SHOWN]) if self.text else "the end"
 
 
-def parse(text: str) -> Node:
-    """Parse an expression; ExpressionError says what is wrong with it."""
-    parser = _Parser(_tokens(text))
+@dataclass(frozen=True)
+class Function:
+    """A function that stands for an expression of its arguments."""
+
+    arguments: tuple[str, ...]
+    body: Node
+
+    def of(self, given: Sequence[Node], column: int) -> Node:
+        """Return its expression for these arguments; mistakes in it are at this column."""
+        known = dict(zip(self.arguments, given, strict=True))
+        found: dict[Node, Node] = {}
+        for node in in_order([self.body]):
+            if node.op == "name" and node.name in known:
+                found[node] = known[node.name]
+            else:
+                arguments = tuple(found[argument] for argument in node.arguments)
+                found[node] = replace(node, column=column, arguments=arguments)
+        return found[self.body]
+
+
+def parse(text: str, functions: Mapping[str, Function] | None = None) -> Node:
+    """Parse an expression; ExpressionError says what is wrong with it.
+
+    functions: further ones, by name.
+    """
+    parser = _Parser(_tokens(text), {**FURTHER, **(functions or {})})
     root = parser.expression(CONDITIONAL)
     if parser.token.kind != "end":
         raise parser.unexpected("an operator")
@@ -187,8 +214,8 @@ def _tokens(text: str) -> list[Token]:
 
 
 class _Parser:
-    def __init__(self, tokens: list[Token]) -> None:
-        self._tokens = iter(tokens)
+    def __init__(self, tokens: list[Token], functions: Mapping[str, Function]) -> None:
+        self._tokens, self._functions = iter(tokens), functions
         self.token = next(self._tokens)
         self._depth = 0
 
@@ -235,6 +262,9 @@ class _Parser:
         token = self.token
         if token.kind == "number":
             return self.number()
+        if token.text in LITERALS:
+            self.take()
+            return Node("literal", token.column, value=LITERALS[token.text])
         if token.kind == "name" and token.text not in NO_NAMES:
             self.take()
             if self.token.text == "(":
@@ -263,8 +293,11 @@ class _Parser:
 
     def call(self, function: Token) -> Node:
         """Parse the arguments of a function."""
-        if function.text not in FUNCTIONS:
-            known = ", ".join(FUNCTIONS)
+        if function.text == DERIVATIVE:
+            return self.derivative(function)
+        further = self._functions.get(function.text)
+        if function.text not in FUNCTIONS and further is None:
+            known = ", ".join([*FUNCTIONS, *self._functions, DERIVATIVE])
             raise ExpressionError(function.column, f"no function {function.shown} (known: {known})")
         arguments = []
         separator = "("
@@ -273,7 +306,7 @@ class _Parser:
             arguments.append(self.expression(CONDITIONAL))
             separator = ","
         self.expect(")")
-        count = FUNCTIONS[function.text]
+        count = len(further.arguments) if further else FUNCTIONS[function.text]
         if len(arguments) != (count or max(2, len(arguments))):
             wanted = count or "2 or more"
             raise ExpressionError(
@@ -281,9 +314,36 @@ class _Parser:
                 f"{function.text}: expected {wanted} argument{'s' * (count != 1)}, "
                 f"got {len(arguments)}",
             )
+        if further:
+            return further.of(arguments, function.column)
         if count:
             return Node(function.text, function.column, tuple(arguments))
         return reduce(lambda a, b: Node(function.text, function.column, (a, b)), arguments)
+
+    def derivative(self, function: Token) -> Node:
+        """Parse the state whose derivative is meant."""
+        self.expect("(")
+        state = self.take()
+        if state.kind != "name":
+            raise ExpressionError(state.column, f"expected a state, got {state.shown}")
+        self.expect(")")
+        return Node("name", function.column, name=derivative_of(state.text))
+
+
+def derivative_of(state: str) -> str:
+    """Return the name that expressions have for the derivative of a state."""
+    return f"{DERIVATIVE}({state})"
+
+
+# functions that are no operations of their own; their names are free for variables
+FURTHER: dict[str, Function] = {}
+for _name, _arguments, _body in (
+    ("sign", "x", "1 if x > 0 else -1 if x < 0 else 0"),
+    ("hypot", "x y", "sqrt(x**2 + y**2)"),
+    ("log10", "x", f"log(x) / {math.log(10)!r}"),
+    ("cbrt", "x", f"x**{1 / 3!r} if x >= 0 else -(-x)**{1 / 3!r}"),
+):
+    FURTHER[_name] = Function(tuple(_arguments.split()), parse(_body))
 
 
 # ---- Values --------------------------------------------------------------------------------------
@@ -350,6 +410,8 @@ def evaluated(root: Node, values: Mapping[str, float]) -> float:
 def _operation(node: Node, arguments: list[float], values: Mapping[str, float]) -> float:
     if node.op == "number":
         return node.value
+    if node.op == "literal":
+        return node.value > 0.0
     if node.op == "name":
         return math.pi if node.name == "pi" else values[node.name]
     return OPERATIONS[node.op](*arguments)

@@ -14,6 +14,7 @@ BASE = ("kg", "m", "s", "A", "K", "mol", "cd")
 ANGLE = "rad"
 
 Unit = tuple[Fraction, ...]  # exponents, in the order of BASE
+LARGEST_ROOT = 100  # 0.3333333333333333 is 1/3
 ONE: Unit = (Fraction(0),) * len(BASE)
 
 
@@ -30,8 +31,8 @@ def times(a: Unit, b: Unit, power: Fraction = Fraction(1)) -> Unit:
 # units with a symbol, as products of those before
 DERIVED = {
     "Hz": "1/s", "N": "kg.m/s2", "Pa": "N/(m.m)", "J": "N.m", "W": "J/s", "C": "A.s", "V": "W/A",
-    "F": "C/V", "ohm": "V/A", "S": "A/V", "Wb": "V.s", "T": "Wb/(m.m)", "H": "Wb/A", "lm": "cd",
-    "lx": "lm/(m.m)", "Bq": "1/s", "Gy": "J/kg", "Sv": "J/kg", "kat": "mol/s",
+    "F": "C/V", "ohm": "V/A", "Ohm": "V/A", "S": "A/V", "Wb": "V.s", "T": "Wb/(m.m)", "H": "Wb/A",
+    "lm": "cd", "lx": "lm/(m.m)", "Bq": "1/s", "Gy": "J/kg", "Sv": "J/kg", "kat": "mol/s",
 }  # fmt: skip
 SYMBOLS: dict[str, dict[str, int]] = {base: {base: 1} for base in (*BASE, ANGLE)}
 FACTOR = re.compile(r"([A-Za-z]+)(-?[1-9])?", re.ASCII)
@@ -150,7 +151,7 @@ def _power(node: Node, given: list[Unit | None]) -> Unit | None:
         raise ExpressionError(
             node.column, f"'**': expected a number as exponent of what has unit {shown(base)}"
         )
-    return times(ONE, base, value)
+    return times(ONE, base, value.limit_denominator(LARGEST_ROOT))
 
 
 def _literal(node: Node) -> Fraction | None:

@@ -29,6 +29,7 @@ INTEGER = (-(2**31), 2**31 - 1)  # range of an Integer of FMI 2.0 and an Int32 o
 
 # variables that a scenario may set, by the name of its section
 PARAMETERS, INITIAL, INPUTS = "parameters", "initial", "inputs"
+CALCULATED = "calculatedParameter"
 KINDS = {PARAMETERS: "a parameter", INITIAL: "a state", INPUTS: "an input"}
 
 # parameters of FMUs that bring their own integrator, as this project's do
@@ -52,6 +53,13 @@ class Variable:
     units: Units = field(default_factory=dict)  # in which a Real may be given; empty: has none
     description: str = ""
     variability: str | None = None
+    # parameters that a calculated parameter, or the start value of a state, follows from
+    follows: tuple[str, ...] = ()
+
+    @property
+    def why_it_follows(self) -> str:
+        """A message for who tries to set it."""
+        return f"{self.name!r} follows from {', '.join(self.follows)}: set these"
 
     def is_a(self, kind: str) -> bool:
         """Return whether it is one of `KINDS`."""
@@ -187,6 +195,8 @@ class Model:
         variable = self.variables.get(name)
         if variable is not None and variable.is_a(kind):
             return variable
+        if variable is not None and variable.follows:
+            raise WrongValueError(variable.why_it_follows)
         meant = [other.name for other in self.variables.values() if other.is_a(kind)]
         if variable is None:
             raise WrongValueError(f"the model has no variable {name!r}{hint(name, meant)}")
@@ -212,10 +222,19 @@ def described(description: ModelDescription) -> Model:
         for unknown in description.derivatives
         if unknown.variable.derivative is not None
     }
+    calculated = {v.name for v in description.modelVariables if v.causality == CALCULATED}
+    follows = {
+        unknown.variable.name: tuple(known.name for known in unknown.dependencies)
+        for unknown in description.initialUnknowns
+        if unknown.dependencies and unknown.variable.name in calculated.union(derivatives)
+    }
     return Model(
         name=description.modelName,
         fmi_version=description.fmiVersion,
-        variables={v.name: _variable(v, displays) for v in description.modelVariables},
+        variables={
+            v.name: _variable(v, displays, follows.get(v.name, ()))
+            for v in description.modelVariables
+        },
         states=tuple(derivatives),
         interpolates_inputs=bool(
             slave and (slave.canInterpolateInputs or slave.providesIntermediateUpdate)
@@ -266,7 +285,7 @@ CONVERT = {
 NUMBERS = ("Real", "Integer", "Enumeration")
 
 
-def _variable(variable: ModelVariable, displays: Displays) -> Variable:
+def _variable(variable: ModelVariable, displays: Displays, follows: tuple[str, ...]) -> Variable:
     kind = TYPES.get(variable.type, variable.type)
     if variable.dimensions:
         kind = f"array of {variable.type}"
@@ -292,4 +311,5 @@ def _variable(variable: ModelVariable, displays: Displays) -> Variable:
         units=units,
         description=variable.description or "",
         variability=variable.variability,
+        follows=follows,
     )

@@ -5,9 +5,9 @@ initialized and read, not integrated: what an FMU answers at one time, either ki
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from ctypes import Array, byref, c_double, sizeof
+from ctypes import POINTER, Array, byref, c_double, sizeof
 from functools import partial
 
 import fmpy
@@ -247,6 +247,21 @@ class _ModelExchange(Instance):
 
     def exit_initialization(self) -> None:
         super().exit_initialization()
+        self._update()
+
+    def set_states(self, values: Mapping[str, float]) -> None:
+        """Move some states, by name, and pass the events that this causes."""
+        states = self.reals(self.fmu.model.states)
+        with self.explained("at its states"):
+            states.get()
+            for name, value in values.items():
+                states.view[states.names.index(name)] = value
+            x = states.view.ctypes.data_as(POINTER(c_double))
+            self.fmi.setContinuousStates(x, len(states.names))
+            self.fmi.enterEventMode()
+        self._update()
+
+    def _update(self) -> None:
         with self.explained("at the events of the start"):
             for _ in range(MOST_UPDATES):
                 needed, terminates, _, _, has_next, time = self._update_discrete_states()

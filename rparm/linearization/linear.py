@@ -331,11 +331,22 @@ class FmuSubject(ExitStack):
             instance.reset()
         self._is_new = False
         instance.set_up(self.time, None)
-        for name, value in values.items():
-            instance.set(name, value)
+        later = {name: v for name, v in values.items() if self.variable(name).follows}
+        for name in values.keys() - later.keys():
+            instance.set(name, values[name])
         instance.enter_initialization()
         instance.exit_initialization()
+        if later:
+            self._move(later)
         return linear_model(instance)
+
+    def _move(self, states: Mapping[str, float]) -> None:
+        """Set states whose start values follow from parameters."""
+        move = getattr(self._instance, "set_states", None)
+        if move is None:
+            why = self.variable(next(iter(states))).why_it_follows
+            raise UserError(f"{self.fmu.path}: {why}, or linearize it in model exchange")
+        move(states)
 
     def held(self, found: Linear) -> list[str]:
         """Return the states of `found` that are held."""
@@ -365,7 +376,8 @@ def known_variable(model: Model, name: str, where: str) -> Variable:
 
 def is_settable(variable: Variable) -> bool:
     """Return whether a point may say its value: a state, an input or a parameter."""
-    is_state = variable.causality in ("output", "local") and variable.initial == "exact"
+    may_start = variable.initial == "exact" or bool(variable.follows)
+    is_state = variable.causality in ("output", "local") and may_start
     return is_state or variable.causality == "input" or variable.is_a(PARAMETERS)
 
 

@@ -224,6 +224,7 @@ static inline void activate_values(struct instance *instance, struct clock_time 
     if (model->events != NULL) {
         activate_bytes(instance, model->events->discrete_inputs);
         activate_bytes(instance, model->events->modes);
+        activate_bytes(instance, model->events->discrete_states);
     }
     instance->parameters_are_active = true;
     activate(instance, model->inputs);

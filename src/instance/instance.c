@@ -41,29 +41,32 @@ static bool lies_in(struct range range, const struct variable *variable) {
     return variable->offset >= range.offset && variable->offset - range.offset < range.size;
 }
 
-/* True if only events write the value: a mode or a discrete state. */
+/* True if, by initialization, only events write the value: a mode, a discrete state or a state
+ * whose start value is calculated. */
 static bool is_kept_by_events(const struct model *model, const struct variable *variable) {
     const struct model_events events = events_of(model);
     return variable->owner == VARIABLE_OF_MODEL &&
-           (lies_in(events.modes, variable) || lies_in(events.discrete_states, variable));
+           (lies_in(events.modes, variable) || lies_in(events.discrete_states, variable) ||
+            (events.starts_follow && lies_in(model->states, variable)));
 }
 
-/* True if the variable is bound to a field of its own kind. Modes (ints) and discrete states
- * (doubles) are calculated and discrete. */
+/* True if the variable is bound to a field of its own kind. Modes (ints) are calculated and
+ * discrete; discrete states (doubles) are discrete, and may have a start value. */
 static bool is_bound_well(const struct model *model, const struct variable *variable) {
     const struct model_events events = events_of(model);
     const bool is_real = variable->type == VARIABLE_FLOAT64;
     const bool is_parameter = variable->causality == CAUSALITY_PARAMETER;
     const bool is_input = variable->causality == CAUSALITY_INPUT;
-    const bool is_state = !is_parameter && variable->initial == INITIAL_EXACT;
-    const bool can_be_kept =
-        variable->initial == INITIAL_CALCULATED && variable->variability == VARIABILITY_DISCRETE;
+    const bool is_exact = !is_parameter && variable->initial == INITIAL_EXACT;
+    const bool is_discrete = variable->variability == VARIABILITY_DISCRETE;
+    const bool is_started = events.starts_follow && variable->initial == INITIAL_CALCULATED;
     return is_parameter == lies_in(model->parameters, variable) &&
            (is_input && is_real) == lies_in(model->inputs, variable) &&
            (is_input && !is_real) == lies_in(events.discrete_inputs, variable) &&
-           is_state == lies_in(model->states, variable) &&
-           (!lies_in(events.modes, variable) || (can_be_kept && !is_real)) &&
-           (!lies_in(events.discrete_states, variable) || (can_be_kept && is_real));
+           (is_exact && !is_discrete) == (lies_in(model->states, variable) && !is_started) &&
+           (!lies_in(events.modes, variable) || (is_discrete && !is_exact && !is_real)) &&
+           (!lies_in(events.discrete_states, variable) || (is_discrete && is_real)) &&
+           (!(is_exact && is_discrete) || lies_in(events.discrete_states, variable));
 }
 
 /* Checks that each variable is bound to a field of its own kind: a wrong binding compiles, but the
@@ -101,7 +104,8 @@ static void locate_reals(struct instance *instance) {
     for (size_t i = 0; i < instance->description->variable_count; i++) {
         const struct variable *variable = &instance->description->variables[i];
         struct instance_real *real = &instance->reals[variable->reference];
-        real->is_kept = is_kept_by_events(instance->model, variable);
+        real->is_kept = variable->initial == INITIAL_CALCULATED &&
+                        is_kept_by_events(instance->model, variable);
         real->is_calculated = variable->initial == INITIAL_CALCULATED &&
                               variable->owner == VARIABLE_OF_MODEL && !real->is_kept;
         if (variable->type != VARIABLE_FLOAT64) {

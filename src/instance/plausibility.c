@@ -178,8 +178,31 @@ static bool are_zeros(const char *values, struct range range) {
     return true;
 }
 
+static bool are_equal(const char *values, const char *others, struct range range) {
+    return memcmp(values + range.offset, others + range.offset, range.size) == 0;
+}
+
+/* True if no event has written a discrete state: all are 0, except those with start values. */
+static bool are_at_start(const struct instance *instance, const char *values) {
+    const struct range kept = events_of(instance->model).discrete_states;
+    size_t zeros = 0;
+    for (size_t i = 0; i < count_of(kept); i++) {
+        zeros += ((const double *)(const void *)(values + kept.offset))[i] == 0.0 ? 1 : 0;
+    }
+    size_t started = 0; // and not 0
+    for (size_t i = 0; i < instance->description->variable_count; i++) {
+        const struct variable *variable = &instance->description->variables[i];
+        if (variable_is_discrete_state(variable) && variable->initial == INITIAL_EXACT) {
+            const double value = *(const double *)(const void *)(values + variable->offset);
+            started += value == 0.0 ? 0 : 1;
+        }
+    }
+    return zeros + started == count_of(kept);
+}
+
 /* Checks the modes of values, which may have been set since the last event, and the integrator's
- * modes. They are equal while the history lasts: an event would have ended it. */
+ * modes. They are equal while the history lasts, as are discrete states: an event would have ended
+ * it. */
 static bool check_modes(const struct instance *instance, const struct instance_state *state,
                         const char *values, const char *restart_values) {
     const struct model_events *events = instance->model->events;
@@ -189,11 +212,12 @@ static bool check_modes(const struct instance *instance, const struct instance_s
     const struct range modes = events->modes;
     const bool is_decided = state->phase >= PHASE_STEPPING;
     if (is_decided ? !events->modes_are_possible(values, false)
-                   : !are_zeros(values, modes) || !are_zeros(values, events->discrete_states)) {
+                   : !are_zeros(values, modes) || !are_at_start(instance, values)) {
         return refuse_modes(instance, "the modes");
     }
     if (state->has_history &&
-        (memcmp(values + modes.offset, restart_values + modes.offset, modes.size) != 0 ||
+        (!are_equal(values, restart_values, modes) ||
+         !are_equal(values, restart_values, events->discrete_states) ||
          !events->modes_are_possible(restart_values, true))) {
         return refuse_modes(instance, "the modes since the restart");
     }

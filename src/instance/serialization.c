@@ -207,13 +207,15 @@ static void transfer_statistics(struct codec *codec, struct integrator_statistic
     codec_int(codec, "last_order", &statistics->last_order);
 }
 
-/* Transfers the values of the model that are not calculated: parameters, inputs and states. */
-static void transfer_values(struct codec *codec, const struct model_description *description,
-                            char *values) {
-    for (size_t i = 0; i < description->variable_count; i++) {
-        const struct variable *variable = &description->variables[i];
+/* Transfers parameters, inputs and states. */
+static void transfer_values(struct codec *codec, const struct instance *instance, char *values) {
+    for (size_t i = 0; i < instance->description->variable_count; i++) {
+        const struct variable *variable = &instance->description->variables[i];
+        const bool is_calculated =
+            variable->initial == INITIAL_CALCULATED && !instance_is_state(instance, variable);
         void *field = values + variable->offset;
-        if (variable->owner != VARIABLE_OF_MODEL || variable->initial == INITIAL_CALCULATED) {
+        if (variable->owner != VARIABLE_OF_MODEL || is_calculated ||
+            variable_is_discrete_state(variable)) { // transfer_kept has these
             continue;
         }
         if (variable->type == VARIABLE_FLOAT64) {
@@ -261,7 +263,7 @@ static void transfer_polynomials(struct codec *codec, struct polynomial polynomi
 
 /* Transfers a value structure, except values that the outputs of the model calculate. */
 static void transfer_structure(struct codec *codec, const struct instance *instance, char *values) {
-    transfer_values(codec, instance->description, values);
+    transfer_values(codec, instance, values);
     transfer_kept(codec, instance->model, values);
 }
 

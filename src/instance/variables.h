@@ -105,6 +105,13 @@ static inline bool variable_is_settable(const struct variable *variable, enum ph
            variable->variability == VARIABILITY_TUNABLE;
 }
 
+/* True if only events write the variable once the initialization has ended. */
+static inline bool variable_is_discrete_state(const struct variable *variable) {
+    return variable->owner == VARIABLE_OF_MODEL &&
+           variable->variability == VARIABILITY_DISCRETE &&
+           variable->causality != CAUSALITY_INPUT;
+}
+
 /* Sends a message that says why a value is refused, and returns the status. */
 enum status variable_refuse_value(const struct variable *variable, double value,
                                   const struct message_sink *sink);

@@ -66,8 +66,11 @@ struct model_events {
     const char *const *indicator_names;
     struct range modes; /* int[]: the right-hand side reads them, only update writes them. 0 until
                            the initialization ends */
-    struct range discrete_states; /* double[]: sums over events, samples; written like modes */
+    struct range discrete_states; /* double[]: sums over events, samples; written like modes, except
+                                     those that are variables with start values */
     struct range discrete_inputs; /* int[]: Boolean inputs */
+    bool starts_follow; /* true if start values of states may be calculated: the first update writes
+                           these states */
 
     /* Returns the time of the next time event, s, or INFINITY if there is none. It depends on
      * parameters, modes and discrete states, and becomes later by update. NULL if the model has no

@@ -1,5 +1,6 @@
 #include "relations.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -15,6 +16,7 @@ struct call {
     void *values;
     int *is_begun, *holds, *active; /* parts of its modes */
     double t;                       /* s */
+    double passed;                  /* s: earlier time events, and those at this time, are past */
     const double *du;               /* derivative of each input by the time */
     bool inputs_move;
 };
@@ -31,8 +33,8 @@ static struct call call_of(const struct relations *model, struct relations_room 
     for (int i = 0; i < model->input_count; i++) {
         inputs_move |= du[i] != 0.0;
     }
-    return (struct call){model, room, values,     modes, holds, holds + model->relation_count,
-                         t,     du,   inputs_move};
+    return (struct call){model, room, values, modes, holds, holds + model->relation_count,
+                         t,     t,    du,     inputs_move};
 }
 
 /* Compares all relations. state_errors: how far from its limit each state may have been located, in
@@ -109,9 +111,23 @@ const void *relations_followed(const struct relations *model, struct relations_r
         return values;
     }
     memcpy(copy, values, model->values_size);
+    if (!is_begun && model->start != NULL) {
+        model->start(copy);
+    }
     const struct call call = call_of(model, room, copy, t, room.zeros);
     set_modes_from_values(&call, is_begun);
     return copy;
+}
+
+static const double *discrete_in(const struct relations *model, const void *values) {
+    return (const double *)(const void *)((const char *)values + model->discrete.offset);
+}
+
+/* Returns the time of a sampler's next tick, s: never a sum of periods, which would drift. */
+static double tick_time(const struct relations *model, struct relations_room room,
+                        const void *values, int sampler) {
+    const double *discrete = discrete_in(model, values);
+    return discrete[0] + (room.offset[sampler] + discrete[1 + sampler] * room.every[sampler]);
 }
 
 double relations_next_time(const struct relations *model, struct relations_room room,
@@ -119,6 +135,10 @@ double relations_next_time(const struct relations *model, struct relations_room 
     const int *modes = modes_in(model, values);
     double next = INFINITY;
     model->write_times(values, room.times);
+    model->write_periods(values, room.every, room.offset);
+    for (int i = 0; i < model->sampler_count && modes[0]; i++) {
+        next = fmin(next, tick_time(model, room, values, i));
+    }
     for (int k = 0; k < model->relation_count && modes[0]; k++) {
         const struct relation *relation = &model->relation[k];
         const bool is_ahead = relation->is_timed && modes[1 + k] != relation->rises;
@@ -160,6 +180,45 @@ static void switch_fallen(const struct call *call) {
     }
 }
 
+/* Updates the modes of timed relations. Their times may follow from discrete variables. */
+static void update_timed_modes(const struct call *call) {
+    const struct relations *model = call->model;
+    model->write_times(call->values, call->room.times);
+    for (int k = 0; k < model->relation_count; k++) {
+        const struct relation *relation = &model->relation[k];
+        if (relation->is_timed) {
+            call->holds[k] = (call->room.times[k] <= call->passed) == relation->rises;
+        }
+    }
+}
+
+/* Performs an event or a sampler, and updates all modes. */
+static void perform(const struct call *call, int event) {
+    const struct relations *model = call->model;
+    compare(call, call->room.tolerance, call->room.before);
+    model->change(call->values, call->t, event, call->room.tolerance);
+    update_timed_modes(call);
+    update_modes_until_stable(call, false);
+    switch_fallen(call);
+    update_modes_until_stable(call, false);
+    memset(call->room.turned, 0, (size_t)model->relation_count * sizeof *call->room.turned);
+}
+
+/* Runs the samplers whose time has come, in their order. Ticks whose times differ only by rounding,
+ * such as 3 0.1 and 1 0.3, are at one instant. */
+static void run_samplers(const struct call *call) {
+    const struct relations *model = call->model;
+    double *ticks = (double *)(void *)((char *)call->values + model->discrete.offset) + 1;
+    const double rounding = 4.0 * DBL_EPSILON * fabs(call->passed);
+    model->write_periods(call->values, call->room.every, call->room.offset);
+    for (int i = 0; i < model->sampler_count; i++) {
+        if (tick_time(model, call->room, call->values, i) <= call->passed + rounding) {
+            perform(call, model->event_count + i);
+            ticks[i] += 1.0;
+        }
+    }
+}
+
 /* Runs the events that have become due, in their order. Returns false if there was none. */
 static bool run_due_events(const struct call *call) {
     const struct relations *model = call->model;
@@ -168,12 +227,7 @@ static bool run_due_events(const struct call *call) {
     for (int i = 0; i < model->event_count; i++) {
         model->find_due(call->values, call->t, due);
         if (due[i] && !call->active[i]) {
-            compare(call, call->room.tolerance, call->room.before);
-            model->change(call->values, call->t, i, call->room.tolerance);
-            update_modes_until_stable(call, false);
-            switch_fallen(call);
-            update_modes_until_stable(call, false);
-            memset(call->room.turned, 0, (size_t)model->relation_count * sizeof *call->room.turned);
+            perform(call, i);
             call->active[i] = 1;
             fires = true;
         }
@@ -194,15 +248,11 @@ static bool joins(const struct compared *compared, int holds) {
 static void pass(const struct call *call, const struct event *event) {
     const struct relations *model = call->model;
     const struct relations_room room = call->room;
-    const double next = relations_next_time(model, room, call->values); /* also writes all times */
-    const double passed = event->is_timed ? next : -INFINITY;
     compare(call, room.tolerance, room.compared);
+    update_timed_modes(call);
     for (int k = 0; k < model->relation_count; k++) {
         const struct relation *relation = &model->relation[k];
-        if (relation->is_timed) {
-            const bool is_past = call->t >= room.times[k] || room.times[k] <= passed;
-            call->holds[k] = is_past == relation->rises;
-        } else if (event->triggered != NULL) {
+        if (!relation->is_timed && event->triggered != NULL) {
             // if a state is at its limit within its error, its indicator may only seem to fall
             const double slope = signed_slope(&room.compared[k], call->holds[k]);
             const bool falls =
@@ -213,15 +263,78 @@ static void pass(const struct call *call, const struct event *event) {
     update_modes_until_stable(call, false);
 }
 
+/* Returns true if a sampler with this period and offset (s) can tick from the time t (s) on;
+ * otherwise writes the reason. */
+static bool can_tick(const char *name, double every, double offset, const struct event *event) {
+    const double shortest = event_shortest_period(event->t);
+    if (every >= shortest && every > 0.0 && isfinite(every) && offset >= 0.0 && isfinite(offset)) {
+        return true;
+    }
+    if (event->reason != NULL && !(offset >= 0.0 && isfinite(offset))) {
+        (void)snprintf(event->reason, event->reason_size,
+                       "sampler %s: offset = %g s is refused: it must be 0 or more", name, offset);
+    } else if (event->reason != NULL) {
+        (void)snprintf(event->reason, event->reason_size,
+                       "sampler %s: every = %g s is refused: it must be above 0, and %g s or more "
+                       "at a start time of %g s",
+                       name, every, shortest, event->t);
+    }
+    return false;
+}
+
+/* Starts the samplers at the time of the event. Returns STATUS_INVALID_PARAMETERS, with the reason,
+ * if one of them cannot tick. */
+static enum status start_samplers(const struct call *call, const struct event *event) {
+    const struct relations *model = call->model;
+    model->write_periods(call->values, call->room.every, call->room.offset);
+    for (int i = 0; i < model->sampler_count; i++) {
+        if (!can_tick(model->sampler_names[i], call->room.every[i], call->room.offset[i], event)) {
+            return STATUS_INVALID_PARAMETERS;
+        }
+    }
+    if (model->sampler_count > 0) {
+        double *discrete = (double *)(void *)((char *)call->values + model->discrete.offset);
+        discrete[0] = event->t;
+    }
+    return STATUS_OK;
+}
+
+/* Returns STATUS_NOT_FINITE, with the reason, if a discrete variable is not finite. */
+static enum status check_discrete(const struct call *call, const struct event *event) {
+    const struct relations *model = call->model;
+    const double *discrete = discrete_in(model, call->values);
+    const size_t first = model->sampler_count > 0 ? 1 + (size_t)model->sampler_count : 0;
+    for (size_t i = first; i < model->discrete.size / sizeof *discrete; i++) {
+        if (!isfinite(discrete[i])) {
+            if (event->reason != NULL) {
+                (void)snprintf(event->reason, event->reason_size, "%s is not finite",
+                               model->discrete_names[i - first]);
+            }
+            return STATUS_NOT_FINITE;
+        }
+    }
+    return STATUS_OK;
+}
+
 enum status relations_update(const struct relations *model, struct relations_room room,
                              void *values, const struct event *event) {
-    const struct call call = call_of(model, room, values, event->t, event->du);
+    struct call call = call_of(model, room, values, event->t, event->du);
     const double *x = (const double *)(const void *)((const char *)values + model->states);
     double *tolerance = room.tolerance;
     const int was_begun = *call.is_begun;
     if (!was_begun) {
+        if (model->start != NULL) {
+            model->start(values);
+        }
+        const enum status status = start_samplers(&call, event);
+        if (status != STATUS_OK) {
+            return status;
+        }
         set_modes_from_values(&call, false);
         *call.is_begun = 1;
+    }
+    if (event->is_timed) {
+        call.passed = fmax(event->t, relations_next_time(model, room, values));
     }
     for (int i = 0; i < model->state_count; i++) {
         const double located = location_error * (model->nominal[i] + fabs(x[i]));
@@ -230,9 +343,10 @@ enum status relations_update(const struct relations *model, struct relations_roo
     if (was_begun) {
         pass(&call, event);
     }
+    run_samplers(&call);
     for (int count = 0; count <= event->max_events; count++) {
         if (!run_due_events(&call)) {
-            return STATUS_OK;
+            return check_discrete(&call, event);
         }
     }
     if (event->reason != NULL) {
@@ -255,12 +369,20 @@ void relations_errors(const struct relations *model, struct relations_room room,
     }
 }
 
+/* True if the number is a count of ticks. */
+static bool is_count(double ticks) {
+    return ticks >= 0.0 && ticks <= 0x1p53 && ticks == floor(ticks);
+}
+
 bool relations_are_plausible(const struct relations *model, const void *values) {
     const int *modes = modes_in(model, values);
     const size_t count = model->modes.size / sizeof *modes;
     bool are_fine = modes[0] == 1;
     for (size_t i = 0; i < count; i++) {
         are_fine = are_fine && (modes[i] == 0 || modes[i] == 1);
+    }
+    for (int i = 0; i < model->sampler_count; i++) {
+        are_fine = are_fine && is_count(discrete_in(model, values)[1 + i]);
     }
     return are_fine;
 }

@@ -2,7 +2,8 @@
  * such model.
  *
  * A relation compares two values; its mode says whether it holds, and changes at events only. An
- * event of the model fires when its condition becomes true. */
+ * event of the model fires when its condition becomes true. A sampler ticks at the times start +
+ * (offset + k every), k = 0, 1, ... */
 #ifndef RELATIONS_H
 #define RELATIONS_H
 
@@ -40,18 +41,28 @@ struct relations {
      * further modes of the model */
     struct range modes;
     size_t states; /* offset of the states */
-    int relation_count, event_count, state_count, input_count;
+    /* double[], discrete states of the model: with samplers first the start time, s, and the number
+     * of ticks of each sampler; then its discrete variables */
+    struct range discrete;
+    int relation_count, event_count, sampler_count, state_count, input_count;
     bool has_inputs; /* true if some relation depends on inputs and parameters only */
     const struct relation *relation;
-    const double *nominal; /* of each state */
+    const double *nominal;              /* of each state */
+    const char *const *sampler_names;
+    const char *const *discrete_names;  /* of the discrete variables */
 
+    /* Writes the start values of modes, and of states and discrete variables that follow from
+     * parameters. NULL if there are none. */
+    void (*start)(void *values);
     void (*compare)(const void *values, double t, const struct given *given,
                     struct compared compared[]);
     /* Writes the time of each timed relation, s. */
     void (*write_times)(const void *values, double times[]);
+    /* Writes every and offset of each sampler, s. */
+    void (*write_periods)(const void *values, double every[], double offset[]);
     void (*find_due)(const void *values, double t, int due[]);
-    /* Performs an event: right sides use the values before it; a state that jumps gets tolerance 0.
-     */
+    /* Performs an event or, with event_count added to its number, a sampler: right sides use the
+     * values before it; a state that jumps gets tolerance 0. */
     void (*change)(void *values, double t, int event, double tolerance[]);
 };
 
@@ -59,6 +70,7 @@ struct relations {
 struct relations_room {
     struct compared *compared, *before; /* one per relation each */
     double *times;                      /* one per relation */
+    double *every, *offset;             /* one per sampler */
     int *due;                           /* one per event */
     int *turned;                        /* one per relation; zeros */
     double *tolerance;                  /* one per state */

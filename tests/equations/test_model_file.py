@@ -28,6 +28,7 @@ EXAMPLES = [
 ]
 HEAD = 'name = "M"\n'
 STATE = HEAD + '[states]\nx = { derivative = "-x" }\n'
+SAMPLED = STATE + "[discrete]\nu = {}\n[sampled.s]\n"
 
 MISTAKES = {
     "no TOML": ("name = ", "is not valid TOML"),
@@ -75,15 +76,50 @@ MISTAKES = {
         STATE + '[where]\na = "b + x"\nb = "c"\nc = "2 * a"', "algebraic loop 'a -> b -> c -> a'",
     ),
     "loop of one": (STATE + '[where]\na = "a"', "[where]: a: algebraic loop 'a -> a'"),
-    "modes": ("modes = 3\n" + STATE, "modes: expected a list of names"),
+    "modes": ("modes = 3\n" + STATE, "modes: expected a list of names, or a table of true and"),
+    "mode as a number": ("modes = { a = 1 }\n" + STATE, "modes: expected a list of names, or a t"),
     "mode twice": ('modes = ["a", "a"]\n' + STATE, "modes: 'a': this name is in modes"),
     "mode as number": (
         'modes = ["a"]\n' + STATE + '[where]\nb = "a"', "column 1: expected a number",
     ),
     "event": (STATE + "[events.e]\n", "[events.e]: when is missing"),
     "event key": (STATE + '[events.e]\nwhen = "x < 0"\nthen = 1', "[events.e]: unknown key 'then'"),
-    "no relation": (
-        STATE + '[events.e]\nwhen = "x < 0 and x > 1"', "[events.e]: when: expected one relation",
+    "no condition": (
+        STATE + '[events.e]\nwhen = "x - 1"', "[events.e]: when: column 3: expected a condition",
+    ),
+    "derivative of a derivative": (
+        STATE + '[where]\na = "der(der(x))"', "column 8: expected ')', got '('",
+    ),
+    "derivative of a number": (STATE + '[where]\na = "der(2)"', "column 5: expected a state, got"),
+    "derivative of no state": (
+        STATE + '[inputs]\nu = {}\n[where]\na = "der(u)"', "unknown name 'der(u)', did you mean",
+    ),
+    "derivative in a loop": (
+        HEAD + '[states]\nx = { derivative = "-der(x)" }', "[states]: x: algebraic loop 'x -> x'",
+    ),
+    "function twice": (
+        STATE + '[functions]\nsin = { arguments = ["a"], value = "a" }', "expected a name that is",
+    ),
+    "arguments twice": (
+        STATE + '[functions]\nf = { arguments = ["a", "a"], value = "a" }', "arguments: expected",
+    ),
+    "function of a variable": (
+        STATE + '[functions]\nf = { arguments = ["a"], value = "a * x" }', "'x' is no argument",
+    ),
+    "recursion": (
+        STATE + '[functions]\nf = { arguments = ["a"], value = "f(a - 1)" }', "no function 'f'",
+    ),
+    "arguments of the file's function": (
+        STATE + '[functions]\nf = { arguments = ["a"], value = "a" }\n[where]\nb = "f(x, 1)"',
+        "[where]: b: column 1: f: expected 1 argument, got 2",
+    ),
+    "unit in a function": (
+        HEAD + '[functions]\nf = { arguments = ["a", "b"], value = "a + b" }\n'
+        '[inputs]\nu = { unit = "m" }\nw = { unit = "s" }\n[where]\nb = "f(u, w)"',
+        "b: column 1: '+': units m and s do not fit",
+    ),
+    "function without value": (
+        STATE + '[functions]\nf = { arguments = ["a"] }', "[functions]: f: value is missing",
     ),
     "reinit": (
         STATE + '[events.e]\nwhen = "x < 0"\nreinit = { y = "1" }',
@@ -137,7 +173,80 @@ MISTAKES = {
         STATE + '[where]\na = "x == 1"', "equations in implicit form are not supported: solve them",
     ),
     "residuals": (STATE + "[algebraic]\n", "equations in implicit form are not supported: solve"),
-    "sampler": (STATE + '[where]\na = "sample(x)"', "samplers are not supported: set an input"),
+    "sampler": (STATE + '[where]\na = "sample(x)"', "samplers are written as [sampled.NAME]"),
+    "no period": (SAMPLED + "set = { u = '1' }", "line 6: [sampled.s]: every is missing"),
+    "sampler without effect": (SAMPLED + 'every = "1"', "[sampled.s]: expected set or reinit"),
+    "sampler key": (SAMPLED + 'every = "1"\nwhen = "x < 0"', "[sampled.s]: unknown key 'when'"),
+    "period of a state": (
+        SAMPLED + 'every = "x"\nset = { u = "1" }', "every: column 1: 'x' is no parameter",
+    ),
+    "period of 0": (
+        SAMPLED + 'every = "1 - 1"\nset = { u = "1" }',
+        "[sampled.s]: every: is 0 s at the start values, expected more than 0",
+    ),
+    "period without value": (
+        SAMPLED + 'every = "1 / (1 - 1)"\nset = { u = "1" }', "every: is nan s at the start values",
+    ),
+    "offset below 0": (
+        SAMPLED + 'every = "1"\noffset = "-1"\nset = { u = "1" }', "offset: is -1 s at the start",
+    ),
+    "unit of a period": (
+        HEAD + '[discrete]\nu = {}\n[parameters]\nT = { start = 1, unit = "m" }\n'
+        '[sampled.s]\nevery = "T"\nset = { u = "1" }',
+        "[sampled.s]: every: column 1: expected unit s, got m",
+    ),
+    "sampled parameter": (
+        SAMPLED + 'every = "1"\nset = { p = "1" }', "one of modes or of [discrete], got 'p'",
+    ),
+    "sampled state": (
+        SAMPLED + 'every = "1"\nset = { x = "1" }', "one of modes or of [discrete], got 'x'",
+    ),
+    "sampled condition": (
+        SAMPLED + 'every = "1"\nset = { u = "x < 1" }', "set: u: column 3: expected a number",
+    ),
+    "sampler of a name that is taken": (SAMPLED.replace(".s]", ".u]"), "is in [discrete] already"),
+    "limits of a discrete one": (STATE + "[discrete]\nu = { min = 0 }", "unknown key 'min'"),
+    "literal as a name": (STATE + "[inputs]\ntrue = {}", "true: this name is reserved"),
+    "literal as a number": (STATE + '[where]\na = "x + true"', "expected a number, true gives"),
+    "value and start": (
+        HEAD + '[parameters]\np = { start = 1, value = "2" }', "p: unknown key 'start'",
+    ),
+    "loop of parameters": (
+        HEAD + '[parameters]\na = { value = "b" }\nb = { value = "2 * a" }',
+        "[parameters]: a: algebraic loop 'a -> b -> a'",
+    ),
+    "parameter of a state": (
+        STATE + '[parameters]\np = { value = "x" }', "p: value: column 1: 'x' is no parameter",
+    ),
+    "start of a state": (
+        HEAD + '[states]\nx = { start = "y", derivative = "1" }\ny = { derivative = "1" }',
+        "[states]: x: start: column 1: 'y' is no parameter",
+    ),
+    "start in quotes": (
+        HEAD + '[inputs]\nu = { start = "1" }', "[inputs]: u: start: expected a number, got '1'",
+    ),
+    "unit of a start": (
+        HEAD + '[parameters]\np = { start = 1, unit = "s" }\n'
+        '[discrete]\nu = { start = "p", unit = "m" }',
+        "[discrete]: u: start: column 1: expected unit m, got s",
+    ),
+    "unit of a parameter that follows": (
+        HEAD + '[parameters]\np = { start = 1, unit = "s" }\nq = { value = "p**2", unit = "s" }',
+        "[parameters]: q: value: column 2: expected unit s, got s2",
+    ),
+    "type": (HEAD + '[inputs]\nu = { type = "Real" }', "u: type: expected \"Boolean\", got 'Real'"),
+    "type of a state": (
+        HEAD + '[states]\nx = { type = "Boolean", derivative = "1" }', "x: unknown key 'type'",
+    ),
+    "limits of a Boolean": (
+        HEAD + '[inputs]\nu = { type = "Boolean", min = 0 }', "u: unknown key 'min', expected one",
+    ),
+    "number as a Boolean": (
+        HEAD + '[inputs]\nu = { type = "Boolean", start = 1 }', "start: expected true or false",
+    ),
+    "Boolean as a number": (
+        HEAD + '[inputs]\nu = { type = "Boolean" }\n[where]\na = "u + 1"', "u gives a condition",
+    ),
     "noise": (STATE + '[where]\na = "x + noise()"', "noise is not supported: make it outside and"),
     "line": (STATE + "[parameters]\na = { start = 1 }\n\nb = { }", "line 7: [parameters]: b"),
     "line of a table": (STATE + "[inputs.u]\nmin = 1", "line 4: [inputs]: u: start = 0"),

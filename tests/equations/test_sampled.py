@@ -1,0 +1,309 @@
+"""Files with samplers: their ticks, and models that only sampling makes possible."""
+
+import ctypes
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Model, FMU2Slave
+from scipy.linalg import expm
+
+from tests.equations.compiled import Model
+from tests.equations.examples import METHODS, build, simulated
+
+EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+COUNTERS = """
+name = "Counters"
+[parameters]
+T = { start = 0.1, unit = "s" }
+[discrete]
+a = {}
+b = {}
+c = { start = 5 }
+[sampled.fast]
+every = "T"
+set = { a = "a + 1" }
+[sampled.slow]
+every = "3 * T"
+set = { b = "a" }
+[sampled.late]
+every = "T"
+offset = "T / 2"
+while = "a > 2"
+set = { c = "c + 1" }
+"""
+PID = """
+name = "Pid"
+[parameters]
+m = { start = 1.3, unit = "kg", min = 1e-6 }
+Kp = { start = 20.0, unit = "N/m" }
+Kd = { start = 6.0, unit = "N.s/m" }
+Ki = { start = 10.0, unit = "N/(m.s)" }
+Ts = { start = 0.01, unit = "s", min = 1e-6 }
+target = { start = 1.0, unit = "m" }
+[states]
+x = { unit = "m", derivative = "v" }
+v = { unit = "m/s", derivative = "u / m" }
+[where]
+error = "target - x"
+[discrete]
+u = { unit = "N", description = "Force of the drive" }
+sum = { unit = "N" }
+last = { unit = "m" }
+[sampled.control]
+every = "Ts"
+set = { u = "Kp * error + sum - Kd * (x - last) / Ts", sum = "sum + Ki * Ts * error", last = "x" }
+"""
+PWM = """
+name = "Pwm"
+modes = ["on"]
+[parameters]
+R = { start = 2.0, unit = "Ohm" }
+L = { start = 5e-3, unit = "H" }
+V = { start = 24.0, unit = "V" }
+T = { start = 1e-3, unit = "s" }
+duty = { start = 0.3, min = 0, max = 0.999 }
+[states]
+i = { unit = "A", derivative = "((V if on else 0) - R * i) / L" }
+[sampled.begin]
+every = "T"
+set = { on = "true" }
+[sampled.end]
+every = "T"
+offset = "duty * T"
+set = { on = "false" }
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("sampled")
+
+
+def made(folder: Path, text: str) -> Path:
+    """The FMU of a text, built once."""
+    name = text.split('"')[1]
+    path = folder / name / f"{name}.toml"
+    if not path.parent.exists():
+        path.parent.mkdir()
+        path.write_text(text)
+        build(path, path.parent)
+    return path.with_suffix(".fmu")
+
+
+def test_samplers_of_one_instant_run_in_the_order_of_the_file(folder: Path) -> None:
+    """3 * 0.1 and 1 * 0.3 are two doubles and one instant; the first tick is at the start."""
+    run = simulated(made(folder, COUNTERS), 30.0, 0.1, {})
+    k = np.arange(len(run))
+    assert np.array_equal(run["a"], k + 1)
+    assert np.array_equal(run["b"], k // 3 * 3 + 1)
+    assert np.array_equal(run["c"], 5 + np.maximum(0, k - 2))
+
+
+def test_ticks_do_not_drift_in_a_thousand_million(tmp_path: Path) -> None:
+    """Time of the next tick: start + (offset + k every), rounded three times."""
+    model = Model(tmp_path, COUNTERS)
+    events = ctypes.cast(model.words.events, ctypes.POINTER(ctypes.c_size_t))
+    words = [events[i] for i in range(16)]
+    next_time = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p)(words[8])
+    for start, every, k in ((0.0, 0.1, 10**9), (3.7, 1 / 3, 123456789), (1.7e9, 0.01, 10**6)):
+        given = {"T": every, "start": start, "ticks_fast": k, "ticks_slow": 1e12}
+        values = model.values(**given, ticks_late=1e12)
+        values.view(np.int32)[2 * len(model.names)] = 1  # is_begun
+        assert next_time(values.ctypes.data) == start + (0.0 + k * every)
+
+
+def pid(stop: float, m: float = 1.3, period: float = 0.01) -> np.ndarray:
+    """x, v, u at the ticks, by the exponential of the motion under a constant force."""
+    exponential = expm(np.array([[0, 1, 0], [0, 0, 1 / m], [0, 0, 0]]) * period)
+    state, total, last, rows = np.zeros(2), 0.0, 0.0, []
+    for _ in range(round(stop / period) + 1):
+        error = 1.0 - state[0]
+        force = 20.0 * error + total - 6.0 * (state[0] - last) / period
+        total, last = total + 10.0 * period * error, state[0]
+        rows.append([*state, force])
+        state = (exponential @ [*state, force])[:2]
+    return np.array(rows)
+
+
+@EACH_METHOD
+@pytest.mark.parametrize("step", [0.01, 0.1, 0.025])
+def test_a_sampled_pid_controller_moves_a_mass(folder: Path, method: int, step: float) -> None:
+    run = simulated(
+        made(folder, PID), 4.0, step, {"solver_method": method}, relative_tolerance=1e-10
+    )
+    rows = np.round(run["time"] / 0.01, 6)
+    exact = pid(4.0)[rows[rows == np.round(rows)].astype(int)]
+    found = np.stack([run[name] for name in ("x", "v")], axis=1)[rows == np.round(rows)]
+    assert np.max(np.abs(found - exact[:, :2])) < 1e-9
+    assert np.max(np.abs(run["u"][rows == np.round(rows)] - exact[:, 2])) < 1e-7
+
+
+def current(t: float, duty: float, R: float = 2.0, L: float = 5e-3) -> float:
+    """Current at the time t, period by period."""
+    i, period = 0.0, 1e-3
+    for k in range(int(t / period) + 1):
+        for goal, length in ((24.0 / R, duty * period), (0.0, (1 - duty) * period)):
+            left = max(0.0, min(length, t - k * period - (duty * period if goal == 0 else 0)))
+            i = goal + (i - goal) * np.exp(-left * R / L)
+    return i
+
+
+@EACH_METHOD
+@pytest.mark.parametrize("duty", [0.3, 0.0])
+def test_a_pwm_drive_charges_a_coil(folder: Path, method: int, duty: float) -> None:
+    """At a duty of 0 both samplers tick at one instant: the second one has the last word."""
+    run = simulated(
+        made(folder, PWM), 0.02, 3.7e-4, {"solver_method": method, "duty": duty},
+        relative_tolerance=1e-11,
+    )  # fmt: skip
+    exact = [current(t, duty) for t in run["time"]]
+    assert np.max(np.abs(run["i"] - exact)) < 1e-9
+
+
+TIMER = """
+name = "Timer"
+[parameters]
+e = { start = 0.8 }
+[states]
+h = { start = 1.0, derivative = "v" }
+v = { derivative = "-10" }
+[discrete]
+next = { start = 0.25 }
+alarms = {}
+bounces = {}
+fastest = {}
+[events.alarm]
+when = "time >= next"
+set = { next = "next + 0.25 * (1 + alarms)", alarms = "alarms + 1" }
+[events.bounce]
+when = "h < 0"
+reinit = { h = "0", v = "-e * v" }
+set = { bounces = "bounces + 1", fastest = "max(fastest, -v)" }
+"""
+
+
+@EACH_METHOD
+def test_events_set_discrete_variables_and_their_own_next_time(folder: Path, method: int) -> None:
+    run = simulated(made(folder, TIMER), 2.0, 0.01, {"solver_method": method})
+    t = run["time"]
+    times = 0.25 * np.cumsum([1, 1, 2, 3, 4, 5, 6])  # the alarm sets the time of the next one
+    assert np.array_equal(run["alarms"], np.sum(t[:, None] >= times, axis=1))
+    speed, falls = np.sqrt(20.0), [np.sqrt(0.2)]
+    while falls[-1] < 2.0:
+        speed *= 0.8
+        falls.append(falls[-1] + speed / 5)
+    assert np.array_equal(run["bounces"], np.sum(t[:, None] >= np.array(falls), axis=1))
+    assert run["fastest"][-1] == pytest.approx(np.sqrt(20.0), abs=1e-9)
+
+
+FILTER = """
+name = "Filter"
+[parameters]
+a = { start = 0.2 }
+[inputs]
+u = {}
+[discrete]
+y = { start = 1.0 }
+z = {}
+[sampled.tick]
+every = "0.1"
+set = { y = "y + a * (u - y)", z = "y" }
+"""
+
+
+def test_a_digital_filter_has_no_states(folder: Path) -> None:
+    """A tick at the end of a step sees the input of the step."""
+    fmu = made(folder, FILTER)
+    signal = np.array(
+        [(0.0, 1.0), (0.45, 1.0), (0.45, 3.0), (2.0, 3.0)], [("time", "f8"), ("u", "f8")]
+    )
+    run = simulated(fmu, 2.0, 0.1, {}, input=signal)
+    y, before = 1.0, 0.0
+    for k, row in enumerate(run):
+        y, before = y + 0.2 * ((1.0 if k <= 5 else 3.0) - y), y
+        assert (row["y"], row["z"]) == (
+            pytest.approx(y, abs=1e-15),
+            pytest.approx(before, abs=1e-15),
+        )
+
+
+def names_of(fmu: Path) -> dict[str, int]:
+    variables = fmpy.read_model_description(fmu).modelVariables
+    return {variable.name: variable.valueReference for variable in variables}
+
+
+def begun(fmu: Path, kind: str) -> FMU2Slave | FMU2Model:
+    """An instance at time 0, initialized."""
+    description = fmpy.read_model_description(fmu)
+    instance = fmpy.instantiate_fmu(fmpy.extract(fmu), description, fmi_type=kind)
+    instance.setupExperiment(startTime=0.0, tolerance=1e-11)
+    instance.enterInitializationMode()
+    instance.exitInitializationMode()
+    return instance
+
+
+def test_an_importer_that_moves_the_mass_itself_gets_all_ticks(folder: Path) -> None:
+    """Model Exchange: tick k is due at k Ts, and the force follows from the states set there."""
+    instance, rows = begun(made(folder, PID), "ModelExchange"), pid(1.0)
+    reference = names_of(made(folder, PID))["u"]
+    for k, (_, _, force) in enumerate(rows[:-1]):
+        needed, terminates, _, changed, is_defined, time = instance.newDiscreteStates()
+        assert (needed, terminates, changed, is_defined) == (False, False, False, True)
+        assert time == 0.01 * (k + 1)
+        assert instance.getReal([reference])[0] == pytest.approx(force, abs=1e-12)
+        instance.enterContinuousTimeMode()
+        instance.setTime(time)
+        instance.setContinuousStates((ctypes.c_double * 2)(*rows[k + 1, :2]), 2)
+        assert instance.getReal([reference])[0] == pytest.approx(force, abs=1e-12)
+        instance.enterEventMode()
+    instance.terminate()
+    instance.freeInstance()
+
+
+def test_ticks_survive_a_rollback_and_a_move_to_another_instance(folder: Path) -> None:
+    fmu = made(folder, PID)
+    references = [names_of(fmu)[name] for name in ("x", "v", "u", "sum", "last")]
+    first, second = begun(fmu, "CoSimulation"), begun(fmu, "CoSimulation")
+    at = [0.0]
+
+    def advance(instance: FMU2Slave, steps: int) -> list[float]:
+        for _ in range(steps):
+            instance.doStep(at[0], 0.0037)
+            at[0] += 0.0037
+        return instance.getReal(references)
+
+    advance(first, 31)
+    then, saved = at[0], first.getFMUstate()
+    ahead = advance(first, 23)
+    content = first.serializeFMUstate(saved)
+    second.setFMUstate(second.deSerializeFMUstate(content))
+    first.setFMUstate(saved)
+    for instance in (first, second):
+        at[0] = then
+        assert advance(instance, 23) == ahead
+
+
+def test_start_values_of_discrete_variables_and_periods_can_be_set(folder: Path) -> None:
+    run = simulated(made(folder, COUNTERS), 1.0, 0.1, {"a": 10.0, "T": 0.2})
+    assert run["a"][-1] == 16.0 and run["c"][0] == 5.0 and run["c"][-1] == 10.0
+
+
+@pytest.mark.parametrize(
+    ("start", "message"),
+    [
+        ({"Ts": 1e-6, "time": 1e9}, "sampler control: every = 1e-06 s is refused"),
+        ({"Kp": 1e308, "target": 1e308}, "u is not finite"),
+    ],
+)
+def test_a_sampler_that_fails_is_named(folder: Path, start: dict[str, float], message: str) -> None:
+    fmu, logged = made(folder, PID), []
+    options = {"start_time": start.pop("time", 0.0)}
+    with pytest.raises(FMICallException):
+        fmpy.simulate_fmu(
+            str(fmu), start_values=start, stop_time=options["start_time"] + 1,
+            logger=lambda *given: logged.append(str(given)), **options,
+        )  # fmt: skip
+    assert any(message in line for line in logged)
