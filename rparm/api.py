@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rparm import files, project, proof
-from rparm.building import build
+from rparm.building import build as build
 from rparm.errors import UserError, hint
 from rparm.federation import federation, network
 from rparm.files import written
@@ -28,12 +28,6 @@ from rparm.systems import comparison, ecos, master, ssp
 if TYPE_CHECKING:
     from rparm.identification.identify import Identification
     from rparm.linearization.linear import Linear
-
-
-__all__ = [
-    "Scenario", "System", "Table", "build", "fmu", "identify", "linearize", "run_campaign",
-    "simulate",
-]  # fmt: skip
 
 
 # ---- Runs ----------------------------------------------------------------------------------------
@@ -175,8 +169,7 @@ class Scenario:
     """
 
     def __init__(self, name: str | Path) -> None:
-        own = Path(name).suffix.lower() == ".toml"
-        self.path = Path(name) if own else project.scenario_file(str(name))
+        self.path = project.scenario_file(name)
         self.title = scenarios.title(self.path)
 
     def run(self, *, fmi: int = 2, tolerance: float | None = None) -> Table:

@@ -114,19 +114,17 @@ class _Parser(argparse.ArgumentParser):
         return options
 
 
+def add_flag(parser: argparse.ArgumentParser, option: str, text: str) -> None:
+    """Add an option without a value."""
+    parser.add_argument(option, action="store_true", help=text)
+
+
 def add_common(parser: argparse.ArgumentParser) -> None:
     """Add the options of all commands."""
-    parser.add_argument(
-        "--json",
-        action="store_true",
-        help="print one JSON document on standard output, and all else on standard error",
-    )
-    parser.add_argument(
-        "--quiet", action="store_true", help="print the last line only, and what is wrong"
-    )
-    parser.add_argument(
-        "--open", action="store_true", help="then show what was written in a browser"
-    )
+    text = "print one JSON document on standard output, and all else on standard error"
+    add_flag(parser, "--json", text)
+    add_flag(parser, "--quiet", "print the last line only, and what is wrong")
+    add_flag(parser, "--open", "then show what was written in a browser")
 
 
 def add_system(
@@ -155,41 +153,30 @@ def add_report(parser: argparse.ArgumentParser, part: str = "") -> None:
     folder = project.report_folder(part)
     # its name until version 0.1
     parser.add_argument("--report", type=Path, default=folder, help=argparse.SUPPRESS)
-    parser.add_argument(
-        "--output",
-        dest="report",
-        type=Path,
-        metavar="DIR",
-        default=folder,
-        help=f"folder for pages and results (default: {project.from_root(folder)})",
-    )
+    text = f"folder for pages and results (default: {project.from_root(folder)})"
+    _add_folder(parser, "report", text, folder)
 
 
 def add_output(parser: argparse.ArgumentParser, text: str) -> None:
     """Add the folder for other files than pages and results."""
-    parser.add_argument("--output", type=Path, metavar="DIR", help=text)
+    _add_folder(parser, "output", text)
 
 
 def add_document(parser: argparse.ArgumentParser) -> None:
     """Add the folder for the document, for a command that writes nothing else."""
-    parser.add_argument(
-        "--output",
-        dest="document",
-        type=Path,
-        metavar="DIR",
-        help="write what --json prints into this folder, too",
-    )
+    _add_folder(parser, "document", "write what --json prints into this folder, too")
+
+
+def _add_folder(
+    parser: argparse.ArgumentParser, kind: str, text: str, default: Path | None = None
+) -> None:
+    parser.add_argument("--output", dest=kind, type=Path, metavar="DIR", default=default, help=text)
 
 
 def add_silence(parser: argparse.ArgumentParser, default: float, text: str) -> None:
     """Add the longest time that something may be silent."""
-    parser.add_argument(
-        "--silence",
-        type=_seconds,
-        metavar="TIME",
-        default=default,
-        help=f"{text} (default: {default:g} s)",
-    )
+    text = f"{text} (default: {default:g} s)"
+    parser.add_argument("--silence", type=_seconds, metavar="TIME", default=default, help=text)
 
 
 def number(text: str) -> int:

@@ -85,9 +85,11 @@ def scenario_files() -> dict[str, Path]:
     return dict(sorted(found.items()))
 
 
-def scenario_file(name: str) -> Path:
-    """Return the scenario called `name`; UserError if there is none."""
-    found = scenario_files()
+def scenario_file(given: str | Path, folder: Path = Path()) -> Path:
+    """Return a scenario: a file in a folder, or one of the project; UserError if there is none."""
+    if Path(given).suffix.lower() == ".toml":
+        return folder / given
+    name, found = str(given), scenario_files()
     if name not in found:
         guess = did_you_mean(name, found)
         raise UserError(f"no scenario {name!r}{guess} ({PROGRAM} list names them)")

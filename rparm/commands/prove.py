@@ -58,8 +58,7 @@ def do_prove(options: argparse.Namespace) -> Ended:
     if options.all:
         raise UserError(f"--all: expected no scenario with it, got {options.name!r}")
     check_writable(options.report)
-    own = Path(options.name).suffix.lower() == ".toml"
-    path = Path(options.name) if own else project.scenario_file(options.name)
+    path = project.scenario_file(options.name)
     program = proof.prover_of(path)
     with Fmu(project.built(program.folder, ".fmu")) as fmu:
         scenario = scenarios.load(path, fmu.model)

@@ -102,11 +102,7 @@ def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
 
 
 def real_connections(ssp: Ssp) -> Sequence[Connection]:
-    return [
-        c
-        for c in ssp.system.connections
-        if ssp.variable(f"{c.start_component}.{c.start_connector}").type == "Real"
-    ]
+    return [c for c in ssp.system.connections if ssp.variable(c.start).type == "Real"]
 
 
 # ---- The process ---------------------------------------------------------------------------------

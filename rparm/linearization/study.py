@@ -139,7 +139,7 @@ def _of_system(path: Path, request: Request) -> Study:
         found = _chosen(whole, trimmed, request)
         units = _units(subject, found)
         if subject.cut is not None:
-            source = f"{subject.cut.start_component}.{subject.cut.start_connector}"
+            source = subject.cut.start
             loop = open_loop(whole.select([request.cut], [source]))
             return Study(path, found, units, request.free, variant, (), loop, margins(loop))
         largest = largest_steps(parts, subject.connections, subject.ways)

@@ -80,7 +80,7 @@ class SystemSubject(ExitStack):
 
     def _found(self, name: str) -> Connection:
         """Return the connection to an input."""
-        ends = {f"{c.end_component}.{c.end_connector}": c for c in self.connections}
+        ends = {c.end: c for c in self.connections}
         if name not in ends:
             raise UserError(f"--break: {name}: no connection ends there{hint(name, ends)}")
         return ends[name]
@@ -146,7 +146,7 @@ class SystemSubject(ExitStack):
         merged = {name: dict(self._parameters.get(name, {})) for name in self.names}
         for name, value in values.items():
             component, _, variable = name.partition(".")
-            fed = {f"{c.end_component}.{c.end_connector}" for c in self.connections}
+            fed = {c.end for c in self.connections}
             if name in fed and self.variable(name).type == "Real":
                 raise UserError(f"{name}: is fed by a connection, which says its value")
             merged[component][variable] = value
@@ -181,9 +181,8 @@ def bypassed(ssp: Ssp, connections: Sequence[Connection], name: str) -> list[Con
         if c.start_component == name:
             found = [s for s in sources if c.end_connector in ssp.models[s].real_outputs]
             if len(found) != 1:
-                what = f"{c.end_component}.{c.end_connector}"
                 raise UserError(
-                    f"--without {name}: {what} has nothing to be fed by: expected one component "
+                    f"--without {name}: {c.end} has nothing to be fed by: expected one component "
                     f"that feeds {name} and has a Real output {c.end_connector!r}"
                 )
             result.append(replace(c, start_component=found[0], start_connector=c.end_connector))
@@ -247,10 +246,8 @@ def _feeding(
     """Return 1 where an output feeds an input, (inputs, outputs); others are constant."""
     fed = np.zeros((len(inputs), len(outputs)))
     for c in connections:
-        start = f"{c.start_component}.{c.start_connector}"
-        end = f"{c.end_component}.{c.end_connector}"
-        if start in outputs and end in inputs:
-            fed[inputs.index(end), outputs.index(start)] = 1.0
+        if c.start in outputs and c.end in inputs:
+            fed[inputs.index(c.end), outputs.index(c.start)] = 1.0
     return fed
 
 

@@ -228,9 +228,7 @@ def _check_values(
     bad = [name for name, value in zip(names, values[row], strict=True) if not np.isfinite(value)]
     # a component passes on a bad input in the same step
     victims = {
-        connection.end_component
-        for connection in ssp.system.connections
-        if f"{connection.start_component}.{connection.start_connector}" in bad
+        connection.end_component for connection in ssp.system.connections if connection.start in bad
     }
     sources = [name for name in bad if name.partition(".")[0] not in victims]
     component, _, variable = (sources or bad)[0].partition(".")

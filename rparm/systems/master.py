@@ -314,7 +314,7 @@ class Master(AbstractContextManager["Master"]):
             value = source.boolean(c.start_connector)
             if value != target.boolean(c.end_connector):
                 target.set(c.end_connector, value)
-                changed.append(f"{c.end_component}.{c.end_connector}")
+                changed.append(c.end)
         return changed
 
     def _read_early(self, component: ConnectedInstance) -> None:

@@ -88,11 +88,18 @@ class Connection:
     end_component: str
     end_connector: str
 
+    @property
+    def start(self) -> str:
+        """Name "component.variable" of the output."""
+        return f"{self.start_component}.{self.start_connector}"
+
+    @property
+    def end(self) -> str:
+        """Name "component.variable" of the input."""
+        return f"{self.end_component}.{self.end_connector}"
+
     def __str__(self) -> str:
-        return (
-            f"{self.start_component}.{self.start_connector} -> "
-            f"{self.end_component}.{self.end_connector}"
-        )
+        return f"{self.start} -> {self.end}"
 
 
 @dataclass(frozen=True)
@@ -178,7 +185,7 @@ class Ssp:
     @property
     def notes(self) -> list[str]:
         """Choices for all runs that the SSP does not make."""
-        fed = {f"{c.end_component}.{c.end_connector}" for c in self.system.connections}
+        fed = {c.end for c in self.system.connections}
         alone = [
             f"{component}.{variable.name}"
             for component, model in self.models.items()

@@ -127,11 +127,7 @@ def opened(path: Path) -> Iterator[ClosedLoop]:
     with ssp.unpacked(path) as unpacked, unpacked.unpacked_fmus() as fmus:
         system = unpacked.system
         # the master connects Reals; that the payload is attached never changes
-        real = [
-            c
-            for c in system.connections
-            if unpacked.variable(f"{c.start_component}.{c.start_connector}").type == "Real"
-        ]
+        real = [c for c in system.connections if unpacked.variable(c.start).type == "Real"]
         loop = ClosedLoop(fmus, real, system.parameter_sets, system.stop)
         _check(path, loop)
         yield loop

@@ -92,9 +92,7 @@ def created_energy(loop: ClosedLoop, columns: Columns) -> float:
 def law(loop: ClosedLoop, columns: Columns) -> np.ndarray:
     """Efforts of the nominal controller for given references and measurements, (2, rows)."""
     sources = {
-        c.end_connector: f"{c.start_component}.{c.start_connector}"
-        for c in loop.connections
-        if c.end_component == "controller"
+        c.end_connector: c.start for c in loop.connections if c.end_component == "controller"
     }
     with loop.fmus["controller"].instance("controller") as controller:
         efforts, inputs = controller.reals(["tau1", "f2"]), controller.reals(list(sources))
