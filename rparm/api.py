@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 
 # ---- Runs ----------------------------------------------------------------------------------------
-
-
 class Table(Mapping[str, np.ndarray]):
     """Columns of a run, by the names of variables; "time" is the first.
 
@@ -325,8 +323,6 @@ def _units(model: Model) -> dict[str, str | None]:
 
 
 # ---- Studies -------------------------------------------------------------------------------------
-
-
 def linearize(
     fmu_or_ssp: str | Path,
     *,

@@ -23,8 +23,6 @@ DELAY = 1.0  # s, shorter activities show nothing
 
 
 # ---- Streams -------------------------------------------------------------------------------------
-
-
 def is_quiet() -> bool:
     """Return whether the user wants to see the end only."""
     return _quiet
@@ -90,8 +88,6 @@ def _plain(value: Any) -> Any:
 
 
 # ---- Lines and tables ----------------------------------------------------------------------------
-
-
 def width() -> int:
     """Return the columns to fill: as many as the terminal has, within limits."""
     return max(min(WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns), LEAST)
@@ -191,8 +187,6 @@ def remark(text: str) -> None:
 
 
 # ---- Progress ------------------------------------------------------------------------------------
-
-
 class Progress(AbstractContextManager["Progress"]):
     """A live bar on stderr, once an activity has taken about a second; nothing if not a terminal.
 

@@ -43,8 +43,6 @@ class UnreadableError(UnplacedError):
 
 
 # ---- Files that are given ------------------------------------------------------------------------
-
-
 def check_regular(path: Path) -> None:
     """Refuse a device, pipe or socket, whose content may never end; a folder is allowed."""
     try:
@@ -139,8 +137,6 @@ def difference(later: float, earlier: float) -> float:
 
 
 # ---- Files that are written ----------------------------------------------------------------------
-
-
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
     """Give a temporary path to write to; it becomes `path` at the end, or is removed on failure."""
@@ -230,8 +226,6 @@ def from_folder(path: Path, folder: Path) -> str:
 
 
 # ---- Trajectories --------------------------------------------------------------------------------
-
-
 def csv_failure(path: Path, way_out: str = "") -> Failure:
     """Return a function that makes the user's errors of a file; they end with the way out."""
 

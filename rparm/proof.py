@@ -41,8 +41,6 @@ ASSUMED = "the equations of motion, exact parameters and inputs as given, and IE
 
 
 # ---- Enclosures ----------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Enclosure:
     """Intervals that contain the exact motion: |exact - (high + low)| <= radius.
@@ -324,8 +322,6 @@ def distances(values: np.ndarray, enclosure: Enclosure, rows: np.ndarray) -> np.
 
 
 # ---- Proven errors -------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class ProvenError:
     """Of one variable in one run."""

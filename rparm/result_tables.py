@@ -15,8 +15,6 @@ NONE = "-"
 
 
 # ---- Tables --------------------------------------------------------------------------------------
-
-
 class RunTable:
     """Runs of scenarios, a row each; `with_tight`: at their own tolerance and at the tightest."""
 
@@ -144,8 +142,6 @@ def print_measured(run: Run) -> None:
 
 
 # ---- The document --------------------------------------------------------------------------------
-
-
 @dataclass
 class Done:
     chosen: Sequence[Scenario]  # of the project

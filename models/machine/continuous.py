@@ -146,8 +146,6 @@ def tracking_error(columns: Columns) -> float:
 
 
 # ---- the picture ---------------------------------------------------------------------------------
-
-
 def draw(measured: Mapping[tuple[str, str], tuple[list[float], float]]) -> Figure:
     """Errors over the step, and the error of the limit, by variant and method."""
     with mpl.rc_context(STYLE):

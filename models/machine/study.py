@@ -69,8 +69,6 @@ REST = Rest(
 
 
 # ---- Picture of a run ----------------------------------------------------------------------------
-
-
 def figure(ssp: Ssp, outcome: Outcome) -> Figure:
     """Joints over their references, errors, efforts, modes, motors, wall, and the path."""
     with mpl.rc_context(STYLE):

@@ -35,7 +35,6 @@ from rparm.systems.ssp import Ssp
 FOLDER = Path(__file__).resolve().parent
 
 # ---- Theory --------------------------------------------------------------------------------------
-
 State = tuple[float, ...]
 Step = Callable[["Contact", float, State], State]
 
@@ -76,8 +75,6 @@ def least_damping(
 
 
 # ---- The discrete loop, exactly ------------------------------------------------------------------
-
-
 def _moved(contact: Contact, h: float, x: float, v: float, f: float, df: float) -> State:
     """Position, velocity and acceleration after a step with the force f + df t against x."""
     m = contact.mass
@@ -176,7 +173,6 @@ def exact_least_damping(
 
 
 # ---- The machine ---------------------------------------------------------------------------------
-
 # The slide, pushed by a constant force, rests in the wall and is moved a little out of its
 # equilibrium. The depth then obeys x_n+2 = s x_n+1 - p x_n + c, and p, the square of the factor of
 # growth in a step, is 1 at the limit.
@@ -230,8 +226,6 @@ def _product(depth: np.ndarray) -> float:
 
 
 # ---- Ecos ----------------------------------------------------------------------------------------
-
-
 def in_ecos(opened: Ssp) -> Measure:
 
     def measure(stiffness: float, damping: float) -> np.ndarray:
@@ -247,8 +241,6 @@ def write_pressed(opened: Ssp, path: Path, stiffness: float, damping: float) -> 
 
 
 # ---- rparm's master ------------------------------------------------------------------------------
-
-
 def under_master(opened: Ssp, fmus: Mapping[str, Fmu], order: str, inputs: str) -> Measure:
     """Runs the machine under rparm's master; the controller sees the joints themselves."""
     connections = direct(opened.system.connections)
@@ -265,8 +257,6 @@ def under_master(opened: Ssp, fmus: Mapping[str, Fmu], order: str, inputs: str) 
 
 
 # ---- the picture ---------------------------------------------------------------------------------
-
-
 def draw(measured: Mapping[str, list[float]], in_engine: list[float]) -> Figure:
     """Limits over the stiffness: theory, exact eigenvalues, and what has been measured."""
     with mpl.rc_context(STYLE):

@@ -306,8 +306,6 @@ def _system_times(opened: Ssp, given: Mapping[str, float]) -> np.ndarray:
 
 
 # ---- Values with units ---------------------------------------------------------------------------
-
-
 def in_si(campaign: Campaign, base: Base, where: object) -> Campaign:
     """Replace values with units by numbers; UserError, at `where`, if a value is wrong."""
     converter = _Converter(base, where)

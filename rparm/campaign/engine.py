@@ -77,8 +77,6 @@ EXPECTED = "an address as tls://192.168.0.1:8786"
 
 
 # ---- Blocks --------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class _Block:
     """A block that is under way."""
@@ -233,8 +231,6 @@ def _joined(parts: Sequence[Rows]) -> Rows:
 
 
 # ---- The cluster ---------------------------------------------------------------------------------
-
-
 @contextmanager
 def opened_cluster(
     scheduler: str | None,
@@ -355,8 +351,6 @@ def _keep_workers(made: SpecCluster, count: int) -> None:
 
 
 # ---- Certificates --------------------------------------------------------------------------------
-
-
 def security_for(
     address: str, ca: Path | None, cert: Path | None, key: Path | None
 ) -> Security | None:

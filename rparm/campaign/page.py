@@ -59,8 +59,6 @@ TEXTS = STYLE | {"text.parse_math": False}
 
 
 # ---- Statistics of the table ---------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Failure:
     """Runs that have failed for the same reason, whatever numbers it has."""
@@ -131,8 +129,6 @@ def sobol_indices(campaign: Campaign, values: np.ndarray) -> list[Index]:
 
 
 # ---- The page ------------------------------------------------------------------------------------
-
-
 class Page:
     """Written into the folder of the results; `command` makes it again."""
 
@@ -313,8 +309,6 @@ def _lacking(values: np.ndarray) -> int:
 
 
 # ---- Pictures ------------------------------------------------------------------------------------
-
-
 def distributions_figure(table: Mapping[str, np.ndarray]) -> Figure:
     """Draw histograms of columns, (runs,) each, by their labels."""
     rows = math.ceil(len(table) / COLUMNS)

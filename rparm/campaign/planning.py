@@ -40,8 +40,6 @@ SMALLEST = 2.0**-54  # a normal distribution is cut there, where its values are 
 
 
 # ---- The job -------------------------------------------------------------------------------------
-
-
 def plan(campaign: Campaign, base: Base, where: object, also: Sequence[str] = ()) -> Job:
     """Return the job, which records `also`, too; UserError, at `where`, for a mistake."""
     return _Planner(campaign, base, where).job(also)
@@ -316,8 +314,6 @@ def constants(campaign: Campaign, base: Base) -> dict[str, float]:
 
 
 # ---- Points --------------------------------------------------------------------------------------
-
-
 class Sampler:
     def __init__(self, campaign: Campaign) -> None:
         self._campaign = campaign

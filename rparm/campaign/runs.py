@@ -219,8 +219,6 @@ class Workshop:
 
 
 # ---- Workers of Dask -----------------------------------------------------------------------------
-
-
 class Plugin(WorkerPlugin):
     """FMUs and job of a campaign on a worker, which may serve others, too."""
 

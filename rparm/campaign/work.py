@@ -101,8 +101,6 @@ def opened(
 
 
 # ---- One run again -------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Replay:
     parameters: dict[str, float]

@@ -58,8 +58,6 @@ OPERATIONS |= {name: BUILT_IN.get(name) or getattr(math, name) for name in FUNCT
 
 
 # ---- The tree ------------------------------------------------------------------------------------
-
-
 class ExpressionError(ValueError):
     """A mistake in an expression, in one line that begins with the column (from 1)."""
 
@@ -116,8 +114,6 @@ def finite_number(given: Any) -> float:
 
 
 # ---- Kinds of its parts --------------------------------------------------------------------------
-
-
 def check_kinds(root: Node, expected: str = NUMBER, conditions: Collection[str] = ()) -> None:
     """Raise ExpressionError where a part is of the wrong kind.
 
@@ -146,8 +142,6 @@ def _check(node: Node, expected: str, conditions: Collection[str]) -> None:
 
 
 # ---- Its parser ----------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class Token:
     """A number, name or operator; at the end of the text one of kind "end"."""
@@ -287,8 +281,6 @@ class _Parser:
 
 
 # ---- Values --------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Expression:
     """A number that follows from others. A name may have dots: ``component.variable``."""

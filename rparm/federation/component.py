@@ -30,8 +30,6 @@ LEAVE = 2.0  # s, for work and processes to end after a failure
 
 
 # ---- Parts of a system ---------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Source:
     """Source of an input: value `index` of those that `component` publishes."""
@@ -106,8 +104,6 @@ def real_connections(ssp: Ssp) -> Sequence[Connection]:
 
 
 # ---- The process ---------------------------------------------------------------------------------
-
-
 def run_component(
     part: Part, fmu: Fmu, address: str, silence: float, is_gone: Callable[[], bool] = lambda: False
 ) -> None:
@@ -215,8 +211,6 @@ class _Stepper:
 
 
 # ---- Watching ------------------------------------------------------------------------------------
-
-
 def run_watched(
     work: Callable[[], Result], look: Callable[[], None], end: Callable[[BaseException], None]
 ) -> Result:

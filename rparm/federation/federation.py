@@ -157,8 +157,6 @@ def _recorded(
 
 
 # ---- Processes -----------------------------------------------------------------------------------
-
-
 @contextmanager
 def _processes(
     commands: Mapping[str, list[str]], folder: Path

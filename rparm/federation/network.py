@@ -45,8 +45,6 @@ _is_separate = False
 
 
 # ---- Addresses -----------------------------------------------------------------------------------
-
-
 def check_host_has_address() -> None:
     """Refuse a machine where HELICS finds no address, not even 127.0.0.1, as no other IPv4 one."""
     try:
@@ -126,8 +124,6 @@ def _refusal_to_listen(host: str, port: int) -> str:
 
 
 # ---- HELICS --------------------------------------------------------------------------------------
-
-
 def helics() -> Any:
     """Import the package helics; UserError if it is not installed."""
     try:
@@ -394,8 +390,6 @@ class Federate:
 
 
 # ---- Standard error ------------------------------------------------------------------------------
-
-
 def separate_messages() -> None:
     """Give Python its own standard error from now on: to be called as the program starts."""
     global _is_separate

@@ -53,8 +53,6 @@ COLUMNS = 8  # component and addresses of its functions
 
 
 # ---- Calls of an FMU -----------------------------------------------------------------------------
-
-
 def function_names(instance: Instance) -> tuple[str, ...]:
     """Return the names of the functions that an instance is called by."""
     return FUNCTIONS[instance.fmu.model.fmi_version]
@@ -119,11 +117,7 @@ def directional_derivative(
 
 
 # ---- True)\nclass Part=Values --------------------------------------------------------------------
-
-
 # ---- Values --------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Part:
     """Variables of one type, Real or Boolean, that a component exchanges."""
@@ -188,11 +182,7 @@ class Tangent:
 
 
 # ---- The loop ------------------------------------------------------------------------------------
-
-
 # ---- The loop ------------------------------------------------------------------------------------
-
-
 def component_calls(instances: Sequence[Instance]) -> np.ndarray:
     """Return each component with its functions' addresses for the loop, then a part for adapters.
 
@@ -416,11 +406,7 @@ def advance(
 
 
 # ---- For its callers -----------------------------------------------------------------------------
-
-
 # ---- For its callers -----------------------------------------------------------------------------
-
-
 class Stepper:
     """Steps components whose Reals and Booleans are wired to each other and to held inputs."""
 

@@ -50,8 +50,6 @@ BINARY, SOURCE = re.compile(r"binaries/[^/]+/[^/]+"), re.compile(r"sources/.+\.c
 
 
 # ---- Archives ------------------------------------------------------------------------------------
-
-
 def unpack(path: Path, folder: Path, kind: str, only: str | None = None) -> dict[str, int]:
     """Unpack an archive, or one file of it, to an empty folder; nothing is written elsewhere.
 
@@ -197,8 +195,6 @@ def _shown(name: str) -> str:
 
 
 # ---- FMUs ----------------------------------------------------------------------------------------
-
-
 class Fmu(AbstractContextManager["Fmu"]):
     """An FMU that is unpacked; a context manager that removes the unpacked copy.
 

@@ -54,8 +54,6 @@ REJECTED = 0.01  # probability below which residuals are not taken for noise
 
 
 # ---- Residuals -----------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Linear:
     """Residuals of a segment, (rows,), linear in what is changed, at one point."""
@@ -184,8 +182,6 @@ def _late(times: np.ndarray, values: np.ndarray, delay: float) -> np.ndarray:
 
 
 # ---- The fit -------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Solution:
     """Result of a fit."""
@@ -286,8 +282,6 @@ class _Arrow:
 
 
 # ---- Intervals -----------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Reduced:
     """A segment whose start state is as good as can be, whatever the parameters."""
@@ -387,8 +381,6 @@ def _degrees(norms: np.ndarray, overlaps: np.ndarray) -> np.ndarray:
 
 
 # ---- Combinations without effect -----------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Combination:
     """Parameters of which the log shows the joint effect only, or one without effect."""
@@ -524,8 +516,6 @@ def _circuits(effects: Effects, classes: Sequence[Sequence[int]]) -> list[list[i
 
 
 # ---- Whiteness of the residuals ------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Whiteness:
     """Of the residuals of one output."""

@@ -32,8 +32,6 @@ ABOVE = ">"  # in "name>other": the parameter stays above the other one
 
 
 # ---- Parameters ----------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Parameter:
     """A parameter of the FMU, or the delay of what was measured."""
@@ -141,8 +139,6 @@ class Parameters:
 
 
 # ---- The request ---------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Request:
     """Request of a user; all names are variables of the FMU."""
@@ -348,8 +344,6 @@ def _column(request: Request, variable: Variable) -> Column:
 
 
 # ---- The demo ------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Demo:
     """A log and what to ask of it."""

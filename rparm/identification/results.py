@@ -97,8 +97,6 @@ def text(number: float | None, digits: int = DIGITS) -> str:
 
 
 # ---- Files ---------------------------------------------------------------------------------------
-
-
 def write_files(found: Identification, folder: Path, model: Model) -> list[Path]:
     """Write the files; their paths."""
     values = {**found.checked.settings, **found.values}

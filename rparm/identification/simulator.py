@@ -160,8 +160,6 @@ class _Runner:
 
 
 # ---- Start states --------------------------------------------------------------------------------
-
-
 def state_names(fmu: Fmu) -> list[str]:
     """Return the names of the states; UserError if one cannot be set."""
     for name in fmu.model.states:

@@ -175,8 +175,6 @@ def _layout(
 
 
 # ---- Measured ------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Limit:
     """The largest stable step of a way to step."""

@@ -184,8 +184,6 @@ def _places(known: Sequence[str], wanted: Sequence[str] | None, option: str) -> 
 
 
 # ---- Matrices ------------------------------------------------------------------------------------
-
-
 def eigenvalues(A: np.ndarray) -> np.ndarray:
     """Return eigenvalues of A, shape (n,): those that are 0 exactly so, also if they are multiple.
 
@@ -253,8 +251,6 @@ def scales(A: np.ndarray) -> np.ndarray:
 
 
 # ---- Of an FMU -----------------------------------------------------------------------------------
-
-
 def linear_model(instance: Instance) -> Linear:
     """Linearize an instance after its initialization, with all states.
 
@@ -370,8 +366,6 @@ def is_settable(variable: Variable) -> bool:
 
 
 # ---- States without rates ------------------------------------------------------------------------
-
-
 def held_states(found: Linear, model: Model) -> list[str]:
     """Return states that stand still whatever inputs and states do: velocities, and what they move.
 
@@ -415,8 +409,6 @@ def _depends_on_inputs(model: Model, name: str) -> bool:
 
 
 # ---- The point -----------------------------------------------------------------------------------
-
-
 class Subject(Protocol):
     """Subject to linearize: an FMU or a system."""
 

@@ -141,8 +141,6 @@ def _not_drawn(found: Study) -> list[str]:
 
 
 # ---- Tables and texts ----------------------------------------------------------------------------
-
-
 def notes(found: Study) -> list[str]:
     """Say what has been left out, in a sentence each."""
     linear, texts = found.linear, []
@@ -275,8 +273,6 @@ def _or_none(number: float) -> str:
 
 
 # ---- Pictures ------------------------------------------------------------------------------------
-
-
 def bode_figure(model: Linear, step: float | None, found: Margins | None = None) -> Figure:
     """Draw gain and phase of each output by each input, with margins of a loop."""
     with mpl.rc_context(TEXTS):

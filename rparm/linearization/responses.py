@@ -133,8 +133,6 @@ def frequencies(steep: Iterable[complex], further: Iterable[float], decades: flo
 
 
 # ---- The minimal part ----------------------------------------------------------------------------
-
-
 def minimal(model: Linear) -> Linear:
     """Leave out states that inputs do not move or outputs do not see: `dropped`, `hidden`.
 

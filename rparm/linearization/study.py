@@ -192,8 +192,6 @@ def _units(subject: FmuSubject | SystemSubject, found: Linear) -> dict[str, str]
 
 
 # ---- Files ---------------------------------------------------------------------------------------
-
-
 def document(found: Study, step: float | None) -> Document:
     """Return all results as names, numbers and lists; with a `step` (s) also the sampled model."""
     linear = found.linear

@@ -207,8 +207,6 @@ def _next_event(ssp: Ssp, name: str, values: Mapping[str, Value], time: float) -
 
 
 # ---- Connections ---------------------------------------------------------------------------------
-
-
 def connected(parts: Mapping[str, Linear], connections: Iterable[Connection]) -> Linear:
     """Join the linear models of components whose outputs feed inputs.
 

@@ -122,8 +122,6 @@ def write_page(path: Path, template: str, **values: object) -> Path:
 
 
 # ---- Assets --------------------------------------------------------------------------------------
-
-
 def write_assets(report: Path) -> None:
     """Write the assets that a report does not have yet: all of them, or none if that fails."""
     folder = report / ASSETS
@@ -165,8 +163,6 @@ def _plotly() -> bytes:
 
 
 # ---- Pictures ------------------------------------------------------------------------------------
-
-
 def save_figure(figure: "Figure", path: Path) -> None:
     """Write a picture in the style of all; complete or not at all."""
     import matplotlib as mpl  # takes long

@@ -31,8 +31,6 @@ SMALL_ENOUGH = 1e-10  # an error below it needs no gain
 
 
 # ---- References ----------------------------------------------------------------------------------
-
-
 class Compared:
     """A run that has been compared: which of its variables is farthest from the reference."""
 
@@ -166,8 +164,6 @@ def _check_times(times: np.ndarray, scenario: Scenario, wrong: files.Failure) ->
 
 
 # ---- Runs ----------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Twin:
     """The same run on an FMU of another version of FMI."""
@@ -313,8 +309,6 @@ def differing(one: Result, other: Result) -> tuple[str, ...]:
 
 
 # ---- Logs ----------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """An output that was measured, at the times of a run's rows."""
@@ -352,8 +346,6 @@ def comparisons(scenario: Scenario, result: Result) -> Iterator[Comparison]:
 
 
 # ---- Tolerances ----------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Sweep:
     """Errors of one scenario over the tolerances."""

@@ -37,8 +37,6 @@ BESIDE = {"offset": SINES} | dict.fromkeys(("column", "time", "begin", "scale", 
 
 
 # ---- Checked values of a file --------------------------------------------------------------------
-
-
 class Reader:
     """Takes checked values from one file; errors name the file and the key."""
 
@@ -90,8 +88,6 @@ class Reader:
 
 
 # ---- Functions of time ---------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Constant:
     """The same value at all times."""
@@ -179,8 +175,6 @@ Signal = Constant | Sines | Table | Switches | Logged
 
 
 # ---- Logs ----------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Columns:
     """Columns of a log with their times, as exact as the file writes them."""
@@ -341,8 +335,6 @@ def _csv_reader(text: str, delimiter: str) -> "csv._reader":
 
 
 # ---- Sections of a scenario ----------------------------------------------------------------------
-
-
 class InputReader:
     """Reads the sections [inputs] and [measured].
 

@@ -333,8 +333,6 @@ class _Reader(Reader):
 
 
 # ---- A scenario to start from --------------------------------------------------------------------
-
-
 def template(name: str, key: str, subject: str, model: Model) -> str:
     """Write the file, which runs as it is.
 

@@ -188,8 +188,6 @@ def _switching(switches: dict[str, np.ndarray]) -> dict[int, list[str]]:
 
 
 # ---- Compiled steps ------------------------------------------------------------------------------
-
-
 def _step_compiled(
     instance: Instance, scenario: Scenario, progress: Callable[[int], object] | None
 ) -> tuple[np.ndarray, np.ndarray, float, UserError | None]:
@@ -279,8 +277,6 @@ class _CompiledSteps:
 
 
 # ---- Values of programs --------------------------------------------------------------------------
-
-
 def is_finite_number(given: object) -> bool:
     """Return whether it is a real number, neither infinite nor nan; a Boolean is none."""
     return isinstance(given, Real) and not isinstance(given, bool) and bool(np.isfinite(given))

@@ -146,8 +146,6 @@ def _check_experiment(ssp: Ssp, experiment: tuple[float, float, float]) -> None:
 
 
 # ---- study.py of a system ------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Measure:
     """A number that a run is measured by, for the tables."""

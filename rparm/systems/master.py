@@ -37,8 +37,6 @@ INPUT_MODES = ("held", "extrapolated")
 
 
 # ---- Components ----------------------------------------------------------------------------------
-
-
 class ConnectedInstance:
     """An instance, its place among the system's values, and the sources of its inputs.
 
@@ -131,8 +129,6 @@ def start_value(fmu: UnpackedFmu, component: str, name: str, value: Value) -> Va
 
 
 # ---- The master ----------------------------------------------------------------------------------
-
-
 class Snapshot(AbstractContextManager["Snapshot"]):
     """The state of a whole system at a communication point; a context manager that frees it."""
 
@@ -439,8 +435,6 @@ def _is_switch(fmus: Mapping[str, Fmu], component: str, name: str, causality: st
 
 
 # ---- A variant -----------------------------------------------------------------------------------
-
-
 def run_in_master(ssp: Ssp, variant: str, names: Sequence[str]) -> Run:
     """Run a system in Jacobi order with one of its parameter sets; read what Ecos would read.
 

@@ -58,8 +58,6 @@ PARAMETERS = ("parameter", "input", "output")  # causalities of variables with a
 
 
 # ---- Structure -----------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Connector:
     """A variable of a component that the system sees."""
@@ -157,8 +155,6 @@ class System:
 
 
 # ---- Archive -------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Ssp:
     """An SSP that is unpacked and can be run."""
@@ -213,8 +209,6 @@ def unpacked(path: Path) -> Iterator[Ssp]:
 
 
 # ---- Reader --------------------------------------------------------------------------------------
-
-
 @cache
 def _schema(name: str) -> etree.XMLSchema:
     return etree.XMLSchema(etree.parse(SCHEMAS / name))
@@ -464,8 +458,6 @@ def _positive(text: object) -> float | None:
 
 
 # ---- Checks against the FMUs ---------------------------------------------------------------------
-
-
 def checked_models(path: Path, folder: Path, system: System) -> dict[str, Model]:
     """Read what the FMU of each component declares, and check the system against it.
 

@@ -173,7 +173,6 @@ def read_reference(path: Path) -> Columns:
 
 
 # ---- Delays --------------------------------------------------------------------------------------
-
 LARGEST_ERROR = 1e-3  # m, of the end effector on the circle at 1 ms in Jacobi order
 PREDICTED_WITHIN = 0.1  # of the measured error
 

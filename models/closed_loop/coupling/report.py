@@ -93,8 +93,6 @@ def _print(lines: list[str]) -> None:
 
 
 # ---- Tables --------------------------------------------------------------------------------------
-
-
 def step_error_lines(study: StepErrors) -> list[str]:
     steps = "".join(f"{1e3 * step:>5g} ms" for step in study.steps)
     width = max(len(method.name) for method in study.methods)
@@ -164,8 +162,6 @@ def doubling_lines(doubling: list[Doubling]) -> list[str]:
 
 
 # ---- Picture -------------------------------------------------------------------------------------
-
-
 def figure(study: StepErrors, tracking: Sequence[Tracking], doubling: Sequence[Doubling]) -> Figure:
     """Errors over step and calls, energy, the delays' prediction, and the controlled steps."""
     with mpl.rc_context(STYLE):

@@ -21,7 +21,6 @@ from rparm.runs.convergence import slope
 from rparm.systems import step_control
 
 # ---- Error against step: how errors fall with the communication step -----------------------------
-
 STEPS = (8e-3, 4e-3, 2e-3, 1e-3, 5e-4)  # s
 COMMON = 0.04  # s, all steps and the reference's rows divide it
 
@@ -118,7 +117,6 @@ def simpson(values: np.ndarray, step: float) -> float:
 
 
 # ---- An unknown payload --------------------------------------------------------------------------
-
 HOLD = 9.0  # s: the circle ends at 5.5 s, what is left of the motion has died out
 
 
@@ -168,7 +166,6 @@ def _held_error(loop: ClosedLoop, columns: Columns) -> np.ndarray:
 
 
 # ---- Step doubling on a motion with a fast and a slow part, against fixed steps ------------------
-
 FAST_AND_SLOW = REFERENCES / "fast_and_slow" / "monolithic.csv"
 RATES = ("arm.dq1", "arm.dq2", "arm.ddq1", "arm.ddq2")
 

@@ -34,8 +34,6 @@ BITS = 192
 
 
 # ---- What the problem says -----------------------------------------------------------------------
-
-
 class Start:
     """The set at the start: uncertain variables have sides of their own, forever the same ones."""
 
@@ -83,8 +81,6 @@ def effort_series(
 
 
 # ---- Checks --------------------------------------------------------------------------------------
-
-
 class Checker:
     """Checks the steps of one certificate in their order."""
 

@@ -43,8 +43,6 @@ class Question:
 
 
 # ---- Operands ------------------------------------------------------------------------------------
-
-
 def number(draw: random.Random, exponents: int = 30) -> float:
     """A double of any digits, or a round one."""
     kind = draw.random()
@@ -78,8 +76,6 @@ def ask(name: str, operands: Sequence[Parts], check: Callable[[Sequence[float]],
 
 
 # ---- What answers have to satisfy ----------------------------------------------------------------
-
-
 def balls(answer: Sequence[float]) -> list[Parts]:
     found = [tuple(answer[i : i + 3]) for i in range(0, len(answer), 3)]
     return [(hi, lo, radius) for hi, lo, radius in found]

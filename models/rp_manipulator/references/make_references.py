@@ -159,8 +159,6 @@ def outputs(scenario: Scenario) -> dict[str, np.ndarray]:
 
 
 # ---- Smooth inputs -------------------------------------------------------------------------------
-
-
 def signal(sines: Sines, real: type) -> hy.expression:
     """`sines` as a function of heyoka's time."""
     omega = 2 * np.arctan2(real(0), real(-1))
