@@ -45,10 +45,7 @@ def pack(archive: Path, files: list[tuple[str, Path]]) -> None:
     for name, path in files:
         contents.setdefault(name, []).append(path.read_bytes())
     archive.parent.mkdir(parents=True, exist_ok=True)
-    with (
-        atomic_write(archive) as temporary,
-        zipfile.ZipFile(temporary, "w") as target,
-    ):
+    with atomic_write(archive) as temporary, zipfile.ZipFile(temporary, "w") as target:
         for name, parts in sorted(contents.items()):
             info = zipfile.ZipInfo(name, FIXED_DATE)
             info.create_system = UNIX

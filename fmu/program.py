@@ -19,9 +19,7 @@ class WrongInputError(Exception):
     """A mistake in a file: its name, the place and the reason in one line."""
 
 
-def program(
-    *expected: type[Exception],
-) -> Callable[[Callable[[], None]], Callable[[], int]]:
+def program(*expected: type[Exception]) -> Callable[[Callable[[], None]], Callable[[], int]]:
     """Make `main` return 0, or 2 after a line on standard error for a mistake of the user's."""
 
     def decorate(main: Callable[[], None]) -> Callable[[], int]:

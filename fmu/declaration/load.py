@@ -256,11 +256,7 @@ def check_names(
         if isinstance(variable, Float64) and variable.unit not in units:
             where = f"neither in {UNITS.name} nor among [units]"
             raise DeclarationError(f"{places[name]}: unit '{variable.unit}' is {where}")
-        listed = [
-            *(variable.dependencies or []),
-            *variable.parameters,
-            *(variable.initially or []),
-        ]
+        listed = [*(variable.dependencies or []), *variable.parameters, *(variable.initially or [])]
         listed += [variable.derivative_of] if variable.derivative_of is not None else []
         for other in listed:
             if other not in variables:

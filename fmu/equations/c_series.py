@@ -163,8 +163,7 @@ class Series:
         if value.op not in (*STEEP, *GROWING):
             return found
         are_finite = reduce(
-            partial(self.graph.value, "and"),
-            (self.graph.value("isfinite", g) for _, g, _ in pairs),
+            partial(self.graph.value, "and"), (self.graph.value("isfinite", g) for _, g, _ in pairs)
         )
         return f"{self.start.of(are_finite)} ? {found} : {self._where_steep(value)}"
 

@@ -19,12 +19,7 @@ from description_parts import (
 )
 from program import Provenance
 
-TYPES = {
-    "float64": "Real",
-    "int32": "Integer",
-    "enumeration": "Enumeration",
-    "boolean": "Boolean",
-}
+TYPES = {"float64": "Real", "int32": "Integer", "enumeration": "Enumeration", "boolean": "Boolean"}
 
 
 def model_description(

@@ -22,12 +22,7 @@ from description_parts import (
 )
 from program import Provenance
 
-TYPES = {
-    "float64": "Float64",
-    "int32": "Int32",
-    "enumeration": "Enumeration",
-    "boolean": "Boolean",
-}
+TYPES = {"float64": "Float64", "int32": "Int32", "enumeration": "Enumeration", "boolean": "Boolean"}
 HALF_WIDTH = 100.0  # of the icon, in units of the coordinate system
 MM_PER_UNIT = 0.1
 PNG_START = b"\x89PNG\r\n\x1a\n"

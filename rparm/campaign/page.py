@@ -133,12 +133,7 @@ class Page:
     """Written into the folder of the results; `command` makes it again."""
 
     def __init__(
-        self,
-        campaign: Campaign,
-        job: Job,
-        results: Results,
-        units: Mapping[str, str],
-        command: str,
+        self, campaign: Campaign, job: Job, results: Results, units: Mapping[str, str], command: str
     ) -> None:
         self.campaign, self.job, self.folder, self.again = campaign, job, results.folder, command
         self.table = results.table([*results.columns, FAILURE])

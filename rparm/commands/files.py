@@ -8,14 +8,7 @@ from pathlib import Path
 from rparm import console, project
 from rparm.command_line import Ended, add_document, add_fmi, add_output
 from rparm.errors import UserError
-from rparm.files import (
-    check_for_windows,
-    copied,
-    create,
-    from_folder,
-    from_here,
-    written,
-)
+from rparm.files import check_for_windows, copied, create, from_folder, from_here, written
 from rparm.project import VERSIONS
 from rparm.runs import scenario
 

@@ -151,11 +151,7 @@ def _enclosure(program: Prover, scenario: Scenario, within: dict[str, float]) ->
 
 
 def _runs(
-    fmu: Fmu,
-    scenario: Scenario,
-    enclosure: Enclosure,
-    methods: list[str],
-    tolerance: float | None,
+    fmu: Fmu, scenario: Scenario, enclosure: Enclosure, methods: list[str], tolerance: float | None
 ) -> tuple[dict[str, dict[str, proof.ProvenError]], dict[str, np.ndarray]]:
     """Print the largest errors of runs by each method; return these, and all errors by run."""
     units = [fmu.model.variables[name].unit for name in enclosure.names]

@@ -385,10 +385,7 @@ def held_states(found: Linear, model: Model) -> list[str]:
 
 
 def is_sampled(
-    found: Linear,
-    model: Model,
-    outputs: Sequence[str],
-    next_event: Callable[[], float | None],
+    found: Linear, model: Model, outputs: Sequence[str], next_event: Callable[[], float | None]
 ) -> bool:
     """Return whether `outputs` follow inputs only at ticks.
 

@@ -43,10 +43,7 @@ class Trimmed:
 
 
 def trim(
-    subject: Subject,
-    values: Mapping[str, Value],
-    free: Sequence[str],
-    targets: Mapping[str, float],
+    subject: Subject, values: Mapping[str, Value], free: Sequence[str], targets: Mapping[str, float]
 ) -> Trimmed:
     """Find an equilibrium by moving the variables `free`, from `values` or else start values.
 

@@ -55,10 +55,7 @@ def of_run(run: Run, rows: Rows = EVERY) -> dict | None:
 
 
 def of_result(
-    scenario: Scenario,
-    result: Result,
-    references: Mapping[str, np.ndarray],
-    rows: Rows = EVERY,
+    scenario: Scenario, result: Result, references: Mapping[str, np.ndarray], rows: Rows = EVERY
 ) -> dict | None:
     """Return data for a run that may have stopped early, and may have no references."""
     # a row holds the outputs at the end of a step, so the inputs are of this step, too

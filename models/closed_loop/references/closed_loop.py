@@ -19,11 +19,7 @@ from rparm.fmi.fmu_file import read_model
 from rparm.fmi.model import Value, Variable
 
 MODELS = Path(__file__).resolve().parents[2]
-COMPONENTS = {
-    "trajectory": "rp_trajectory",
-    "controller": "rp_controller",
-    "arm": "rp_manipulator",
-}
+COMPONENTS = {"trajectory": "rp_trajectory", "controller": "rp_controller", "arm": "rp_manipulator"}
 ORDERS = ("jacobi", "gauss_seidel", "gauss_seidel_arm_first")
 READ = ("before", "after")
 ERRORS = ("q1_error", "q2_error", "dq1_error", "dq2_error")
