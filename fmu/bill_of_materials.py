@@ -1,7 +1,5 @@
 """Writes checksums of a release, and its bill of materials in CycloneDX."""
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import re

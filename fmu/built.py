@@ -6,8 +6,6 @@ project/, musl/ ...  the sources it names, the same for all, and all that these 
 playground/          the page for a browser
 """
 
-from __future__ import annotations
-
 import argparse
 import io
 import json

@@ -1,7 +1,5 @@
 """What the model descriptions of all versions of FMI have in common."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 
 from declaration.load import Declaration

@@ -7,8 +7,6 @@ to the page, and links to files that are not in the FMU become plain text. Equal
 bytes.
 """
 
-from __future__ import annotations
-
 import argparse
 import html
 import shutil

@@ -5,8 +5,6 @@ entry of [where] that the lock file does not name is no variable of the FMU. Ter
 a file cannot declare, come from another file.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

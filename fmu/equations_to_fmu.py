@@ -4,8 +4,6 @@ Prints the names of the files in the folder of the output: first the lock file, 
 the one beside the file with equations.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile

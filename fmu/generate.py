@@ -3,8 +3,6 @@
 declaration/schema.py describes that file.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

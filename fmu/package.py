@@ -1,7 +1,5 @@
 """Packs an FMU: a zip archive whose bytes depend only on the contents of its files."""
 
-from __future__ import annotations
-
 import argparse
 import struct
 import sys

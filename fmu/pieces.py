@@ -4,8 +4,6 @@ FMUs share most of their sources, and systems contain FMUs: archives are cut whe
 begin, and those of stored archives in them. `rparm.shipped` puts them together again.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import zipfile

@@ -1,8 +1,6 @@
 """Shared by the programs of this folder: how they end, how they read and write files, and the
 origin of an FMU (version, author, license, copyright, date)."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 import os

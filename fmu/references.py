@@ -5,8 +5,6 @@ cross-check, and its parameters as a parameter set of SSP; beside them fmi-ls-ma
 says what each file is (FMI Layered Standard References 1.0.0-alpha.1).
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tomllib

@@ -9,8 +9,6 @@ The functions of musl get other names. Compilers know the standard ones and calc
 in their own way, and a program that links the FMU statically has them already.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -10,8 +10,6 @@ plotly/                    the library that draws on pages
 RPARM_RELEASE names the folder of a release that is there; without it, one is built here.
 """
 
-from __future__ import annotations
-
 import gzip
 import lzma
 import os

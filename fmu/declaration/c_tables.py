@@ -1,7 +1,5 @@
 """Writes what C needs of a declaration: value_references.h and the table in variables.c."""
 
-from __future__ import annotations
-
 from declaration.load import Declaration
 from declaration.schema import Enumeration, Variable
 

@@ -1,7 +1,5 @@
 """Reads a variables.toml and what it includes, file by file, and checks all of it together."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import tomllib

@@ -4,8 +4,6 @@ NAME.lock.toml beside the file has a line for each variable that ever was: its n
 its value reference. It grows and never changes.
 """
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

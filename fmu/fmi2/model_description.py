@@ -1,7 +1,5 @@
 """Writes modelDescription.xml of FMI 2.0 (section 2.2 of the specification)."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 

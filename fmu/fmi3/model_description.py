@@ -1,8 +1,6 @@
 """Writes the XML files of FMI 3.0: modelDescription.xml (section 2.4 of the specification),
 terminalsAndIcons.xml (section 2.4.9) and buildDescription.xml (section 2.5.1.4.1)."""
 
-from __future__ import annotations
-
 import struct
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence

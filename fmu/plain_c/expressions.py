@@ -1,7 +1,5 @@
 """Expressions of interpreted C: their types and values."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

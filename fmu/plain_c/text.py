@@ -4,8 +4,6 @@ A small preprocessor reads include guards and `#include "name.h"`; pycparser rea
 rules that users read are in models/README.md.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field

@@ -4,8 +4,6 @@ A whole number is an int, a table over an integer leaf, or a choice. What is kno
 the text resolves conditions: a mode that is 2 is not 3.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
