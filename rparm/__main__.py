@@ -131,8 +131,7 @@ def _drop_output(stream: TextIO | None = None) -> None:
 def _as_program() -> int:
     """Run `main`; a signal as Ctrl-C ends it after temporary files are removed.
 
-    Compiled code of libraries may turn the exception of a signal into another one: whatever
-    arrives after a signal counts as its end.
+    Libraries may turn a signal's exception into another: all after a signal counts as its end.
     """
     received = handle_endings()
     try:

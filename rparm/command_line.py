@@ -51,12 +51,9 @@ def function(command: str, form: str) -> Any:
 
 
 def parsed(arguments: Sequence[str]) -> argparse.Namespace:
-    """Parse the options of the command that `arguments` ask for; `command` is its name.
+    """Parse the command's options, and its name as `command`; raise Answered if none is to run.
 
-    Names and options without a command are for `run`. Only the module of the command is
-    imported, because some take long.
-
-    UserError if something in them is wrong. Raises Answered if no command is to run.
+    Names and options without a command are for `run`. UserError if something in them is wrong.
     """
     first, *rest = arguments
     while first in COMMON and rest:  # may stand in front of the command

@@ -132,9 +132,8 @@ def verdict_line(failed: Iterable[str], done: Sized, name: str) -> str:
 class Table:
     """Rows under a head, each printed when it is known.
 
-    `names` are of all rows to come: they set the width of the first column, which is cut if
-    it has no room. `columns` are titles with the widths of their columns, `gap` blanks apart. The
-    last column is aligned to the left and `result` characters wide; 0: there is none.
+    `names`, of all rows to come, set the width of the first column, which is cut if it has no room.
+    `columns` are titles with widths, `gap` blanks apart; the last one is `result` wide (0: none).
     """
 
     def __init__(
@@ -188,10 +187,7 @@ def remark(text: str) -> None:
 
 # ---- Progress ------------------------------------------------------------------------------------
 class Progress(AbstractContextManager["Progress"]):
-    """A live bar on stderr, once an activity has taken about a second; nothing if not a terminal.
-
-    Call it with the number of steps (or of what `counted` names) done since the last call.
-    """
+    """Live bar on a terminal's stderr, after about a second; call it with the steps just done."""
 
     def __init__(self, label: str, total: int, counted: str = "steps") -> None:
         self._bar = None

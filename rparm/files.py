@@ -160,10 +160,7 @@ def written(path: str | Path) -> Iterator[None]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text; its folder is made, and the file appears complete or not at all.
-
-    Characters for bytes of a file name that is not UTF-8 are escaped, as in JSON.
-    """
+    """Write a text, complete or not at all, to a folder that is made; escape bytes not of UTF-8."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
@@ -246,8 +243,7 @@ def write_trajectory(
 ) -> None:
     """Write trajectories, (rows, names), over times in s; the file appears complete or not at all.
 
-    `digits` are the significant ones; None, and for times `short_times`: as many as are needed to
-    read the same number back.
+    `digits` are the significant ones; None and `short_times` take as many as doubles need.
     """
     import numpy as np  # takes long
 
@@ -268,8 +264,7 @@ def _shortest(value: float) -> str:
 def read_trajectory(path: Path, failure: Failure) -> tuple[tuple[str, ...], "np.ndarray"]:
     """Read trajectories that `write_trajectory` wrote; in an installed package they are compressed.
 
-    Returns the names of all columns, the first is "time", and the finite table (rows, names) of at
-    least one row.
+    Returns the columns' names, "time" first, and a finite table (rows, names) of a row or more.
     """
     import numpy as np  # takes long
 

@@ -79,8 +79,7 @@ def temporary_folder(within: Path | None = None) -> Iterator[Path]:
 def run_group(command: Sequence[object], **options: Any) -> subprocess.CompletedProcess:
     """Run a program to its end, as subprocess.run does; `options` are Popen's.
 
-    If this is interrupted, it is killed, with the programs that it started where there are process
-    groups: they write files, too.
+    An interruption kills it and, where there are process groups, the programs that it started.
     """
     child = None
     try:

@@ -120,10 +120,7 @@ def models() -> dict[str, Path]:
 
 
 def model(name: str) -> Path:
-    """Return the folder of a model, by its own name or its FMU's.
-
-    A UserError lists the known ones.
-    """
+    """Return the folder of a model, by its own name or its FMU's; a UserError lists known ones."""
     known = models()
     for folder in known.values():
         if name == folder.name or is_built_from(name, folder):
@@ -218,7 +215,7 @@ def built_names(suffix: str) -> list[str]:
 def built(folder: Path, suffix: str, option: str = "", version: str = VERSIONS[0]) -> Path:
     """Return the FMU (.fmu) or SSP (.ssp) built from a folder, of a version of FMI.
 
-    UserError if it is not there; names `option`, which takes another file, if it is given.
+    UserError if it is not there; it names an `option` that takes another file.
     """
     kind = suffix.removeprefix(".").upper()
     if INSTALLED:

@@ -43,29 +43,17 @@ ASSUMED = "the equations of motion, exact parameters and inputs as given, and IE
 # ---- Enclosures ----------------------------------------------------------------------------------
 @dataclass(frozen=True, eq=False)
 class Enclosure:
-    """Intervals that contain the exact motion: |exact - (high + low)| <= radius.
+    """Intervals that contain the exact motion: |exact - (high + low)| <= radius."""
 
-    Attributes
-    ----------
-    times : ndarray, shape (n + 1,)
-        Communication points in s; fewer than asked for if the proof stopped.
-    names : tuple of str
-        States and outputs; outputs have the inputs of the step before, first ones those after.
-    high, low, radius : ndarrays, shape (n + 1, names)
-        In the units of the variables.
-    stopped : float or None
-        Time in s up to which the proof holds, if it does not to the end.
-    starts : tuple of Start
-        Pieces of the start that were proven one by one.
-    """
-
+    # (n + 1,), communication points in s; fewer than asked for if the proof stopped
     times: np.ndarray
+    # states and outputs, which have the inputs of the step before, at the start of that after
     names: tuple[str, ...]
-    high: np.ndarray
+    high: np.ndarray  # (n + 1, names), in the variables' units, as `low` and `radius`
     low: np.ndarray
     radius: np.ndarray
-    stopped: float | None
-    starts: tuple[Start, ...]
+    stopped: float | None  # s, the time up to which the proof holds, if it does not to the end
+    starts: tuple[Start, ...]  # pieces of the start that were proven one by one
 
     def of(self, names: Sequence[str]) -> "Enclosure":
         """Return the intervals of these variables."""
@@ -93,16 +81,8 @@ class Prover:
     ) -> Enclosure:
         """Enclose all motions of a scenario at its communication points.
 
-        A start that is too broad for one proof is halved, and so are its halves.
-
-        Parameters
-        ----------
-        within : mapping of str to float, optional
-            By how much the start of states may be off, in their units.
-        progress : callable, optional
-            Called with 1 after each communication step.
-        seconds : float
-            Time after which to give up a proof, with a UserError.
+        The start of states may be off by `within`; if too broad for a proof, it is halved, and its
+        halves, too. `progress` gets 1 after each step. UserError if a proof takes over `seconds`.
         """
         off = within or {}
         start = {n: (float(scenario.start_values[n]), off.get(n, 0.0)) for n in self.states}
@@ -185,10 +165,9 @@ class Prover:
         enclosure: Enclosure,
         progress: Callable[[int], object] | None = None,
     ) -> tuple[int, int]:
-        """Prove again, with certificates, and check every claim of them, and single operations.
+        """Prove again, check every claim of certificates, and single operations; count both.
 
-        How many steps and operations are confirmed. UserError if one is not, or if the intervals
-        are not those of `enclosure`.
+        UserError if one is not confirmed, or if the intervals are not those of `enclosure`.
         """
         checked = [self._check(scenario, start, progress) for start in enclosure.starts]
         steps = sum(count for count, _ in checked)
@@ -298,15 +277,9 @@ def _watched(lines: Iterable[str], progress: Callable[[int], object] | None) -> 
 
 
 def is_nearest(values: np.ndarray, enclosure: Enclosure, rows: np.ndarray) -> np.ndarray:
-    """Return which values are proven to be the doubles nearest to the exact ones.
+    """Return which values (rows, names) are proven to be the doubles nearest to the exact ones.
 
-    0 is so up to `UNDERFLOW`, because intervals are no narrower there.
-
-    Parameters
-    ----------
-    values : ndarray, shape (rows, names)
-    rows : ndarray of int, shape (rows,)
-        Communication points of the values.
+    `rows` are their communication points. 0 is so up to `UNDERFLOW`: intervals are no narrower.
     """
     distance = distances(values, enclosure, rows)
     side = (enclosure.high[rows] - values) + enclosure.low[rows]  # where the exact value is
@@ -400,8 +373,8 @@ def errors_of_run(
 ) -> Mapping[str, ProvenError] | None:
     """Bound the errors of a run at the points that were recorded; None: nothing is proven.
 
-    That is so of models without a prover, where the proof does not come to the end, and of
-    scenarios of more than `most_steps` communication steps or that take more than `SECONDS`.
+    So it is without a prover, where a proof does not come to the end or takes more than `SECONDS`,
+    and for more than `most_steps` communication steps.
     """
     program = provers().get(scenario.model)
     if program is None or len(scenario.times) > most_steps + 1:
@@ -422,14 +395,7 @@ def errors_of_run(
 def largest_errors(
     errors: np.ndarray, enclosure: Enclosure, rows: np.ndarray | None = None
 ) -> dict[str, ProvenError]:
-    """Return the largest proven errors of all variables of an enclosure, by name.
-
-    Parameters
-    ----------
-    errors : ndarray, shape (points, names)
-    rows : ndarray of int, shape (points,), optional
-        Communication points of the errors; default: all.
-    """
+    """Return the largest of errors (points, names) by name; `rows`: their communication points."""
     times = enclosure.times if rows is None else enclosure.times[rows]
     worst = np.argmax(errors, axis=0)
     return {

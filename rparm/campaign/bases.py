@@ -86,10 +86,7 @@ class Base(ABC):
         return self._variables[name]
 
     def settable(self, name: str) -> tuple[int, Variable]:
-        """Return a variable that a run may start from, or an input that is constant then.
-
-        WrongValueError if there is none of that name.
-        """
+        """Find a variable that a run may start from, or an input to hold; or WrongValueError."""
         component, variable = self.variable(name)
         is_free = variable.is_a(INPUTS) and variable.type == "Real" and name not in self._fed
         if not (variable.can_start or is_free):

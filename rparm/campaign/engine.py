@@ -239,11 +239,10 @@ def opened_cluster(
     security: Security | None = None,
     dashboard: bool = False,
 ) -> Iterator[Client]:
-    """Return a cluster's client; UserError if the scheduler cannot be reached.
+    """Return a client of a cluster; UserError if the scheduler at its address cannot be reached.
 
-    Without the address of a scheduler that runs elsewhere, and certificates for it, the cluster is
-    made on this machine: `workers` processes, by default one per core, with their files in
-    `folder`. There, Dask shows its pages (`dashboard`) to all users, who can change nothing.
+    Without an address the cluster is made on this machine: `workers` processes, by default one per
+    core, with files in `folder`. There Dask shows all users its pages (`dashboard`), to look at.
     """
     logging.disable(logging.CRITICAL)  # the errors that are raised here say it
     try:
@@ -356,9 +355,8 @@ def security_for(
 ) -> Security | None:
     """Return the TLS settings of a client of the scheduler at `address`; None without certificates.
 
-    Files in PEM form: the certificate of the authority that signs all others, and the client's own
-    with its private key; without them, those of Dask's configuration. UserError if they do not fit
-    the address or cannot be used.
+    Files in PEM form; Dask's configuration has those that are not given. UserError if they do not
+    fit the address or cannot be used.
     """
     given = dict(zip(OPTIONS, (ca, cert, key), strict=True))
     named = [option for option, path in given.items() if path is not None]

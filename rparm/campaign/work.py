@@ -83,9 +83,8 @@ def opened(
 ) -> Iterator[Work]:
     """Open the work of a campaign's file; UserError if anything in it is wrong.
 
-    By default, the FMU or SSP is the built one, and results go to the folder that the file names,
-    or else to the project's. `ask` is called with questions to the user: values that are hardly
-    meant so.
+    By default, the FMU or SSP is the built one, and the file or the project names the folder.
+    `ask` is called with questions to the user: values that are hardly meant so.
     """
     given = campaign_file.read(file)
     with bases.opened(given, fmu, file) as base:

@@ -137,9 +137,8 @@ def _open(
 ) -> tuple[list[Scenario], list[Scenario], dict[str, Fmu], dict[str, Fmu]]:
     """Return scenarios of the options, or all; users' own; FMUs by their models; and their twins.
 
-    An FMU is opened once, and every scenario of its model is checked against it. Without names, one
-    that is given runs only the scenarios of its model. There are twins if no FMU and no version of
-    FMI is given, of the models whose scenarios have references.
+    Without names, a given FMU runs only the scenarios of its model. There are twins, of models
+    whose scenarios have references, if no FMU and no version of FMI is given.
     """
     given = stack.enter_context(Fmu(options.fmu)) if options.fmu else None
     if given is not None and options.fmi is not None:

@@ -115,15 +115,7 @@ def finite_number(given: Any) -> float:
 
 # ---- Kinds of its parts --------------------------------------------------------------------------
 def check_kinds(root: Node, expected: str = NUMBER, conditions: Collection[str] = ()) -> None:
-    """Raise ExpressionError where a part is of the wrong kind.
-
-    Parameters
-    ----------
-    expected : str
-        `NUMBER` or `CONDITION`: kind of the whole.
-    conditions : collection of str
-        Names of Booleans; all others are numbers.
-    """
+    """Raise ExpressionError where a part is of the wrong kind; `conditions` are Booleans' names."""
     for node in in_order([root]):
         for number, argument in enumerate(node.arguments):
             is_condition = node.op in LOGIC or (node.op == "if" and number == 0)
@@ -294,10 +286,7 @@ class Expression:
         return names(self.tree)
 
     def value(self, values: Mapping[str, float]) -> float:
-        """Return the value for the values of the names.
-
-        ArithmeticError, ValueError if it is not defined or too large.
-        """
+        """Return the value; ArithmeticError, ValueError if it is not defined or too large."""
         result = evaluated(self.tree, values)
         if not math.isfinite(result):
             raise ValueError("is not a finite number")
@@ -314,10 +303,7 @@ def parsed(text: str) -> Expression:
 
 
 def evaluated(root: Node, values: Mapping[str, float]) -> float:
-    """Evaluate a tree whose kinds are right; a branch that is not taken need not have a value.
-
-    ArithmeticError, ValueError if it has none.
-    """
+    """Evaluate a tree of right kinds, not its branches that are not taken; errors as in `value`."""
     known: dict[Node, float] = {}
     todo = [root]
     while todo:

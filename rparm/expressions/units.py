@@ -39,10 +39,7 @@ PRODUCT = re.compile(r"([^/()]+)(?:/(?:([^./()]+)|\(([^/()]+)\)))?")  # a.b, a/b
 
 
 def exponents(text: str) -> dict[str, int]:
-    """Return the exponents of the base units and rad in a product of symbols, as FMI writes it.
-
-    ValueError if it is none.
-    """
+    """Return exponents of base units and rad in a product of symbols; ValueError if it is none."""
     product = PRODUCT.fullmatch(text)
     if product is None or (text.startswith("1") and text != "1" and not text.startswith("1/")):
         raise ValueError(f"unit {text!r} is no product of SI symbols such as kg.m/s2")
@@ -76,19 +73,9 @@ def shown(unit: Unit | Mapping[str, int]) -> str:
 
 
 def unit_of(root: Node, units: Mapping[str, Unit], expected: Unit | None = None) -> Unit:
-    """Return the unit of an expression whose kinds are right; 1 for a condition and for a number.
+    """Return the unit of an expression of right kinds; 1 for a condition and for a number.
 
-    Parameters
-    ----------
-    units : mapping of str to Unit
-        Of all names that are numbers, `time` among them.
-    expected : Unit, optional
-        What the expression is assigned to.
-
-    Raises
-    ------
-    ExpressionError
-        where units do not fit.
+    `units` has all names that are numbers, `time` too. ExpressionError where units do not fit.
     """
     found: dict[Node, Unit | None] = {}  # None: a number, which takes any unit
     for node in in_order([root]):

@@ -107,13 +107,10 @@ def real_connections(ssp: Ssp) -> Sequence[Connection]:
 def run_component(
     part: Part, fmu: Fmu, address: str, silence: float, is_gone: Callable[[], bool] = lambda: False
 ) -> None:
-    """Step a component from the first to the last communication point.
+    """Step a component to the last communication point; UserError if it or the federation fails.
 
     A call of the FMU, and silence of the broker at `address`, may last `silence` s. `is_gone` says
     whether the process that started this one has ended.
-
-    UserError if the FMU fails, the federation steps something else or ends, or an output changes
-    that must not.
     """
     name = part.component
     federate = Federate(name, address, sorted({s.component for s in part.sources}))

@@ -48,11 +48,9 @@ def run(
 ) -> Record:
     """Run a variant, each component in its own process, with the broker at `address`.
 
-    Components `elsewhere` are stepped by other machines: they are waited for. A process that is
-    silent for `silence` s ends the federation. `progress` is called with the number of steps made,
-    `connected` when all components have been initialized and the first step begins.
-
-    UserError if a process fails; its text is the first one that one of them gave.
+    Components `elsewhere` are stepped by other machines. A process that is silent for `silence` s
+    ends the federation. `progress` gets the number of steps made; `connected` is called before the
+    first step. UserError if a process fails, with the first text that one of them gave.
     """
     made = parts(ssp, variant)
     whole = next(iter(made.values())).system

@@ -85,9 +85,8 @@ def check_address_is_free(address: str) -> None:
 def wait_for_listener(address: str, seconds: float, say: Callable[[], object]) -> None:
     """Wait until something listens at `address`; `say` so, if it does not yet.
 
-    HELICS would wait too, but print that it does, several times a second.
-
-    UserError if nothing has listened there after `seconds`, or the host is unknown.
+    HELICS would print that it waits, several times a second. UserError after `seconds`, or if the
+    host is unknown.
     """
     place = check_address(address)
     latest = time.monotonic() + seconds
@@ -243,10 +242,9 @@ class _Questions:
 
 
 class Federate:
-    """A process in a federation: publishes one vector, under its name, reads those of `sources`.
+    """Process in a federation: publishes one vector, under its name, reads those of `sources`.
 
-    All federates make the same exchanges. The first number of a vector is the count of exchanges
-    before it: what is read is of the present exchange, or an error.
+    A vector begins with the count of exchanges before it, which all federates make alike.
     """
 
     def __init__(
@@ -334,10 +332,7 @@ class Federate:
         self._h.helicsPublicationPublishVector(self._publication, vector)
 
     def read(self) -> Mapping[str, Sequence[float]]:
-        """Read the values that sources published before the last exchange.
-
-        UserError if none arrived.
-        """
+        """Read all values that sources published before the last exchange, or raise UserError."""
         values = {}
         for source, place in self._subscriptions.items():
             count, *values[source] = self._h.helicsInputGetVector(place)

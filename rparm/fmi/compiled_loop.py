@@ -184,10 +184,7 @@ class Tangent:
 # ---- The loop ------------------------------------------------------------------------------------
 # ---- The loop ------------------------------------------------------------------------------------
 def component_calls(instances: Sequence[Instance]) -> np.ndarray:
-    """Return each component with its functions' addresses for the loop, then a part for adapters.
-
-    (instances, 2 * COLUMNS), without a copy: an adapter is given the address of its part.
-    """
+    """Return a row per component: its functions' addresses, then a part that adapters refer to."""
     calls = np.zeros((len(instances), 2 * COLUMNS), np.int64)
     for row, instance in zip(calls, instances, strict=True):
         called, adapted = row[:COLUMNS], row[COLUMNS:]
@@ -273,10 +270,7 @@ def read_outputs(calls, reals, switches):
 
 @njit(cache=True, nogil=True)
 def _deviation_rate(calls, derivatives, states, deviation, rate):
-    """Write the derivative by time of a deviation of the first component's states to `rate`.
-
-    Returns the status of the FMU.
-    """
+    """Write the rate of a deviation of the first component's states; return the FMU's status."""
     return directional_derivative(
         calls[0, 1 + DERIVATIVE],
         calls[0, 0],
@@ -322,6 +316,8 @@ def advance(
 ):
     """Make all steps from times[0], where outputs have been read.
 
+    Returns status, function, component and step of the call that failed; status 0 if none did.
+
     Parameters
     ----------
     calls : (components, 2 * COLUMNS) of component_calls
@@ -329,19 +325,11 @@ def advance(
     held, held_switches : (n + 1, held values), zero-order hold: over the step from times[i]
     reals, switches : tuples of Wires
     points : (rows,)
-        Indices of the times, increasing from 1 on, at which outputs are read: all, where components
-        are connected.
+        Indices of times, from 1 on, at which outputs are read: all, if components are connected.
     watched : (variables,) columns among the Reals
-    record : (rows, variables)
-        Values that an importer reads after the step to times[points[j]].
+    record : (rows, variables) read after the step to times[points[j]]
     tangent : fields of Tangent, empty if no deviation is carried along
-    growth : (n,)
-        Factor by which each step lengthens the deviation: filled if one is carried along.
-
-    Returns
-    -------
-    status, function, component, step
-        The call that failed; status 0 if none did.
+    growth : (n,) factor by which each step lengthens the deviation, if there is one
     """
     derivatives, states, discrete_reals, discrete_integers, deviation = tangent
     carried = len(states) > 0

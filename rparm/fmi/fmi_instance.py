@@ -98,10 +98,9 @@ class SavedState:
 
 
 class Instance(ABC):
-    """One instance of an FMU: a context manager that instantiates, terminates and frees it.
+    """Instance of an FMU: a context manager that instantiates, terminates and frees it.
 
-    The FMU stays open as long as the instance, which has the `name` in messages;
-    `input_polynomials` is for `smooth_inputs`.
+    The FMU stays open as long. `name` is for messages, `input_polynomials` for `smooth_inputs`.
     """
 
     # of the version of FMI

@@ -53,8 +53,7 @@ BINARY, SOURCE = re.compile(r"binaries/[^/]+/[^/]+"), re.compile(r"sources/.+\.c
 def unpack(path: Path, folder: Path, kind: str, only: str | None = None) -> dict[str, int]:
     """Unpack an archive, or one file of it, to an empty folder; nothing is written elsewhere.
 
-    Returns the bytes of all files in the archive, by their names: relative paths with "/".
-    UnreadableError for whatever is wrong with what should be an FMU or SSP (`kind`).
+    Returns the bytes of all files by their paths with "/". UnreadableError, which names the `kind`.
     """
     check_regular(path)
     if path.is_dir():
@@ -182,10 +181,7 @@ def _wrong_entry(entry: zipfile.ZipInfo) -> str:
 
 
 def _place(name: str) -> tuple[str, ...]:
-    """Return where a file is unpacked: one place for names that are one file on some system.
-
-    Windows ignores case and drops blanks and dots at the end; macOS knows one form of an accent.
-    """
+    """Return a place for names that are one file under Windows (case, ends) or macOS (accents)."""
     parts = unicodedata.normalize("NFC", name).casefold().split("/")
     return tuple(part.rstrip(" .") for part in parts if part not in ("", "."))
 
@@ -196,11 +192,10 @@ def _shown(name: str) -> str:
 
 # ---- FMUs ----------------------------------------------------------------------------------------
 class Fmu(AbstractContextManager["Fmu"]):
-    """An FMU that is unpacked; a context manager that removes the unpacked copy.
+    """FMU unpacked in the folder `within`, a temporary one by default; removed at the end.
 
     Raises UserError if the file is no FMU of the `kind`, co-simulation or model exchange, of a
-    known version of FMI, that runs on this platform. The copy is made in the folder `within`, or
-    where temporary files are. Messages name the FMU by `shown`, where it lies in another archive.
+    known version of FMI, that runs on this platform. Messages name it `shown`, if in an archive.
     """
 
     def __init__(

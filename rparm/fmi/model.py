@@ -66,9 +66,7 @@ class Variable:
         return self.causality == "parameter" or is_state
 
     def checked(self, given: Any) -> Value:
-        """Return the value to set, from what a user gives.
-
-        That is a number, a text with a number and its unit, or the name of an Enumeration's item.
+        """Return the value to set for a number, a text with a unit, or the name of an item.
 
         WrongValueError if it is not of the variable's type or out of range.
         """
@@ -180,10 +178,7 @@ class Model:
             )
 
     def find(self, name: str, kind: str) -> Variable:
-        """Return a variable of one of `KINDS`.
-
-        WrongValueError, with all of these, if it is none.
-        """
+        """Return a variable of one of `KINDS`; a WrongValueError names all of these."""
         variable = self.variables.get(name)
         if variable is not None and variable.is_a(kind):
             return variable
@@ -195,9 +190,7 @@ class Model:
 
 
 def described(description: ModelDescription) -> Model:
-    """Return the model that a description of FMI 2.0 or 3.0 declares.
-
-    Of its capabilities those for co-simulation, or for model exchange if it has no others.
+    """Return the model that a description of FMI 2.0 or 3.0 declares, for co-simulation if it can.
 
     ValueError if a start value or a limit is not a number.
     """

@@ -115,10 +115,10 @@ class Fmi2Instance(Instance):
 
 
 class Fmi3Instance(Instance):
-    """An instance of an FMU of FMI 3.0.
+    """Instance of an FMU of FMI 3.0.
 
-    FMI 3.0 has no derivatives of inputs: in a step, the FMU asks for the values of the inputs at
-    times inside of it (intermediate update), and gets them from the polynomials or functions.
+    It has no derivatives of inputs: in a step the FMU asks for the inputs at times inside of it
+    (intermediate update), and gets them from the polynomials or functions.
     """
 
     PLATFORMS = (fmpy.platform_tuple,)

@@ -67,10 +67,7 @@ class Validation:
 def validate(
     fmu: Fmu, request: Request, known: Checked, values: Mapping[str, float], noise: np.ndarray
 ) -> Validation:
-    """Run the log `request.validation` with `values` of the parameters.
-
-    Its start states are fitted: the first one for the run in one go, and each for chi2.
-    """
+    """Run a log with `values`: its first start state is fitted to one run, and each to chi2."""
     assert request.validation is not None
     time = request.columns.get("time", "time")
     recording = logs.read(request.validation, known.reals, known.switches, known.outputs, time)
@@ -209,10 +206,7 @@ class _Fitted:
 
 
 def identify(fmu: Fmu, request: Request) -> Identification:
-    """Fit parameters of an FMU to logs.
-
-    UserError if something in the request or in a log is wrong, or the FMU does not run.
-    """
+    """Fit parameters of an FMU to logs; UserError if the request, a log or a run is wrong."""
     known = checked(request, fmu)
     lead = LEAD * request.segment if request.with_delay else 0.0
     columns = known.reals, known.switches, known.outputs, request.columns.get("time", "time")
@@ -340,12 +334,7 @@ def _ends(
 ) -> np.ndarray:
     """Return the ends (parameters, 2) of the intervals, in the parameters' units.
 
-    Parameters
-    ----------
-    widths : ndarray, shape (parameters,)
-        Half intervals of the fit's numbers.
-    covariance : ndarray, shape (known, known)
-        Of those at `basis`.
+    `widths` are half intervals of the fit's numbers; `covariance` is of the numbers at `basis`.
     """
     ends = np.empty((len(z), 2))
     slopes = parameters.slopes(z)[:, basis]

@@ -45,10 +45,7 @@ class Parameter:
     scale: float = 0.0  # of one without limits; 0: its start
 
     def check(self, low: float) -> None:
-        """Check that the start is inside; `low` is its limit from below.
-
-        WrongValueError if it is not, or lies on the limit.
-        """
+        """Check that the start is inside, above `low` from below; else WrongValueError."""
         unit = f" {self.unit}" if self.unit else ""
         for limit, is_in, word in (
             (low, self.start > low, "above"),
@@ -61,13 +58,7 @@ class Parameter:
 
 
 class Parameters:
-    """All that are estimated.
-
-    Parameters
-    ----------
-    fixed : mapping
-        Values of the parameters that are not estimated, for those that are `above` them.
-    """
+    """All parameters to estimate; `fixed` has the values of others, which some are `above`."""
 
     def __init__(self, every: Sequence[Parameter], fixed: Mapping[str, float]) -> None:
         self.every, self._fixed = tuple(every), fixed

@@ -30,16 +30,8 @@ SHIFTS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 0.5)  # towards the middle of all states, 
 class Simulator:
     """Instances of an FMU, one for each thread; a context manager that frees them.
 
-    Parameters
-    ----------
-    parameters, states, inputs, outputs : sequence of str
-        What differs between runs, and what is read; of the inputs, the Real ones.
-    switches : sequence of str
-        The Boolean inputs.
-    settings : mapping
-        Values of other variables, the same in all runs.
-    tolerance : float
-        Relative, of the integrator.
+    `parameters` and `states` differ between runs, `settings` do not; `inputs` are Reals, `switches`
+    Booleans; `outputs` are read. The `tolerance` is relative.
     """
 
     def __init__(
@@ -79,9 +71,9 @@ class Simulator:
         return list(self._pool.map(function, tasks))
 
     def run(self, segment: Segment, values: np.ndarray) -> np.ndarray:
-        """Run a segment; return the outputs (rows, outputs) at its rows.
+        """Run a segment with values of parameters and states; return outputs (rows, outputs).
 
-        UserError if the FMU refuses `values`, those of parameters and states, or fails.
+        UserError if the FMU refuses the values or fails.
         """
         if not hasattr(self._own, "runner"):
             self._own.runner = _Runner(self)
@@ -226,9 +218,9 @@ def start_scales(states: np.ndarray) -> np.ndarray:
 def admitted_start(
     simulator: Simulator, segments: Sequence[Segment], parameters: Parameters, states: np.ndarray
 ) -> np.ndarray:
-    """Return states near `states` (segments, states) that the FMU starts from.
+    """Move `states` (segments, states) until the FMU starts there; UserError if it never does.
 
-    What was measured a hair past a stop, for example, is moved inward. UserError if nothing helps.
+    A value that was measured a hair past a stop, for example, is moved inward.
     """
     values = parameters.values(np.zeros(len(parameters)))
     values = values[: len(simulator.names) - states.shape[1]]

@@ -26,46 +26,23 @@ BISECTIONS = 60
 
 @dataclass(frozen=True)
 class Crossing:
-    """A frequency at which L has the gain 1 or the phase -180 degrees.
+    """A frequency at which L has the gain 1 or the phase -180 degrees."""
 
-    Attributes
-    ----------
-    frequency : float
-        rad/s.
-    value : complex
-        L there.
-    """
-
-    frequency: float
-    value: complex
+    frequency: float  # rad/s
+    value: complex  # L there
 
 
 @dataclass(frozen=True)
 class Margins:
-    """Margins of a loop; nan or inf if nothing of the kind makes it unstable.
+    """Margins of a loop; nan or inf if nothing of the kind makes it unstable."""
 
-    Attributes
-    ----------
-    stable : bool
-        Whether the closed loop is stable; if not, it has no margins: they are nan.
-    gain_up, gain_down : float
-        Factors of the loop's gain, above and below 1, at which it loses stability; inf and 0 if
-        none does.
-    phase : float
-        Further lag in degrees.
-    delay : float
-        Further delay in s.
-    gain_crossings, phase_crossings : tuple of Crossing
-        Where the gain is 1, and where the phase is -180 degrees.
-    """
-
-    stable: bool
-    gain_up: float
-    gain_down: float
-    phase: float
-    delay: float
-    gain_crossings: tuple[Crossing, ...]
-    phase_crossings: tuple[Crossing, ...]
+    stable: bool  # without it, all margins are nan
+    gain_up: float  # factor of the loop's gain at which it loses stability
+    gain_down: float  # another one, below 1; 0: none
+    phase: float  # further lag in degrees
+    delay: float  # further one in s
+    gain_crossings: tuple[Crossing, ...]  # where the gain is 1
+    phase_crossings: tuple[Crossing, ...]  # where the phase is -180 degrees
 
 
 def open_loop(broken: Linear) -> Linear:
@@ -122,8 +99,8 @@ def closed(loop: Linear) -> Linear:
 def searched(loop: Linear) -> np.ndarray:
     """Return frequencies in rad/s between which L has one crossing at most, ascending.
 
-    Crossings are zeros of L(s) L(-s) - 1 and of L(s) - L(-s) on the axis. Rounding moves those that
-    eigenvalues give, so they only say where to look, as poles and zeros do.
+    Crossings are zeros of L(s) L(-s) - 1 and L(s) - L(-s) on the axis. Rounding moves them as
+    eigenvalues, so they only say where to look, as poles and zeros do.
     """
     scale = suited(loop.A, loop.B, loop.C)
     A, B, C, D = loop.A * scale / scale[:, None], loop.B / scale[:, None], loop.C * scale, loop.D

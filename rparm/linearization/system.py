@@ -31,21 +31,9 @@ NEGLIGIBLE = 1e-14  # of the largest entries of row and column: rounding
 class SystemSubject(ExitStack):
     """A variant of a system to linearize; a context manager, which keeps its FMUs unpacked.
 
-    Names are "component.variable".
-
-    Parameters
-    ----------
-    ssp : Ssp
-        Unpacked as long as this.
-    variant : str
-        Of its parameter sets.
-    time : float, optional
-        s; default: the start of the system.
-    without : sequence of str
-        Components that are left out: what they feed is fed by outputs of the same names, of what
-        feeds them. So sensors become ideal.
-    cut : str
-        An input whose connection is left out.
+    The SSP stays unpacked as long. `time` in s is the system's start by default. Components
+    `without` are left out, as ideal sensors: what they feed is fed by outputs of the same names, of
+    what feeds them. `cut` is an input whose connection is left out.
     """
 
     def __init__(
@@ -95,10 +83,7 @@ class SystemSubject(ExitStack):
         return known_variable(self.ssp.models[component], variable, where)
 
     def parts(self, values: Mapping[str, Value]) -> dict[str, Linear]:
-        """Linearize each component, without held states, by its name.
-
-        UserError if one is sampled, or if the connections form an algebraic loop.
-        """
+        """Linearize components, without held states; UserError if one is sampled, or a loop."""
         parameters = self.merged(values)
         found = {}
         with Master(self.fmus, self.connections) as master:
@@ -110,10 +95,7 @@ class SystemSubject(ExitStack):
         return found
 
     def at(self, values: Mapping[str, Value]) -> Linear:
-        """Linearize where parameters and states have these values, held states included.
-
-        All loops are closed, also the one that is to be broken: the point is that of the system.
-        """
+        """Linearize at values of parameters and states, held ones too, with all loops closed."""
         return connected(self.parts(values), self.connections)
 
     @property
@@ -210,8 +192,8 @@ def _next_event(ssp: Ssp, name: str, values: Mapping[str, Value], time: float) -
 def connected(parts: Mapping[str, Linear], connections: Iterable[Connection]) -> Linear:
     """Join the linear models of components whose outputs feed inputs.
 
-    Its inputs are those of all components, each added to what its connection brings; names are
-    "component.variable". UserError if connections form an algebraic loop, with its path.
+    Inputs are all components' "component.variable", added to what connections bring. UserError with
+    the path of an algebraic loop.
     """
     inputs = [f"{name}.{u}" for name, part in parts.items() for u in part.inputs]
     outputs = [f"{name}.{y}" for name, part in parts.items() for y in part.outputs]
@@ -250,10 +232,7 @@ def _feeding(
 
 
 def _clear(part: Linear) -> tuple[np.ndarray, ...]:
-    """Set A, B, C and D of a component to 0 where they are rounding.
-
-    An entry is compared with its row and its column, as units may make a whole row or column small.
-    """
+    """Set entries of A, B, C and D to 0 that are rounding, compared with their row and column."""
     n = len(part.A)
     whole = np.block([[part.A, part.B], [part.C, part.D]])
     size = np.abs(whole)
@@ -304,10 +283,7 @@ def _refuse_algebraic_loop(outputs: Sequence[str], direct: np.ndarray) -> None:
 # ---- Loops ---------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Looped:
-    """Part of a system on loops through its connections: the rest cannot be unstable by them.
-
-    `parts` have only states, inputs and outputs on loops; components that have none are left out.
-    """
+    """Part of a system on loops through its connections, which alone may make it unstable."""
 
     parts: Mapping[str, Linear]
     connections: Sequence[Connection]

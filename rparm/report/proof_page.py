@@ -31,8 +31,8 @@ def write(
 ) -> Path:
     """Write the page of a scenario; return its path. The command `again` proves it again.
 
-    `errors` are the proven ones of runs, (communication points, states), by method and tolerance;
-    `good` says how good the reference is, if there is one.
+    `errors` are proven, (communication points, states), by method and tolerance; `good` is about
+    the reference.
     """
     plots = [
         Plot(

@@ -91,10 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def data_of(name: str) -> dict[str, Any]:
-    """Run a scenario, or a variant of a system: what its player gets.
-
-    UserError if there is none of this name, if it has nothing to animate, or if the run fails.
-    """
+    """Run a scenario or variant for its player; UserError if it fails or has no animation."""
     files = project.scenario_files()
     data = _of_scenario(files[name]) if name in files else _of_variant(name, list(files))
     if data is None:

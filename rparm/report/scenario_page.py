@@ -29,8 +29,7 @@ def write(
 ) -> Entry:
     """Write page and values, called `name`, of a scenario to a section; its line in the overview.
 
-    The first of its runs is drawn; `failures` are others that did not end. The command `again` runs
-    it again.
+    The first run is drawn; `failures` did not end. The command `again` runs the scenario.
     """
     folder.mkdir(parents=True, exist_ok=True)
     first, scenario = runs[0], runs[0].scenario
@@ -114,10 +113,7 @@ def _write_values(
 
 
 def recorded(scenario: Scenario, model: Model, result: Result) -> dict[str, np.ndarray]:
-    """Return the columns (rows,) of Real outputs, Integers to draw, and given inputs.
-
-    A row holds what an importer reads after a step, so it holds the inputs of that step too.
-    """
+    """Return columns (rows,) of Real outputs, Integers to draw and inputs, read after each step."""
     rows = scenario.input_rows[: len(result.times)]
     drawn = {name for panel in scenario.panels for name in panel}
     inputs = [

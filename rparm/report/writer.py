@@ -62,8 +62,7 @@ class ReportWriter:
     ) -> Path:
         """Write all pages; return the one to open: a single file's, or the overview.
 
-        Of the runs of each scenario, the first one is drawn. `progress` is called with 1 after
-        each.
+        Each scenario's first run is drawn. `progress` is called with 1 after each scenario.
         """
         failed: dict[Path, list[Failure]] = {}
         for failure in failures:

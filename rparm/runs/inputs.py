@@ -114,10 +114,10 @@ class Sines:
         return total.astype(np.float64)
 
     def derivative(self, elapsed: np.ndarray, order: int) -> np.ndarray:
-        """Return the derivative of an order at `elapsed` seconds after the start, (n,).
+        """Return the derivative of an order (0: value) at `elapsed` seconds after the start, (n,).
 
-        Order 0 is the value. It is exact but for one rounding, unlike `values`, whose pi is a
-        double: the exact final states of the convergence problems are compared with it.
+        It is exact but for a rounding, unlike `values`, whose pi is a double: exact final states of
+        convergence problems are compared with it.
         """
         pi = np.arctan2(np.longdouble(0), np.longdouble(-1))
         t = np.asarray(elapsed, dtype=np.longdouble)
@@ -217,10 +217,9 @@ class Log:
     names: tuple[str, ...]  # of the columns
 
     def columns(self, time: str, names: Sequence[str], since: float | None = None) -> Columns:
-        """Read columns, with times since `since` (s), or since the first row.
+        """Read columns, with times since `since` (s), or the first row, subtracted as decimals.
 
-        UserError names the line of what is wrong. Times are subtracted as decimals: doubles of
-        clocks that count from 1970 are 0.2 microseconds apart.
+        UserError names the line of what is wrong.
         """
         indices = [self._index(name) for name in (time, *names)]
         origin = None if since is None else Decimal(repr(since))
@@ -336,10 +335,7 @@ def _csv_reader(text: str, delimiter: str) -> "csv._reader":
 
 # ---- Sections of a scenario ----------------------------------------------------------------------
 class InputReader:
-    """Reads the sections [inputs] and [measured].
-
-    Communication points are `times` (n + 1,) in s, rounded, and `elapsed` since the start.
-    """
+    """Reads [inputs] and [measured] at `times` (n + 1,) s, rounded; `elapsed` since the start."""
 
     def __init__(
         self, reader: Reader, model: Model, times: np.ndarray, elapsed: np.ndarray

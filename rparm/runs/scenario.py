@@ -63,8 +63,7 @@ INPUT_HELP = """\
 class Scenario:
     """A run of one model: parameters, initial state, communication points and inputs (SI units).
 
-    Only what the file gives is in `parameters`, `initial` and `inputs`; everything else has its
-    start value. Arrays are read-only; Boolean inputs' hold Booleans.
+    What the file does not give has its start value. Arrays are read-only, of Booleans for Booleans.
     """
 
     name: str
@@ -133,8 +132,8 @@ def title(path: Path) -> str:
 def subject_of(path: Path) -> Path:
     """Return the FMU that the scenario's key `fmu` names, or the folder of its model.
 
-    The key `model` names the model, else it is the one whose folder the file lies in. UserError if
-    the file cannot be read, or names nothing that is there.
+    Without the key `model` it is the model in whose folder the file lies. UserError if the file
+    cannot be read, or names nothing that is there.
     """
     content, reader = read_toml(path), Reader(path)
     if FMU in content:
@@ -165,10 +164,9 @@ def name_of(subject: Path) -> str:
 
 
 def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> Scenario:
-    """Read and check the scenario at `path`, of the project or of a user.
+    """Read and check the scenario at `path`, of the project or of a user, or raise UserError.
 
-    Values of `times` replace section [time]'s. UserError if the file cannot be read, or if
-    anything in it is wrong.
+    Values of `times` replace section [time]'s.
     """
     path = Path(path)
     content = read_toml(path)
@@ -311,10 +309,7 @@ class _Reader(Reader):
     def communication_points(
         self, start: float, stop: float, steps: tuple[float, ...]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return times from start to stop in s, and since the start.
-
-        Each is computed from its index: nothing accumulates.
-        """
+        """Return times (s) from start to stop, and since the start, from their numbers."""
         period = math.fsum(steps)
         cycles = math.ceil((stop - start) / period) + 1
         within = np.array([math.fsum(steps[:i]) for i in range(len(steps))])
@@ -336,8 +331,7 @@ class _Reader(Reader):
 def template(name: str, key: str, subject: str, model: Model) -> str:
     """Write the file, which runs as it is.
 
-    The `key` is `model`, with its folder below models/, or `fmu`, with the path of an FMU from the
-    file.
+    `key` is `model` with its folder below models/, or `fmu` with a path from the file.
     """
     outputs = model.real_outputs[:2]
     panels = "# Further plots, each of variables of one unit:\n"

@@ -60,12 +60,9 @@ def simulate(
 ) -> Result:
     """Run `scenario` on the FMU that it was checked against, and record its Real outputs.
 
-    The relative tolerance is the scenario's if none is given. `progress` is called now and
-    then with the number of steps done since the last call. `compiled` uses the compiled loop, where
-    numba is installed, even if it does not pay.
-
-    UserError if the FMU has no Real outputs, or if one of its functions fails; the text holds the
-    FMU's own message. In a step it is a `StoppedError`.
+    By default the relative tolerance is the scenario's. `progress` gets the number of steps since
+    its last call. `compiled` uses the compiled loop, where numba is installed, even if it does not
+    pay. UserError with the FMU's message if it fails, in a step a `StoppedError`.
     """
     tolerance = scenario.tolerance if tolerance is None else tolerance
     if not fmu.model.real_outputs:
@@ -283,10 +280,7 @@ def is_finite_number(given: object) -> bool:
 
 
 def communication_points(start: float, stop: float, step: float) -> np.ndarray:
-    """Return communication points in s.
-
-    UserError if the stop time is no whole number of steps on.
-    """
+    """Return communication points in s; UserError if no whole number of steps leads to the stop."""
     for name, value in (("start_time", start), ("stop_time", stop), ("step", step)):
         if not is_finite_number(value):
             raise UserError(f"{name}: expected a finite number, got {value!r}")
@@ -319,10 +313,9 @@ def start_values(model: Model, given: Mapping[str, Any]) -> dict[str, Value]:
 
 
 def input_values(model: Model, name: str, given: Any, times: np.ndarray) -> np.ndarray:
-    """Sample an input at all communication points `times` (s).
+    """Sample an input - a number, values, pair to interpolate, or function - at `times` (s).
 
-    `given` is a number, a value for each point, a pair (times, values) to interpolate, or a
-    function of the time. UserError if a value is not finite or not in the input's range.
+    UserError if a value is not finite or not in the input's range.
     """
     with placed(f"inputs: {name}"):
         variable = model.find(name, INPUTS)

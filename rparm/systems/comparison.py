@@ -99,8 +99,8 @@ def load_reference(
 ) -> Reference:
     """Read and check the reference of a variant of the system in a folder.
 
-    References are for `experiment`: start, stop and step in s. UserError if the file is missing,
-    damaged, or not of this system; names the line and the command that makes references.
+    `experiment` is its start, stop and step in s. UserError if it is missing, damaged or another's;
+    names the line and the command that makes it.
     """
     _check_experiment(ssp, experiment)
     path = project.variant_reference_file(system, variant)

@@ -74,11 +74,10 @@ def absent() -> str:
 
 
 def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
-    """Run a system from its start to its stop time with one of its parameter sets.
+    """Run a system from start to stop with a parameter set; read variables ``component.variable``.
 
-    Reads the Real, Integer or Boolean variables ``component.variable``. UserError if a component
-    fails or gives a value that is not finite (the text names component, variable and time), or if
-    Ecos itself fails. After the start it is a `StoppedError`.
+    UserError if a component fails or a value is not finite, with component, variable and time, or
+    if Ecos itself fails; after the start it is a `StoppedError`.
     """
     system = ssp.system
     if variant not in system.parameters:
@@ -217,10 +216,7 @@ def _components(ssp: "Ssp", fmu: str) -> str:
 def _check_values(
     ssp: "Ssp", variant: str, names: Sequence[str], times: np.ndarray, values: np.ndarray
 ) -> None:
-    """Refuse values that are not finite, naming the component that the first of them is from.
-
-    `values` are (times, names); each name is component.variable.
-    """
+    """Refuse values (times, names) that are not finite, naming the first component that has one."""
     bad_rows = np.flatnonzero(~np.isfinite(values).all(axis=1))
     if not len(bad_rows):
         return

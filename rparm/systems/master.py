@@ -114,10 +114,7 @@ def check_finite(component: str, outputs: Reals, when: str) -> None:
 
 
 def start_value(fmu: UnpackedFmu, component: str, name: str, value: Value) -> Value:
-    """Return the value to set before initialization, an item as its number.
-
-    UserError if it cannot be set.
-    """
+    """Return the value to set before initialization, an item as its number; else UserError."""
     variable = fmu.model.variables.get(name)
     if variable is None or not (variable.can_start or variable.is_a(INPUTS)):
         raise UserError(f"{component}: {fmu.path} has no parameter {name!r}")
@@ -169,20 +166,18 @@ class Snapshot(AbstractContextManager["Snapshot"]):
 class Master(AbstractContextManager["Master"]):
     """A system of connected components; a context manager that frees their instances.
 
-    In Gauss-Seidel order the components step in the order of `fmus`. After each step all Real
-    outputs are read, and the Real variables `also`, pairs of component and variable. UserError if
-    names are unknown, an input has several connections, or an FMU cannot do what is asked.
+    In Gauss-Seidel order components step in the order of `fmus`. After each step all Real outputs
+    are read, and Real variables `also` (component, variable). UserError if names are unknown, an
+    input has several connections, or an FMU cannot do what is asked.
 
     Attributes
     ----------
     names : tuple of str
         "component.variable" of all that is read, by component, outputs first.
     values : ndarray, shape (len(names),)
-        As read right after the last step, before inputs are set for the next one; where a Boolean
-        has changed, after all that follows from it.
+        As read right after the last step, and all that follows from a Boolean that changed.
     slopes : ndarray, shape (len(names),)
-        Their derivatives with respect to time; only those that are connected, and only if
-        `inputs` is "extrapolated".
+        Derivatives by time of what is connected, if `inputs` is "extrapolated".
     time : float
         s.
     do_steps : int
@@ -436,11 +431,10 @@ def _is_switch(fmus: Mapping[str, Fmu], component: str, name: str, causality: st
 
 # ---- A variant -----------------------------------------------------------------------------------
 def run_in_master(ssp: Ssp, variant: str, names: Sequence[str]) -> Run:
-    """Run a system in Jacobi order with one of its parameter sets; read what Ecos would read.
+    """Run a system in Jacobi order with a parameter set; read what Ecos would read.
 
-    That is the values of the Real, Integer or Boolean variables ``component.variable`` at a
-    communication point after the inputs of the next step have been set. UserError if a component
-    fails, or gives a value that is not finite.
+    That is ``component.variable`` after the inputs of the next step have been set. UserError if a
+    component fails, or gives a value that is not finite.
     """
     system = ssp.system
     times = system.times

@@ -316,10 +316,7 @@ class SspReader:
     def experiment(
         self, root: etree._Element, components: Iterable[Component]
     ) -> tuple[float, float, float]:
-        """Start, stop and communication step in s.
-
-        Where the SSP does not say them, the FMUs do: the largest stop and the smallest step.
-        """
+        """Start, stop and communication step in s; FMUs give the largest stop and smallest step."""
         node = root.find("ssd:DefaultExperiment", NAMESPACES)
         given = {} if node is None else node.attrib
         sizes = [] if node is None else node.xpath(STEP_SIZE, namespaces=NAMESPACES)
@@ -461,10 +458,8 @@ def _positive(text: object) -> float | None:
 def checked_models(path: Path, folder: Path, system: System) -> dict[str, Model]:
     """Read what the FMU of each component declares, and check the system against it.
 
-    Every component has its FMU, every connector is a variable of it with that causality, and with
-    that type and unit where it has them, connections go from an output to an input of the same type
-    and unit, no input has two, and parameters are variables that can be set. UserError if not; the
-    text names component and variable. The SSP is unpacked in `folder`.
+    Connectors are variables of the same causality, type and unit, connections lead from outputs to
+    inputs of the same type and unit, no input has two, parameters can be set; else UserError.
     """
     checker = _Checker(path, system)
     for component in system.components:
