@@ -11,8 +11,7 @@ def value_references(declaration: Declaration) -> str:
     prefix = macro_prefix(name)
     lines = [
         "/* Generated from variables.toml. */",
-        f"#ifndef {prefix}_VALUE_REFERENCES_H",
-        f"#define {prefix}_VALUE_REFERENCES_H",
+        "#pragma once",
         "",
         f'#define {prefix}_NAME "{name}"',
         f'#define {prefix}_GUID "{declaration.guid}"',
@@ -21,8 +20,6 @@ def value_references(declaration: Declaration) -> str:
         "enum {",
         *(f"    {prefix}_{n} = {v.reference}," for n, v in declaration.variables.items()),
         "};",
-        "",
-        "#endif",
     ]
     return "\n".join(lines) + "\n"
 

@@ -1,7 +1,6 @@
 /* Table of variables that fmu/generate.py makes from variables.toml, functions of its rows, and the
  * values that belong to the instance. Terms as in section 2.2.7 of the FMI 2.0 specification. */
-#ifndef VARIABLES_H
-#define VARIABLES_H
+#pragma once
 
 #include "model.h"
 #include "ode.h" // enum integrator_method
@@ -148,5 +147,3 @@ struct instance_experiment {
     bool tolerance_defined;
     double tolerance; /* relative, > 0 */
 };
-
-#endif

@@ -3,8 +3,7 @@
  *
  * A relation compares two values; its mode says whether it holds, and changes at events only. An
  * event of the model fires when its condition becomes true. */
-#ifndef RELATIONS_H
-#define RELATIONS_H
+#pragma once
 
 #include "model.h"
 
@@ -99,5 +98,3 @@ static inline struct indicator relations_state_indicator(size_t state, int holds
                               .offset = sign * offset,
                               .rises = sign * factor * rate > 0.0};
 }
-
-#endif
