@@ -3,18 +3,9 @@
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 
+import description_parts
 from declaration.load import Declaration, DeclarationError
 from declaration.schema import Enumeration, Float64, Unit, Variable
-from description_parts import (
-    add_experiment,
-    add_items,
-    add_log_categories,
-    add_units,
-    document,
-    texts_of,
-    type_name,
-    value_attributes,
-)
 from program import Provenance
 
 TYPES = {"float64": "Real", "int32": "Integer", "enumeration": "Enumeration", "boolean": "Boolean"}
@@ -32,20 +23,20 @@ def model_description(
         fmiVersion="2.0",
         modelName=model.name,
         guid=declaration.guid,
-        **texts_of(declaration, provenance),
+        **description_parts.texts_of(declaration, provenance),
         variableNamingConvention="flat",
         numberOfEventIndicators=str(len(model.event_indicators)),
     )
     add_interfaces(root, model.name, sources)
-    add_units(root, declaration.units)
+    description_parts.add_units(root, declaration.units)
     add_types(root, variables)
-    add_log_categories(root, "fmi2")
-    add_experiment(root, declaration.experiment)
+    description_parts.add_log_categories(root, "fmi2")
+    description_parts.add_experiment(root, declaration.experiment)
     scalars = ET.SubElement(root, "ModelVariables")
     for name, variable in variables.items():
         add_variable(scalars, name, variable, index, declaration.units)
     add_structure(root, variables, index)
-    return document(root)
+    return description_parts.document(root)
 
 
 def with_aliases(declaration: Declaration) -> dict[str, Variable]:
@@ -106,9 +97,9 @@ def add_types(root: ET.Element, variables: dict[str, Variable]) -> None:
         return
     definitions = ET.SubElement(root, "TypeDefinitions")
     for name, variable in enumerations.items():
-        simple = ET.SubElement(definitions, "SimpleType", name=type_name(name))
+        simple = ET.SubElement(definitions, "SimpleType", name=description_parts.type_name(name))
         enumeration = ET.SubElement(simple, "Enumeration")
-        add_items(enumeration, variable)
+        description_parts.add_items(enumeration, variable)
 
 
 def add_variable(
@@ -129,7 +120,7 @@ def add_variable(
     )
     element = ET.SubElement(scalar, TYPES[variable.type])
     if isinstance(variable, Enumeration):
-        element.set("declaredType", type_name(name))
+        element.set("declaredType", description_parts.type_name(name))
     if isinstance(variable, Float64):
         element.set("unit", variable.unit)
         for display in list(units[variable.unit].display)[:1]:
@@ -138,7 +129,7 @@ def add_variable(
         element.set("derivative", index[variable.derivative_of])
     if variable.reinit:
         element.set("reinit", "true")
-    for key, text in value_attributes(variable).items():
+    for key, text in description_parts.value_attributes(variable).items():
         element.set(key, text)
     if isinstance(variable, Float64) and variable.nominal is not None:
         element.set("nominal", repr(variable.nominal))

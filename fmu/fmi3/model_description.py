@@ -6,18 +6,9 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import description_parts
 from declaration.load import Declaration
 from declaration.schema import Enumeration, Float64, Terminal, Unit, Variable
-from description_parts import (
-    add_experiment,
-    add_items,
-    add_log_categories,
-    add_units,
-    document,
-    texts_of,
-    type_name,
-    value_attributes,
-)
 from program import Provenance
 
 TYPES = {"float64": "Float64", "int32": "Int32", "enumeration": "Enumeration", "boolean": "Boolean"}
@@ -33,19 +24,19 @@ def model_description(declaration: Declaration, provenance: Provenance) -> str:
         fmiVersion="3.0",
         modelName=model.name,
         instantiationToken=declaration.token("fmi3"),
-        **texts_of(declaration, provenance),
+        **description_parts.texts_of(declaration, provenance),
         variableNamingConvention="flat",
     )
     add_interfaces(root, model.name, has_events=model.has_events)
-    add_units(root, declaration.units)
+    description_parts.add_units(root, declaration.units)
     add_types(root, declaration)
-    add_log_categories(root, "fmi3")
-    add_experiment(root, declaration.experiment)
+    description_parts.add_log_categories(root, "fmi3")
+    description_parts.add_experiment(root, declaration.experiment)
     elements = ET.SubElement(root, "ModelVariables")
     for name, variable in variables.items():
         add_variable(elements, name, variable, declaration)
     add_structure(root, declaration)
-    return document(root)
+    return description_parts.document(root)
 
 
 def add_interfaces(root: ET.Element, identifier: str, *, has_events: bool) -> None:
@@ -84,8 +75,10 @@ def add_types(root: ET.Element, declaration: Declaration) -> None:
             add_float_type(definitions, variable, declaration.units)
     for name, variable in declaration.variables.items():
         if isinstance(variable, Enumeration):
-            enumeration = ET.SubElement(definitions, "EnumerationType", name=type_name(name))
-            add_items(enumeration, variable)
+            enumeration = ET.SubElement(
+                definitions, "EnumerationType", name=description_parts.type_name(name)
+            )
+            description_parts.add_items(enumeration, variable)
 
 
 def float_type_name(variable: Float64) -> str:
@@ -125,7 +118,7 @@ def add_variable(
     if variable.initial is not None:
         element.set("initial", variable.initial)
     if isinstance(variable, Enumeration):
-        element.set("declaredType", type_name(name))
+        element.set("declaredType", description_parts.type_name(name))
     if isinstance(variable, Float64):
         element.set("declaredType", float_type_name(variable))
     if has_intermediate_update(variable):
@@ -135,7 +128,7 @@ def add_variable(
         element.set("derivative", str(state.reference))
     if variable.reinit:
         element.set("reinit", "true")
-    for key, text in value_attributes(variable).items():
+    for key, text in description_parts.value_attributes(variable).items():
         element.set(key, text)
 
 
@@ -181,7 +174,7 @@ def terminals_and_icons(declaration: Declaration) -> str:
         add_icon(root, icon)
     if declaration.terminals:
         add_terminals(ET.SubElement(root, "Terminals"), declaration.terminals)
-    return document(root)
+    return description_parts.document(root)
 
 
 def add_icon(root: ET.Element, icon: Path) -> None:
@@ -235,4 +228,4 @@ def build_description(identifier: str, sources: Sequence[str]) -> str:
     files = ET.SubElement(configuration, "SourceFileSet", language="C11")
     for name in sources:
         ET.SubElement(files, "SourceFile", name=name)
-    return document(root)
+    return description_parts.document(root)

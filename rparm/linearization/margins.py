@@ -9,14 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rparm.linearization import responses
 from rparm.linearization.linear import Linear, cleared, zeros
-from rparm.linearization.responses import (
-    bounded_response,
-    frequencies,
-    frequency_response,
-    minimal,
-    suited,
-)
 
 ROUNDING = 1e-12  # relative, of a real part that is 0
 DECADES = 2  # below the slowest and above the fastest pole, zero or crossing: where to search
@@ -47,7 +41,7 @@ class Margins:
 
 def open_loop(broken: Linear) -> Linear:
     """Return L of a system that is broken: one input, and the output that fed it; minimal."""
-    return minimal(replace(broken, C=-broken.C, D=-broken.D))
+    return responses.minimal(replace(broken, C=-broken.C, D=-broken.D))
 
 
 def margins(loop: Linear) -> Margins:
@@ -77,7 +71,7 @@ def margins(loop: Linear) -> Margins:
 
 def _ends(loop: Linear) -> Iterator[Crossing]:
     """Return the ends of L where it is real: at 0, if it has no pole there, and at infinity."""
-    value, bound = (each[0] for each in bounded_response(loop)(np.zeros(1)))
+    value, bound = (each[0] for each in responses.bounded_response(loop)(np.zeros(1)))
     if loop.poles.all() and abs(value) > bound:
         yield Crossing(0.0, complex(value))
     if loop.D[0, 0]:
@@ -102,7 +96,7 @@ def searched(loop: Linear) -> np.ndarray:
     Crossings are zeros of L(s) L(-s) - 1 and L(s) - L(-s) on the axis. Rounding moves them as
     eigenvalues, so they only say where to look, as poles and zeros do.
     """
-    scale = suited(loop.A, loop.B, loop.C)
+    scale = responses.suited(loop.A, loop.B, loop.C)
     A, B, C, D = loop.A * scale / scale[:, None], loop.B / scale[:, None], loop.C * scale, loop.D
     none = np.zeros_like(A)
     gains = zeros(
@@ -123,15 +117,15 @@ def searched(loop: Linear) -> np.ndarray:
 
     found = near(np.concatenate([gains, turns]))
     steep = [*poles, *near(zeros(A, B, C, D))]
-    return frequencies(steep, [*np.abs(found), *np.abs(found.imag)], DECADES)
+    return responses.frequencies(steep, [*np.abs(found), *np.abs(found.imag)], DECADES)
 
 
 def _crossings(
     loop: Linear, grid: np.ndarray, function: Callable[[np.ndarray], np.ndarray]
 ) -> Iterator[Crossing]:
     """Find where a function of L changes its sign, also if it is 0 at a frequency of the grid."""
-    response = frequency_response(loop)
-    values, bounds = bounded_response(loop)(grid)
+    response = responses.frequency_response(loop)
+    values, bounds = responses.bounded_response(loop)(grid)
     clear = np.flatnonzero(np.abs(function(values)) > bounds)
     signs = np.sign(function(values[clear]))
     changes = np.flatnonzero(signs[:-1] != signs[1:])

@@ -10,18 +10,7 @@ from rparm.errors import UserError, hint
 from rparm.files import UnreadableError
 from rparm.fmi.fmu_file import MODEL_EXCHANGE, Fmu
 from rparm.fmi.model import Value, Variable
-from rparm.linearization.linear import (
-    SAMPLED,
-    Linear,
-    cleared,
-    closure,
-    held_states,
-    is_sampled,
-    known_variable,
-    linear_model,
-    next_event,
-    require_derivatives,
-)
+from rparm.linearization import linear
 from rparm.systems.master import INPUT_MODES, ORDERS, Master
 from rparm.systems.ssp import Connection, Ssp
 
@@ -63,7 +52,7 @@ class SystemSubject(ExitStack):
         with ExitStack() as stack:  # closes what is open if one of them is refused
             self.fmus = {name: stack.enter_context(ssp.unpacked_fmu(name)) for name in self.names}
             for fmu in self.fmus.values():
-                require_derivatives(fmu)
+                linear.require_derivatives(fmu)
             self.push(stack.pop_all())
 
     def _found(self, name: str) -> Connection:
@@ -80,21 +69,21 @@ class SystemSubject(ExitStack):
             where = f"{self.ssp.path}: {name}: expected COMPONENT.VARIABLE"
             raise UserError(f"{where}{hint(component, self.names, 'components')}")
         where = f"{self.ssp.path}: component {component!r}"
-        return known_variable(self.ssp.models[component], variable, where)
+        return linear.known_variable(self.ssp.models[component], variable, where)
 
-    def parts(self, values: Mapping[str, Value]) -> dict[str, Linear]:
+    def parts(self, values: Mapping[str, Value]) -> dict[str, linear.Linear]:
         """Linearize components, without held states; UserError if one is sampled, or a loop."""
         parameters = self.merged(values)
         found = {}
         with Master(self.fmus, self.connections) as master:
             master.initialize(self.time, None, parameters)
             for name, component in master.components.items():
-                part = linear_model(component.instance)
+                part = linear.linear_model(component.instance)
                 self._refuse_sampled(name, part, parameters.get(name, {}))
                 found[name] = part
         return found
 
-    def at(self, values: Mapping[str, Value]) -> Linear:
+    def at(self, values: Mapping[str, Value]) -> linear.Linear:
         """Linearize at values of parameters and states, held ones too, with all loops closed."""
         return connected(self.parts(values), self.connections)
 
@@ -119,9 +108,11 @@ class SystemSubject(ExitStack):
             for order in ORDERS
         ]
 
-    def held(self, parts: Mapping[str, Linear]) -> dict[str, list[str]]:
+    def held(self, parts: Mapping[str, linear.Linear]) -> dict[str, list[str]]:
         """Return held states by component."""
-        return {name: held_states(part, self.ssp.models[name]) for name, part in parts.items()}
+        return {
+            name: linear.held_states(part, self.ssp.models[name]) for name, part in parts.items()
+        }
 
     def merged(self, values: Mapping[str, Value]) -> dict[str, dict[str, Value]]:
         """Join all that is set, by component."""
@@ -134,15 +125,17 @@ class SystemSubject(ExitStack):
             merged[component][variable] = value
         return merged
 
-    def _refuse_sampled(self, name: str, part: Linear, values: Mapping[str, Value]) -> None:
+    def _refuse_sampled(self, name: str, part: linear.Linear, values: Mapping[str, Value]) -> None:
         feeding = [c.start_connector for c in self.connections if c.start_component == name]
         outputs = [output for output in feeding if self._is_real(name, output)]
 
         def announced() -> float | None:
             return _next_event(self.ssp, name, values, self.time)
 
-        if is_sampled(part, self.ssp.models[name], outputs, announced):
-            raise UserError(f"{self.ssp.path}: component {name!r} {SAMPLED}{self._way_out(name)}")
+        if linear.is_sampled(part, self.ssp.models[name], outputs, announced):
+            raise UserError(
+                f"{self.ssp.path}: component {name!r} {linear.SAMPLED}{self._way_out(name)}"
+            )
 
     def _way_out(self, name: str) -> str:
         try:
@@ -185,11 +178,13 @@ def _next_event(ssp: Ssp, name: str, values: Mapping[str, Value], time: float) -
             instance.set(variable, value)
         instance.enter_initialization()
         instance.exit_initialization()
-        return next_event(instance)
+        return linear.next_event(instance)
 
 
 # ---- Connections ---------------------------------------------------------------------------------
-def connected(parts: Mapping[str, Linear], connections: Iterable[Connection]) -> Linear:
+def connected(
+    parts: Mapping[str, linear.Linear], connections: Iterable[Connection]
+) -> linear.Linear:
     """Join the linear models of components whose outputs feed inputs.
 
     Inputs are all components' "component.variable", added to what connections bring. UserError with
@@ -202,14 +197,14 @@ def connected(parts: Mapping[str, Linear], connections: Iterable[Connection]) ->
     _refuse_algebraic_loop(outputs, D @ fed)
     solved, terms = _solved(D @ fed), _solved(np.abs(D) @ fed)
     back, back_terms = B @ fed @ solved, np.abs(B) @ fed @ terms
-    return Linear(
+    return linear.Linear(
         states=tuple(f"{name}.{x}" for name, part in parts.items() for x in part.states),
         inputs=tuple(inputs),
         outputs=tuple(outputs),
-        A=cleared(A + back @ C, np.abs(A) + back_terms @ np.abs(C)),
-        B=cleared(B + back @ D, np.abs(B) + back_terms @ np.abs(D)),
-        C=cleared(solved @ C, terms @ np.abs(C)),
-        D=cleared(solved @ D, terms @ np.abs(D)),
+        A=linear.cleared(A + back @ C, np.abs(A) + back_terms @ np.abs(C)),
+        B=linear.cleared(B + back @ D, np.abs(B) + back_terms @ np.abs(D)),
+        C=linear.cleared(solved @ C, terms @ np.abs(C)),
+        D=linear.cleared(solved @ D, terms @ np.abs(D)),
         **{
             key: np.concatenate([getattr(part, key) for part in parts.values()])
             for key in ("x", "u", "y", "rates")
@@ -231,7 +226,7 @@ def _feeding(
     return fed
 
 
-def _clear(part: Linear) -> tuple[np.ndarray, ...]:
+def _clear(part: linear.Linear) -> tuple[np.ndarray, ...]:
     """Set entries of A, B, C and D to 0 that are rounding, compared with their row and column."""
     n = len(part.A)
     whole = np.block([[part.A, part.B], [part.C, part.D]])
@@ -285,11 +280,11 @@ def _refuse_algebraic_loop(outputs: Sequence[str], direct: np.ndarray) -> None:
 class Looped:
     """Part of a system on loops through its connections, which alone may make it unstable."""
 
-    parts: Mapping[str, Linear]
+    parts: Mapping[str, linear.Linear]
     connections: Sequence[Connection]
 
 
-def looped(parts: Mapping[str, Linear], connections: Iterable[Connection]) -> Looped:
+def looped(parts: Mapping[str, linear.Linear], connections: Iterable[Connection]) -> Looped:
     """Return the part of a system that signals come back to through a connection."""
     nodes = [
         (name, kind, variable)
@@ -317,7 +312,7 @@ def looped(parts: Mapping[str, Linear], connections: Iterable[Connection]) -> Lo
         if start is not None and end is not None:
             arrows[start, end] = True
             kept.append((c, start, end))
-    reached = closure(arrows)
+    reached = linear.closure(arrows)
     on_loop = [(c, start) for c, start, end in kept if reached[end, start]]
     on_some = [start for _, start in on_loop]
     both = reached & reached.T
