@@ -9,7 +9,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-import pydantic
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    NonNegativeInt,
+    PositiveInt,
+    ValidationError,
+    model_validator,
+)
 
 from rparm.errors import UserError, WrongValueError, hint
 from rparm.expressions.expression import Expression, parsed
@@ -24,16 +34,12 @@ MAX_PARAMETERS = 1000
 MAX_BLOCK = 100_000
 LONGEST_NAME = 100
 
-Name = Annotated[str, pydantic.Field(min_length=1, max_length=LONGEST_NAME)]
-Title = Annotated[
-    str, pydantic.Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")
-]
-Text = Annotated[str, pydantic.Field(min_length=1, max_length=2000)]
-Quantity = (
-    pydantic.FiniteFloat | str
-)  # a text has a unit: `rparm.campaign.bases` makes numbers of all
-Pair = Annotated[list[Quantity], pydantic.Field(min_length=2, max_length=2)]
-Number = pydantic.FiniteFloat | bool | str
+Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME)]
+Title = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
+Text = Annotated[str, Field(min_length=1, max_length=2000)]
+Quantity = FiniteFloat | str  # a text has a unit: `rparm.campaign.bases` makes numbers of all
+Pair = Annotated[list[Quantity], Field(min_length=2, max_length=2)]
+Number = FiniteFloat | bool | str
 
 
 def _seconds(given: Any) -> Any:
@@ -43,11 +49,11 @@ def _seconds(given: Any) -> Any:
         raise ValueError(str(error)) from None
 
 
-Seconds = Annotated[pydantic.FiniteFloat, pydantic.BeforeValidator(_seconds)]
+Seconds = Annotated[FiniteFloat, BeforeValidator(_seconds)]
 
 
-class _Table(pydantic.BaseModel):
-    model_config = pydantic.ConfigDict(extra="forbid", strict=True, frozen=True)
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
 class Distribution(_Table):
@@ -56,10 +62,8 @@ class Distribution(_Table):
     uniform: Pair | None = None  # lower and upper limit
     log_uniform: Pair | None = None  # the same, both positive
     normal: Pair | None = None  # mean and standard deviation
-    values: Annotated[list[Quantity], pydantic.Field(min_length=1, max_length=1_000_000)] | None = (
-        None
-    )
-    points: pydantic.PositiveInt | None = None  # of a grid between the limits
+    values: Annotated[list[Quantity], Field(min_length=1, max_length=1_000_000)] | None = None
+    points: PositiveInt | None = None  # of a grid between the limits
 
     @property
     def kind(self) -> str:
@@ -75,7 +79,7 @@ class Distribution(_Table):
         """Number of values of a grid."""
         return len(self.values) if self.kind == "values" else self.points
 
-    @pydantic.model_validator(mode="after")
+    @model_validator(mode="after")
     def _possible(self) -> Self:
         given = [name for name in KINDS if getattr(self, name) is not None]
         if len(given) != 1:
@@ -101,7 +105,7 @@ class Settling(_Table):
 
     variable: Name
     target: Quantity
-    band: Annotated[pydantic.FiniteFloat, pydantic.Field(gt=0)] | str
+    band: Annotated[FiniteFloat, Field(gt=0)] | str
 
 
 class Crossings(_Table):
@@ -115,8 +119,8 @@ class Tracking(_Table):
     """Distance of a point from its reference, both given by their coordinates."""
 
     of: Annotated[
-        list[Annotated[list[Name], pydantic.Field(min_length=2, max_length=2)]],
-        pydantic.Field(min_length=1, max_length=10),
+        list[Annotated[list[Name], Field(min_length=2, max_length=2)]],
+        Field(min_length=1, max_length=10),
     ]
 
 
@@ -133,7 +137,7 @@ class Keep(_Table):
     tracking: dict[Name, Tracking] = {}
     crossings: dict[Name, Crossings] = {}
     lyapunov: bool = False
-    trajectories: list[pydantic.NonNegativeInt] = []  # numbers of the runs
+    trajectories: list[NonNegativeInt] = []  # numbers of the runs
 
 
 class Map(_Table):
@@ -149,7 +153,7 @@ class Time(_Table):
 
     start: Seconds | None = None
     stop: Seconds | None = None
-    step: Annotated[Seconds, pydantic.Field(gt=0)] | None = None
+    step: Annotated[Seconds, Field(gt=0)] | None = None
 
 
 class Campaign(_Table):
@@ -159,16 +163,14 @@ class Campaign(_Table):
     system: Name | None = None  # or a file FILE.ssp, beside this one
     variant: Name | None = None  # of a system with parameter sets
     sampling: Literal["random", "sobol", "latin", "grid", "indices"]
-    seed: pydantic.NonNegativeInt = 0
-    runs: pydantic.PositiveInt | None = None
-    block: Annotated[int, pydantic.Field(ge=1, le=MAX_BLOCK)] = 200  # runs of a file of results
+    seed: NonNegativeInt = 0
+    runs: PositiveInt | None = None
+    block: Annotated[int, Field(ge=1, le=MAX_BLOCK)] = 200  # runs of a file of results
     output: Name | None = None  # folder, beside this file
     worst: list[Name] = []  # columns whose largest values the page lists
     time: Time = Time()
     set: dict[Name, Number] = {}
-    parameters: Annotated[
-        dict[Name, Distribution], pydantic.Field(min_length=1, max_length=MAX_PARAMETERS)
-    ]
+    parameters: Annotated[dict[Name, Distribution], Field(min_length=1, max_length=MAX_PARAMETERS)]
     derived: dict[Name, str] = {}
     keep: Keep
     maps: list[Map] = []
@@ -195,7 +197,7 @@ class Campaign(_Table):
         """Expressions of the derived values, in the order of the file."""
         return {name: parsed(text) for name, text in self.derived.items()}
 
-    @pydantic.model_validator(mode="after")
+    @model_validator(mode="after")
     def _fits(self) -> Self:
         if (self.scenario is None) == (self.system is None):
             raise ValueError("expected exactly one of scenario, system")
@@ -267,7 +269,7 @@ def checked(content: Mapping[str, Any], where: object) -> Campaign:
     """Return the campaign of this content; a UserError begins with `where`."""
     try:
         return Campaign.model_validate(content)
-    except pydantic.ValidationError as error:
+    except ValidationError as error:
         raise UserError(f"{where}: {_explained(error)}") from None
 
 
@@ -281,7 +283,7 @@ EXPECTED = {
 }
 
 
-def _explained(error: pydantic.ValidationError) -> str:
+def _explained(error: ValidationError) -> str:
     """Explain the first mistake in one line: its place, what is expected, what is there."""
     first = error.errors()[0]
     # pydantic adds the members of a union that it tried

@@ -16,14 +16,21 @@ from fmpy import fmi2, fmi3
 from fmpy.fmi1 import FMICallException
 
 from rparm.errors import UserError
-from rparm.fmi import fmi_instance
+from rparm.fmi.fmi_instance import (
+    Call,
+    InputPolynomials,
+    Instance,
+    SavedState,
+    UnpackedFmu,
+    doubles,
+)
 
 # Without them FMUs send errors only. They cost nothing as long as all is well.
 LOGGED = ("logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal")
 MOST_UPDATES = 100  # of the discrete states at one time
 
 
-class Fmi2Instance(fmi_instance.Instance):
+class Fmi2Instance(Instance):
     # the folder of FMI 3.0 first, because on Arm linux64 may be for x86-64
     PLATFORMS = (fmpy.platform_tuple, fmpy.platform)
     LIBRARY = fmi2.FMU2Slave
@@ -37,9 +44,7 @@ class Fmi2Instance(fmi_instance.Instance):
         "String": "setString",
     }
 
-    def __init__(
-        self, fmu: fmi_instance.UnpackedFmu, name: str, smooth_inputs: Sequence[str] = ()
-    ) -> None:
+    def __init__(self, fmu: UnpackedFmu, name: str, smooth_inputs: Sequence[str] = ()) -> None:
         super().__init__(fmu, name, smooth_inputs)
         # The texts are taken as sent: fmpy's proxy, which fills in printf arguments, has one logger
         # for the whole process. The structure stays referenced for as long as the FMU uses it.
@@ -67,26 +72,22 @@ class Fmi2Instance(fmi_instance.Instance):
     def _integer(self, reference: int) -> int:
         return self.fmi.getInteger([reference])[0]
 
-    def _real_calls(
-        self, references: Array, values: Array
-    ) -> tuple[fmi_instance.Call, fmi_instance.Call]:
+    def _real_calls(self, references: Array, values: Array) -> tuple[Call, Call]:
         fmi, arguments = self.fmi, (self.fmi.component, references, len(references), values)
         return partial(fmi.fmi2GetReal, *arguments), partial(fmi.fmi2SetReal, *arguments)
 
-    def _derivative_call(
-        self, references: Array, orders: Array, values: Array
-    ) -> fmi_instance.Call:
+    def _derivative_call(self, references: Array, orders: Array, values: Array) -> Call:
         arguments = self.fmi.component, references, len(references), orders, values
         return partial(self.fmi.fmi2GetRealOutputDerivatives, *arguments)
 
-    def input_polynomials(self, names: Sequence[str], order: int) -> fmi_instance.InputPolynomials:
+    def input_polynomials(self, names: Sequence[str], order: int) -> InputPolynomials:
         fmi, count = self.fmi, len(names)
-        memory, numbers = fmi_instance.doubles(count * (order + 1))
+        memory, numbers = doubles(count * (order + 1))
         rows = numbers.reshape(order + 1, count)
         set_values = self.reals(names, (c_double * count).from_buffer(memory)).set
         further = count * order
         if not further:
-            return fmi_instance.InputPolynomials(rows, set_values)
+            return InputPolynomials(rows, set_values)
         set_derivatives = partial(
             fmi.fmi2SetRealInputDerivatives,
             fmi.component,
@@ -100,20 +101,20 @@ class Fmi2Instance(fmi_instance.Instance):
             set_values()
             set_derivatives()
 
-        return fmi_instance.InputPolynomials(rows, set_all)
+        return InputPolynomials(rows, set_all)
 
     def do_step(self, start: float, length: float, goes_back: bool = False) -> None:
         final = fmi2.fmi2False if goes_back else fmi2.fmi2True
         self.fmi.fmi2DoStep(self.fmi.component, start, length, final)
 
-    def saved_state(self) -> fmi_instance.SavedState:
+    def saved_state(self) -> SavedState:
         fmi = self.fmi
-        return fmi_instance.SavedState(
+        return SavedState(
             fmi.component, fmi.fmi2GetFMUstate, fmi.fmi2SetFMUstate, fmi.fmi2FreeFMUstate
         )
 
 
-class Fmi3Instance(fmi_instance.Instance):
+class Fmi3Instance(Instance):
     """Instance of an FMU of FMI 3.0.
 
     It has no derivatives of inputs: in a step the FMU asks for the inputs at times inside of it
@@ -172,21 +173,17 @@ class Fmi3Instance(fmi_instance.Instance):
     def _integer(self, reference: int) -> int:
         return self.fmi.getInt32([reference])[0]
 
-    def _real_calls(
-        self, references: Array, values: Array
-    ) -> tuple[fmi_instance.Call, fmi_instance.Call]:
+    def _real_calls(self, references: Array, values: Array) -> tuple[Call, Call]:
         fmi, count = self.fmi, len(references)
         arguments = fmi.component, references, count, values, count
         return partial(fmi.fmi3GetFloat64, *arguments), partial(fmi.fmi3SetFloat64, *arguments)
 
-    def _derivative_call(
-        self, references: Array, orders: Array, values: Array
-    ) -> fmi_instance.Call:
+    def _derivative_call(self, references: Array, orders: Array, values: Array) -> Call:
         count = len(references)
         arguments = self.fmi.component, references, count, orders, values, count
         return partial(self.fmi.fmi3GetOutputDerivatives, *arguments)
 
-    def input_polynomials(self, names: Sequence[str], order: int) -> fmi_instance.InputPolynomials:
+    def input_polynomials(self, names: Sequence[str], order: int) -> InputPolynomials:
         coefficients = np.zeros((order + 1, len(names)))
         inputs, powers = self.reals(names), np.arange(order + 1)
         factorials = np.array([math.factorial(power) for power in powers], dtype=float)
@@ -200,7 +197,7 @@ class Fmi3Instance(fmi_instance.Instance):
             set_in_step(self._start)
             self._inputs = set_in_step if order else None
 
-        return fmi_instance.InputPolynomials(coefficients, set_all)
+        return InputPolynomials(coefficients, set_all)
 
     def input_functions(
         self, names: Sequence[str], values: Callable[[float], Sequence[float] | np.ndarray]
@@ -236,14 +233,14 @@ class Fmi3Instance(fmi_instance.Instance):
             time = self._time.value
             raise UserError(f"{self.name}: the FMU ends the simulation at t = {time!r} s")
 
-    def saved_state(self) -> fmi_instance.SavedState:
+    def saved_state(self) -> SavedState:
         fmi = self.fmi
-        return fmi_instance.SavedState(
+        return SavedState(
             fmi.component, fmi.fmi3GetFMUState, fmi.fmi3SetFMUState, fmi.fmi3FreeFMUState
         )
 
 
-class _ModelExchange(fmi_instance.Instance):
+class _ModelExchange(Instance):
     """Ends initialization in continuous-time mode, after all events of the start."""
 
     next_event: float | None = None  # s, of the next time event
