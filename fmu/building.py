@@ -52,10 +52,7 @@ def _write(folder: Path, texts: dict[str, str]) -> None:
 def build(
     file: ModelFile, references: dict[lock.Key, int], runtimes: list[Runtime], work: Path
 ) -> dict[str, list[tuple[str, Path]]]:
-    """Make all that the FMUs consist of, in the empty folder `work`.
-
-    What they contain, by the version of FMI: names in the archive, and files.
-    """
+    """Make all parts of the FMUs in the empty folder `work`; names and files by version of FMI."""
     declared = write_c(file, references, work)
     provenance = Provenance(runtimes[0].content["version"])
     texts = {
@@ -129,10 +126,7 @@ class Runtime:
 
     @classmethod
     def load(cls, path: Path, of_this_machine: bool) -> Runtime:
-        """Load runtime.json; ModelFileError if it is not there, or no compiler for it.
-
-        For this machine, gcc and clang come before zig.
-        """
+        """Load runtime.json; ModelFileError without it or a compiler: gcc and clang before zig."""
         try:
             content = json.loads(path.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:

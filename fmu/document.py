@@ -58,9 +58,8 @@ class FormulaError(Exception):
 def mathml(latex: str, display: str) -> str:
     """Convert a formula without dollar signs to a math element, "inline" or "block" (`display`).
 
-
-    FormulaError if it does not convert: the converter passes on unknown commands and does not
-    notice a missing argument, so its result is searched for signs of either.
+    The converter passes on unknown commands and misses no argument: FormulaError if its result has
+    signs of either.
     """
     try:
         root = ET.fromstring(convert(latex, display=display))
@@ -142,10 +141,9 @@ def prepare_tables(tokens: Iterable[Token]) -> None:
 
 
 def readme_page(readme: Path) -> tuple[str, list[Path], list[tuple[str, str]]]:
-    """Write README.md as the inside of an HTML body.
+    """Write README.md as the inside of an HTML body; return it, local images, and headings.
 
-    Also its local images, which the HTML refers to by their names, and identifier and text (HTML)
-    of each heading of level 2.
+    Headings of level 2 are pairs of identifier and text (HTML).
     """
 
     def formula(latex: str, options: dict[str, bool]) -> str:

@@ -35,10 +35,7 @@ def collect(entries: list[str]) -> list[tuple[str, Path]]:
 
 
 def pack(archive: Path, files: list[tuple[str, Path]]) -> None:
-    """Write the archive to a temporary name and rename it, so that a broken one never stays.
-
-    Libraries for macOS may have the same name: they become one.
-    """
+    """Write the archive to a temporary name and rename it; join libraries for macOS of one name."""
     contents: dict[str, list[bytes]] = {}
     for name, path in files:
         contents.setdefault(name, []).append(path.read_bytes())
@@ -58,10 +55,7 @@ def pack(archive: Path, files: list[tuple[str, Path]]) -> None:
 
 
 def universal(libraries: Sequence[bytes]) -> bytes:
-    """One library with the code of several processors, as lipo makes it.
-
-    ValueError if one is not for macOS, or two are for one processor.
-    """
+    """Join libraries for macOS as lipo does; ValueError for others, or two for one processor."""
     parts = {}
     for library in libraries:
         processor, kind = struct.unpack_from("<II", library.ljust(12, b"\0"), 4)

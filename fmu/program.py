@@ -47,10 +47,7 @@ def read_text(path: Path) -> str:
 
 @contextmanager
 def atomic_write(path: Path) -> Iterator[Path]:
-    """Yield a temporary path to write to, which becomes `path` at the end.
-
-    The file appears complete or not at all: on failure the temporary one is removed.
-    """
+    """Yield a temporary path, which becomes `path` at the end, or is removed on failure."""
     temporary = path.with_name(f".{os.getpid()}.{path.name}")
     try:
         yield temporary
@@ -71,10 +68,7 @@ class Provenance:
 
 
 def license_texts(path: Path) -> dict[str, str]:
-    """Return author, license and copyright from a LICENSE.
-
-    It has "NAME License" and "Copyright (c) YEAR, AUTHOR".
-    """
+    """Return author, license and copyright from a file with "NAME License" and "Copyright (c)"."""
     text = read_text(path)
     title = re.match(r"(.+) License\n", text)
     notice = re.search(r"^Copyright \(c\) [-\d]+, (.+)$", text, re.MULTILINE)

@@ -41,10 +41,7 @@ def formula(op: str, *given: str) -> str:
 
 
 class Code:
-    """Statements, to which each value that is asked for is added once.
-
-    With an `outer` code, values that do not move are calculated there.
-    """
+    """Statements, each value once; values that do not move are calculated in an `outer` code."""
 
     def __init__(self, leaves: Leaves, prefix: str = "n", outer: Code | None = None) -> None:
         self.leaves, self.prefix, self.outer = leaves, prefix, outer

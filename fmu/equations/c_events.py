@@ -205,10 +205,7 @@ class Events:
 
 
 def _guards(graph: Graph, roots: Iterable[tuple[Value, Value | None]]) -> Guards:
-    """Return, for each mode that is read, under which modes and parameters it is.
-
-    roots: values that are needed, each with its condition.
-    """
+    """Return under which modes and parameters each mode is read; `roots` are values, conditions."""
     found: Guards = {}
     modes: dict[Value, list[Value]] = {}  # by the distance that they follow from
     for relation in graph.relations.values():

@@ -16,10 +16,7 @@ NEVER_STEEPER_THAN_1 = ("sin", "cos", "atan", "tanh")
 
 
 class Errors:
-    """C expressions of errors, as constants of a code that has the values.
-
-    given: the errors of leaves; all others are exact.
-    """
+    """C expressions of errors, as constants of a code; leaves without `given` errors are exact."""
 
     def __init__(self, code: Code, given: Leaves) -> None:
         self.code, self.given = code, given

@@ -96,8 +96,8 @@ class Relation:
 class Graph:
     """Makes values, and finds those that exist.
 
-    A relation of values that move is a switch: its result is a mode, which changes at events only.
-    `relations` has the relations by the names of their modes.
+    A relation of values that move is a switch: its result is a mode, which changes at events only;
+    `relations` has them by mode.
     """
 
     known: dict[tuple, Value] = field(default_factory=dict)

@@ -22,10 +22,7 @@ def path_of(model: Path) -> Path:
 
 
 def references(path: Path, wanted: list[Key]) -> dict[Key, int]:
-    """References of all variables that the lock file has and of those wanted; does not write it.
-
-    ModelFileError if it cannot be used.
-    """
+    """Return references of all variables in the lock file, or wanted; ModelFileError."""
     found = _read(path) if path.exists() else {}
     following = max([0, *found.values()]) + 1
     for key in wanted:

@@ -40,12 +40,11 @@ def model_description(
 
 
 def with_aliases(declaration: Declaration) -> dict[str, Variable]:
-    """All variables, and after each state that is the derivative of another one its alias.
+    """Return all variables, and after each state that is the derivative of another one its alias.
 
     Importers expect each state derivative among the initial unknowns, and no variable that has a
-    start value, as states do. So the alias, der_STATE, is the derivative: it has the value
-    reference of the state, and no start value. The state is not marked as a derivative: importers
-    take each variable that is for the derivative of a further state.
+    start value, as states do. So the alias, der_STATE, is the derivative, with the state's value
+    reference and no start value; marked themselves, states would be for a further state.
     """
     variables: dict[str, Variable] = {}
     for name, variable in declaration.variables.items():

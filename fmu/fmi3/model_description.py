@@ -164,10 +164,7 @@ def add_structure(root: ET.Element, declaration: Declaration) -> None:
 
 
 def terminals_and_icons(declaration: Declaration) -> str:
-    """Return the text of terminalsAndIcons.xml.
-
-    The icon is model.png beside the declaration, if it exists.
-    """
+    """Return the text of terminalsAndIcons.xml; the icon is model.png beside the declaration."""
     root = ET.Element("fmiTerminalsAndIcons", fmiVersion="3.0")
     icon = declaration.path.with_name("model.png")
     if icon.is_file():
@@ -219,10 +216,7 @@ def add_terminals(parent: ET.Element, terminals: Mapping[str, Terminal]) -> None
 
 
 def build_description(identifier: str, sources: Sequence[str]) -> str:
-    """Return the text of buildDescription.xml.
-
-    sources: files beside it, each compiled by itself.
-    """
+    """Return the text of buildDescription.xml; `sources` beside it are compiled one by one."""
     root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
     files = ET.SubElement(configuration, "SourceFileSet", language="C11")

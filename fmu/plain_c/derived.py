@@ -116,10 +116,9 @@ class Curve:
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is to be derived from a function.
+    """A "jacobian", "rates" (first derivatives along a curve) or "derivatives" (both) to derive.
 
-    kind: "jacobian", "rates" (first derivatives along a curve) or "derivatives" (first and second).
-    of: the arguments that it writes, if not of all. by: the arguments that move.
+    `of`: the arguments that the function writes, if not of all. `by`: the arguments that move.
     """
 
     name: str

@@ -23,10 +23,7 @@ MIRRORED = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "==", "!=": "!="}
 
 @dataclass(frozen=True)
 class Table:
-    """What follows from an integer leaf: a result for each of its possible values.
-
-    results is None for a leaf whose possible values are not known: the leaf itself.
-    """
+    """Results for all values of an integer leaf; None: the leaf itself, of unknown values."""
 
     leaf: Value
     results: tuple[tuple[int, Any], ...] | None

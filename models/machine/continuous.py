@@ -39,11 +39,10 @@ Columns = dict[str, np.ndarray]
 
 @dataclass(frozen=True)
 class Method:
-    """One way to step the machine.
+    """A way to step the machine.
 
-    The payload changes at 0.2005 s and 3.7005 s. These are communication points for the master,
-    which passes the change on at once. For Ecos, whose times are sums of steps, they are in the
-    middle of a step, so that the payload always changes half a step later.
+    The payload changes at 0.2005 s and 3.7005 s: points for the master, which passes it on at once;
+    in the middle of a step for Ecos, whose times are sums of steps, so that it is half a step late.
     """
 
     name: str
@@ -106,10 +105,10 @@ def run(
 
 
 def limit(runs: Sequence[Columns], per_second: Sequence[int], power: int) -> tuple[Columns, float]:
-    """Values for a step that goes to 0, and by which factor rounding of the runs grows at most.
+    """Return values for a step that goes to 0, and by which factor rounding of runs grows at most.
 
-    The `runs` differ by their steps. Errors are taken for a polynomial in the step that begins with
-    `power` and has as many terms as there are runs but one.
+    The `runs` differ by their steps. Errors are a polynomial in the step from `power` on, with as
+    many terms as there are runs but one.
     """
     steps = per_second[0] / np.array(per_second)
     terms = steps[:, None] ** np.array([0, *range(power, power + len(runs) - 1)])
@@ -122,10 +121,9 @@ def limit(runs: Sequence[Columns], per_second: Sequence[int], power: int) -> tup
 
 
 def largest_error(columns: Columns, expected: Columns) -> tuple[float, str]:
-    """Largest difference of all variables, relative to the largest value of each, and whose it is.
+    """Return the largest difference relative to the largest value of each variable, and its name.
 
-    As the errors of `rparm.runs.comparison`, but never relative to a sum. `columns` have the first
-    rows of `expected`, or all.
+    No error is relative to a sum, as in `rparm.runs.comparison`. `columns` may have fewer rows.
     """
     errors = {
         name: float(

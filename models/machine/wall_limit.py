@@ -64,10 +64,9 @@ class Contact:
 def least_damping(
     contact: Contact, step: float, order: str = "jacobi", inputs: str = "held"
 ) -> float:
-    """Damping above which the contact is stable, to leading order in the step, N.s/m.
+    """Return the damping (N.s/m) above which the contact is stable, to leading order in a step (s).
 
-    The step (s) is small against the period of the contact, whose damping is not used; with held
-    inputs neither is its mass.
+    It is without regard to the contact's own damping and, with held inputs, its mass.
     """
     if inputs == "held":
         return AGE[order] * step * contact.stiffness
@@ -124,12 +123,11 @@ _STEPS: dict[tuple[str, str], tuple[Step, int]] = {
 def transition(
     contact: Contact, step: float, order: str = "jacobi", inputs: str = "held"
 ) -> np.ndarray:
-    """Matrix that leads from one communication point to the next, shape (n, n).
+    """Return the matrix from one communication point to the next, shape (n, n).
 
-    The state is the deviation from the equilibrium: depth (m) and velocity into the wall (m/s),
-    then the past on which the next step depends. In Jacobi order it is the force (N) on the mass,
-    in Gauss-Seidel order nothing; with extrapolated inputs it is force and slope (N/s), in Jacobi
-    order after the acceleration (m/s2).
+    It acts on depth (m) and velocity (m/s) from the equilibrium, then on the past: in Jacobi order
+    the force (N) on the mass; with extrapolated inputs force and slope (N/s), in Jacobi order after
+    the acceleration (m/s2).
     """
     function, size = _STEPS[order, inputs]
     return np.array([function(contact, step, tuple(unit)) for unit in np.eye(size).tolist()]).T

@@ -235,10 +235,10 @@ def path_error(columns: Columns) -> np.ndarray:
 
 
 def predicted_error(loop: ClosedLoop, smooth: Columns, method: Method) -> np.ndarray:
-    """First-order prediction of the end effector's error along a motion without coupling error.
+    """Predict the end effector's error along a motion without coupling error, to first order.
 
-    e'' + Kd e' + Kp e = D^-1 delta, where delta is what the efforts lack: those applied are the
-    law's of references and measurements of other times, on the average over a step.
+    e'' + Kd e' + Kp e = D^-1 delta, where the efforts lack delta, as they are the law's of
+    references and measurements of other times, on the average over a step.
     """
     step = smooth["time"][1] - smooth["time"][0]
     ages = {  # mean ages of references and measurements in steps

@@ -78,10 +78,7 @@ def state_error(columns: Columns, exact: Columns) -> float:
 
 
 def created_energy(loop: ClosedLoop, columns: Columns) -> float:
-    """What the arm's energy gained beyond the work of the efforts that the control law asks for.
-
-    The law is evaluated at the arm's momentary motion; without coupling error nothing remains. J.
-    """
+    """Return the energy (J) that the arm gained beyond the efforts of the law at its motion."""
     efforts = law(loop, columns)
     power = efforts[0] * columns["arm.dq1"] + efforts[1] * columns["arm.dq2"]
     gained = columns["arm.total_energy"][-1] - columns["arm.total_energy"][0]

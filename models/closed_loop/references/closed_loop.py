@@ -41,10 +41,10 @@ def monolithic(
     state: Sequence[float] | None = None,
     real: type = np.longdouble,
 ) -> Columns:
-    """The closed loop in continuous time: every one of `COLUMNS`, (times,), in `real`.
+    """Return `COLUMNS` (times,) of the closed loop in continuous time, in `real`.
 
-    The motion begins at the first of `times` (s, ascending) with `state`: q1, q2, dq1, dq2,
-    integral1, integral2; without it, with the start values of the parameters.
+    The motion begins at the first of `times` (s) with the start values or `state`: q1, q2, dq1,
+    dq2, integral1, integral2.
     """
     loop, segments, start = prepare(parameters, real)
     times = _ascending(times, real)
@@ -79,17 +79,13 @@ def sampled(
     read: str = "before",
     real: type = np.longdouble,
 ) -> Columns:
-    """The closed loop stepped with held inputs, each component solved exactly; as `monolithic`.
+    """Step the closed loop with held inputs, each component solved exactly; as `monolithic`.
 
-    At the first point everything is consistent. Every step takes the components to the next of
-    `times` with the inputs that they were given; then inputs are set from the outputs of that
-    point.
-
-    Order ``jacobi``: all components step with the outputs of the point before; ``gauss_seidel``:
-    trajectory, controller and arm, each with the newest outputs of those before it;
-    ``gauss_seidel_arm_first``: the same for trajectory, arm and controller. The values of a point
-    are read ``before`` the inputs are set there, so that outputs still have the inputs of the step,
-    or ``after``.
+    At the first point everything is consistent. Every step leads to the next of `times` with the
+    inputs that were given; then inputs are set from that point's outputs. Order ``jacobi``: all
+    components step with the outputs of the point before; ``gauss_seidel``: trajectory, controller
+    and arm, each with the newest outputs; ``gauss_seidel_arm_first``: trajectory, arm, controller.
+    Values are read ``before`` the inputs are set, with the inputs of the step, or ``after``.
     """
     for what, value, items in (("order", order, ORDERS), ("read", read, READ)):
         if value not in items:
@@ -137,9 +133,9 @@ def reference_motion(
 
 
 def prepare(parameters: Parameters, real: type) -> tuple[Loop, np.ndarray, np.ndarray]:
-    """The equations with the parameters in them, the trajectory's segments and the start.
+    """Return equations with parameters, the trajectory's segments and the start.
 
-    Segments are (segments, 8): time of the begin, coefficients of the progress from there.
+    Segments (segments, 8) are the time of the begin and the progress' coefficients from there.
     """
     values = _complete(parameters)
     number = {name: real(v) for name, v in values.items() if not isinstance(v, str)}

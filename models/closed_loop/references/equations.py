@@ -60,10 +60,10 @@ def law(mode: str) -> sp.Matrix:
 
 
 def reference(path: str) -> dict[str, sp.Expr]:
-    """Outputs of the trajectory on one segment, as functions of time.
+    """Return outputs of the trajectory on a segment, as functions of time.
 
-    The progress is a polynomial of the time since the segment's begin: a share of the way, or for a
-    circle the time for which the angle has moved at its full rate.
+    The progress is a polynomial of the time in the segment: a share of the way, or for a circle the
+    time for which the angle has moved at its full rate.
     """
     progress = sp.Symbol("progress")
     if path == "point_to_point":
@@ -96,10 +96,10 @@ def reference(path: str) -> dict[str, sp.Expr]:
 
 
 def _through_inverse_kinematics(path: str, progress: sp.Expr) -> tuple[sp.Matrix, sp.Matrix]:
-    """Position of the end effector and the joints that hold it there.
+    """Return the position of the end effector and the joints that hold it there.
 
-    The direction from the axis of joint 1 is counted from a heading, from which it never differs by
-    half a turn: the start of the line, the center of a circle aside, the radius of one around.
+    The direction from joint 1's axis is counted from a heading, at less than half a turn: the start
+    of the line, the center of a circle aside, the radius of one around.
     """
     if path == "line":
         start = sp.Matrix(symbols("trajectory", "ee_x_from ee_y_from"))

@@ -37,13 +37,10 @@ class Switch:
 class Loop:
     """Equations of one of `equations.PATHS` and one of `equations.MODES`.
 
-    All that changes from run to run or within one is a runtime value, named like the variable:
-
-    - the parameters of the components that are `numbers`;
-    - ``segment.*``, the trajectory between two of its corners;
-    - ``held.*``, what a component reads during a step;
-    - ``at_limit*``, 1 where an effort is at the limit ``level*``, else 0;
-    - ``back*`` in 1/(kg.m2.s) and 1/(kg.s), how fast the integral part gives way there.
+    Runtime values, named like variables, are the components' parameters that are `numbers`; of the
+    trajectory between corners ``segment.*``; inputs of a step ``held.*``; ``at_limit*``, 1 where an
+    effort is at ``level*``, else 0; and ``back*`` in 1/(kg.m2.s) and 1/(kg.s), how fast the
+    integral part gives way there.
     """
 
     def __init__(self, path: str, mode: str, numbers: Iterable[str], real: type) -> None:

@@ -173,8 +173,7 @@ class Environment:
 class Controller:
     """Computed torque with integral action, of the arm and the payload that it knows.
 
-    The inertia and the forces to be cancelled are those of the Lagrangian of the plant's
-    references, with the controller's parameters and without what it does not know.
+    Inertia and forces to cancel are of the plant's Lagrangian with the controller's parameters.
     """
 
     REFERENCES = ("q1_ref", "q2_ref", "dq1_ref", "dq2_ref", "ddq1_ref", "ddq2_ref")

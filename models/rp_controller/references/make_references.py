@@ -35,10 +35,7 @@ mp.dps = 40
 
 @cache
 def equations_of_the_arm() -> Callable[..., tuple]:
-    """Function of parameters, q and dq that gives D, C(q, dq) dq and g(q), by Euler-Lagrange.
-
-    Of the plant's equations, with the payload, where its mass and inertia are above 0.
-    """
+    """Make a function of parameters, q, dq for D, C(q, dq) dq, g(q); a payload above 0 counts."""
     e = plant.derive()
     unknown = [f"{name}{joint}" for name in plant.PER_JOINT for joint in (1, 2)]
     alone = dict.fromkeys((*unknown, *plant.INPUTS), 0) | {"attached": 1}

@@ -25,20 +25,11 @@ class WrongAnswer(Exception):
 
 @dataclass(frozen=True)
 class Question:
-    """A line for `prove --operations`, and what its answer has to satisfy.
+    """A line for `prove --operations`, and a check of its answer."""
 
-    Attributes
-    ----------
-    name : str
-        Of the operation.
-    line : str
-        How many operands there are, and they.
-    check : callable
-        Raises WrongAnswer; gets the numbers of two balls, from the operation's result on.
-    """
-
-    name: str
-    line: str
+    name: str  # of the operation
+    line: str  # number of operands, and operands
+    # raises WrongAnswer; gets the numbers of two balls, from the operation's result on
     check: Callable[[Sequence[float]], None]
 
 

@@ -27,10 +27,9 @@ class Joints:
 
 
 class Plant:
-    """State, modes and sums from t = 0.
+    """State, modes and sums from t = 0; `values` by the FMU's names, `rates` of inputs per s.
 
-    `values` are parameters, initial states and inputs by the FMU's names, `rates` those of the
-    inputs per s. Bouncing ends where the next bounce goes no higher than `rest_height` (rad, m).
+    Bouncing ends where the next bounce goes no higher than `rest_height` (rad, m).
     """
 
     def __init__(
