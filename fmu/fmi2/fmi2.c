@@ -1,5 +1,4 @@
-/* All functions of FMI 2.0: checks of arguments that only FMI has, conversion of types and status,
- * and nothing else. */
+/* All functions of FMI 2.0: checks of arguments, conversion of types and status, nothing else. */
 #include "component.h"
 #include "fmi2Functions.h"
 #include "fmi2_functions.h"

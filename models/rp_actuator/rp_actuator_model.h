@@ -1,5 +1,4 @@
-/* The drives as the instance runs them: their value structure, to which variables.toml binds the
- * variables, and their struct model. */
+/* Value structure of the drives, to which variables.toml binds the variables, and struct model. */
 #pragma once
 
 #include "model.h"

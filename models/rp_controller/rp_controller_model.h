@@ -1,5 +1,4 @@
-/* The controller as the instance runs it: its value structure, to which variables.toml binds the
- * variables, and its struct model. */
+/* Value structure of the controller, to which variables.toml binds variables, and struct model. */
 #pragma once
 
 #include "model.h"

@@ -1,5 +1,4 @@
-/* The manipulator as the instance runs it: its value structure, to which variables.toml binds the
- * variables, and its struct model. */
+/* Value structure of the manipulator, to which variables.toml binds variables; struct model. */
 #pragma once
 
 #include "model.h"

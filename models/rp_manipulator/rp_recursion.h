@@ -64,8 +64,7 @@ static inline void write_loads(const struct joint_loads *loads, struct rp_joint_
 
 /* ---- Forward -------------------------------------------------------------------------------- */
 
-/* omega' x r + omega x (omega x r): acceleration of a point fixed to a body whose origin does not
- * accelerate. */
+/* omega' x r + omega x (omega x r): acceleration at r of a body with an unaccelerated origin. */
 static inline struct vector rigid_acceleration(struct vector omega, struct vector domega,
                                                struct vector r) {
     const struct vector centripetal = vector_cross(omega, vector_cross(omega, r));

@@ -1,5 +1,4 @@
-/* Equations of an incremental encoder: noise, and the count that a position gives. The page
- * README.md derives them. */
+/* Equations of an incremental encoder: noise, and the count of a position (README.md). */
 #pragma once
 
 #include <stdint.h>

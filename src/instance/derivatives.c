@@ -6,8 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Returns the variable if it serves; otherwise NULL, with a message that says which kind is
- * expected. */
+/* Returns the variable if it serves; otherwise NULL, with a message about the expected kind. */
 static const struct variable *
 find_as(const struct instance *instance, unsigned reference,
         bool (*serves)(const struct instance *, const struct variable *), const char *expected) {
@@ -87,8 +86,7 @@ enum status instance_set_input_derivatives(struct instance *instance, const unsi
     return STATUS_OK;
 }
 
-/* Writes the derivatives of all calculated values to instance->first_derivatives and second, which
- * may be NULL. */
+/* Writes all calculated values' derivatives to first_derivatives and second, perhaps NULL. */
 static enum status propagate(struct instance *instance, double dt, char *second) {
     const double t = instance->state.time.s;
     const enum status status = instance->model->propagate(instance->memory.values, t, dt,
@@ -224,8 +222,7 @@ static double *double_in(char *structure, const struct variable *variable) {
     return (double *)(void *)(structure + variable->offset);
 }
 
-/* Checks that the value and its derivative are finite. direction: name of the direction of the
- * derivative, for a message. */
+/* Checks that a value and its derivative are finite. direction: its name, for a message. */
 static enum status check_derivative(const struct instance *instance, const struct variable *unknown,
                                     const char *direction) {
     if (unknown->owner == VARIABLE_OF_MODEL &&

@@ -1,5 +1,4 @@
-/* Refuses a state read from bytes that no instance can be in: a hash that fits does not prove it.
- */
+/* Refuses a state from bytes that no instance can have: a fitting hash does not prove it. */
 #pragma once
 
 #include "state.h"

@@ -1,5 +1,4 @@
-/* Settings of an instance: its experiment, its parameters, and the integrator's settings that
- * follow. */
+/* Settings of an instance: experiment, parameters, and the integrator's settings from them. */
 #pragma once
 
 #include "state.h"

@@ -120,8 +120,7 @@ const char *variable_type_name(enum variable_type type);
 
 /* ---- Values of the instance ----------------------------------------------------------------- */
 
-/* Values of the variables with owner = "instance" (time_variable.toml, solver_variables.toml).
- */
+/* Values of variables with owner = "instance" (time_variable.toml, solver_variables.toml). */
 struct instance_values {
     double time;                         /* s */
     int solver_steps;                    /* internal steps since initialization */

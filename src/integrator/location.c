@@ -167,8 +167,7 @@ static double fall_behind(const struct roots_polynomial *p, double s) {
     return INFINITY;
 }
 
-/* True if p, between two roots, is no farther from 0 than `touch` or the rounding of its
- * coefficients. */
+/* True if p, between two roots, is no farther from 0 than `touch` or its rounding. */
 static bool is_touch(const struct roots_polynomial *p, double begin, double end, double touch) {
     const double s = 0.5 * (begin + end);
     double value = 0.0;
@@ -214,8 +213,7 @@ static double fall_or_end(const struct roots_polynomial *p, const struct fall *f
     return INFINITY;
 }
 
-/* Returns the first s at which p, below the level before, is above it; INFINITY if it stays below.
- */
+/* Returns the first s at which p, below the level before, is above it; INFINITY: nowhere. */
 static double first_rise(const struct roots_polynomial *p, double level) {
     double c[ROOTS_LENGTH];
     c[0] = level - p->c[0];
@@ -303,8 +301,7 @@ double fall_first(const struct roots_polynomial *p, const struct fall *fall) {
     return s > 0.0 && s <= 1.0 ? fall_or_end(p, fall) : s;
 }
 
-/* Returns fall_first of indicator i; given: the fields of struct fall that do not follow from
- * location. */
+/* Returns fall_first of indicator i; given: the fields of struct fall but for location's. */
 static double first_fall(const struct location *location, size_t i,
                          const struct roots_polynomial *p, const struct fall *given) {
     struct fall fall = *given;
@@ -334,8 +331,7 @@ static void expand(const struct step_polynomial *step, const struct indicator *i
     }
 }
 
-/* True if the state moves by less than the indicator is above 0 and above its noise at a restart.
- */
+/* True if the state moves by less than the indicator is above its noise at a restart. */
 static bool is_far_above(const struct step_polynomial *step, const struct indicator *indicator,
                          double value, double noise) {
     const double *row = step->row[indicator->state];

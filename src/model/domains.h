@@ -20,8 +20,7 @@ struct domains {
     int relation_count;
     const struct relation *relation;
     const size_t *row_of_indicator;
-    size_t own_row; /* row of the series that is 1 in order 0 if it is not in the modes of its
-                       values */
+    size_t own_row; /* row that is 1 in order 0 if it is not in its values' modes */
     void (*write_distances)(const void *values, double t, double distance[]);
 
     /* as in struct model, struct model_events and struct series */
