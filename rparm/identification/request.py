@@ -22,9 +22,7 @@ from rparm.fmi.model import INITIAL, INPUTS, METHOD, PARAMETERS, Model, Value, V
 from rparm.identification.logs import LENGTH, Column
 from rparm.units import quantity
 
-CLOSEST = np.log(
-    1e-6
-)  # to a limit, of the distance at the start: from here on a parameter is at it
+CLOSEST = np.log(1e-6)  # of the distance from a limit at the start: nearer, a parameter is at it
 LARGEST = 700.0  # whose exponential is a double: ends of very long intervals
 DELAY = "delay"  # between the outputs and their measured values
 FASTEST = "taylor", "erk"  # methods of integration, for steps as short as a log's
@@ -63,10 +61,8 @@ class Parameters:
     def __init__(self, every: Sequence[Parameter], fixed: Mapping[str, float]) -> None:
         self.every, self._fixed = tuple(every), fixed
         self.names = tuple(parameter.name for parameter in every)
-        start = dict(zip(self.names, (p.start for p in every), strict=True))
-        self._low = {
-            p.name: (fixed | start)[p.above] if p.above else p.least for p in every
-        }  # at the start
+        known = {**fixed, **{p.name: p.start for p in every}}
+        self._low = {p.name: known[p.above] if p.above else p.least for p in every}  # at the start
         self._order = sorted(range(len(every)), key=lambda i: bool(every[i].above))
 
     def __len__(self) -> int:
