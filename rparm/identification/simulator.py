@@ -138,14 +138,9 @@ class _Runner:
     def _advance(self, segment: Segment) -> np.ndarray:
         record = np.empty((len(segment.times), len(self._watched)))
         record[0] = self._stepper.reals.values[self._watched]
-        _, failure = self._stepper.advance(
-            segment.times,
-            segment.inputs,
-            segment.switches,
-            np.arange(1, len(segment.times)),
-            self._watched,
-            record[1:],
-        )
+        given, points = (segment.inputs, segment.switches), np.arange(1, len(segment.times))
+        where = points, self._watched, record[1:]
+        _, failure = self._stepper.advance(segment.times, *given, *where)
         if failure is not None:
             raise failure
         return record

@@ -60,11 +60,8 @@ def largest_steps(
     poles = connected(loop.parts, loop.connections).poles
     rates = np.abs(poles[poles != 0])
     rates = rates if len(rates) else np.ones(1)
-    tried = np.geomspace(
-        FASTEST / rates.max(),
-        SLOWEST / rates.min(),
-        1 + math.ceil(math.log(SLOWEST / FASTEST * rates.max() / rates.min(), RATIO)),
-    )
+    count = 1 + math.ceil(math.log(SLOWEST / FASTEST * rates.max() / rates.min(), RATIO))
+    tried = np.geomspace(FASTEST / rates.max(), SLOWEST / rates.min(), count)
     held = cache(lambda name, step: hold(loop.parts[name].A, loop.parts[name].B, step))
 
     def eigenvalues(step: float, way: tuple[str, str]) -> np.ndarray:

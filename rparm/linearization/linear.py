@@ -104,9 +104,7 @@ class Linear:
     @property
     def _labels(self) -> dict[str, list[str]]:
         names = {"inputs": self.inputs, "outputs": self.outputs, "states": self.states}
-        return {
-            kind: [name.replace(".", "_") for name in own] for kind, own in names.items() if own
-        }
+        return {k: [name.replace(".", "_") for name in own] for k, own in names.items() if own}
 
     def select(
         self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None

@@ -80,14 +80,10 @@ def _ends(loop: Linear) -> Iterator[Crossing]:
 
 def closed(loop: Linear) -> Linear:
     """Close the loop: from the request at the break to the value there."""
-    back = loop.B @ loop.C / (1 + loop.D[0, 0])
-    return replace(
-        loop,
-        A=cleared(loop.A - back, np.abs(loop.A) + np.abs(back)),
-        B=loop.B / (1 + loop.D[0, 0]),
-        C=loop.C / (1 + loop.D[0, 0]),
-        D=loop.D / (1 + loop.D[0, 0]),
-    )
+    through = 1 + loop.D[0, 0]
+    back = loop.B @ loop.C / through
+    A = cleared(loop.A - back, np.abs(loop.A) + np.abs(back))
+    return replace(loop, A=A, B=loop.B / through, C=loop.C / through, D=loop.D / through)
 
 
 def searched(loop: Linear) -> np.ndarray:
@@ -99,15 +95,10 @@ def searched(loop: Linear) -> np.ndarray:
     scale = responses.suited(loop.A, loop.B, loop.C)
     A, B, C, D = loop.A * scale / scale[:, None], loop.B / scale[:, None], loop.C * scale, loop.D
     none = np.zeros_like(A)
-    gains = zeros(
-        np.block([[A, none], [-C.T @ C, -A.T]]),
-        np.vstack([B, -C.T @ D]),
-        np.hstack([D @ C, B.T]),
-        D @ D - 1,
-    )
-    turns = zeros(
-        np.block([[A, none], [none, -A]]), np.vstack([B, -B]), np.hstack([C, -C]), np.zeros((1, 1))
-    )
+    whole = np.block([[A, none], [-C.T @ C, -A.T]])
+    gains = zeros(whole, np.vstack([B, -C.T @ D]), np.hstack([D @ C, B.T]), D @ D - 1)
+    whole = np.block([[A, none], [none, -A]])
+    turns = zeros(whole, np.vstack([B, -B]), np.hstack([C, -C]), np.zeros((1, 1)))
     poles = np.array([*loop.poles, *closed(loop).poles])
     rates = np.abs(poles[poles != 0]) if poles.any() else np.ones(1)
 

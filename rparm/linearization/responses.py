@@ -155,13 +155,9 @@ def minimal(model: Linear) -> Linear:
 
 def suited(A: np.ndarray, B: np.ndarray, C: np.ndarray) -> np.ndarray:
     """Return units of states that suit the ways from inputs to outputs, too, shape (n,)."""
-    sizes = np.block(
-        [
-            [np.abs(A), np.abs(B).sum(axis=1, keepdims=True)],
-            [np.abs(C).sum(axis=0, keepdims=True), np.zeros((1, 1))],
-        ]
-    )
-    found = scales(sizes)
+    above = [np.abs(A), np.abs(B).sum(axis=1, keepdims=True)]
+    below = [np.abs(C).sum(axis=0, keepdims=True), np.zeros((1, 1))]
+    found = scales(np.block([above, below]))
     return found[:-1] / found[-1]
 
 

@@ -61,15 +61,12 @@ STYLE = {
     "savefig.dpi": 130,
 }
 
-
 _templates.filters |= {
     "address": lambda path: quote(os.fsencode(path)),
     "minus": units.minus,
     "number": units.number,
     "short": units.short,
 }
-
-
 _templates.tests |= {
     "numeric": lambda cell: NUMERIC.fullmatch(str(cell)) is not None,
     "command": lambda cell: isinstance(cell, Command),
@@ -155,11 +152,8 @@ def _plotly() -> bytes:
     assert version is not None
     packed = base64.b64encode(gzip.compress(bundle, mtime=0)).decode("ascii")
     script = (ASSET_SOURCES / UNPACK).read_text(encoding="utf-8")
-    return (
-        script.replace("@VERSION@", version[1].decode("ascii"))
-        .replace("@PACKED@", packed)
-        .encode("utf-8")
-    )
+    script = script.replace("@VERSION@", version[1].decode("ascii"))
+    return script.replace("@PACKED@", packed).encode("utf-8")
 
 
 # ---- Pictures ------------------------------------------------------------------------------------

@@ -191,12 +191,8 @@ def _plot(plot: Plot, packer: "_Packer") -> dict[str, Any]:
     content["levels"] = [{"name": name, "value": value} for name, value in plot.levels]
     content["curves"] = curves = []
     for curve in plot.curves:
-        item = {
-            "name": curve.name,
-            "values": packer.packed(narrow(curve.values)),
-            "steps": curve.steps,
-        }
-        item["limit"] = curve.limit
+        item = {"name": curve.name, "values": packer.packed(narrow(curve.values))}
+        item |= {"steps": curve.steps, "limit": curve.limit}
         if curve.reference is not None:
             item["reference"] = packer.packed(narrow(curve.reference))
         curves.append(item)

@@ -253,9 +253,8 @@ def _csv_note(run: Run, shown: int) -> str:
     if run.compared:
         texts.append(f"Its values have {DIGITS} digits.")
     if shown < count:
-        texts.append(
-            f"This page shows {shown} of its {count} rows, with the extremes of all curves."
-        )
+        rows = f"{shown} of its {count} rows"
+        texts.append(f"This page shows {rows}, with the extremes of all curves.")
     return " ".join(texts)
 
 
@@ -272,18 +271,12 @@ def _start_tables(scenario: Scenario, model: Model) -> list[Table]:
     if given:
         tables.append(_values("Parameters and initial state of this run", model, given))
     if scenario.signals:
-        tables.append(
-            Table(
-                "Inputs",
-                ("input", "unit", "course", "meaning"),
-                [
-                    (name, unit(known.unit), describe_signal(signal), known.description)
-                    for name, signal in scenario.signals.items()
-                    if (known := model.variables[name])
-                ],
-                note="Sampled at communication points, each held over the step that begins there.",
-            )
-        )
+        rows = []
+        for name, signal in scenario.signals.items():
+            known = model.variables[name]
+            rows.append((name, unit(known.unit), describe_signal(signal), known.description))
+        note = "Sampled at communication points, each held over the step that begins there."
+        tables.append(Table("Inputs", ("input", "unit", "course", "meaning"), rows, note))
     rest = {
         name: value
         for name, value in scenario.defaults.items()
@@ -363,14 +356,9 @@ def measured_tables(comparisons: Sequence[Comparison], model: Model) -> list[Tab
         (c.name, unit(model.variables[c.name].unit), f"{c.rms:.4g}", f"{c.largest:.4g}", c.source)
         for c in comparisons
     ]
-    return [
-        Table(
-            "Difference from what was measured",
-            ("output", "unit", "RMS", "largest", "log"),
-            rows,
-            note="Simulated less measured, over the rows of the values that the log covers.",
-        )
-    ]
+    head = ("output", "unit", "RMS", "largest", "log")
+    note = "Simulated less measured, over the rows of the values that the log covers."
+    return [Table("Difference from what was measured", head, rows, note)]
 
 
 def describe_signal(signal: Signal) -> str:
