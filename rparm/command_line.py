@@ -83,11 +83,8 @@ def _help(names: Sequence[str]) -> str:
 
 def parser(command: str) -> argparse.ArgumentParser:
     """Return the parser of a command's options."""
-    made = _Parser(
-        prog=f"{PROGRAM} {command}",
-        epilog=EPILOG,
-        allow_abbrev=False,  # --json is looked for before anything is parsed
-    )
+    # no abbreviations: --json is looked for before anything is parsed
+    made = _Parser(prog=f"{PROGRAM} {command}", epilog=EPILOG, allow_abbrev=False)
     function(command, "add_{}_options")(made)
     add_common(made)
     return made
@@ -241,9 +238,8 @@ def _seconds(text: str) -> float:
         seconds = typed_quantity(text, SECONDS)
         if seconds >= 1:
             return seconds
-    raise argparse.ArgumentTypeError(
-        f"expected 1 s or more: a number, or one with s, ms, cs or ks, got {text!r}"
-    )
+    form = "a number, or one with s, ms, cs or ks"
+    raise argparse.ArgumentTypeError(f"expected 1 s or more: {form}, got {text!r}")
 
 
 def _version(text: str) -> str:

@@ -138,21 +138,14 @@ class ScenarioBase(Base):
         def references(names: Sequence[str]) -> tuple[int, ...]:
             return tuple(variables[name].reference for name in names)
 
-        return [
-            Component(
-                name=self._scenario.name,
-                archive=self._hash,
-                values=self._given[""] | {name: value for (_, name), value in fixed.items()},
-                reals=Part(
-                    references(list(self._reals)),
-                    tuple(range(len(self._reals))),
-                    references([name for _, name in read]),
-                ),
-                switches=Part(
-                    references(list(self._switches)), tuple(range(len(self._switches))), ()
-                ),
-            )
-        ]
+        reals, switches = list(self._reals), list(self._switches)
+        outputs = references([name for _, name in read])
+        parts = (
+            Part(references(reals), tuple(range(len(reals))), outputs),
+            Part(references(switches), tuple(range(len(switches))), ()),
+        )
+        values = self._given[""] | {name: value for (_, name), value in fixed.items()}
+        return [Component(self._scenario.name, self._hash, values, *parts)]
 
     @property
     def hashes(self) -> dict[str, str]:
@@ -203,10 +196,14 @@ class SystemBase(Base):
             if kind not in fed:
                 raise UserError(f"{self.path}: {c}: is neither Real nor Boolean")
             fed[kind].append(c)
+
+        def source(c: Connection) -> tuple[int, str]:
+            return self._names.index(c.start_component), c.start_connector
+
         outputs = {"Real": list(read), "Boolean": []}
         for kind, known in outputs.items():
-            sources = [(self._names.index(c.start_component), c.start_connector) for c in fed[kind]]
-            known[:] = sorted(dict.fromkeys([*known, *sources]), key=lambda key: key[0])
+            every = dict.fromkeys([*known, *map(source, fed[kind])])
+            known[:] = sorted(every, key=lambda key: key[0])
         result = []
         for i, name in enumerate(self._names):
             parts = {}
@@ -214,19 +211,14 @@ class SystemBase(Base):
                 incoming = [c for c in fed[kind] if c.end_component == name]
                 parts[kind] = Part(
                     tuple(self._reference(i, c.end_connector) for c in incoming),
-                    tuple(
-                        known.index((self._names.index(c.start_component), c.start_connector))
-                        for c in incoming
-                    ),
+                    tuple(known.index(source(c)) for c in incoming),
                     tuple(self._reference(i, variable) for j, variable in known if j == i),
                 )
             with self._ssp.unpacked_fmu(name) as fmu:
                 given = self._parameters.get(name, {}).items()
                 values = {x: start_value(fmu, name, x, value) for x, value in given}
             values |= {variable: value for (j, variable), value in fixed.items() if j == i}
-            result.append(
-                Component(name, self._hashes[name], values, parts["Real"], parts["Boolean"])
-            )
+            result.append(Component(name, self._hashes[name], values, *parts.values()))
         return result
 
     def _reference(self, component: int, variable: str) -> int:

@@ -279,39 +279,28 @@ class _Worker(_NoPages, distributed.Worker):
 def _local(count: int, folder: Path, dashboard: bool) -> Iterator[distributed.Client]:
     security = distributed.Security.temporary()
     common = {"host": LOCAL, "protocol": "tls://", "security": security}
-    scheduler = {
-        "cls": distributed.Scheduler if dashboard else _Scheduler,
-        "options": {
-            **common,
-            "dashboard": dashboard,
-            "dashboard_address": f"{LOCAL}:0" if dashboard else None,
-        },
-    }
-    worker = {
-        "cls": distributed.Nanny,
-        "options": {
-            **common,
-            "worker_class": _Worker,
-            "nthreads": 1,
-            "memory_limit": 1 / count,  # share of the machine's memory
-            "local_directory": str(folder),
-            "silence_logs": logging.CRITICAL,
-        },
+    pages = {"dashboard": dashboard, "dashboard_address": f"{LOCAL}:0" if dashboard else None}
+    kind = distributed.Scheduler if dashboard else _Scheduler
+    options = {
+        "worker_class": _Worker,
+        "nthreads": 1,
+        "memory_limit": 1 / count,  # share of the machine's memory
+        "local_directory": str(folder),
+        "silence_logs": logging.CRITICAL,
     }
     with ExitStack() as stack:
         with uninterrupted():  # a cluster that is half made cannot be closed
             # without workers at first: one that dies while it starts would end the cluster
             try:
                 made = distributed.SpecCluster(
-                    scheduler=scheduler,
-                    worker=worker,
+                    scheduler={"cls": kind, "options": common | pages},
+                    worker={"cls": distributed.Nanny, "options": common | options},
                     security=security,
                     silence_logs=logging.CRITICAL,
                 )
             except RuntimeError as error:  # it waits for a connection until it gives up
-                raise UserError(
-                    f"the campaign's processes cannot connect at {LOCAL}: {one_line(error)}"
-                ) from error
+                text = f"the campaign's processes cannot connect at {LOCAL}"
+                raise UserError(f"{text}: {one_line(error)}") from error
             client = stack.enter_context(distributed.Client(stack.enter_context(made)))
         made.sync(_keep_signals_from_children)
         keeper = PeriodicCallback(partial(_keep_workers, made, count), RESTART_EVERY)
@@ -361,21 +350,16 @@ def security_for(
         missing = ", ".join(option for option in OPTIONS if option not in named)
         raise UserError(f"{missing}: missing, {address} needs {', '.join(OPTIONS)}")
     _check_credentials(ca, cert, key)
-    return distributed.Security(
-        require_encryption=True,
-        tls_ca_file=str(ca),
-        tls_client_cert=str(cert),
-        tls_client_key=str(key),
-    )
+    files = {"tls_ca_file": str(ca), "tls_client_cert": str(cert), "tls_client_key": str(key)}
+    return distributed.Security(require_encryption=True, **files)
 
 
 def _configured_security(address: str) -> distributed.Security:
     made = distributed.Security(require_encryption=True)
     ca, cert, key = made.tls_ca_file, made.tls_client_cert, made.tls_client_key
     if not ca or not cert:
-        raise UserError(
-            f"{address}: needs certificates: {', '.join(OPTIONS)}, or those of Dask's configuration"
-        )
+        options = f"{', '.join(OPTIONS)}, or those of Dask's configuration"
+        raise UserError(f"{address}: needs certificates: {options}")
     if not any("\n" in text for text in (ca, cert, key or "")):  # else not files, but their text
         _check_credentials(Path(ca), Path(cert), Path(key or cert))
     return made
@@ -398,7 +382,5 @@ def _check_credentials(ca: Path, cert: Path, key: Path) -> None:
     try:
         context.load_cert_chain(cert, key, password=lambda: "")
     except OSError:
-        raise UserError(
-            f"{cert}, {key}: are not a certificate and its private key without a password, in PEM "
-            "form"
-        ) from None
+        expected = "a certificate and its private key without a password, in PEM form"
+        raise UserError(f"{cert}, {key}: are not {expected}") from None

@@ -105,13 +105,9 @@ def sobol_indices(campaign: Campaign, values: np.ndarray) -> list[Index]:
     rows = saltelli_groups(campaign, values)
     if len(rows) < 2 or np.ptp(rows) == 0:
         return []
+    options = {"num_resamples": RESAMPLES, "conf_level": CONFIDENCE, "seed": campaign.seed}
     found: Mapping[str, np.ndarray] = sobol.analyze(
-        sampling_problem(campaign),
-        rows.ravel(),
-        calc_second_order=False,
-        num_resamples=RESAMPLES,
-        conf_level=CONFIDENCE,
-        seed=campaign.seed,
+        sampling_problem(campaign), rows.ravel(), calc_second_order=False, **options
     )
     rows = np.column_stack([found[key] for key in ("S1", "S1_conf", "ST", "ST_conf")])
     return [Index(name, *row) for name, row in zip(campaign.parameters, rows.tolist(), strict=True)]
@@ -163,10 +159,8 @@ class Page:
         """Return the columns that fit into a picture, and a note on the others."""
         columns = list(columns)
         left = columns[DRAWN:]
-        text = (
-            f"The picture leaves out {left[0]} and what is below it in the table." if left else ""
-        )
-        return columns[:DRAWN], text
+        text = f"The picture leaves out {left[0]} and what is below it in the table."
+        return columns[:DRAWN], text if left else ""
 
     # ---- Distributions ---------------------------------------------------------------------------
 
@@ -211,17 +205,12 @@ class Page:
         picture = indices_figure({self.labels[name]: found[name] for name in drawn})
         pages.save_figure(picture, self.folder / "indices.png")
         head = ["kept", "parameter", "first order", "±", "total", "±", "groups of runs"]
-        rows = [
-            [
-                name,
-                row.parameter,
-                *(f"{x:.3f}" for x in (row.first, row.first_confidence)),
-                *(f"{x:.3f}" for x in (row.total, row.total_confidence)),
-                len(saltelli_groups(self.campaign, self.kept[name])),
-            ]
-            for name, rows in found.items()
-            for row in rows
-        ]
+        rows = []
+        for name, indices in found.items():
+            groups = len(saltelli_groups(self.campaign, self.kept[name]))
+            for x in indices:
+                numbers = (x.first, x.first_confidence, x.total, x.total_confidence)
+                rows.append([name, x.parameter, *(f"{number:.3f}" for number in numbers), groups])
         return pages.Table("Sobol' indices", head, rows, note)
 
     def doubts(self, found: Mapping[str, list[Index]]) -> list[str]:
@@ -250,14 +239,10 @@ class Page:
     # ---- Runs ------------------------------------------------------------------------------------
 
     def worst(self, column: str) -> pages.Table:
-        names = list(self.campaign.parameters)
-        head = [RUN, *(self.labels[name] for name in (column, *names)), "run it again"]
+        names = [column, *self.campaign.parameters]
+        head = [RUN, *(self.labels[name] for name in names), "run it again"]
         rows = [
-            [
-                run,
-                *(_rounded(self.table[name][run]) for name in (column, *names)),
-                self.command(run),
-            ]
+            [run, *(_rounded(self.table[name][run]) for name in names), self.command(run)]
             for run in worst(self.table[column])
         ]
         return pages.Table(f"Largest {column}", head, rows)
@@ -354,16 +339,9 @@ def indices_figure(found: Mapping[str, Sequence[Index]]) -> Figure:
                 ("total", [x.total for x in rows], [x.total_confidence for x in rows]),
             )
             for i, (kind, values, half) in enumerate(kinds):
-                one.bar(
-                    middle + 0.36 * (i - 0.5),
-                    values,
-                    0.34,
-                    yerr=half,
-                    color=(pages.RUN_COLOR, pages.ERROR_COLORS[0])[i],
-                    ecolor=pages.MUTED,
-                    capsize=4,
-                    label=kind,
-                )
+                color = (pages.RUN_COLOR, pages.ERROR_COLORS[0])[i]
+                style = {"color": color, "ecolor": pages.MUTED, "capsize": 4, "label": kind}
+                one.bar(middle + 0.36 * (i - 0.5), values, 0.34, yerr=half, **style)
             width = max(COLUMNS * LONGEST_LINE // len(rows), FEWEST)
             one.set_xticks(middle, [fill(row.parameter, width) for row in rows])
             one.set_ylabel("Sobol' index")

@@ -72,10 +72,8 @@ class _Planner:
         reals, switches = base.held
         first = np.cumsum([0, *(len(c.reals.outputs) for c in components)])
         columns = [
-            len(reals.names)
-            + first[component]
-            + components[component].reals.outputs.index(self.base.variable(name)[1].reference)
-            for name, component in ((name, base.variable(name)[0]) for name in watched)
+            len(reals.names) + first[c] + components[c].reals.outputs.index(variable.reference)
+            for c, variable in map(base.variable, watched)
         ]
         self.check_columns(measures)
         return Job(

@@ -64,10 +64,8 @@ class Work:
         """Make the runs of some blocks; `progress` is called with the number of those made."""
         from rparm.campaign.engine import Engine  # takes long
 
-        engine = Engine(
-            client, self.campaign, self.job, self.base.archives, self.points, self.results
-        )
-        engine.run(blocks, progress)
+        given = self.campaign, self.job, self.base.archives, self.points, self.results
+        Engine(client, *given).run(blocks, progress)
 
     def table(self) -> dict[str, np.ndarray]:
         """Read all columns, (runs,) each: parameters, measures, reasons of failures."""
@@ -203,10 +201,7 @@ def _data(base: Base, job: Job, given: dict[str, float], record: np.ndarray) -> 
     outputs = dict(zip(job.watched, record.T, strict=True))
     curves = [result_curve(x, outputs[x]) for x in base.states() or list(outputs)]
     rows = thinned([curve.values for curve in curves])
-    plots = [
-        Plot(curve.name, unit(base.variable(curve.name)[1].unit), [curve.at(rows)])
-        for curve in curves
-    ]
+    plots = [Plot(x.name, unit(base.variable(x.name)[1].unit), [x.at(rows)]) for x in curves]
     moving = motion.of_recorded(base.folder, _recorded(base, job, given, outputs), rows)
     return RunData("run", "", job.times[rows], plots, motion=moving)
 
