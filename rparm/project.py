@@ -61,9 +61,8 @@ def check_current_folder() -> None:
     try:
         Path.cwd()
     except OSError as error:
-        raise UserError(
-            f"the current folder cannot be used: {reason(error)}; change to another one"
-        ) from None
+        text = f"{reason(error)}; change to another one"
+        raise UserError(f"the current folder cannot be used: {text}") from None
 
 
 def fmi_version(given: object) -> str | None:

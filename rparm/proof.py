@@ -189,12 +189,8 @@ class Prover:
         with tempfile.TemporaryDirectory() as folder:
             certificate = Path(folder) / "certificate"
             problem = list(self.problem(scenario, start))
-            points = subprocess.run(
-                [program, certificate],
-                input="".join(problem),
-                capture_output=True,
-                encoding="utf-8",
-            ).stdout.splitlines()
+            question = {"input": "".join(problem), "capture_output": True, "encoding": "utf-8"}
+            points = subprocess.run([program, certificate], **question).stdout.splitlines()
             try:
                 with certificate.open(encoding="utf-8") as claims:
                     count = checker.check(problem, points, claims, progress)
@@ -218,9 +214,8 @@ def prover_of(path: Path) -> Prover:
     known = provers()
     if name not in known:
         names = ", ".join(known) or "none"
-        raise UserError(
-            f"{path}: expected a model whose motion can be proven ({names}), got {name}"
-        )
+        expected = f"expected a model whose motion can be proven ({names})"
+        raise UserError(f"{path}: {expected}, got {name}")
     return known[name]
 
 
@@ -358,11 +353,8 @@ def error_bounds(
     progress: Callable[[int], object] | None = None,
 ) -> np.ndarray:
     """Bound the errors in a run, (communication points, names), in the names' units."""
-    run = replace(
-        scenario,
-        parameters=scenario.parameters | {METHOD: fmu.model.variables[METHOD].items[method]},
-        reference_every=1,
-    )
+    parameters = scenario.parameters | {METHOD: fmu.model.variables[METHOD].items[method]}
+    run = replace(scenario, parameters=parameters, reference_every=1)
     result = simulation.simulate(fmu, run, tolerance_of(method, tolerance), progress)
     values = _columns(result.names, result.values, enclosure.names)
     return distances(values, enclosure, np.arange(len(enclosure.times)))
@@ -398,11 +390,10 @@ def largest_errors(
     """Return the largest of errors (points, names) by name; `rows`: their communication points."""
     times = enclosure.times if rows is None else enclosure.times[rows]
     worst = np.argmax(errors, axis=0)
+    radius = enclosure.radius.max(axis=0)
     return {
-        name: ProvenError(
-            float(errors[worst[i], i]), float(times[worst[i]]), float(enclosure.radius[:, i].max())
-        )
-        for i, name in enumerate(enclosure.names)
+        name: ProvenError(float(errors[at, i]), float(times[at]), float(radius[i]))
+        for i, (name, at) in enumerate(zip(enclosure.names, worst, strict=True))
     }
 
 
@@ -413,19 +404,13 @@ def proven_reference(fmu: Fmu, scenario: Scenario, enclosure: Enclosure) -> Prov
     around = enclosure.of(expected.names)
     nearest = is_nearest(expected.values, around, rows)
     within = distances(around.high[rows], around, rows)
-    wrong = tuple(
-        WrongValue(
-            expected.path,
-            int(row) + 2,
-            expected.names[i],
-            float(expected.values[row, i]),
-            float(around.high[rows[row], i]),
-            float(within[row, i]),
-        )
-        for row, i in np.argwhere(~nearest)[:SHOWN]
-    )
+    wrong = []
+    for row, i in np.argwhere(~nearest)[:SHOWN]:
+        numbers = expected.values[row, i], around.high[rows[row], i], within[row, i]
+        place = expected.path, int(row) + 2, expected.names[i]
+        wrong.append(WrongValue(*place, *map(float, numbers)))
     radius = float(around.radius[rows].max())
-    return ProvenReference(nearest.size, int(nearest.sum()), radius, wrong)
+    return ProvenReference(nearest.size, int(nearest.sum()), radius, tuple(wrong))
 
 
 def _columns(names: Sequence[str], values: np.ndarray, wanted: Sequence[str]) -> np.ndarray:

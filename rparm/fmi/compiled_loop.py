@@ -26,24 +26,14 @@ from rparm.fmi.fmi_instance import DISCARD, TERMINATED, Instance
 
 FUNCTIONS = {
     "2.0": (
-        "fmi2SetReal",
-        "fmi2GetReal",
-        "fmi2SetBoolean",
-        "fmi2GetBoolean",
-        "fmi2DoStep",
-        "fmi2GetDirectionalDerivative",
-        "fmi2GetInteger",
+        "fmi2SetReal", "fmi2GetReal", "fmi2SetBoolean", "fmi2GetBoolean", "fmi2DoStep",
+        "fmi2GetDirectionalDerivative", "fmi2GetInteger",
     ),
     "3.0": (
-        "fmi3SetFloat64",
-        "fmi3GetFloat64",
-        "fmi3SetBoolean",
-        "fmi3GetBoolean",
-        "fmi3DoStep",
-        "fmi3GetDirectionalDerivative",
-        "fmi3GetInt32",
+        "fmi3SetFloat64", "fmi3GetFloat64", "fmi3SetBoolean", "fmi3GetBoolean", "fmi3DoStep",
+        "fmi3GetDirectionalDerivative", "fmi3GetInt32",
     ),
-}
+}  # fmt: skip
 SET_REAL, GET_REAL, SET_BOOLEAN, GET_BOOLEAN, DO_STEP, DERIVATIVE, GET_INTEGER = range(7)
 _POINTER = ir.IntType(8).as_pointer()
 _SIZE = ir.IntType(64)
@@ -116,7 +106,6 @@ def directional_derivative(
     return signature, generate
 
 
-# ---- True)\nclass Part=Values --------------------------------------------------------------------
 # ---- Values --------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Part:
@@ -181,7 +170,6 @@ class Tangent:
         return Tangent(*[np.zeros(0, np.uint32)] * 4)
 
 
-# ---- The loop ------------------------------------------------------------------------------------
 # ---- The loop ------------------------------------------------------------------------------------
 def component_calls(instances: Sequence[Instance]) -> np.ndarray:
     """Return a row per component: its functions' addresses, then a part that adapters refer to."""
@@ -379,9 +367,8 @@ def advance(
             status, jumps = _changes(calls, discrete_reals, GET_REAL, numbers[0], numbers[1])
             if status >= DISCARD:
                 return status, GET_REAL, 0, i
-            status, turns = _changes(
-                calls, discrete_integers, GET_INTEGER, integers[0], integers[1]
-            )
+            old, new = integers[0], integers[1]
+            status, turns = _changes(calls, discrete_integers, GET_INTEGER, old, new)
             if status >= DISCARD:
                 return status, GET_INTEGER, 0, i
             if jumps or turns:
@@ -393,7 +380,6 @@ def advance(
     return 0, 0, 0, 0
 
 
-# ---- For its callers -----------------------------------------------------------------------------
 # ---- For its callers -----------------------------------------------------------------------------
 class Stepper:
     """Steps components whose Reals and Booleans are wired to each other and to held inputs."""
@@ -431,20 +417,10 @@ class Stepper:
     ) -> tuple[int, UserError | None]:
         """Make steps as `advance` explains; return how many were made, and why not all of them."""
         tangent = Tangent.none() if tangent is None else tangent
-        calls, reals, switches = self._state()
-        *failed, step = advance(
-            calls,
-            times,
-            held,
-            held_switches,
-            reals,
-            switches,
-            points,
-            watched,
-            record,
-            tangent.fields,
-            np.empty(0) if growth is None else growth,
-        )
+        calls, *wires = self._state()
+        found = record, tangent.fields, np.empty(0) if growth is None else growth
+        given = calls, times, held, held_switches, *wires, points, watched
+        *failed, step = advance(*given, *found)
         try:
             self._check(failed, f"in the step from t = {float(times[step])!r} s")
         except UserError as error:

@@ -172,10 +172,8 @@ class Model:
         """Refuse a tolerance that the method of these values, or of start values, cannot reach."""
         smallest = self.smallest_tolerance(values)
         if tolerance < smallest:
-            method = self.method(values)
-            raise WrongValueError(
-                f"expected at least {short(smallest)}, the smallest of {method}, got {tolerance!r}"
-            )
+            least = f"{short(smallest)}, the smallest of {self.method(values)}"
+            raise WrongValueError(f"expected at least {least}, got {tolerance!r}")
 
     def find(self, name: str, kind: str) -> Variable:
         """Return a variable of one of `KINDS`; a WrongValueError names all of these."""
@@ -196,6 +194,7 @@ def described(description: ModelDescription) -> Model:
     """
     slave = description.coSimulation
     capabilities = slave or description.modelExchange
+    interpolates = slave and (slave.canInterpolateInputs or slave.providesIntermediateUpdate)
     displays = {
         unit.name: {x.name: display_unit(x.factor, x.offset) for x in unit.displayUnits}
         for unit in description.unitDefinitions
@@ -210,9 +209,7 @@ def described(description: ModelDescription) -> Model:
         fmi_version=description.fmiVersion,
         variables={v.name: _variable(v, displays) for v in description.modelVariables},
         states=tuple(derivatives),
-        interpolates_inputs=bool(
-            slave and (slave.canInterpolateInputs or slave.providesIntermediateUpdate)
-        ),
+        interpolates_inputs=bool(interpolates),
         gives_output_derivatives=bool(slave and (slave.maxOutputDerivativeOrder or 0) >= 1),
         saves_states=bool(capabilities.canGetAndSetFMUstate),
         gives_directional_derivatives=bool(capabilities.providesDirectionalDerivative),
@@ -233,9 +230,8 @@ def _experiment(given: DefaultExperiment | None) -> Experiment:
     def number(text: str | None) -> float | None:
         return float(text) if text and math.isfinite(float(text)) else None
 
-    return Experiment(
-        *map(number, (texts.startTime, texts.stopTime, texts.stepSize, texts.tolerance))
-    )
+    every = texts.startTime, texts.stopTime, texts.stepSize, texts.tolerance
+    return Experiment(*map(number, every))
 
 
 # types of FMI 2.0 and FMI 3.0 -> type of `Variable`

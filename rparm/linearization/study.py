@@ -110,17 +110,14 @@ def _path(request: Request) -> Path:
     if path.suffix.lower() in (".fmu", ".ssp"):
         return path
     systems, models = project.systems(), project.models()
-    for folder in systems.values():
-        if name == folder.name or project.is_built_from(name, folder):
-            return project.built(folder, ".ssp", version=request.version)
-    for folder in models.values():
-        if name == folder.name or project.is_built_from(name, folder):
-            return project.built(folder, ".fmu", version=request.version)
+    for suffix, folders in ((".ssp", systems), (".fmu", models)):
+        for folder in folders.values():
+            if name == folder.name or project.is_built_from(name, folder):
+                return project.built(folder, suffix, version=request.version)
     known = [*models, *systems]
     guess = did_you_mean(name, [*known, *project.built_names(".fmu"), *project.built_names(".ssp")])
-    raise UserError(
-        f"{name}: expected a file .fmu or .ssp, or a name{guess} (known: {', '.join(known)})"
-    )
+    expected = "expected a file .fmu or .ssp, or a name"
+    raise UserError(f"{name}: {expected}{guess} (known: {', '.join(known)})")
 
 
 def _opened(path: Path, kind: str) -> Fmu:
@@ -163,9 +160,7 @@ def document(found: Study, step: float | None) -> Document:
         "held": list(linear.held),
         "poles": pairs(linear.poles),
         "left_out": list(linear.left_out),
-        "intervals": {
-            name: [finite(end) for end in ends] for name, ends in linear.intervals.items()
-        },
+        "intervals": {name: list(map(finite, ends)) for name, ends in linear.intervals.items()},
     }
     if step is not None:
         transition, forced = linear.sampled(step)
@@ -179,12 +174,8 @@ def document(found: Study, step: float | None) -> Document:
         result["variant"] = found.variant
     if found.largest:
         result["largest_steps"] = [
-            {
-                "order": x.order,
-                "inputs": x.inputs,
-                "step": finite(x.step),
-                "frequency": finite(x.frequency),
-            }
+            {"order": x.order, "inputs": x.inputs}
+            | {"step": finite(x.step), "frequency": finite(x.frequency)}
             for x in found.largest
         ]
     if found.margins is not None:
@@ -222,9 +213,8 @@ def save(path: Path, found: Study, step: float | None) -> None:
 
 
 def _save_json(path: Path, found: Document, _linear: Linear) -> None:
-    path.write_text(
-        json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8", newline="\n"
-    )
+    text = json.dumps(found, indent=1, allow_nan=False) + "\n"
+    path.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _save_mat(path: Path, found: Document, linear: Linear) -> None:

@@ -102,17 +102,13 @@ class SystemSubject(ExitStack):
             for c in self.connections
             if self._is_real(c.start_component, c.start_connector)
         )
-        return [
-            (order, inputs)
-            for inputs in (INPUT_MODES if can else INPUT_MODES[:1])
-            for order in ORDERS
-        ]
+        modes = INPUT_MODES if can else INPUT_MODES[:1]
+        return [(order, inputs) for inputs in modes for order in ORDERS]
 
     def held(self, parts: Mapping[str, linear.Linear]) -> dict[str, list[str]]:
         """Return held states by component."""
-        return {
-            name: linear.held_states(part, self.ssp.models[name]) for name, part in parts.items()
-        }
+        models = self.ssp.models
+        return {name: linear.held_states(part, models[name]) for name, part in parts.items()}
 
     def merged(self, values: Mapping[str, Value]) -> dict[str, dict[str, Value]]:
         """Join all that is set, by component."""
@@ -133,9 +129,8 @@ class SystemSubject(ExitStack):
             return _next_event(self.ssp, name, values, self.time)
 
         if linear.is_sampled(part, self.ssp.models[name], outputs, announced):
-            raise UserError(
-                f"{self.ssp.path}: component {name!r} {linear.SAMPLED}{self._way_out(name)}"
-            )
+            wrong = f"{linear.SAMPLED}{self._way_out(name)}"
+            raise UserError(f"{self.ssp.path}: component {name!r} {wrong}")
 
     def _way_out(self, name: str) -> str:
         try:
@@ -297,11 +292,9 @@ def looped(parts: Mapping[str, linear.Linear], connections: Iterable[Connection]
     for name, part in parts.items():
         A, B, C, D = _clear(part)
         for cause, effect, matrix in (
-            ("states", "states", A),
-            ("inputs", "states", B),
-            ("states", "outputs", C),
-            ("inputs", "outputs", D),
-        ):
+            ("states", "states", A), ("inputs", "states", B),
+            ("states", "outputs", C), ("inputs", "outputs", D),
+        ):  # fmt: skip
             for i, j in np.argwhere(matrix).tolist():
                 start = index[name, cause, getattr(part, cause)[j]]
                 arrows[start, index[name, effect, getattr(part, effect)[i]]] = True

@@ -143,15 +143,12 @@ class _Problem:
             left, responses, size = tried
         worst = int(np.argmax(np.abs(left) / size))
         name = self.equations[worst]
-        what = (
-            f"{name} stays {left[worst]:+.6g} off its value"
-            if name in self.targets
-            else f"the derivative of {name} stays at {left[worst]:.6g}"
-        )
+        what = f"the derivative of {name} stays at {left[worst]:.6g}"
+        if name in self.targets:
+            what = f"{name} stays {left[worst]:+.6g} off its value"
         few = f"; free at most {self.count} variables" if len(self.free) > self.count else ""
-        raise UserError(
-            f"--trim: no equilibrium found by {', '.join(self.free)}: {what}{few or GUESS}"
-        )
+        names = ", ".join(self.free)
+        raise UserError(f"--trim: no equilibrium found by {names}: {what}{few or GUESS}")
 
     def interval(self, point: np.ndarray, i: int) -> tuple[float, float] | None:
         """Return where a free variable may be, if it is not one value; UserError if anywhere."""
