@@ -36,11 +36,8 @@ def results_stream(as_json: bool, quiet: bool) -> Iterator[TextIO | None]:
     try:
         with ExitStack() as stack:
             if real is not None and (as_json or quiet):
-                null = stack.enter_context(
-                    Path(os.devnull).open(
-                        "w", encoding="utf-8", errors="backslashreplace", newline="\n"
-                    )
-                )
+                text = {"encoding": "utf-8", "errors": "backslashreplace", "newline": "\n"}
+                null = stack.enter_context(Path(os.devnull).open("w", **text))
                 elsewhere = null if quiet or sys.stderr is None else sys.stderr
                 real = stack.enter_context(_apart(real, elsewhere))
                 stack.enter_context(redirect_stdout(elsewhere))
@@ -124,9 +121,8 @@ def verdict_line(failed: Iterable[str], done: Sized, name: str) -> str:
         return f"passed: {counted(done, name)}"
     some = [*names[:NAMED], f"{len(names) - NAMED} more"] if len(names) > NAMED + 1 else names
     text = f"failed: {counted(names, name)}"
-    return textwrap.shorten(
-        f"{text}: {', '.join(some)}", max(width(), len(text)), placeholder=" ..."
-    )
+    whole = f"{text}: {', '.join(some)}"
+    return textwrap.shorten(whole, max(width(), len(text)), placeholder=" ...")
 
 
 class Table:
@@ -179,9 +175,8 @@ def plain_table(title: str, head: Sequence[str], rows: Sequence[Sequence[object]
 
 def remark(text: str) -> None:
     """Print a text, wrapped and indented."""
-    wrapped = textwrap.wrap(
-        text, width(), initial_indent=INDENT, subsequent_indent=2 * INDENT, break_on_hyphens=False
-    )
+    indents = {"initial_indent": INDENT, "subsequent_indent": 2 * INDENT}
+    wrapped = textwrap.wrap(text, width(), break_on_hyphens=False, **indents)
     print(*wrapped, sep="\n", flush=True)
 
 
@@ -194,14 +189,8 @@ class Progress(AbstractContextManager["Progress"]):
         if sys.stderr.isatty() and not is_quiet():
             from tqdm import tqdm  # takes time
 
-            self._bar = tqdm(
-                total=total,
-                desc=label,
-                unit=f" {counted}",
-                unit_scale=total >= 10_000,
-                delay=DELAY,
-                leave=False,
-            )
+            unit = {"unit": f" {counted}", "unit_scale": total >= 10_000}
+            self._bar = tqdm(total=total, desc=label, delay=DELAY, leave=False, **unit)
 
     def __exit__(self, *_: object) -> None:
         if self._bar is not None:

@@ -251,9 +251,8 @@ def write_trajectory(
     of_time = _shortest if short_times else form
     with whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
         file.write(",".join(f'"{name}"' for name in ("time", *names)) + "\n")
-        for time, row in zip(
-            *(np.asarray(x, float).tolist() for x in (times, values)), strict=True
-        ):
+        lists = (np.asarray(x, float).tolist() for x in (times, values))
+        for time, row in zip(*lists, strict=True):
             file.write(",".join([of_time(time), *map(form, row)]) + "\n")
 
 

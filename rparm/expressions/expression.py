@@ -124,10 +124,8 @@ def check_kinds(root: Node, expected: str = NUMBER, conditions: Collection[str] 
 
 
 def _check(node: Node, expected: str, conditions: Collection[str]) -> None:
-    is_condition = node.op in (*LOGIC, *RELATIONS) or (
-        node.op == "name" and node.name in conditions
-    )
-    found = CONDITION if is_condition else NUMBER
+    is_condition = node.op == "name" and node.name in conditions
+    found = CONDITION if is_condition or node.op in (*LOGIC, *RELATIONS) else NUMBER
     if found != expected:
         what = node.name or ("the number" if node.op == "number" else repr(node.op))
         raise ExpressionError(node.column, f"expected {expected}, {what} gives {found}")
@@ -261,12 +259,9 @@ class _Parser:
         self.expect(")")
         count = FUNCTIONS[function.text]
         if len(arguments) != (count or max(2, len(arguments))):
-            wanted = count or "2 or more"
-            raise ExpressionError(
-                function.column,
-                f"{function.text}: expected {wanted} argument{'s' * (count != 1)}, "
-                f"got {len(arguments)}",
-            )
+            wanted = f"{count or '2 or more'} argument{'s' * (count != 1)}"
+            text = f"{function.text}: expected {wanted}, got {len(arguments)}"
+            raise ExpressionError(function.column, text)
         if count:
             return Node(function.text, function.column, tuple(arguments))
         return reduce(lambda a, b: Node(function.text, function.column, (a, b)), arguments)

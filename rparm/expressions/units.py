@@ -48,9 +48,8 @@ def exponents(text: str) -> dict[str, int]:
         for factor in part.split(".") if part and part != "1" else ():
             symbol = FACTOR.fullmatch(factor)
             if symbol is None or symbol[1] not in SYMBOLS:
-                raise ValueError(
-                    f"unit {text!r}: {factor!r} is no SI symbol with an exponent, such as s2"
-                )
+                expected = "SI symbol with an exponent, such as s2"
+                raise ValueError(f"unit {text!r}: {factor!r} is no {expected}")
             power = sign * int(symbol[2] or 1)
             for base, exponent in SYMBOLS[symbol[1]].items():
                 found[base] = found.get(base, 0) + power * exponent
@@ -134,9 +133,8 @@ def _power(node: Node, given: list[Unit | None]) -> Unit | None:
         return base
     value = _literal(node.arguments[1])
     if value is None:
-        raise ExpressionError(
-            node.column, f"'**': expected a number as exponent of what has unit {shown(base)}"
-        )
+        text = f"expected a number as exponent of what has unit {shown(base)}"
+        raise ExpressionError(node.column, f"'**': {text}")
     return times(ONE, base, value)
 
 

@@ -58,9 +58,8 @@ class Part:
             return
         (here, own), (there, foreign) = self.system.rsplit(" ", 1), other.rsplit(" ", 1)
         if here != there:
-            raise UserError(
-                f"{self.component}: its variant is {here!r}, that of the federation is {there!r}"
-            )
+            variants = f"its variant is {here!r}, that of the federation is {there!r}"
+            raise UserError(f"{self.component}: {variants}")
         raise UserError(
             f"{self.component}: its SSP is not that of the federation (SHA-256 {own[:12]}..., "
             f"expected {foreign[:12]}...): copy the file"
@@ -75,23 +74,23 @@ def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
         raise UserError(f"{ssp.path}: has no variant {variant!r}{known}")
     published = {name: model.real_outputs for name, model in ssp.models.items()}
     whole = f"{variant} {hashlib.sha256(ssp.path.read_bytes()).hexdigest()}"
+
+    def source(c: Connection) -> Source:
+        return Source(c.start_component, published[c.start_component].index(c.start_connector))
+
     made = {}
     for component in system.components:
         name = component.name
         incoming = [c for c in real_connections(ssp) if c.end_component == name]
         others = [c for c in system.connections if c not in real_connections(ssp)]
+        constant = [c.start_connector for c in others if c.start_component == name]
         made[name] = Part(
             component=name,
             parameters=system.parameter_sets[variant].get(name, {}),
             published=tuple(published[name]),
             inputs=tuple(c.end_connector for c in incoming),
-            sources=tuple(
-                Source(c.start_component, published[c.start_component].index(c.start_connector))
-                for c in incoming
-            ),
-            constant=tuple(
-                dict.fromkeys(c.start_connector for c in others if c.start_component == name)
-            ),
+            sources=tuple(map(source, incoming)),
+            constant=tuple(dict.fromkeys(constant)),
             rounds=len(system.components) + 1,
             times=system.times,
             system=whole,

@@ -55,10 +55,8 @@ def run(
     made = parts(ssp, variant)
     whole = next(iter(made.values())).system
     local = [component for component in made if component not in elsewhere]
-    started = {
-        c: [*arguments(ssp.path, variant, c, address), "--silence", str(silence), "--owned"]
-        for c in local
-    }
+    further = ["--silence", str(silence), "--owned"]
+    started = {c: [*arguments(ssp.path, variant, c, address), *further] for c in local}
     recorder = Federate(RECORDER, address, list(made), publishes=False)
     with (
         temporary_folder() as folder,
@@ -66,9 +64,7 @@ def run(
         _processes(started, folder) as processes,
     ):
         still, stuck = Silence(recorder, silence), Silence(recorder, 2.0 * silence)
-        ended = (
-            itertools.count()
-        )  # looks since a process here has failed, perhaps as the federation ended
+        ended = itertools.count()  # looks since a process here has failed, perhaps at the end
 
         def look() -> None:
             failure = _failure(processes, folder)
@@ -166,13 +162,9 @@ def _processes(
     try:
         for component, command in commands.items():
             with (folder / component).open("wb") as log, uninterrupted():
-                processes[component] = subprocess.Popen(
-                    [sys.executable, "-P", "-m", "rparm", *command],
-                    stdin=subprocess.PIPE,
-                    stdout=log,
-                    stderr=subprocess.STDOUT,
-                    env=environment,
-                )
+                streams = {"stdin": subprocess.PIPE, "stdout": log, "stderr": subprocess.STDOUT}
+                whole = [sys.executable, "-P", "-m", "rparm", *command]
+                processes[component] = subprocess.Popen(whole, env=environment, **streams)
         yield processes
     finally:
         for process in processes.values():

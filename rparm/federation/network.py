@@ -151,10 +151,8 @@ class Broker(AbstractContextManager["Broker"]):
         h = self._h = helics()
         self._questions = _Questions()
         self._address = address
-        options = (
-            f"-f {count} --maxfederates={count} --brokerkey={key()} --local_interface={address} "
-            f"{QUIET}"
-        )
+        options = f"-f {count} --maxfederates={count} --brokerkey={key()} "
+        options += f"--local_interface={address} {QUIET}"
         try:
             self._broker = h.helicsCreateBroker(NETWORK, "", options)
         except h.HelicsException as error:
@@ -281,13 +279,11 @@ class Federate:
                 if TOO_EARLY not in str(error) or not left:
                     raise
         if self._publishes:
-            self._publication = h.helicsFederateRegisterGlobalPublication(
-                self._federate, self._name, h.HELICS_DATA_TYPE_VECTOR, ""
-            )
-        self._subscriptions = {
-            source: h.helicsFederateRegisterSubscription(self._federate, source, "")
-            for source in self._sources
-        }
+            kind = self._name, h.HELICS_DATA_TYPE_VECTOR, ""
+            publish = h.helicsFederateRegisterGlobalPublication
+            self._publication = publish(self._federate, *kind)
+        subscribe = partial(h.helicsFederateRegisterSubscription, self._federate)
+        self._subscriptions = {source: subscribe(source, "") for source in self._sources}
 
     def _information(self) -> Any:
         """Return the settings that HELICS needs to make the federate."""
@@ -296,15 +292,12 @@ class Federate:
         h.helicsFederateInfoSetCoreTypeFromString(info, NETWORK)
         # not one that another federate of this process has
         h.helicsFederateInfoSetCoreName(info, f"{self._name}-{secrets.token_hex(8)}")
-        h.helicsFederateInfoSetCoreInitString(
-            info,
-            f"--federates=1 --broker_address={self._address} --network_timeout={JOIN:g}s {QUIET}",
-        )
+        options = f"--federates=1 --broker_address={self._address} --network_timeout={JOIN:g}s"
+        h.helicsFederateInfoSetCoreInitString(info, f"{options} {QUIET}")
         h.helicsFederateInfoSetBrokerKey(info, key())
         h.helicsFederateInfoSetTimeProperty(info, h.HELICS_PROPERTY_TIME_DELTA, 1.0)
-        h.helicsFederateInfoSetIntegerProperty(
-            info, h.HELICS_PROPERTY_INT_LOG_LEVEL, h.HELICS_LOG_LEVEL_NO_PRINT
-        )
+        level = h.HELICS_PROPERTY_INT_LOG_LEVEL, h.HELICS_LOG_LEVEL_NO_PRINT
+        h.helicsFederateInfoSetIntegerProperty(info, *level)
         return info
 
     def system(self) -> str:

@@ -378,9 +378,8 @@ def sweep_violations(tolerances: Sequence[float], errors: Sequence[float]) -> li
     for tolerance, error in zip(tolerances, errors, strict=True):
         largest = error_bound(tolerance)
         if not error <= largest:
-            texts.append(
-                f"error {error:.2e} at tolerance {tolerance:g} is above its bound {largest:.0e}"
-            )
+            found = f"error {error:.2e} at tolerance {tolerance:g}"
+            texts.append(f"{found} is above its bound {largest:.0e}")
     for i in range(1, len(errors)):
         if not errors[i] <= LARGEST_RISE * errors[i - 1]:
             texts.append(

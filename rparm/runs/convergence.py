@@ -31,13 +31,10 @@ from rparm.runs.scenario import Scenario
 FACTORS = (64, 32, 16, 8, 4, 2, 1)  # communication steps, in shortest steps of the problem
 ORDERS = (0, 1, 2, 3)  # of the highest input derivative that is set; 0: zero-order hold
 INTERMEDIATE_UPDATE = len(ORDERS)  # the case after the orders
+# of the cases
 NAMES = (
-    "inputs held",
-    "1st derivatives",
-    "2nd derivatives",
-    "3rd derivatives",
-    "intermediate update",
-)  # of the cases
+    "inputs held", "1st derivatives", "2nd derivatives", "3rd derivatives", "intermediate update",
+)  # fmt: skip
 POWERS = (1, 2, 3, 4, 4)  # of the step, which the error follows in each case
 LARGEST_DEVIATION = 0.2  # of a slope from the order expected
 CLEAR_OF_INTEGRATION = 100.0  # an error counts from this many times the integration's own

@@ -514,9 +514,8 @@ class InputReader:
             found = f"ends at {begin + float(log.times[-1])!r} s"
         else:
             return
-        self._reader.fail(
-            f"{where}: {found}, the run needs it from {begin!r} to {begin + last!r} s"
-        )
+        needed = f"from {begin!r} to {begin + last!r} s"
+        self._reader.fail(f"{where}: {found}, the run needs it {needed}")
 
     def _on_or_off(self, table: dict[str, Any], numbers: np.ndarray, where: str) -> np.ndarray:
         """Convert values of a Boolean input."""

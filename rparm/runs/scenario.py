@@ -85,9 +85,7 @@ class Scenario:
     defaults: dict[str, Value]  # start values in the FMU
     panels: tuple[tuple[str, ...], ...] = ()  # variables to draw beside the states, by diagram
     measured: dict[str, Logged] = field(default_factory=dict)  # outputs to compare with logs
-    logs: dict[str, str] = field(
-        default_factory=dict
-    )  # SHA-256 of logs of inputs, by file as given
+    logs: dict[str, str] = field(default_factory=dict)  # SHA-256 of inputs' logs, by file as given
     # to ask the user: values that are hardly meant so, logs that look damaged
     questions: tuple[str, ...] = ()
     smallest_tolerance: float = 0.0  # relative; a smaller one makes no difference
@@ -172,12 +170,8 @@ def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> 
     content = read_toml(path)
     subject = subject_of(path)
     reader = _Reader(path)
-    reader.keys(
-        content,
-        "",
-        required=("title", "description", "tolerance", "time"),
-        optional=(MODEL, FMU, "reference_every", "panels", PARAMETERS, INITIAL, INPUTS, MEASURED),
-    )
+    optional = (MODEL, FMU, "reference_every", "panels", PARAMETERS, INITIAL, INPUTS, MEASURED)
+    reader.keys(content, "", ("title", "description", "tolerance", "time"), optional)
     tolerance = reader.number(content["tolerance"], "tolerance")
     if not 0 < tolerance < 1:
         reader.fail(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")
@@ -387,15 +381,10 @@ def toml_text(content: str) -> str:
 
 def _template_section(section: str, title: str, model: Model) -> Iterator[str]:
     """Write a section with the start value of each variable in a comment."""
-    known = [
-        variable
-        for variable in model.variables.values()
-        if variable.is_a(section) and variable.start is not None and variable.type != "String"
-    ]
+    known = [v for v in model.variables.values() if v.is_a(section) and v.start is not None]
+    known = [variable for variable in known if variable.type != "String"]
     if known:
-        lines = [
-            f"{_template_comment(variable)}\n# {_template_line(variable)}" for variable in known
-        ]
+        lines = [f"{_template_comment(x)}\n# {_template_line(x)}" for x in known]
         yield f"# {title}\n[{section}]\n" + "\n".join(lines) + "\n"
 
 

@@ -69,11 +69,8 @@ def simulate(
         raise UserError(f"{fmu.path}: has no Real outputs, nothing can be recorded")
     with fmu.instance(scenario.name) as instance:
         initialize(instance, scenario, tolerance)
-        drawn = [
-            name
-            for name in dict.fromkeys(chain.from_iterable(scenario.panels))
-            if fmu.model.variables[name].type == "Integer"
-        ]
+        shown = dict.fromkeys(chain.from_iterable(scenario.panels))
+        drawn = [name for name in shown if fmu.model.variables[name].type == "Integer"]
         step_through = None if drawn else _compiled_loop(compiled, len(scenario.times) - 1)
         if step_through is None:
             made = _step_through(instance, scenario, drawn, progress)
@@ -256,14 +253,9 @@ class _CompiledSteps:
         last = min(first + count, self.count)
         here = slice(first, last + 1)
         rows = slice(*np.searchsorted(self._points, (first, last), side="right"))
-        made, failure = self._stepper.advance(
-            self._times[here],
-            self._held[here],
-            self._switches[here],
-            self._points[rows] - first,
-            self._watched,
-            self._values[rows],
-        )
+        given = self._times[here], self._held[here], self._switches[here]
+        where = self._points[rows] - first, self._watched, self._values[rows]
+        made, failure = self._stepper.advance(*given, *where)
         self.done += made
         self._recorded = int(np.searchsorted(self._points, self.done, side="right"))
         return failure
@@ -285,10 +277,8 @@ def communication_points(start: float, stop: float, step: float) -> np.ndarray:
         if not is_finite_number(value):
             raise UserError(f"{name}: expected a finite number, got {value!r}")
     if start < 0 or stop <= start or step <= 0:
-        raise UserError(
-            "expected 0 <= start_time < stop_time and step > 0, "
-            f"got {start!r}, {stop!r} and {step!r}"
-        )
+        expected = "expected 0 <= start_time < stop_time and step > 0"
+        raise UserError(f"{expected}, got {start!r}, {stop!r} and {step!r}")
     exact = difference(stop, start) / step
     count = round(exact)
     if not 1 <= count <= MAX_STEPS:

@@ -203,9 +203,8 @@ def load_study(folder: Path) -> Study:
     """Import the module of a system's folder; UserError if there is none."""
     file = folder / f"{project.STUDY}.py"
     if not is_file(file):
-        raise UserError(
-            f"{file}: no such file, rparm/systems/comparison.py says what belongs in it"
-        )
+        where = "rparm/systems/comparison.py"
+        raise UserError(f"{file}: no such file, {where} says what belongs in it")
     return cast(Study, import_module(f"rparm.models.{folder.name}.{project.STUDY}"))
 
 

@@ -135,9 +135,7 @@ class Snapshot(AbstractContextManager["Snapshot"]):
             fmu = component.instance.fmu
             if not fmu.model.saves_states:
                 raise UserError(f"{component.name}: {fmu.path} has no FMU state to go back to")
-        self._states = [
-            component.instance.saved_state() for component in master.components.values()
-        ]
+        self._states = [c.instance.saved_state() for c in master.components.values()]
 
     def __exit__(self, *_: object) -> None:
         for state in self._states:
@@ -267,9 +265,8 @@ class Master(AbstractContextManager["Master"]):
         parameters = parameters or {}
         for name in parameters:
             if name not in self.components:
-                raise UserError(
-                    f"{name}: no such component (there are: {', '.join(self.components)})"
-                )
+                known = ", ".join(self.components)
+                raise UserError(f"{name}: no such component (there are: {known})")
         self.time = start
         for component in self.components.values():
             component.begin(start, stop, parameters.get(component.name, {}))
@@ -322,9 +319,8 @@ class Master(AbstractContextManager["Master"]):
                     component.read_slopes()
             for component in self.components.values():
                 with component.instance.explained(when):
-                    component.set_lines(
-                        self.values[component.sources], self.slopes[component.sources]
-                    )
+                    known = component.sources
+                    component.set_lines(self.values[known], self.slopes[known])
         for component in self.components.values():
             with component.instance.explained(when):
                 component.read_slopes()
@@ -451,11 +447,8 @@ def run_in_master(ssp: Ssp, variant: str, names: Sequence[str]) -> Run:
                     reader.component.set_inputs(master.values[reader.component.sources])
                     reader.read(rows[row])
         wall_time = time.perf_counter() - begin
-        messages = [
-            f"{component.name!r}: {text}"
-            for component in master.components.values()
-            for text in component.instance.messages
-        ]
+        known = master.components.values()
+        messages = [f"{c.name!r}: {text}" for c in known for text in c.instance.messages]
         said = {name: _value_at_end(master, ssp, name) for name in said_at_end(ssp)}
     return Run(tuple(names), times, rows, wall_time, tuple(dict.fromkeys(messages)), said)
 
@@ -484,10 +477,9 @@ class _RowReader:
         self._real_columns = [own[name] for name in real]
         self._others: list[tuple[int, Callable[[str], int | None], str]] = []
         for name in own.keys() - set(real):
-            boolean = variables[name].type == "Boolean"
-            self._others.append(
-                (own[name], instance.boolean if boolean else instance.integer, name)
-            )
+            is_boolean = variables[name].type == "Boolean"
+            read = instance.boolean if is_boolean else instance.integer
+            self._others.append((own[name], read, name))
 
     def read(self, row: np.ndarray) -> None:
         self._reals.get()
