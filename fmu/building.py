@@ -161,26 +161,17 @@ class Runtime:
         command = [*self.compiler, *map(str, arguments)]
         environment = os.environ | {"ZIG_LOCAL_CACHE_DIR": str(folder / "zig")}
         try:
-            ended = subprocess.run(
-                command,
-                cwd=folder,
-                env=environment,
-                capture_output=True,
-                encoding="utf-8",
-                errors="replace",
-                check=False,
-            )
+            text = {"capture_output": True, "encoding": "utf-8", "errors": "replace"}
+            ended = subprocess.run(command, cwd=folder, env=environment, check=False, **text)
         except OSError as error:
-            raise ModelFileError(
-                f"{command[0]}: cannot be run: {error.strerror}; {INSTALL}"
-            ) from None
+            why = f"{error.strerror}; {INSTALL}"
+            raise ModelFileError(f"{command[0]}: cannot be run: {why}") from None
         if ended.returncode:
             lines = [line for line in ended.stderr.splitlines() if "error" in line]
             reason = (lines or ended.stderr.splitlines() or ["no message"])[0]
             # the C is right: what fails is the compiler
-            raise ModelFileError(
-                f"{command[0]}: {reason:.300}; gcc and clang need binutils, {INSTALL}"
-            )
+            way_out = f"gcc and clang need binutils, {INSTALL}"
+            raise ModelFileError(f"{command[0]}: {reason:.300}; {way_out}")
 
     def sources(self, version: str, own: Library, root: Path) -> Manifest:
         """Return all sources of a version's shared object, with the model's own part."""

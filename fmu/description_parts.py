@@ -70,14 +70,9 @@ def add_log_categories(root: ET.Element, prefix: str) -> None:
 
 
 def add_experiment(root: ET.Element, experiment: Experiment) -> None:
-    ET.SubElement(
-        root,
-        "DefaultExperiment",
-        startTime=repr(experiment.start),
-        stopTime=repr(experiment.stop),
-        tolerance=repr(experiment.tolerance),
-        stepSize=repr(experiment.step),
-    )
+    numbers = {"startTime": experiment.start, "stopTime": experiment.stop}
+    numbers |= {"tolerance": experiment.tolerance, "stepSize": experiment.step}
+    ET.SubElement(root, "DefaultExperiment", {key: repr(x) for key, x in numbers.items()})
 
 
 def document(root: ET.Element) -> str:

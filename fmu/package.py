@@ -69,9 +69,8 @@ def universal(libraries: Sequence[bytes]) -> bytes:
         page = PAGES[processor]
         gap = -(end + len(body)) % 2**page
         body += bytes(gap) + library
-        head += struct.pack(
-            ">IIIII", processor, kind, end + len(body) - len(library), len(library), page
-        )
+        place = end + len(body) - len(library), len(library), page
+        head += struct.pack(">IIIII", processor, kind, *place)
     return head + body
 
 

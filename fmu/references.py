@@ -77,9 +77,7 @@ def tag(name: str) -> str:
     return f"{{{NAMESPACES[prefix]}}}{local}"
 
 
-# ---- the parameter set
-
-
+# ---- The parameter set ---------------------------------------------------------------------------
 def parameter_set(scenario: Scenario, declaration: Declaration) -> str:
     """Text of the .ssv (SSP 1.0) with the values that are not the start values of the FMU."""
     root = ET.Element(
@@ -104,9 +102,8 @@ def typed(variable: Variable, value: Any, place: str) -> tuple[str, dict[str, st
     """Element for a value, with its attributes."""
     if isinstance(variable, Enumeration):
         if not isinstance(value, str) or value not in variable.items:
-            raise WrongInputError(
-                f"{place} = {value!r:.40} is not one of {', '.join(variable.items)}"
-            )
+            known = ", ".join(variable.items)
+            raise WrongInputError(f"{place} = {value!r:.40} is not one of {known}")
         return "Enumeration", {"value": value}
     wanted = {"float64": (int, float), "int32": (int,), "boolean": (bool,)}
     if type(value) not in wanted[variable.type]:
@@ -127,9 +124,7 @@ def add_units(root: ET.Element, names: Sequence[str], declaration: Declaration) 
         ET.SubElement(unit, tag("ssc:BaseUnit"), exponents)
 
 
-# ---- the manifest
-
-
+# ---- The manifest --------------------------------------------------------------------------------
 def manifest(model: str, scenarios: Sequence[Scenario]) -> str:
     """Text of fmi-ls-manifest.xml."""
     root = ET.Element("fmiReferences")
@@ -138,14 +133,9 @@ def manifest(model: str, scenarios: Sequence[Scenario]) -> str:
     root.set(tag("fmi-ls:fmi-ls-description"), DESCRIPTION)
     for scenario in scenarios:
         for ending, (role, kind, what) in FILES.items():
-            ET.SubElement(
-                root,
-                "Related",
-                source=f"{scenario.name}/{file_name(model, ending)}",
-                role=role,
-                type=kind,
-                description=f"{what} ({scenario.title})",
-            )
+            source = f"{scenario.name}/{file_name(model, ending)}"
+            related = {"source": source, "role": role, "type": kind}
+            ET.SubElement(root, "Related", related, description=f"{what} ({scenario.title})")
     return document(root)
 
 
@@ -154,9 +144,7 @@ def file_name(model: str, ending: str) -> str:
     return model + ending if ending.startswith("_") else ending
 
 
-# ---- all files
-
-
+# ---- All files -----------------------------------------------------------------------------------
 def files(
     declaration: Declaration, names: Sequence[str], folder: Path
 ) -> Iterator[tuple[str, bytes]]:

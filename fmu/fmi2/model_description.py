@@ -104,19 +104,11 @@ def add_types(root: ET.Element, variables: dict[str, Variable]) -> None:
 def add_variable(
     parent: ET.Element, name: str, variable: Variable, index: dict[str, str], units: dict[str, Unit]
 ) -> None:
-    attributes = {
-        "description": variable.description,
-        "causality": variable.causality,
-        "variability": variable.variability,
-        "initial": variable.initial,
-    }
-    scalar = ET.SubElement(
-        parent,
-        "ScalarVariable",
-        name=name,
-        valueReference=str(variable.reference),
-        **{key: text for key, text in attributes.items() if text},
-    )
+    keys = {"name": name, "valueReference": str(variable.reference)}
+    for key in ("description", "causality", "variability", "initial"):
+        if text := getattr(variable, key):
+            keys[key] = text
+    scalar = ET.SubElement(parent, "ScalarVariable", keys)
     element = ET.SubElement(scalar, TYPES[variable.type])
     if isinstance(variable, Enumeration):
         element.set("declaredType", description_parts.type_name(name))

@@ -75,9 +75,8 @@ def add_types(root: ET.Element, declaration: Declaration) -> None:
             add_float_type(definitions, variable, declaration.units)
     for name, variable in declaration.variables.items():
         if isinstance(variable, Enumeration):
-            enumeration = ET.SubElement(
-                definitions, "EnumerationType", name=description_parts.type_name(name)
-            )
+            type_name = description_parts.type_name(name)
+            enumeration = ET.SubElement(definitions, "EnumerationType", name=type_name)
             description_parts.add_items(enumeration, variable)
 
 
@@ -88,9 +87,8 @@ def float_type_name(variable: Float64) -> str:
 
 
 def add_float_type(parent: ET.Element, variable: Float64, units: dict[str, Unit]) -> None:
-    element = ET.SubElement(
-        parent, "Float64Type", name=float_type_name(variable), unit=variable.unit
-    )
+    keys = {"name": float_type_name(variable), "unit": variable.unit}
+    element = ET.SubElement(parent, "Float64Type", keys)
     for display in list(units[variable.unit].display)[:1]:
         element.set("displayUnit", display)
     if variable.nominal is not None:
@@ -106,15 +104,9 @@ def has_intermediate_update(variable: Variable) -> bool:
 def add_variable(
     parent: ET.Element, name: str, variable: Variable, declaration: Declaration
 ) -> None:
-    element = ET.SubElement(
-        parent,
-        TYPES[variable.type],
-        name=name,
-        valueReference=str(variable.reference),
-        description=variable.description,
-        causality=variable.causality,
-        variability=variable.variability,
-    )
+    keys = {"name": name, "valueReference": str(variable.reference)}
+    keys |= {key: getattr(variable, key) for key in ("description", "causality", "variability")}
+    element = ET.SubElement(parent, TYPES[variable.type], keys)
     if variable.initial is not None:
         element.set("initial", variable.initial)
     if isinstance(variable, Enumeration):
@@ -138,13 +130,11 @@ def add_structure(root: ET.Element, declaration: Declaration) -> None:
     structure = ET.SubElement(root, "ModelStructure")
     states = {v.derivative_of for v in variables.values() if v.derivative_of is not None}
     derivatives = {v.derivative_of: n for n, v in variables.items() if v.derivative_of is not None}
+    calculated = [n for n, v in variables.items() if v.is_unknown and v.initial == "calculated"]
     for section, names in (
         ("Output", [n for n, v in variables.items() if v.causality == "output"]),
         ("ContinuousStateDerivative", [derivatives[n] for n in variables if n in states]),
-        (
-            "InitialUnknown",
-            [n for n, v in variables.items() if v.is_unknown and v.initial == "calculated"],
-        ),
+        ("InitialUnknown", calculated),
         ("EventIndicator", declaration.model.event_indicators),
     ):
         for name in names:
@@ -152,15 +142,9 @@ def add_structure(root: ET.Element, declaration: Declaration) -> None:
             later = (unknown.dependencies or []) + unknown.parameters
             is_initial = section == "InitialUnknown"
             knowns = unknown.initial_knowns(variables) if is_initial else later
-            ET.SubElement(
-                structure,
-                section,
-                valueReference=str(unknown.reference),
-                dependencies=" ".join(
-                    str(reference)
-                    for reference in sorted(variables[known].reference for known in knowns)
-                ),
-            )
+            dependencies = map(str, sorted(variables[known].reference for known in knowns))
+            keys = {"valueReference": str(unknown.reference)}
+            ET.SubElement(structure, section, keys, dependencies=" ".join(dependencies))
 
 
 def terminals_and_icons(declaration: Declaration) -> str:
@@ -181,9 +165,8 @@ def add_icon(root: ET.Element, icon: Path) -> None:
     box = {"x1": -HALF_WIDTH, "y1": -half_height, "x2": HALF_WIDTH, "y2": half_height}
     corners = {key: repr(value) for key, value in box.items()}
     graphics = ET.SubElement(root, "GraphicalRepresentation")
-    ET.SubElement(
-        graphics, "CoordinateSystem", corners, suggestedScalingFactorTo_mm=repr(MM_PER_UNIT)
-    )
+    scale = {"suggestedScalingFactorTo_mm": repr(MM_PER_UNIT)}
+    ET.SubElement(graphics, "CoordinateSystem", corners | scale)
     ET.SubElement(graphics, "Icon", corners)
 
 
@@ -197,21 +180,11 @@ def png_size(path: Path) -> tuple[int, int]:
 def add_terminals(parent: ET.Element, terminals: Mapping[str, Terminal]) -> None:
     """Write terminals, each with its members and the terminals in it."""
     for name, terminal in terminals.items():
-        element = ET.SubElement(
-            parent,
-            "Terminal",
-            name=name,
-            matchingRule=terminal.rule,
-            description=terminal.description,
-        )
+        keys = {"name": name, "matchingRule": terminal.rule, "description": terminal.description}
+        element = ET.SubElement(parent, "Terminal", keys)
         for kind, member, variable in terminal.members:
-            ET.SubElement(
-                element,
-                "TerminalMemberVariable",
-                variableName=variable,
-                memberName=member,
-                variableKind=kind,
-            )
+            keys = {"variableName": variable, "memberName": member, "variableKind": kind}
+            ET.SubElement(element, "TerminalMemberVariable", keys)
         add_terminals(element, terminal.terminals)
 
 

@@ -281,9 +281,8 @@ class Function:
 
     def _variables(self) -> list[Place]:
         """Return parts of the arguments that move, in their order."""
-        return [
-            place for name in self.wanted.by for place in self._parts((name,), self.kinds[name])
-        ]
+        moving = self.wanted.by
+        return [place for name in moving for place in self._parts((name,), self.kinds[name])]
 
     def _parts(self, place: Place, kind: Any) -> list[Place]:
         kind = pointed(kind)

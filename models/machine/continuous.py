@@ -52,19 +52,12 @@ class Method:
     inputs: str = "held"
 
 
+FEWER = (4000, 6000, 8000, 12000, 16000)  # steps per second
 METHODS = (
     Method("Ecos", 1, (5000, 7000, 9000, 11000, 13000, 15000)),
     Method("Jacobi, inputs held", 1, (4000, 6000, 8000, 10000, 12000, 16000), "jacobi"),
-    Method(
-        "Jacobi, inputs extrapolated", 2, (4000, 6000, 8000, 12000, 16000), "jacobi", "extrapolated"
-    ),
-    Method(
-        "Gauss-Seidel, inputs extrapolated",
-        2,
-        (4000, 6000, 8000, 12000, 16000),
-        "gauss_seidel",
-        "extrapolated",
-    ),
+    Method("Jacobi, inputs extrapolated", 2, FEWER, "jacobi", "extrapolated"),
+    Method("Gauss-Seidel, inputs extrapolated", 2, FEWER, "gauss_seidel", "extrapolated"),
 )
 
 

@@ -23,7 +23,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from rparm.models.machine.systems import SEQUENCE, direct, run_in_ecos, write_system
+from rparm.models.machine.systems import SEQUENCE, direct, run_in_ecos
 
 from rparm import project
 from rparm.fmi.fmu_file import Fmu
@@ -231,11 +231,6 @@ def in_ecos(opened: Ssp) -> Measure:
         return run[:, 0]
 
     return measure
-
-
-def write_pressed(opened: Ssp, path: Path, stiffness: float, damping: float) -> None:
-    """An SSP of the machine whose slide is pressed to the wall."""
-    write_system(opened, path, pressed(stiffness, damping), STEPS * STEP, STEP)
 
 
 # ---- rparm's master ------------------------------------------------------------------------------

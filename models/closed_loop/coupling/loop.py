@@ -143,10 +143,8 @@ def _check(path: Path, loop: ClosedLoop) -> None:
             )
         for name in names:
             if name not in loop.fmus[component].model.variables:
-                raise UserError(
-                    f"{path}: component {component!r} has no variable {name!r}, "
-                    "which the study needs"
-                )
+                missing = f"component {component!r} has no variable {name!r}"
+                raise UserError(f"{path}: {missing}, which the study needs")
     for variant in VARIANTS:
         if variant not in loop.variants:
             raise UserError(f"{path}: has no variant {variant!r}, which the study needs")
@@ -210,9 +208,8 @@ def study_tracking(loop: ClosedLoop, step: float = 1e-3) -> list[Tracking]:
     for method in (METHODS[0], METHODS[1], REFERENCE_AHEAD):
         columns = loop.run(method, step)[0]
         error = path_error(columns)
-        found.append(
-            Tracking(method, step, columns["time"], error, predicted_error(loop, smooth, method))
-        )
+        predicted = predicted_error(loop, smooth, method)
+        found.append(Tracking(method, step, columns["time"], error, predicted))
     return found
 
 
@@ -249,10 +246,8 @@ def predicted_error(loop: ClosedLoop, smooth: Columns, method: Method) -> np.nda
 
     # gains (2, 2) by Kp and Kd, mass matrix (rows, 2, 2)
     gains = np.array([[loop.gain(f"{kind}{i}") for i in (1, 2)] for kind in ("Kp", "Kd")])
-    mass = np.array(
-        [[smooth["arm.D11"], smooth["arm.D12"]], [smooth["arm.D12"], smooth["arm.D22"]]]
-    )
-    mass = np.moveaxis(mass, 2, 0)
+    D11, D12, D22 = (smooth[f"arm.{name}"] for _, name in MASSES)
+    mass = np.moveaxis(np.array([[D11, D12], [D12, D22]]), 2, 0)
 
     # rate of the efforts, and the part of it that the references cause, (rows, 2)
     efforts = np.array([smooth["controller.tau1"], smooth["controller.f2"]]).T

@@ -190,13 +190,8 @@ def _by_step(axes: Axes, study: StepErrors, values: np.ndarray, title: str) -> N
         label = method.name if title.startswith("Error") else None
         axes.loglog(study.steps, row, "o-", color=COLORS[i], markeredgecolor="white", label=label)
         slope = study.slopes(values)[i]
-        axes.annotate(
-            f"{slope:.2f}",
-            (study.steps[0], row[0]),
-            xytext=(6, -3),
-            textcoords="offset points",
-            color=COLORS[i],
-        )
+        style = {"xytext": (6, -3), "textcoords": "offset points", "color": COLORS[i]}
+        axes.annotate(f"{slope:.2f}", (study.steps[0], row[0]), **style)
     axes.xaxis.set_major_locator(FixedLocator(study.steps))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_formatter(FuncFormatter(lambda step, _: f"{1e3 * step:g}"))

@@ -87,9 +87,8 @@ def created_energy(loop: ClosedLoop, columns: Columns) -> float:
 
 def law(loop: ClosedLoop, columns: Columns) -> np.ndarray:
     """Efforts of the nominal controller for given references and measurements, (2, rows)."""
-    sources = {
-        c.end_connector: c.start for c in loop.connections if c.end_component == "controller"
-    }
+    fed = (c for c in loop.connections if c.end_component == "controller")
+    sources = {c.end_connector: c.start for c in fed}
     with loop.fmus["controller"].instance("controller") as controller:
         efforts, inputs = controller.reals(["tau1", "f2"]), controller.reals(list(sources))
         controller.set_up(0.0, None)
@@ -142,9 +141,8 @@ def study_payload(loop: ClosedLoop, step: float = 1e-3) -> Payload:
     for variant in VARIANTS:
         columns = loop.run(METHODS[0], step, variant, stop=HOLD)[0]
         largest[variant] = float(path_error(columns).max())
-        held[variant] = np.array(
-            [columns[f"trajectory.q{i}_ref"][-1] - columns[f"arm.q{i}"][-1] for i in (1, 2)]
-        )
+        ends = [(columns[f"trajectory.q{i}_ref"][-1], columns[f"arm.q{i}"][-1]) for i in (1, 2)]
+        held[variant] = np.array([wanted - found for wanted, found in ends])
         if variant == "heavy_payload":
             theory = _held_error(loop, columns)
     return Payload(largest, held, theory)
@@ -239,9 +237,8 @@ class FastAndSlow:
         self, tolerance: float, method: Method = FINEST
     ) -> tuple[step_control.Controlled, np.ndarray, tuple[str, ...]]:
         """A controlled run, with the local error of every accepted step, measured by redoing it."""
-        control = step_control.Control(
-            tolerance, dict.fromkeys(STATES, 1.0), FIRST, SHORTEST, LONGEST, CORNERS
-        )
+        norm, lengths = dict.fromkeys(STATES, 1.0), (FIRST, SHORTEST, LONGEST)
+        control = step_control.Control(tolerance, norm, *lengths, CORNERS)
         redone = []
         with self.loop.master(method) as master:
             places = [master.names.index(name) for name in STATES]

@@ -107,9 +107,8 @@ def _through_inverse_kinematics(path: str, progress: sp.Expr) -> tuple[sp.Matrix
         position = start + progress * (end - start)
         heading, heading_angle = start, sp.atan2(start[1], start[0])
     else:
-        x, y, radius, angle, frequency = symbols(
-            "trajectory", "x_center y_center radius start_angle frequency"
-        )
+        names = "x_center y_center radius start_angle frequency"
+        x, y, radius, angle, frequency = symbols("trajectory", names)
         center, phase = sp.Matrix([x, y]), angle + 2 * sp.pi * frequency * progress
         along_radius = sp.Matrix([sp.cos(phase), sp.sin(phase)])
         position = center + radius * along_radius

@@ -41,14 +41,11 @@ def make(solver: Solver, parameters: Mapping[str, Value], stop: float = STOP) ->
     names = [*columns(), *DISCRETE]
     machine = Machine(solver, parameters, times)
     runs = dict(zip(FILES, machine.run(), strict=True))
-    stepped = {
-        file: (
-            times[::KEPT],
-            {name: np.array([row[name] for row in rows[::KEPT]]) for name in names},
-        )
-        for file, rows in runs.items()
-    }
-    return stepped | {"tightest.csv": _tightest(machine.sensor.samples)}
+    found: dict[str, tuple[np.ndarray, dict[str, np.ndarray]]] = {}
+    for file, rows in runs.items():
+        kept = {name: np.array([row[name] for row in rows[::KEPT]]) for name in names}
+        found[file] = times[::KEPT], kept
+    return found | {"tightest.csv": _tightest(machine.sensor.samples)}
 
 
 def _tightest(samples: Sequence[Sample]) -> tuple[np.ndarray, dict[str, np.ndarray]]:

@@ -139,9 +139,8 @@ class Monolith:
 
     def _path(self) -> str:
         """The circle of the reference motion contains the axis of joint 1, or leaves it aside."""
-        x, y, radius = (
-            self._numbers[f"trajectory.{n}"] for n in ("x_center", "y_center", "radius")
-        )
+        names = ("x_center", "y_center", "radius")
+        x, y, radius = (self._numbers[f"trajectory.{name}"] for name in names)
         return "circle_around" if np.hypot(x, y) < radius else "circle_aside"
 
     def _law(
@@ -167,13 +166,9 @@ class Monolith:
         known |= {sp.Symbol(name): effort for name, effort in zip(EFFORTS, moved, strict=True)}
         D, b = e.inertia, e.forces
         determinant = D[0, 0] * D[1, 1] - D[0, 1] ** 2
-        return [
-            hy.from_sympy(x, known)
-            for x in (
-                (D[1, 1] * b[0] - D[0, 1] * b[1]) / determinant,
-                (D[0, 0] * b[1] - D[0, 1] * b[0]) / determinant,
-            )
-        ]
+        first = (D[1, 1] * b[0] - D[0, 1] * b[1]) / determinant
+        second = (D[0, 0] * b[1] - D[0, 1] * b[0]) / determinant
+        return [hy.from_sympy(x, known) for x in (first, second)]
 
     # ---- The motion ------------------------------------------------------------------------------
 

@@ -53,12 +53,8 @@ class Law:
         self.limit = (value["tau1_max"], value["f2_max"])
         self.error = [value[f"q{i}_ref"] - value[f"q{i}"] for i in (1, 2)]
         self.derror = [value[f"dq{i}_ref"] - value[f"dq{i}"] for i in (1, 2)]
-        correction = mp.matrix(
-            [
-                value[f"Kp{i}"] * self.error[i - 1] + value[f"Kd{i}"] * self.derror[i - 1]
-                for i in (1, 2)
-            ]
-        )
+        both = zip((1, 2), self.error, self.derror, strict=True)
+        correction = mp.matrix([value[f"Kp{i}"] * e + value[f"Kd{i}"] * de for i, e, de in both])
         payload = [value[name] if value[ATTACHED] else mpf(0) for name in plant.PAYLOAD]
         known = (value[name] for name in plant.ARM)
         state = (value[name] for name in plant.STATES)

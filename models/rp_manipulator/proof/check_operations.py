@@ -236,14 +236,8 @@ def check(program: Path, rounds: int = 1, seed: int = 1) -> int:
     try:
         asked = questions(seed, rounds)
         lines = "".join(f"{question.line}\n" for question in asked)
-        run = subprocess.run(
-            [program, "--operations"],
-            input=lines,
-            capture_output=True,
-            text=True,
-            encoding="utf-8",
-            timeout=60,
-        )
+        text = {"input": lines, "capture_output": True, "text": True, "encoding": "utf-8"}
+        run = subprocess.run([program, "--operations"], timeout=60, **text)
         answers = run.stdout.splitlines()
         if run.returncode != 0 or len(answers) != len(asked):
             raise WrongAnswer(f"{len(answers)} answers to {len(asked)} questions: {run.stderr}")
