@@ -17,7 +17,7 @@ LOG_CATEGORIES = {
 
 
 def texts_of(declaration: Declaration, provenance: Provenance) -> dict[str, str]:
-    """Attributes of the root: what the model is and where it comes from."""
+    """Return attributes of the root: what the model is and where it comes from."""
     model = declaration.model
     texts = {
         "author": provenance.author,
@@ -54,7 +54,7 @@ def add_items(parent: ET.Element, variable: Enumeration) -> None:
 
 
 def value_attributes(variable: Variable) -> dict[str, str]:
-    """Attributes start, min and max, of those that the variable has."""
+    """Return attributes start, min and max, of those that the variable has."""
     if isinstance(variable, Boolean):
         return {} if variable.start is None else {"start": str(variable.start).lower()}
     values = {key: getattr(variable, key) for key in ("start", "min", "max")}

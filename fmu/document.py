@@ -141,10 +141,7 @@ def prepare_tables(tokens: Iterable[Token]) -> None:
 
 
 def readme_page(readme: Path) -> tuple[str, list[Path], list[tuple[str, str]]]:
-    """Write README.md as the inside of an HTML body; return it, local images, and headings.
-
-    Headings of level 2 are pairs of identifier and text (HTML).
-    """
+    """Write README.md as an HTML body; also images, and (id, HTML text) of level-2 headings."""
 
     def formula(latex: str, options: dict[str, bool]) -> str:
         try:

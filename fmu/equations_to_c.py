@@ -18,7 +18,7 @@ from program import program
 
 
 def toml(declared: dict[str, Any]) -> str:
-    """Text of a variables.toml."""
+    """Return the text of a variables.toml."""
     lines = []
     for title, content in declared.items():
         tables = {title: content} if title in ("model", "experiment") else {}

@@ -24,7 +24,7 @@ def write_if_changed(path: Path, text: str) -> None:
 
 
 def source_files(folder: Path) -> list[str]:
-    """Names of the files that a source-code FMU is compiled from."""
+    """Return the names of the files that a source-code FMU is compiled from."""
     names = sorted(path.name for path in folder.glob("*.c"))
     if not names:
         raise FileNotFoundError(f"{folder}: has no C files")

@@ -99,7 +99,7 @@ def parameter_set(scenario: Scenario, declaration: Declaration) -> str:
 
 
 def typed(variable: Variable, value: Any, place: str) -> tuple[str, dict[str, str]]:
-    """Element for a value, with its attributes."""
+    """Return the element for a value, with its attributes."""
     if isinstance(variable, Enumeration):
         if not isinstance(value, str) or value not in variable.items:
             known = ", ".join(variable.items)
@@ -126,7 +126,7 @@ def add_units(root: ET.Element, names: Sequence[str], declaration: Declaration) 
 
 # ---- The manifest --------------------------------------------------------------------------------
 def manifest(model: str, scenarios: Sequence[Scenario]) -> str:
-    """Text of fmi-ls-manifest.xml."""
+    """Return the text of fmi-ls-manifest.xml."""
     root = ET.Element("fmiReferences")
     root.set(tag("fmi-ls:fmi-ls-name"), NAME)
     root.set(tag("fmi-ls:fmi-ls-version"), VERSION)
@@ -140,7 +140,7 @@ def manifest(model: str, scenarios: Sequence[Scenario]) -> str:
 
 
 def file_name(model: str, ending: str) -> str:
-    """Name of a file of a scenario: after the model where the cross-check has it so."""
+    """Return the name of a file of a scenario: after the model where the cross-check has it so."""
     return model + ending if ending.startswith("_") else ending
 
 
@@ -148,7 +148,7 @@ def file_name(model: str, ending: str) -> str:
 def files(
     declaration: Declaration, names: Sequence[str], folder: Path
 ) -> Iterator[tuple[str, bytes]]:
-    """Name and content of each file; folder: of the model."""
+    """Return name and content of each file; folder: of the model."""
     model = declaration.model.name
     scenarios = [read(folder / "scenarios" / f"{name}.toml") for name in names]
     yield MANIFEST, manifest(model, scenarios).encode()

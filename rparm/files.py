@@ -129,10 +129,7 @@ def number_in(text: str) -> float:
 
 
 def difference(later: float, earlier: float) -> float:
-    """Return the difference of two numbers as they are written, rounded once.
-
-    Doubles of times that count from 1970 are 0.2 microseconds apart: their difference is as coarse.
-    """
+    """Subtract decimals as written: doubles of times since 1970 are 0.2 microseconds apart."""
     return float(Decimal(repr(float(later))) - Decimal(repr(float(earlier))))
 
 
@@ -241,10 +238,7 @@ def write_trajectory(
     digits: int | None = 17,
     short_times: bool = False,
 ) -> None:
-    """Write trajectories, (rows, names), over times in s; the file appears complete or not at all.
-
-    `digits` are the significant ones; None and `short_times` take as many as doubles need.
-    """
+    """Write (rows, names) over times (s), complete or not at all; None: all digits of doubles."""
     import numpy as np  # takes long
 
     form = _shortest if digits is None else f"{{:.{digits}g}}".format
@@ -261,10 +255,7 @@ def _shortest(value: float) -> str:
 
 
 def read_trajectory(path: Path, failure: Failure) -> tuple[tuple[str, ...], "np.ndarray"]:
-    """Read trajectories that `write_trajectory` wrote; in an installed package they are compressed.
-
-    Returns the columns' names, "time" first, and a finite table (rows, names) of a row or more.
-    """
+    """Read names, "time" first, and a finite table (rows, names); installed, it is compressed."""
     import numpy as np  # takes long
 
     try:

@@ -77,10 +77,7 @@ def temporary_folder(within: Path | None = None) -> Iterator[Path]:
 
 
 def run_group(command: Sequence[object], **options: Any) -> subprocess.CompletedProcess:
-    """Run a program to its end, as subprocess.run does; `options` are Popen's.
-
-    An interruption kills it and, where there are process groups, the programs that it started.
-    """
+    """Run a program as subprocess.run does; an interruption kills its whole process group."""
     child = None
     try:
         with uninterrupted():

@@ -212,10 +212,7 @@ def built_names(suffix: str) -> list[str]:
 
 
 def built(folder: Path, suffix: str, option: str = "", version: str = VERSIONS[0]) -> Path:
-    """Return the FMU (.fmu) or SSP (.ssp) built from a folder, of a version of FMI.
-
-    UserError if it is not there; it names an `option` that takes another file.
-    """
+    """Return the FMU or SSP built from a folder; a UserError names an `option` for another file."""
     kind = suffix.removeprefix(".").upper()
     if INSTALLED:
         for name in shipped.names():

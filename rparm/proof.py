@@ -165,10 +165,7 @@ class Prover:
         enclosure: Enclosure,
         progress: Callable[[int], object] | None = None,
     ) -> tuple[int, int]:
-        """Prove again, check every claim of certificates, and single operations; count both.
-
-        UserError if one is not confirmed, or if the intervals are not those of `enclosure`.
-        """
+        """Prove again, check all claims and operations, count both; UserError for a wrong one."""
         checked = [self._check(scenario, start, progress) for start in enclosure.starts]
         steps = sum(count for count, _ in checked)
         again = reduce(hull, (answer for _, answer in checked))
@@ -365,8 +362,8 @@ def errors_of_run(
 ) -> Mapping[str, ProvenError] | None:
     """Bound the errors of a run at the points that were recorded; None: nothing is proven.
 
-    So it is without a prover, where a proof does not come to the end or takes more than `SECONDS`,
-    and for more than `most_steps` communication steps.
+    So it is without a prover, where a proof does not come to the end or takes more than
+    `LONGEST_RUN` s, and for more than `most_steps` communication steps.
     """
     program = provers().get(scenario.model)
     if program is None or len(scenario.times) > most_steps + 1:

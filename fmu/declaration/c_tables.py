@@ -124,5 +124,5 @@ def table_row(name: str, variable: Variable, structure: str) -> str:
 
 
 def c_number(value: float | None, otherwise: str) -> str:
-    """Text of a double that reads back as the same value."""
+    """Return the text of a double that reads back as the same value."""
     return otherwise if value is None else repr(float(value))

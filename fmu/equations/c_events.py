@@ -39,7 +39,7 @@ def leaves(file: ModelFile) -> Leaves:
 
 
 def arrays(file: ModelFile) -> Leaves:
-    """Where functions of (values, t, x, u) have them."""
+    """Return where functions of (values, t, x, u) have them."""
     own = {("state", v.name): f"x[{i}]" for i, v in enumerate(file.of("states"))}
     own |= {("input", v.name): f"u[{i}]" for i, v in enumerate(file.of("inputs"))}
     return {**leaves(file), **own}
@@ -157,7 +157,7 @@ class Events:
         return code.lines + lines
 
     def _due(self) -> list[str]:
-        """Whether each event of the file is due."""
+        """Return whether each event of the file is due."""
         code = Code(leaves(self.file))
         for i, event in enumerate(self.file.events):
             during = "" if event.during is None else f" && {code.of(event.during.value)}"

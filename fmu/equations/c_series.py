@@ -128,7 +128,7 @@ class Series:
         return self._coefficients[value]
 
     def _coefficient(self, value: Value) -> str:
-        """C expression of coefficient k > 0, without operators; writes it to its row."""
+        """Return the C expression of coefficient k > 0, without operators; writes it to its row."""
         if not value.moves:
             return "0.0"
         leaf = self.later.leaves.get((value.op, value.name), "")

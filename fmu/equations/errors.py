@@ -23,7 +23,7 @@ class Errors:
         self.known: dict[Value, str] = {}
 
     def of(self, root: Value) -> str:
-        """Error of a value, >= 0 in its unit."""
+        """Return the error of a value, >= 0 in its unit."""
         for value in in_order([root], self.known):
             error = self._error(value)
             is_name = error == NONE or error.isidentifier()

@@ -37,7 +37,7 @@ def references(path: Path, wanted: list[Key]) -> dict[Key, int]:
 
 
 def text(name: str, found: dict[Key, int]) -> str:
-    """Text of the lock file."""
+    """Return the text of the lock file."""
     lines = [
         f'[[variables]]\nname = "{key[0]}"\nkind = "{key[1]}"\nreference = {reference}\n'
         for key, reference in sorted(found.items(), key=lambda item: item[1])

@@ -81,7 +81,7 @@ def add_types(root: ET.Element, declaration: Declaration) -> None:
 
 
 def float_type_name(variable: Float64) -> str:
-    """Name of the type of a floating-point number, for example "Float64 in rad/s"."""
+    """Return the name of the type of a floating-point number, for example "Float64 in rad/s"."""
     nominal = "" if variable.nominal is None else f", nominal {variable.nominal!r}"
     return f"Float64 in {variable.unit}{nominal}"
 
@@ -96,7 +96,7 @@ def add_float_type(parent: ET.Element, variable: Float64, units: dict[str, Unit]
 
 
 def has_intermediate_update(variable: Variable) -> bool:
-    """Whether the variable can be accessed inside a step, as fmi3.c has it."""
+    """Return whether the variable can be accessed inside a step, as fmi3.c has it."""
     is_continuous = isinstance(variable, Float64) and variable.variability == "continuous"
     return is_continuous and variable.owner == "model" and variable.causality in ("input", "output")
 

@@ -298,10 +298,7 @@ class Scope:
 
 
 class Blocks:
-    """Statements that give targets, lvalues of C, their values.
-
-    `names` are names of values, `enumerators` names of whole numbers by an integer leaf.
-    """
+    """Statements that give lvalues of C (`targets`) values; `enumerators` name whole numbers."""
 
     def __init__(
         self,

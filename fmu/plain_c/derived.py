@@ -433,7 +433,7 @@ def c_name(kind: Any) -> str:
 
 
 def parameter_name(text: str) -> str:
-    """Name of a parameter in its declaration."""
+    """Return the name of a parameter in its declaration."""
     return text.replace("*", " ").split()[-1].partition("[")[0]
 
 

@@ -70,7 +70,7 @@ def parameters(opened: Ssp, variant: str) -> dict[str, dict[str, Value]]:
 
 
 def reference(variant: str) -> Columns:
-    """Columns of the solution in continuous time, by name."""
+    """Return columns of the solution in continuous time, by name."""
     path = project.references(FOLDER) / variant / "monolithic.csv"
     names, table = files.read_trajectory(path, files.csv_failure(path))
     return dict(zip(names, table.T, strict=True))
@@ -84,7 +84,7 @@ def run(
     per_second: int,
     stop: float = STOP,
 ) -> Columns:
-    """Values at the times of the reference up to `stop` in s, by name."""
+    """Return values at the times of the reference up to `stop` in s, by name."""
     every = per_second // ROWS_PER_SECOND
     values = parameters(opened, variant)
     if not method.order:
@@ -131,7 +131,7 @@ def largest_error(columns: Columns, expected: Columns) -> tuple[float, str]:
 
 
 def tracking_error(columns: Columns) -> float:
-    """Largest distance of the end effector from its reference, m."""
+    """Return the largest distance of the end effector from its reference, m."""
     away = (columns[f"plant.ee_{x}"] - columns[f"trajectory.ee_{x}_ref"] for x in "xy")
     return float(np.hypot(*away).max())
 

@@ -24,7 +24,7 @@ EXPERIMENT = (START, STOP, 1 / STEPS_PER_SECOND)
 
 
 def contact_force(outcome: Outcome) -> float:
-    """Largest force of the wall, N."""
+    """Return the largest force of the wall, N."""
     return float(np.max(outcome.column("environment.wall_force")))
 
 

@@ -64,10 +64,7 @@ class Contact:
 def least_damping(
     contact: Contact, step: float, order: str = "jacobi", inputs: str = "held"
 ) -> float:
-    """Return the damping (N.s/m) above which the contact is stable, to leading order in a step (s).
-
-    It is without regard to the contact's own damping and, with held inputs, its mass.
-    """
+    """Return the damping (N.s/m) above which a contact is stable, to leading order of a step."""
     if inputs == "held":
         return AGE[order] * step * contact.stiffness
     return EXTRAPOLATED[order] * contact.stiffness**2 * step**3 / contact.mass
@@ -75,7 +72,7 @@ def least_damping(
 
 # ---- The discrete loop, exactly ------------------------------------------------------------------
 def _moved(contact: Contact, h: float, x: float, v: float, f: float, df: float) -> State:
-    """Position, velocity and acceleration after a step with the force f + df t against x."""
+    """Return position, velocity and acceleration after a step with the force f + df t against x."""
     m = contact.mass
     return (
         x + h * v - (f / 2 + df * h / 6) * h**2 / m,
@@ -136,7 +133,7 @@ def transition(
 def eigenvalues(
     contact: Contact, step: float, order: str = "jacobi", inputs: str = "held"
 ) -> np.ndarray:
-    """Eigenvalues of `transition`, the largest first, shape (n,)."""
+    """Return eigenvalues of `transition`, the largest first, shape (n,)."""
     found = np.linalg.eigvals(transition(contact, step, order, inputs))
     return found[np.argsort(-np.abs(found))]
 

@@ -94,7 +94,7 @@ class Base(ABC):
         return component, variable
 
     def start_values(self) -> dict[str, Value]:
-        """Start values of all variables, by the names that a campaign uses."""
+        """Return start values of all variables, by the names that a campaign uses."""
         return {
             f"{prefix}{name}": value
             for prefix, model in self._models.items()

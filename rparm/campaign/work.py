@@ -221,7 +221,7 @@ def _recorded(
 
 
 def _values(base: Base, job: Job, given: dict[str, float]) -> dict[str, object]:
-    """Start values of all variables in this run."""
+    """Return start values of all variables in this run."""
     is_system = len(job.components) > 1
     fixed = {
         f"{component.name}.{name}" if is_system else name: value

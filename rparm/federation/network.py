@@ -240,10 +240,7 @@ class _Questions:
 
 
 class Federate:
-    """Process in a federation: publishes one vector, under its name, reads those of `sources`.
-
-    A vector begins with the count of exchanges before it, which all federates make alike.
-    """
+    """Process that publishes a vector, and reads those of `sources`, each with its exchange."""
 
     def __init__(
         self, name: str, address: str, sources: Sequence[str], publishes: bool = True

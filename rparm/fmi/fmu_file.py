@@ -51,10 +51,7 @@ BINARY, SOURCE = re.compile(r"binaries/[^/]+/[^/]+"), re.compile(r"sources/.+\.c
 
 # ---- Archives ------------------------------------------------------------------------------------
 def unpack(path: Path, folder: Path, kind: str, only: str | None = None) -> dict[str, int]:
-    """Unpack an archive, or one file of it, to an empty folder; nothing is written elsewhere.
-
-    Returns the bytes of all files by their paths with "/". UnreadableError, which names the `kind`.
-    """
+    """Unpack an archive, or one file, to an empty folder; bytes by path, or UnreadableError."""
     check_regular(path)
     if path.is_dir():
         raise UnreadableError(f"is a folder, expected an {kind}")

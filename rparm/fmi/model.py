@@ -66,10 +66,7 @@ class Variable:
         return self.causality == "parameter" or is_state
 
     def checked(self, given: Any) -> Value:
-        """Return the value to set for a number, a text with a unit, or the name of an item.
-
-        WrongValueError if it is not of the variable's type or out of range.
-        """
+        """Return the value for a number, a text with a unit, or an item's name; WrongValueError."""
         if self.type not in TYPES.values():
             raise WrongValueError(f"is of type {self.type}, which cannot be set here")
         if self.type == "Enumeration":
@@ -188,10 +185,7 @@ class Model:
 
 
 def described(description: ModelDescription) -> Model:
-    """Return the model that a description of FMI 2.0 or 3.0 declares, for co-simulation if it can.
-
-    ValueError if a start value or a limit is not a number.
-    """
+    """Return the declared model, for co-simulation if it can; ValueError for a wrong number."""
     slave = description.coSimulation
     capabilities = slave or description.modelExchange
     interpolates = slave and (slave.canInterpolateInputs or slave.providesIntermediateUpdate)

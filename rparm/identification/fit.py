@@ -456,10 +456,7 @@ def _sum(
 
 
 def _circuits(effects: Effects, classes: Sequence[Sequence[int]]) -> list[list[int]]:
-    """Return the sets of three columns or more, one of a class, that depend on each other.
-
-    Small ones come first; each has a column that the others lack.
-    """
+    """Return the sets of three columns or more, one of a class, that depend, small ones first."""
     columns = [group[0] for group in classes]
     if len(columns) < 3:
         return []
@@ -503,10 +500,7 @@ class Whiteness:
 
 
 def whiteness(segments: Sequence[Reduced], outputs: int) -> list[Whiteness]:
-    """Test the residuals of each output, over pairs of rows within segments.
-
-    An estimated start state makes them a little correlated, by a projection that is taken off.
-    """
+    """Test the residuals of each output in segments, without what start states correlate."""
     return [_of_output(segments, outputs, k) for k in range(outputs)]
 
 

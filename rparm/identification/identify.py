@@ -337,10 +337,7 @@ def _ends(
     widths: np.ndarray,
     covariance: np.ndarray,
 ) -> np.ndarray:
-    """Return the ends (parameters, 2) of the intervals, in the parameters' units.
-
-    `widths` are half intervals of the fit's numbers; `covariance` is of the numbers at `basis`.
-    """
+    """Return the ends (parameters, 2) of intervals; `widths` and `covariance` (`basis`) of fits."""
     ends = np.empty((len(z), 2))
     slopes = parameters.slopes(z)[:, basis]
     deviations = np.sqrt(np.maximum(np.diag(covariance), 1e-300))

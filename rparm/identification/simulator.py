@@ -71,10 +71,7 @@ class Simulator:
         return list(self._pool.map(function, tasks))
 
     def run(self, segment: Segment, values: np.ndarray) -> np.ndarray:
-        """Run a segment with values of parameters and states; return outputs (rows, outputs).
-
-        UserError if the FMU refuses the values or fails.
-        """
+        """Run with values of parameters and states; outputs (rows, outputs), or UserError."""
         if not hasattr(self._own, "runner"):
             self._own.runner = _Runner(self)
             self._runners.append(self._own.runner)
@@ -213,10 +210,7 @@ def start_scales(states: np.ndarray) -> np.ndarray:
 def admitted_start(
     simulator: Simulator, segments: Sequence[Segment], parameters: Parameters, states: np.ndarray
 ) -> np.ndarray:
-    """Move `states` (segments, states) until the FMU starts there; UserError if it never does.
-
-    A value that was measured a hair past a stop, for example, is moved inward.
-    """
+    """Move `states` (segments, states) inward until the FMU starts there; UserError if never."""
     values = parameters.values(np.zeros(len(parameters)))
     values = values[: len(simulator.names) - states.shape[1]]
     middle = (states.min(axis=0) + states.max(axis=0)) / 2

@@ -50,10 +50,7 @@ def largest_steps(
     connections: Sequence[Connection],
     ways: Sequence[tuple[str, str]] = tuple((o, i) for o in ORDERS for i in INPUT_MODES),
 ) -> list[LargestStep]:
-    """Find the limit of each way to step; empty if no signal comes back through connections.
-
-    `parts` are components in the order of stepping, `ways` orders and inputs.
-    """
+    """Find the limit of each way to step `parts`, in their order; empty if there is no loop."""
     loop = looped(parts, connections)
     if not loop.parts:
         return []
@@ -242,10 +239,7 @@ def study_steps(path: Path, rest: Rest) -> dict[str, object]:
 
 
 def growth(master: Master, step: float, signals: Sequence[str]) -> float:
-    """Fit the largest eigenvalue of the map between points by least squares, `step` s apart.
-
-    The run begins a little out of an equilibrium; `signals` are values that the motion shows in.
-    """
+    """Fit the largest eigenvalue of the map over `step` s, by signals of a run near equilibrium."""
     rows = master.run(master.time + np.arange(STEPS + 1) * step)[EARLY:]
     moved = np.diff(rows[:, [master.names.index(name) for name in signals]], axis=0)
     scaled = moved / np.abs(moved).max(axis=0)

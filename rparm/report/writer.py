@@ -65,10 +65,7 @@ class ReportWriter:
         progress: Callable[[int], object] = lambda _: None,
         failures: Sequence[Failure] = (),
     ) -> Path:
-        """Write all pages; return the one to open: a single file's, or the overview.
-
-        Each scenario's first run is drawn. `progress` is called with 1 after each scenario.
-        """
+        """Write all pages; return the one to open: a single file's, or the overview."""
         failed = _by(failures, lambda failure: failure.scenario.path)
         scenarios: list[Entry] = []
         files: list[Entry] = []

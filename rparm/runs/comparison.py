@@ -103,10 +103,7 @@ def read_summed(folder: Path) -> Summed:
 
 
 def error_scale(columns: Mapping[str, np.ndarray], name: str, summed: Summed) -> float:
-    """Return the divisor of a variable's error, in its unit: its largest value, or a sum's.
-
-    A sum of which `columns` (rows,) lack a term does not count.
-    """
+    """Return the divisor of a variable's error: its largest value, or a complete sum's."""
     terms = summed.get(name, ())
     if not terms or not set(terms) <= set(columns):
         terms = (name,)
@@ -123,10 +120,7 @@ def errors_against(result: Result, reference: Reference) -> dict[str, float]:
 
 
 def error_bound(tolerance: float) -> float:
-    """Return the largest error allowed of a run at a relative tolerance.
-
-    1000 times the tolerance, at most 1e-6 from tolerance 1e-8 on and 1e-8 from 1e-11 on.
-    """
+    """Return 1000 tolerances, at most 1e-6 from tolerance 1e-8 on and 1e-8 from 1e-11 on."""
     applying = [error for loosest, error in BOUNDS.items() if tolerance <= loosest]
     return min([ERROR_PER_TOLERANCE * tolerance, *applying])
 

@@ -196,10 +196,7 @@ def study(
 
 
 def final_state(fmu: Fmu, problem: Problem, case: int, factor: int) -> dict[str, float]:
-    """Run a problem with steps of `factor` shortest ones; return the states at the end.
-
-    The case is the highest derivative of inputs that is set (0: none), or INTERMEDIATE_UPDATE.
-    """
+    """Return the states after steps of `factor` shortest ones; case: order, or intermediate."""
     scenario = problem.scenario
     step_through = _with_updates if case == INTERMEDIATE_UPDATE else _with_derivatives
     with fmu.instance(scenario.name, list(problem.inputs) if case else ()) as instance:

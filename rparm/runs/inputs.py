@@ -217,10 +217,7 @@ class Log:
     names: tuple[str, ...]  # of the columns
 
     def columns(self, time: str, names: Sequence[str], since: float | None = None) -> Columns:
-        """Read columns, with times since `since` (s), or the first row, subtracted as decimals.
-
-        UserError names the line of what is wrong.
-        """
+        """Read columns over times since `since` (s) or the first row; UserError names the line."""
         indices = [self._index(name) for name in (time, *names)]
         origin = None if since is None else Decimal(repr(since))
         found, lines, joined = array("d"), array("q"), list[tuple[int, int]]()

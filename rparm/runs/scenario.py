@@ -162,10 +162,7 @@ def name_of(subject: Path) -> str:
 
 
 def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> Scenario:
-    """Read and check the scenario at `path`, of the project or of a user, or raise UserError.
-
-    Values of `times` replace section [time]'s.
-    """
+    """Read and check a scenario; `times` replace its own. UserError if anything is wrong."""
     path = Path(path)
     content = read_toml(path)
     subject = subject_of(path)
@@ -323,10 +320,7 @@ class _Reader(Reader):
 
 # ---- A scenario to start from --------------------------------------------------------------------
 def template(name: str, key: str, subject: str, model: Model) -> str:
-    """Write the file, which runs as it is.
-
-    `key` is `model` with its folder below models/, or `fmu` with a path from the file.
-    """
+    """Write the file, which runs as it is; `key` is `model`, or `fmu` with a path from the file."""
     outputs = model.real_outputs[:2]
     panels = "# Further plots, each of variables of one unit:\n"
     panels += f"# panels = {json.dumps([[output] for output in outputs])}\n"

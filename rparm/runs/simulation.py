@@ -185,10 +185,7 @@ def _switching(switches: dict[str, np.ndarray]) -> dict[int, list[str]]:
 def _step_compiled(
     instance: Instance, scenario: Scenario, progress: Callable[[int], object] | None
 ) -> tuple[np.ndarray, np.ndarray, float, UserError | None]:
-    """Make all steps of an initialized instance, or those before one that fails.
-
-    Recorded outputs (rows, outputs), no Integers (rows, 0), seconds of the loop, why it ended.
-    """
+    """Make all steps, or those before one that fails; Integers have the shape (rows, 0)."""
     made = _CompiledSteps(instance, scenario)
     begin = time.perf_counter()
     failure, count = made.begin(), FIRST_STEPS
@@ -303,10 +300,7 @@ def start_values(model: Model, given: Mapping[str, Any]) -> dict[str, Value]:
 
 
 def input_values(model: Model, name: str, given: Any, times: np.ndarray) -> np.ndarray:
-    """Sample an input - a number, values, pair to interpolate, or function - at `times` (s).
-
-    UserError if a value is not finite or not in the input's range.
-    """
+    """Sample a number, values, pair to interpolate or function at `times` (s); UserError."""
     with placed(f"inputs: {name}"):
         variable = model.find(name, INPUTS)
     boolean = variable.type == "Boolean"

@@ -185,7 +185,7 @@ def _unzip(folder: Path) -> Path:
 
 
 def _sender(ssp: "Ssp", message: re.Match[str]) -> str:
-    """Name of the component that a message is of."""
+    """Return the name of the component that a message is of."""
     component = message["component"]
     return repr(component) if component is not None else _components(ssp, message["fmu"])
 

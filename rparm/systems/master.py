@@ -427,11 +427,7 @@ def _is_switch(fmus: Mapping[str, Fmu], component: str, name: str, causality: st
 
 # ---- A variant -----------------------------------------------------------------------------------
 def run_in_master(ssp: Ssp, variant: str, names: Sequence[str]) -> Run:
-    """Run a system in Jacobi order with a parameter set; read what Ecos would read.
-
-    That is ``component.variable`` after the inputs of the next step have been set. UserError if a
-    component fails, or gives a value that is not finite.
-    """
+    """Run a variant in Jacobi order; read ``component.variable`` as Ecos would, all finite."""
     system = ssp.system
     times = system.times
     rows = np.empty((len(times), len(names)))

@@ -59,7 +59,7 @@ class Method:
         return 2 if self.inputs == "extrapolated" else 1
 
     def expects(self, slope: float) -> bool:
-        """Whether a slope of log error over log step is near the power."""
+        """Return whether a slope of log error over log step is near the power."""
         return abs(slope - self.power) <= LARGEST_DEVIATION
 
 
@@ -85,7 +85,7 @@ class ClosedLoop:
     def parameters(
         self, variant: str, changes: Mapping[str, Mapping[str, Value]] | None = None
     ) -> dict[str, dict[str, Value]]:
-        """Values of a variant by component and name, with `changes` to them."""
+        """Return values of a variant by component and name, with `changes` to them."""
         if variant not in self.variants:
             raise UserError(f"no variant {variant!r} (there are: {', '.join(self.variants)})")
         values = {name: dict(self.variants[variant].get(name, {})) for name in self.fmus}
@@ -111,7 +111,7 @@ class ClosedLoop:
         stop: float | None = None,
         changes: Mapping[str, Mapping[str, Value]] | None = None,
     ) -> tuple[Columns, int]:
-        """Values at all communication points by name, with "time", and calls of DoStep."""
+        """Return values at all communication points by name, with "time", and calls of DoStep."""
         stop = self.stop if stop is None else stop
         times = grid(stop, step)
         with self.master(method) as master:
@@ -153,7 +153,7 @@ def _check(path: Path, loop: ClosedLoop) -> None:
 
 
 def grid(stop: float, step: float) -> np.ndarray:
-    """Communication points from 0 to `stop`, s, each rounded once or twice."""
+    """Return communication points from 0 to `stop`, s, each rounded once or twice."""
     count = round(stop / step)
     per_second = round(1 / step)
     if abs(per_second * step - 1) < 1e-9:
@@ -162,7 +162,7 @@ def grid(stop: float, step: float) -> np.ndarray:
 
 
 def read_reference(path: Path) -> Columns:
-    """Columns of a reference by name, with "time"."""
+    """Return columns of a reference by name, with "time"."""
     wrong = files.csv_failure(path)
     names, table = files.read_trajectory(path, wrong)
     if not set(STATES) <= set(names):
@@ -214,7 +214,7 @@ def study_tracking(loop: ClosedLoop, step: float = 1e-3) -> list[Tracking]:
 
 
 def tracking_passed(tracking: Sequence[Tracking]) -> bool:
-    """Whether the errors are small, ordered and predicted."""
+    """Return whether the errors are small, ordered and predicted."""
     jacobi, gauss_seidel, _ = tracking
     return (
         jacobi.largest < LARGEST_ERROR
@@ -224,7 +224,7 @@ def tracking_passed(tracking: Sequence[Tracking]) -> bool:
 
 
 def path_error(columns: Columns) -> np.ndarray:
-    """Distance of the end effector from its reference at the same time, m."""
+    """Return the distance of the end effector from its reference at the same time, m."""
     return np.hypot(
         columns["arm.ee_x"] - columns["trajectory.ee_x_ref"],
         columns["arm.ee_y"] - columns["trajectory.ee_y_ref"],

@@ -40,7 +40,7 @@ class StepErrors:
         return [slope(self.steps, np.abs(row)) for row in values]
 
     def holds(self, i: int) -> bool:
-        """Whether error and energy of a method fall as expected."""
+        """Return whether error and energy of a method fall as expected."""
         slopes = self.slopes(self.errors)[i], self.slopes(self.energies)[i]
         return all(map(self.methods[i].expects, slopes))
 
@@ -53,7 +53,7 @@ class StepErrors:
 def study_step_errors(
     loop: ClosedLoop, steps: Sequence[float] = STEPS, methods: Sequence[Method] = METHODS
 ) -> StepErrors:
-    """Error against step on the nominal motion, which does not saturate."""
+    """Return the error against step on the nominal motion, which does not saturate."""
     exact = read_reference(REFERENCES / "nominal" / "monolithic.csv")
     shape = len(methods), len(steps)
     errors, energies, calls = np.empty(shape), np.empty(shape), np.empty(shape, int)
@@ -86,7 +86,7 @@ def created_energy(loop: ClosedLoop, columns: Columns) -> float:
 
 
 def law(loop: ClosedLoop, columns: Columns) -> np.ndarray:
-    """Efforts of the nominal controller for given references and measurements, (2, rows)."""
+    """Return efforts of the nominal controller for given references and measurements, (2, rows)."""
     fed = (c for c in loop.connections if c.end_component == "controller")
     sources = {c.end_connector: c.start for c in fed}
     with loop.fmus["controller"].instance("controller") as controller:
@@ -107,7 +107,7 @@ def law(loop: ClosedLoop, columns: Columns) -> np.ndarray:
 
 
 def simpson(values: np.ndarray, step: float) -> float:
-    """Integral over an even number of equal steps."""
+    """Return the integral over an even number of equal steps."""
     inner = 4 * values[1:-1:2].sum() + 2 * values[2:-1:2].sum()
     return float((values[0] + inner + values[-1]) * step / 3)
 
@@ -211,13 +211,13 @@ class FastAndSlow:
         }
 
     def check(self) -> float:
-        """Error of this solution at the rows of the committed reference, in the norm."""
+        """Return the error of this solution at the rows of the committed reference, in the norm."""
         reference = read_reference(FAST_AND_SLOW)
         found = self.states(reference["time"])
         return float(max(np.abs(found[:, i] - reference[n]).max() for i, n in enumerate(STATES)))
 
     def states(self, times: np.ndarray) -> np.ndarray:
-        """States at any times, (times, 4), by cubic interpolation."""
+        """Return states at any times, (times, 4), by cubic interpolation."""
         h = self.step
         i = np.clip((times / h).astype(int), 0, len(self.exact[STATES[0]]) - 2)
         s = times / h - i

@@ -133,10 +133,7 @@ def reference_motion(
 
 
 def prepare(parameters: Parameters, real: type) -> tuple[Loop, np.ndarray, np.ndarray]:
-    """Return equations with parameters, the trajectory's segments and the start.
-
-    Segments (segments, 8) are the time of the begin and the progress' coefficients from there.
-    """
+    """Return equations, segments (segments, 8: begin, the progress' coefficients) and start."""
     values = _complete(parameters)
     number = {name: real(v) for name, v in values.items() if not isinstance(v, str)}
     motion, mode = values["trajectory.motion"], values["controller.mode"]
@@ -166,7 +163,7 @@ _loop = cache(Loop)
 
 @cache
 def _declared() -> dict[str, Variable]:
-    """Parameters of the components, and the states, as the FMUs declare them."""
+    """Return parameters of the components, and the states, as the FMUs declare them."""
     return {
         f"{component}.{name}": variable
         for component, folder in COMPONENTS.items()
@@ -176,7 +173,7 @@ def _declared() -> dict[str, Variable]:
 
 
 def _complete(parameters: Parameters) -> dict[str, Value]:
-    """All parameters; items of enumerations, which may be given as numbers too, by name."""
+    """Return all parameters; items of enumerations, which may be given as numbers too, by name."""
     declared = _declared()
     unknown = [name for name in parameters if name not in declared]
     if unknown:
@@ -196,7 +193,7 @@ def _complete(parameters: Parameters) -> dict[str, Value]:
 
 
 def _segments(motion: str, number: Mapping[str, np.floating], real: type) -> np.ndarray:
-    """Segments of the trajectory: hold, move, hold; a circle is blended in and out."""
+    """Return segments of the trajectory: hold, move, hold; a circle is blended in and out."""
     begin = number["trajectory.start_time"]
     if motion != "circle":
         whole = number["trajectory.duration"]
@@ -219,7 +216,7 @@ def _segments(motion: str, number: Mapping[str, np.floating], real: type) -> np.
 
 
 def _at(times: np.ndarray, segments: np.ndarray) -> np.ndarray:
-    """Coefficients of the segment that every time is in, (times, 8)."""
+    """Return coefficients of the segment that every time is in, (times, 8)."""
     return segments[np.searchsorted(segments[1:, 0], times, side="right")]
 
 
@@ -233,7 +230,7 @@ def _ascending(times: Sequence[float], real: type) -> np.ndarray:
 def _held_controller(
     loop: Loop, signals: np.ndarray, integrals: np.ndarray, step: np.ndarray
 ) -> np.ndarray:
-    """Integral parts at the end of a step with held inputs."""
+    """Return the integral parts at the end of a step with held inputs."""
     if not loop.get("controller.Ki1", "controller.Ki2").any():
         return integrals
     loop.set({f"held.{n}": value for n, value in zip(SIGNALS, signals, strict=True)})
@@ -243,7 +240,7 @@ def _held_controller(
 
 
 def _held_arm(loop: Loop, efforts: np.ndarray, state: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """State of the arm at the end of a step with held efforts."""
+    """Return the state of the arm at the end of a step with held efforts."""
     loop.set({f"held.{n}": value for n, value in zip(INPUTS, efforts, strict=True)})
     loop.begin(loop.held_arm, step[0], state)
     return loop.advance(loop.held_arm, step[1])

@@ -42,7 +42,7 @@ def dynamics_terms() -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
 
 
 def law(mode: str) -> sp.Matrix:
-    """Efforts before the limits, (2, 1), of references, measurements and integral parts."""
+    """Return efforts before the limits, (2, 1), of references, measurements and integral parts."""
     reference = sp.Matrix(symbols("controller", REFERENCES))
     measured = sp.Matrix(symbols("controller", STATES))
     error, rate_error = (reference[:4, :] - measured)[:2, :], (reference[:4, :] - measured)[2:, :]

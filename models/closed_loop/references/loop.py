@@ -94,7 +94,7 @@ class Loop:
     def _control(
         self, efforts: list[hy.expression], signals: dict[str, hy.expression]
     ) -> tuple[list, dict[str, hy.expression], list]:
-        """Integral parts with their rates, limited efforts, events at the limits."""
+        """Return the integral parts with their rates, limited efforts, events at the limits."""
         efforts = hy.subs(efforts, {f"controller.{n}": e for n, e in signals.items()})
         action, limited, events = [], {}, []
         for joint, effort in enumerate(efforts):
@@ -134,13 +134,13 @@ class Loop:
         return self._evaluate(self._law, np.concatenate((signals, integrals)))
 
     def limited(self, unlimited: np.ndarray) -> np.ndarray:
-        """Efforts after the limits, in the shape of those before."""
+        """Return efforts after the limits, in the shape of those before."""
         limits = self.get(*(f"controller.{name}" for name in LIMITS))
         limits = limits.reshape(2, *[1] * (unlimited.ndim - 1))
         return np.clip(unlimited, -limits, limits)
 
     def outputs(self, states: np.ndarray, efforts: np.ndarray) -> np.ndarray:
-        """Outputs of the arm, (outputs, n)."""
+        """Return outputs of the arm, (outputs, n)."""
         return self._evaluate(self._outputs, np.concatenate((states, efforts)))
 
     def _evaluate(self, function, inputs: np.ndarray) -> np.ndarray:
@@ -169,7 +169,7 @@ class Loop:
 
     @staticmethod
     def advance(integrator: hy.taylor_adaptive, until: np.floating) -> np.ndarray:
-        """State at the time `until`, with the efforts switched on the way."""
+        """Return the state at the time `until`, with the efforts switched on the way."""
         outcome = integrator.propagate_until(until)[0]
         if outcome != hy.taylor_outcome.time_limit:
             raise UserError(f"the motion blows up near {float(integrator.time)!r} s")

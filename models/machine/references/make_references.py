@@ -31,12 +31,12 @@ solver = cache(Solver)  # compiles the equations once
 
 
 def variants() -> dict[str, dict[str, Value]]:
-    """Parameters of every variant, ``component.name``."""
+    """Return parameters of every variant, ``component.name``."""
     return reference_files.variants(SYSTEM, COMPONENTS)
 
 
 def make(solver: Solver, parameters: Mapping[str, Value], stop: float = STOP) -> Files:
-    """Times and columns of the files of a machine in steps, by the name of the file."""
+    """Return times and columns of the files of a machine in steps, by the name of the file."""
     times = communication_points(stop, STEPS_PER_SECOND)
     names = [*columns(), *DISCRETE]
     machine = Machine(solver, parameters, times)

@@ -88,7 +88,7 @@ class Monolith:
         return hy.par[self._place[name]]
 
     def _of(self, component: str) -> dict[sp.Symbol, hy.expression]:
-        """Parameters of the plant's equations as a component knows them."""
+        """Return parameters of the plant's equations as a component knows them."""
         known = {sp.Symbol(n): self._par(f"{component}.{n}") for n in plant.PARAMETERS}
         known |= {sp.Symbol(n): hy.expression(0.0) for n in (*INPUTS, *plant.SWITCHES)}
         return known | {sp.Symbol("attached"): self._par("attached")}
@@ -125,7 +125,7 @@ class Monolith:
         return {name: hy.from_sympy(x, known) for name, x in outputs.items()}
 
     def _motors(self, efforts: list, currents: list, speeds: list) -> tuple[list, list, list]:
-        """Efforts of the motors, their voltages, and the rates of their currents."""
+        """Return efforts of the motors, their voltages, and the rates of their currents."""
         moved, voltages, rates = [], [], []
         for j, i in enumerate((1, 2)):
             constant, gear, resistance, lag = (

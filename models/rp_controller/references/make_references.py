@@ -98,7 +98,7 @@ class Law:
         return [[row[i] for row in reversed(rows)] for i in (0, 1)]
 
     def advance(self, w: list[mpf], h: mpf) -> list[mpf]:
-        """Integral parts after a time h with these inputs."""
+        """Return the integral parts after a time h with these inputs."""
         sides = [self.side(i, u) for i, u in enumerate(self.unlimited(w))]
         while h > 0:
             series = self.series(w, sides)

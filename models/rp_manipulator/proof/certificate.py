@@ -26,11 +26,11 @@ class Ball:
         return arb(self.middle) + arb(0, 1) * arb(self.radius)
 
     def contains(self, x: arb) -> bool:
-        """Whether all of an interval is in it."""
+        """Return whether all of an interval is in it."""
         return bool((x - arb(self.middle)).abs_upper() <= arb(self.radius))
 
     def holds(self, middle: fmpq, radius: fmpq = NOTHING) -> bool:
-        """Whether another ball is in it."""
+        """Return whether another ball is in it."""
         return abs(middle - self.middle) + radius <= self.radius
 
 
@@ -91,7 +91,7 @@ def balls_of(words: Sequence[str]) -> list[Ball]:
 
 
 def of_states(words: Sequence[str]) -> list[Ball]:
-    """Balls of all states, no more and no fewer."""
+    """Return balls of all states, no more and no fewer."""
     found = balls_of(words)
     if len(found) != STATES:
         raise WrongClaim(f"{len(found)} balls for {STATES} states")

@@ -63,7 +63,7 @@ def effort_series(
     step: arb,
     last: int,
 ) -> list[arb]:
-    """Coefficients 0 to `last` of an effort at a time, or over an interval of times."""
+    """Return coefficients 0 to `last` of an effort at a time, or over an interval of times."""
     polynomial = [arb(u) / arb.fac_ui(k) for k, u in enumerate(derivatives)]
     found = []
     for k in range(last + 1):

@@ -35,7 +35,7 @@ class Question:
 
 # ---- Operands ------------------------------------------------------------------------------------
 def number(draw: random.Random, exponents: int = 30) -> float:
-    """A double of any digits, or a round one."""
+    """Return a double of any digits, or a round one."""
     kind = draw.random()
     if kind < 0.2:
         return draw.choice((-1, 1)) * draw.choice((0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 10.0, 1024.0))
