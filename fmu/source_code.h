@@ -1,6 +1,5 @@
 /* Stands in front of every file of a source-code FMU (source_code.py), in place of options of the
- * compiler in the project's build. The headers of the system come first: they keep their own
- * symbols. */
+ * compiler. The headers of the system come first: they keep their own symbols. */
 #pragma once
 
 #include <errno.h>

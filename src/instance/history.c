@@ -20,8 +20,7 @@ static void evaluate_inputs(const struct instance *instance, double t) {
     }
 }
 
-/* Writes the values of inputs after a restart: constant ones are evaluated once, not at every call.
- * moves: some inputs are not constant. */
+/* Writes inputs after a restart: constant ones are evaluated once. moves: some are not constant. */
 static void prepare_inputs(struct instance *instance, bool moves) {
     const bool had_moved = instance->inputs_move;
     instance->inputs_move = moves;

@@ -22,8 +22,7 @@ MUST_CHECK NONNULL enum continuation instance_continuation(const struct instance
 NONNULL double instance_horizon(const struct instance_state *state, struct clock_time restart,
                                 double target, bool inputs_move);
 
-/* Prepares the integrator to advance to the time end: replays its history, restarts it, or does
- * nothing, as the continuation says. */
+/* Prepares an advance to the time end: replays the history, restarts, or does nothing. */
 MUST_CHECK NONNULL enum status instance_prepare_history(struct instance *instance,
                                                         struct clock_time end,
                                                         enum continuation continuation);

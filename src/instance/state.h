@@ -1,5 +1,4 @@
-/* Structure of an instance: its parts, the places of its values, and the values of the integrator.
- * Private to this library. */
+/* Structure of an instance: parts, places of values, integrator's values. For this library only. */
 #pragma once
 
 #include "clock.h"
@@ -25,8 +24,7 @@ enum event_point {
     EVENT_HANDLED,   /* the modes have been updated */
 };
 
-/* State of an instance: with the values in struct instance_memory, all that later results depend
- * on. A snapshot is a copy of both. */
+/* State of an instance, with the values in struct instance_memory; a snapshot copies both. */
 struct instance_state {
     enum phase phase;
     bool experiment_defined;
@@ -77,8 +75,7 @@ struct instance_real {
     bool is_kept;        /* true if events keep it: in initialization mode it is calculated, too */
 };
 
-/* The fields that each step reads or writes stand first: if many instances are stepped in turn, few
- * lines of a cache are used for each. */
+/* Fields of each step stand first: if many instances take turns, few lines of a cache are used. */
 struct instance {
     const struct model_description *description;
     const struct model *model;

@@ -1,5 +1,4 @@
-/* Sets that contain the arm's states, and steps from one to the next by Lohner's method with a box
- * of high order: README.md has the theorems. */
+/* Sets of states, and steps by Lohner's method with a box of high order (README.md). */
 #pragma once
 
 #include "arm_series.h"
