@@ -159,7 +159,8 @@ class Page:
         """Return the columns that fit into a picture, and a note on the others."""
         columns = list(columns)
         left = columns[DRAWN:]
-        text = f"The picture leaves out {left[0]} and what is below it in the table."
+        rest = "and what is below it in the table."
+        text = f"The picture leaves out {left[0]} {rest}" if left else ""
         return columns[:DRAWN], text if left else ""
 
     # ---- Distributions ---------------------------------------------------------------------------
