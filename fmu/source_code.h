@@ -1,5 +1,6 @@
 /* Stands in front of every file of a source-code FMU (source_code.py), in place of options of the
- * compiler. The headers of the system come first: they keep their own symbols. */
+ * compiler in the project's build. The headers of the system come first: they keep their own
+ * symbols. */
 #pragma once
 
 #include <errno.h>

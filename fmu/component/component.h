@@ -118,8 +118,9 @@ NONNULL void component_end(struct component *component);
  * state that the rule allows. Otherwise fails as component_fail. */
 MUST_CHECK bool component_enter(struct component *component, unsigned call);
 
-/* Refuses a call from inside the importer's logger, in the middle of another call; it changes
- * nothing. Returns true if it has; a message says so after the logger's own. */
+/* Refuses a call from inside the importer's logger, while the instance is in the middle of another
+ * call; it changes nothing. A message says so after the logger's own. Returns true if it has
+ * refused the call. */
 MUST_CHECK NONNULL bool component_refuse_in_logger(struct component *component, const char *call);
 
 /* Reports NULL in place of an array as component_fail does. Returns false. */

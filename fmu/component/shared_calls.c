@@ -290,7 +290,8 @@ static unsigned version_in(unsigned tag) {
     return (tag >> TAG_VERSION_SHIFT) + TAG_VERSION_0;
 }
 
-/* Returns the FMI states in which such a component can be while its instance is in a phase. */
+/* Returns the FMI states that a component of this kind can be in while its instance is in a phase;
+ * each of them is also possible after an error. */
 static unsigned states_of(enum fmi_kind kind, enum phase phase) {
     const bool steps = kind != KIND_MODEL_EXCHANGE;
     switch (phase) {

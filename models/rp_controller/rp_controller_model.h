@@ -16,7 +16,8 @@ struct rp_controller_command {
     double effort[2];    /* N.m, N */
 };
 
-/* State of the sampled form between events; 0 in others. Doubles count far beyond any int. */
+/* What the sampled form keeps from one event to the next; zeros in the other forms. The counts are
+ * doubles, which are exact far beyond the largest int. */
 struct rp_controller_samples {
     double start;                         /* s: time of sample 0 */
     double taken;                         /* number of samples so far */

@@ -41,6 +41,7 @@ static inline void rp_calculate(struct rp_values *values) {
 /* Derived: J[i + 4 j] is the derivative of dx[i] by x[j]. */
 void rp_jacobian(const struct rp_parameters *p, const double x[4], const double u[2], double J[]);
 
-/* Derived: first and, unless NULL, second derivatives along a curve, which they also give. */
+/* Derived: first and, unless NULL, second derivatives of the calculated fields along a curve.
+ * The other fields of first and second give the curve. */
 void rp_derivatives(const struct rp_values *values, struct rp_values *first,
                     struct rp_values *second);

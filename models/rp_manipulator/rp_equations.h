@@ -139,7 +139,8 @@ static inline void arm_coriolis_forces(const struct arm *arm, real forces[2]) {
     forces[1] = C[1][0] * dq1 + C[1][1] * dq2;
 }
 
-/* Kinetic energy q'^T D q' / 2 as a sum of squares, never negative. Link 2 moves at q2' - a q1'. */
+/* Kinetic energy q'^T D q' / 2 as a sum of squares, which shows that it is never negative. Link 2
+ * moves along the slide at q2' - a q1'. */
 static inline real arm_kinetic_energy(const struct arm *arm) {
     const real dq1 = arm->dq[0], dq2 = arm->dq[1];
     const real along_slide = dq2 - arm->a * dq1;

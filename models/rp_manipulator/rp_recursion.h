@@ -1,5 +1,6 @@
-/* The Newton-Euler recursion of the notes, (16)-(27), which shares nothing with rp_equations.h and
- * checks it. A number stands above its equation of the notes. */
+/* The Newton-Euler recursion of the notes, (16)-(27). It shares no equation of motion with
+ * rp_equations.h, which it checks. A comment that begins with a number stands above this equation
+ * of the notes. */
 #pragma once
 
 #include "rp_equations.h"

@@ -166,7 +166,8 @@ bool rp_plant_surely_holds(const struct rp_plant_values *values) {
 
 /* ---- Breaking away -------------------------------------------------------------------------- */
 
-/* Returns the side on which a joint that stays is at its limit: as triggered, or by friction. */
+/* Returns the side on which a joint that stays is at its limit: the side that has triggered, or
+ * where the reaction is the breakaway friction. */
 static int side_at_limit(const struct rp_plant_decision *decision, int joint, int leaves) {
     const struct rp_plant_rest *rest = &decision->rest;
     if (!rest->at_rest[joint] || decision->outcome.pattern[joint] != 0) {

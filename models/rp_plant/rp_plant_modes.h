@@ -59,7 +59,8 @@ static inline bool rp_plant_can_stick(const struct rp_plant_parameters *p, int j
 bool rp_plant_find_rest(const struct rp_plant_parameters *p, const double q[2], const double dq[2],
                         struct rp_plant_modes *modes, struct rp_plant_rest *rest);
 
-/* Writes accelerations and modes of joints that begin to move, after rp_plant_find_rest. */
+/* Writes the accelerations, and the modes of the joints that begin to move, after
+ * rp_plant_find_rest. The mode of the payload is given. */
 void rp_plant_decide(const struct rp_plant_parameters *p, const double q[2], const double dq[2],
                      const struct rp_plant_inputs *inputs, struct rp_plant_modes *modes,
                      struct rp_plant_decision *decision);

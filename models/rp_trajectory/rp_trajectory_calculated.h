@@ -17,7 +17,8 @@ static inline void rp_trajectory_calculate(struct rp_trajectory_values *values, 
     }
 }
 
-/* Derived: first and, unless NULL, second derivatives along a curve of parameters and time. */
+/* Derived: first and, unless values_second is NULL, second derivatives of these fields along a
+ * curve in the space of parameters and time. */
 void rp_trajectory_derivatives(const struct rp_trajectory_values *values, double time,
                                struct rp_trajectory_values *values_first, double time_first,
                                struct rp_trajectory_values *values_second, double time_second);

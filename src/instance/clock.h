@@ -102,7 +102,8 @@ static inline bool polynomials_move(const struct polynomial polynomials[], size_
 /* Returns the value at time t (s) after the origin. */
 double polynomial_value(const struct polynomial *polynomial, double t);
 
-/* Returns the polynomial through values at POLYNOMIAL_NODES points; equal ones: a constant. */
+/* Returns the polynomial with values[k] at k step_size / (POLYNOMIAL_NODES - 1), step_size > 0 (s).
+ * With equal values, all its derivatives are 0. */
 enum { POLYNOMIAL_NODES = POLYNOMIAL_DEGREE + 1 };
 struct polynomial polynomial_through(const double values[POLYNOMIAL_NODES], double step_size);
 

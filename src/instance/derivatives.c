@@ -98,7 +98,8 @@ static enum status propagate(struct instance *instance, double dt, char *second)
     return status;
 }
 
-/* Writes known derivatives of this order by time: the inputs', and the states' from below. */
+/* Writes the known derivatives of this order by time: the inputs' and the states', which a value
+ * structure of the order below has calculated. */
 static void begin_by_time(const struct instance *instance, int order, char *below,
                           char *derivatives) {
     const struct model *model = instance->model;
@@ -110,7 +111,8 @@ static void begin_by_time(const struct instance *instance, int order, char *belo
     }
 }
 
-/* Derives twice: the states' derivatives are calculated values, whose derivatives follow. */
+/* Derives twice along the motion: the states' derivatives are calculated values, whose own
+ * derivatives are the next ones of the states. */
 static enum status derive_by_time(struct instance *instance) {
     enum status status = instance_update_outputs(instance);
     if (status != STATUS_OK) {

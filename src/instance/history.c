@@ -20,7 +20,8 @@ static void evaluate_inputs(const struct instance *instance, double t) {
     }
 }
 
-/* Writes inputs after a restart: constant ones are evaluated once. moves: some are not constant. */
+/* Writes the values of inputs after a restart: constant ones are evaluated once, not at every call.
+ * moves: some inputs are not constant. */
 static void prepare_inputs(struct instance *instance, bool moves) {
     const bool had_moved = instance->inputs_move;
     instance->inputs_move = moves;

@@ -22,7 +22,8 @@ MUST_CHECK NONNULL enum continuation instance_continuation(const struct instance
 NONNULL double instance_horizon(const struct instance_state *state, struct clock_time restart,
                                 double target, bool inputs_move);
 
-/* Prepares an advance to the time end: replays the history, restarts, or does nothing. */
+/* Prepares the integrator to advance to the time end: replays its history, restarts it, or does
+ * nothing, as the continuation says. */
 MUST_CHECK NONNULL enum status instance_prepare_history(struct instance *instance,
                                                         struct clock_time end,
                                                         enum continuation continuation);

@@ -48,7 +48,8 @@ static bool is_kept_by_events(const struct model *model, const struct variable *
            (lies_in(events.modes, variable) || lies_in(events.discrete_states, variable));
 }
 
-/* True if the variable has a field of its own kind; modes and discrete states are calculated. */
+/* True if the variable is bound to a field of its own kind. Modes (ints) and discrete states
+ * (doubles) are calculated and discrete. */
 static bool is_bound_well(const struct model *model, const struct variable *variable) {
     const struct model_events events = events_of(model);
     const bool is_real = variable->type == VARIABLE_FLOAT64;
@@ -65,7 +66,8 @@ static bool is_bound_well(const struct model *model, const struct variable *vari
            (!lies_in(events.discrete_states, variable) || (can_be_kept && is_real));
 }
 
-/* Checks that variables have fields of their kinds: a wrong binding compiles without effect. */
+/* Checks that each variable is bound to a field of its own kind: a wrong binding compiles, but the
+ * value would have no effect. */
 static enum status check_bindings(const struct model_description *description,
                                   const struct message_sink *sink) {
     const size_t indicator_count = events_of(description->model).indicator_count;

@@ -134,7 +134,8 @@ enum status instance_count_event(struct instance *instance, const bool triggered
 
 /* ---- The event at which a step has ended ---------------------------------------------------- */
 
-/* Forgets triggered forces: after a change of inputs they may no longer trigger; states do. */
+/* Forgets forces that had triggered the event: after a change of inputs or parameters they may no
+ * longer do so; states still do. */
 static void forget_unhandled_forces(struct instance *instance) {
     const struct model_events *events = instance->model->events;
     if (events->describe != NULL) {
@@ -255,7 +256,8 @@ static enum status evaluate(struct instance *instance, double t, const double x[
     return model->events->indicators(instance->memory.values, t, x, u, z);
 }
 
-/* Writes all indicators at up to 3 points, slope_time apart along the motion with these inputs. */
+/* Writes all indicators at `points` points, 3 at most: now and after each slope_time along the
+ * motion that begins here while the inputs stay. */
 static enum status look_ahead(struct instance *instance, size_t points) {
     const struct model *model = instance->model;
     const double *u = doubles_of(instance->memory.values, model->inputs);

@@ -1,4 +1,5 @@
-/* Modes of the model and every event that changes them: in a step, at its end, and outside. */
+/* Modes of the model and every event that changes them: within a step, at its end, and at points
+ * where an integrator outside stops. */
 #pragma once
 
 #include "state.h"
@@ -21,7 +22,8 @@ MUST_CHECK NONNULL enum status instance_count_event(struct instance *instance,
 
 /* ---- The event at which a step has ended ---------------------------------------------------- */
 
-/* Updates modes, states and discrete states after the unhandled event, which counts here. */
+/* Updates modes, states and discrete states after the unhandled event, if there is one. It counts
+ * as an event of this communication step. */
 MUST_CHECK NONNULL enum status instance_handle_event(struct instance *instance,
                                                      struct event_counts *in_step);
 

@@ -128,7 +128,8 @@ static bool check_inputs(const struct instance *instance, const char *name,
     return true;
 }
 
-/* Checks that parameters, inputs and states could be set, and the limits of other values. */
+/* Checks that parameters, inputs and states could have been set, and that modes and discrete states
+ * are within their limits. */
 static bool check_limits(const struct instance *instance, const char *values) {
     const struct message_sink quiet = {0};
     for (size_t i = 0; i < instance->description->variable_count; i++) {
@@ -334,7 +335,8 @@ static bool check_history_twins(const struct instance *instance, const struct in
     return !state->has_history || check_twins(instance, twins, COUNT(twins));
 }
 
-/* Checks values that are stored twice: current inputs, and fixed parameters. */
+/* Checks values that are stored twice: inputs at the current time are among the values, too, fixed
+ * parameters also among the integrator's. */
 static bool check_value_twins(const struct instance *instance, const struct instance_state *state,
                               const char *values, const char *restart_values,
                               const struct polynomial current[]) {

@@ -85,7 +85,8 @@ static void codec_end(struct codec *codec) {
     transfer_number(codec, &value, HASH_SIZE);
 }
 
-/* Reads all but the fields, and goes to the first. Returns NULL, or a fault. length: in all. */
+/* Reads and checks all but the fields, and goes to the first of them. Returns NULL, or the fault as
+ * a text. length: bytes expected in all. */
 static const char *codec_check(struct codec *codec, const char *guid, size_t length) {
     unsigned char start[sizeof magic] = {0};
     uint64_t version = 0;

@@ -7,7 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* True if the snapshot belongs to the instance; searched from both ends, as masters free. */
+/* True if the snapshot belongs to the instance. Searches from both ends: masters free in the order
+ * of saving or in reverse. */
 static bool is_own(const struct instance *instance, const struct instance_snapshot *snapshot) {
     const struct instance_snapshot *from_newest = instance->newest;
     const struct instance_snapshot *from_oldest = instance->oldest;

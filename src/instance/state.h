@@ -1,4 +1,5 @@
-/* Structure of an instance: parts, places of values, integrator's values. For this library only. */
+/* Structure of an instance: its parts, the places of its values, and the values of the integrator.
+ * Private to this library. */
 #pragma once
 
 #include "clock.h"
@@ -24,7 +25,8 @@ enum event_point {
     EVENT_HANDLED,   /* the modes have been updated */
 };
 
-/* State of an instance, with the values in struct instance_memory; a snapshot copies both. */
+/* State of an instance: with the values in struct instance_memory, all that later results depend
+ * on. A snapshot is a copy of both. */
 struct instance_state {
     enum phase phase;
     bool experiment_defined;
@@ -75,7 +77,8 @@ struct instance_real {
     bool is_kept;        /* true if events keep it: in initialization mode it is calculated, too */
 };
 
-/* Fields of each step stand first: if many instances take turns, few lines of a cache are used. */
+/* The fields that each step reads or writes stand first: if many instances are stepped in turn, few
+ * lines of a cache are used for each. */
 struct instance {
     const struct model_description *description;
     const struct model *model;

@@ -95,7 +95,8 @@ static int64_t steps_left(const struct step *step) {
 
 /* ---- Inputs --------------------------------------------------------------------------------- */
 
-/* Sets the inputs to the begin of a step, from where derivatives of the last step led. */
+/* Sets the inputs to those at the beginning of a step. Until then, inputs have the values to which
+ * the derivatives of the last step led. */
 static void begin_inputs(struct instance *instance) {
     if (instance->inputs_are_held) {
         return;
@@ -119,7 +120,8 @@ static void evaluate_inputs(struct instance *instance, double elapsed) {
     }
 }
 
-/* Sets the inputs after a step that has asked for them: to the values at its actual end. */
+/* Sets the inputs after a step that has asked for them: they keep the value given for its end or,
+ * if the step ended earlier, the value there. */
 static void keep_last_nodes(const struct step *step) {
     struct instance *instance = step->instance;
     const struct instance_memory *memory = &instance->memory;
@@ -284,7 +286,8 @@ static enum status move(struct step *step, enum continuation continuation) {
 
 /* ---- Events --------------------------------------------------------------------------------- */
 
-/* Ends a step that would last until `end`: these indicators fall to 0, unhandled, now. */
+/* Ends a step that would have lasted until `end` at the present time, at which these indicators
+ * fall to 0. The event stays unhandled. */
 static void leave_event(struct instance *instance, const bool triggered[], struct clock_time end) {
     memcpy(instance->memory.unhandled, triggered, instance_event_size(instance->model));
     instance->state.event_point = EVENT_UNHANDLED;

@@ -21,7 +21,8 @@ enum event_handling {
 /* Options of a step; each may be NULL. The functions may read values of the instance and return
  * STATUS_OK, or a status that ends the step, which returns it. */
 struct step_options {
-    /* Snapshot, which the step overwrites: a step that fails leaves the instance as before. */
+    /* Snapshot of the instance, which the step overwrites: a step that fails (severity discard)
+     * leaves the instance as it was before. */
     struct instance_snapshot *undo;
 
     /* Sets inputs by instance_set_real, called before anything else at POLYNOMIAL_NODES times (s)

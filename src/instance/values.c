@@ -23,7 +23,8 @@ static enum status calculate(struct instance *instance) {
     return status;
 }
 
-/* Writes initial_values: ends the initialization silently for a moment, if that works. */
+/* Writes initial_values: ends the initialization for a moment, without a message. If it cannot end,
+ * they are the present values. */
 static void look_ahead(struct instance *instance) {
     const size_t size = instance->model->values_size;
     const struct message_sink sink = instance->sink;

@@ -13,7 +13,8 @@
 
 struct instance;
 
-/* Type of a variable; all but float64 are ints: an item from 1, a Boolean 0 or 1. */
+/* Type of a variable. All but float64 are kept as an int: an enumeration as 1 for its first item, a
+ * Boolean as 0 or 1. */
 enum variable_type { VARIABLE_FLOAT64, VARIABLE_INT32, VARIABLE_ENUMERATION, VARIABLE_BOOLEAN };
 
 /* Structure that holds the value: the model's own or struct instance_values. */
@@ -90,7 +91,8 @@ static inline const struct variable *variable_find(const struct model_descriptio
     return variable_of(description, reference);
 }
 
-/* True if the variable may be set: start values; later inputs and tunable parameters. */
+/* True if the variable may be set: before and during initialization start values and inputs; later
+ * inputs and tunable parameters. */
 static inline bool variable_is_settable(const struct variable *variable, enum phase phase) {
     if (variable->causality == CAUSALITY_INPUT) {
         return phase != PHASE_CONTINUOUS_TIME || variable->variability == VARIABILITY_CONTINUOUS;
@@ -106,7 +108,8 @@ static inline bool variable_is_settable(const struct variable *variable, enum ph
 enum status variable_refuse_value(const struct variable *variable, double value,
                                   const struct message_sink *sink);
 
-/* Returns STATUS_OK, or refuses a value not finite or outside [min, max]; inline: sets run it. */
+/* Returns STATUS_OK, or refuses a value that is not finite or outside [min, max]. Inline: it runs
+ * for each value that is set. */
 static inline enum status variable_check_value(const struct variable *variable, double value,
                                                const struct message_sink *sink) {
     const bool is_allowed = value >= variable->min && value <= variable->max && isfinite(value);

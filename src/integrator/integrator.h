@@ -30,7 +30,8 @@ int64_t integrator_longest_history(enum integrator_method method, bool has_event
 /* True if the method can integrate the ode: only INTEGRATOR_TAYLOR needs the series. */
 NONNULL bool integrator_is_possible(enum integrator_method method, const struct ode *ode);
 
-/* Creates a handle with copies of ode and sink, not of their data. On failure *integrator: NULL. */
+/* Creates a handle. ode and sink are copied; the data behind their pointers must outlive the
+ * handle. On failure *integrator is NULL. */
 MUST_CHECK NONNULL enum status integrator_create(const struct ode *ode,
                                                  const struct message_sink *sink,
                                                  struct integrator **integrator);
@@ -51,7 +52,8 @@ MUST_CHECK NONNULL enum status integrator_restart(struct integrator *integrator,
 /* Returns, after an advance, how long a first step after a restart can be, s; 0: unknown. */
 NONNULL double integrator_next_step(const struct integrator *integrator);
 
-/* Returns the end of the last internal step, up to which integrator_interpolate gives states. */
+/* Returns, after an advance, the end of the last internal step, s since the restart.
+ * integrator_interpolate gives states up to there. */
 NONNULL double integrator_passed_time(const struct integrator *integrator);
 
 /* Sets the observer of the next advances; NULL for none. Watching changes neither states nor

@@ -275,7 +275,8 @@ static bool is_above_until(const struct roots_polynomial *p, double s, double no
     return c[0] >= 0.0 && roots_is_above(&(struct roots_polynomial){c, p->degree, noise});
 }
 
-/* An indicator below 0 at a restart has not fallen: the modes have just been found valid. */
+/* An indicator that is below 0 at a restart has not fallen: the modes have just been found valid,
+ * and the same event would come again and again. */
 double fall_first(const struct roots_polynomial *p, const struct fall *fall) {
     double *noise = fall->noise;
     const bool is_armed = *fall->is_armed;

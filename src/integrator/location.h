@@ -22,7 +22,8 @@ struct step_polynomial {
 };
 
 struct location {
-    /* Event's time, s since the restart; INFINITY: none. Steps without events read only this. */
+    /* Time of the event, s since the restart; INFINITY if there is none. A step without events
+     * reads only this and the indicators. */
     double time;
     const struct indicator *indicators; /* indicators since the restart; NULL if none is searched */
     const struct ode *ode;
@@ -46,7 +47,8 @@ struct location {
     double (*samples)[CHEBYSHEV_LENGTH]; /* by indicator */
 };
 
-/* Allocates all memory, or nothing: then returns false. absolute_tolerances must stay. */
+/* Allocates all memory. Returns false if memory is short: then nothing has to be freed.
+ * absolute_tolerances: of the states; they must stay. */
 MUST_CHECK NONNULL bool location_create(const struct ode *ode, const double absolute_tolerances[],
                                         struct location *location);
 NONNULL void location_destroy(struct location *location);
@@ -73,7 +75,8 @@ MUST_CHECK NONNULL enum status location_search(struct location *location);
 MUST_CHECK NONNULL enum status location_search_at_rest(struct location *location, const double x[],
                                                        double t);
 
-/* Writes the cubic through states and derivatives at both ends of a step to location->step. */
+/* Writes the cubic polynomial through the states and their derivatives at the begin and at the end
+ * of a step to location->step. */
 NONNULL void location_write_cubic(struct location *location, double begin, const double begin_x[],
                                   const double begin_dx[], double end, const double x[],
                                   const double dx[]);

@@ -37,7 +37,8 @@ static inline bool problem_are_finite(const double values[], size_t count) {
     return sum == 0.0;
 }
 
-/* Writes f(t, x) to dx, or returns STATUS_NOT_FINITE. Inline: most of a step is this. */
+/* Writes f(t, x) to dx. Returns STATUS_NOT_FINITE if that fails or is not finite. Inline, because
+ * these calls are most of a step. */
 static inline enum status problem_rhs(struct problem *problem, double t, const double x[],
                                       double dx[]) {
     const struct ode *ode = &problem->ode;

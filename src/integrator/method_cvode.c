@@ -22,7 +22,8 @@ static const double adams_iteration_error = 0.2;
 static const double growth_after_event = 10.0;
 static const double usual_growth = 1e4;
 
-/* Shortest first advance, s: below, squares underflow and steps depend on who watches. */
+/* Shortest first advance, s. The square of a length underflows in shorter first steps, and their
+ * number then depends on who watches them. */
 static const double shortest_first_advance = 1e-150;
 
 struct cvode {

@@ -1,4 +1,5 @@
-/* Explicit Runge-Kutta steps of ARKODE, started again at each advance with the last length. */
+/* Explicit Runge-Kutta steps of ARKODE. Each advance starts ERKStep again: only the length of the
+ * next step connects one advance with the next. */
 #include "sundials.h"
 #include "workspace.h"
 
@@ -60,7 +61,8 @@ static enum status search(struct erk *erk, double t, const double x[]) {
     return status;
 }
 
-/* Evaluates the right-hand side if events are searched: the search has done so already. */
+/* Evaluates the right-hand side if events are searched: at the begin of an internal step the search
+ * has evaluated it already. */
 static int searched_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data) {
     const struct erk *erk = user_data;
     const size_t size = erk->base.problem->ode.state_count * sizeof(double);
@@ -264,7 +266,8 @@ static bool is_too_close(double begin, double end) {
     return end - begin <= 8.0 * DBL_EPSILON * end;
 }
 
-/* Steps from the begin of the event's step to t; writes the state to x, x' to erk->dx. */
+/* Steps from the begin of the step that contains the event to the time t. Writes the state to x and
+ * the right-hand side to erk->dx. */
 static int step_to(struct erk *erk, double t, double x[]) {
     struct problem *problem = erk->base.problem;
     double reached;

@@ -16,7 +16,8 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Largest length past requested times, in time scales: beyond, terms may underflow. */
+/* Largest length of a step that goes past requested times, in time scales: the terms of a much
+ * longer step may have underflowed. */
 static const double most_scales = 1000.0;
 
 /* Ratio of the next time scale to the last one, if a term overflows, and in the step after that. */
@@ -359,7 +360,8 @@ static double next_step(void *memory, const double x[]) {
 
 #define TOLERANCE_FRACTION 1e-1
 
-/* Events must not depend on requested times: a long step begins at the end of the last one. */
+/* Events must not depend on the requested times, so that a long step begins at the end of the last
+ * one. As in method_cvode.c. */
 #define LONGEST_HISTORY_WITH_EVENTS 1000
 
 const struct method integrator_taylor = {

@@ -398,7 +398,8 @@ static int find_extrema(const struct rising *p, double points[ROOTS_LENGTH]) {
     return count;
 }
 
-/* Writes the first `most` roots of p, rising or, if sign is -1, falling; returns their number. */
+/* Writes the first `most` roots (1 or ROOTS_LENGTH) of p, which is rising or, if sign is -1, its
+ * opposite. Returns their number. */
 static int find(const struct rising *p, int sign, int most, struct root roots[ROOTS_LENGTH]) {
     double points[ROOTS_LENGTH];
     const int expected = most_roots(p);

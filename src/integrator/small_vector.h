@@ -15,7 +15,8 @@ struct small_vector_terms {
     const double *data[SMALL_VECTOR_MOST_TERMS];
 };
 
-/* Creates length zeros; NULL if memory is short. Clones are zeros, too. N_VDestroy frees each. */
+/* Creates a vector of length (> 0) zeros; NULL if memory is short. Vectors cloned from it are zeros
+ * too. N_VDestroy frees each. */
 N_Vector small_vector_create(sunindextype length, SUNContext context);
 
 /* Returns the elements of a vector made by small_vector_create or a clone. */

@@ -67,7 +67,8 @@ enum status sundials_status(const struct problem *problem, int flag) {
     }
 }
 
-/* Explains a text: SUNDIALS fails at length 0 or NaN if derivatives' norm has overflowed. */
+/* Explains a text. SUNDIALS gives the length of the step at which it fails: 0, or not a number, if
+ * the norm of the derivatives has overflowed. */
 static const char *explained(const char *text) {
     static const char *const overflows[] = {"h = nan", "h = -nan", "hu = 0 and"};
     for (size_t i = 0; i < sizeof overflows / sizeof overflows[0]; i++) {

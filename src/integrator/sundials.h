@@ -19,7 +19,8 @@ struct sundials {
 /* Returns the number of bytes for the context and the largest method, the one with matrices. */
 size_t sundials_memory_size(const struct ode *ode);
 
-/* Allocates size bytes that begin with a struct sundials, its context and vectors; or NULL. */
+/* Allocates memory of size bytes that begins with a struct sundials, with the context and the
+ * vectors in it. Returns NULL if memory is short. */
 MUST_CHECK NONNULL void *sundials_create(size_t size, struct problem *problem,
                                          const struct method *method);
 

@@ -7,7 +7,8 @@
 
 #include "method.h"
 
-/* Most rows on the stack if no later call reads them: there they stay in a cache. */
+/* Largest number of rows that are on the stack if no later call reads them: there they are in a
+ * cache even if many instances are stepped in turn. */
 enum { TAYLOR_FEW_ROWS = 8 };
 
 static inline bool taylor_series_has_few_rows(const struct ode *ode) {

@@ -51,7 +51,8 @@ struct event {
     size_t reason_size;
 };
 
-/* Returns the shortest period (s) of time events at t: 4096 doubles, else it is irregular. */
+/* Returns the shortest period (s) of time events about the time t (s). With fewer than 4096 doubles
+ * between two events these would be irregular. */
 static inline double event_shortest_period(double t) {
     return 0x1p-40 * (t < 0.0 ? -t : t);
 }
@@ -69,7 +70,8 @@ struct model_events {
      * time events. */
     double (*next_time)(const void *values);
 
-    /* True if state events are possible; if not, update writes modes that are smooth everywhere. */
+    /* True if state events are possible with these parameters. If not, update writes the modes in
+     * which the right-hand side is smooth everywhere. */
     bool (*are_possible)(const void *values);
 
     /* True if update can have written these modes; the modes of a saved state may be anything.

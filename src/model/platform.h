@@ -1,4 +1,5 @@
-/* Names that compilers spell differently: only here. Attributes precede the return type. */
+/* Names that compilers and platforms spell differently: the only header that asks which one it is.
+ * Attributes stand in front of the return type. */
 #pragma once
 
 #if defined(__FAST_MATH__)

@@ -182,7 +182,8 @@ static bool run_due_events(const struct call *call) {
     return fires;
 }
 
-/* True if a relation at its limit is about to pass it, and so switches with others there. */
+/* True if a relation at its limit is about to pass it, so that it switches together with another
+ * relation of the same limit. It need not be read yet. */
 static bool joins(const struct compared *compared, int holds) {
     return is_near(compared) && signed_slope(compared, holds) < 0.0;
 }

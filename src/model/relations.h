@@ -79,7 +79,8 @@ static inline double relations_spread(double y, double at_begin, double at_end) 
     return fmax(fabs(at_begin - y), fabs(at_end - y));
 }
 
-/* Returns values with modes after all that was set since the event: `values`, or `copy`. */
+/* Returns the values with modes that have followed all inputs and parameters set since the last
+ * event: `values` itself, or `copy`. */
 const void *relations_followed(const struct relations *model, struct relations_room room,
                                const void *values, double t, void *copy);
 

@@ -5,7 +5,8 @@
 
 #include <math.h>
 
-/* Returns the derivative of f(x) by f'(x) and d; 0 if x does not move, however steep f is. */
+/* Returns the derivative of f(x) from f'(x) and the derivative d of x. If x does not move, f(x)
+ * does not move either, however steep it is. */
 static inline double slopes_scaled(double slope, double d) {
     return d == 0.0 ? 0.0 : slope * d;
 }

@@ -34,7 +34,8 @@ static bool is_in_word(char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
 }
 
-/* Returns the length of nan in front of text, with sign and kind as on some platforms, or 0. */
+/* Returns the length of the word nan in front of text, with the sign and the kind that some
+ * platforms add; 0 if it is not there. */
 static size_t nan_length(const char *text) {
     const size_t end = (size_t)(*text == '-') + strlen("nan");
     if (strncmp(text + (*text == '-'), "nan", strlen("nan")) != 0 || is_in_word(text[end])) {
@@ -77,7 +78,8 @@ static size_t shorten_number(const char *text, char shorter[SHORTER_SIZE]) {
     return 0;
 }
 
-/* Writes numbers alike on every platform: not -nan(ind), nor 0.80000000000000004 by %.17g. */
+/* Writes numbers alike on every platform: printf writes NaN as nan, -nan, nan(ind) or -nan(ind),
+ * and 0.8 with %.17g as 0.80000000000000004. */
 static void simplify_numbers(char *text) {
     char *to = text;
     const char *from = text;

@@ -49,7 +49,8 @@ struct message_sink {
     void *context;
 };
 
-/* Formats as vsnprintf, alike on every platform, in few digits: 0.8 by %.17g. */
+/* Formats like vsnprintf, but writes numbers alike on every platform and with no more digits than
+ * needed: %.17g writes 0.8 and 0.30000000000000004. */
 PRINTF_FORMAT(3, 0)
 void message_format(char *text, size_t size, const char *format, va_list arguments);
 

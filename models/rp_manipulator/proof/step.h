@@ -1,4 +1,5 @@
-/* Sets of states, and steps by Lohner's method with a box of high order (README.md). */
+/* Sets that contain the arm's states, and steps from one to the next by Lohner's method with a box
+ * of high order: README.md has the theorems. */
 #pragma once
 
 #include "arm_series.h"

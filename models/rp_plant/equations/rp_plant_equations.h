@@ -148,7 +148,8 @@ static inline real plant_push(const struct rp_plant_parameters *p, int contact, 
     return contact > 0 ? 1.0 - p->stop_damping[i] * dq : 1.0 + p->stop_damping[i] * dq;
 }
 
-/* Hunt and Crossley: k d (1 + c d'), on the joint; past d = 0 up to the end of the contact. */
+/* Hunt and Crossley: k d (1 + c d'), on the joint. In a given contact it continues past d = 0, up
+ * to the event that ends the contact. */
 static inline real plant_compliant_force(const struct rp_plant_parameters *p, int contact, int i,
                                          real q, real dq) {
     if (abs(contact) != RP_PLANT_PUSHED) {
@@ -261,7 +262,8 @@ static inline void plant_forward_dynamics(const struct plant *plant, const real 
     ddq[1] = mu * (push + centrifugal - fall + arm->a * ddq[0]);
 }
 
-/* Accelerations, and reactions of stuck joints, whose rows of D q'' = forces are left out. */
+/* Accelerations, and the reactions of stuck joints, whose rows of D q'' = forces are left out of
+ * the solution and give the reactions. */
 static inline void plant_motion(const struct plant *plant, const int mode[2], const real efforts[2],
                                 real ddq[2], real reaction[2]) {
     const bool stuck[2] = {mode[0] == RP_PLANT_STUCK, mode[1] == RP_PLANT_STUCK};

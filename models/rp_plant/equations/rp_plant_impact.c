@@ -2,7 +2,8 @@
 
 #include <math.h>
 
-/* The impact with impulses at struck joints only; by the determinant it cannot be negative. */
+/* The impact whose impulses are at the struck joints only. D_ii - D_ij^2 / D_jj is written by the
+ * determinant: it cannot come out negative. */
 static void strike(const struct rp_plant_inertia *inertia, const bool struck[2],
                    const double restitution[2], const double dq[2],
                    struct rp_plant_impact *impact) {
