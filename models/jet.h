@@ -50,7 +50,8 @@ static inline double jet_quotient(const double x[], const double y[], const doub
     return rest / y[0];
 }
 
-/* z = sqrt(x) with x_0 > 0, from x = z^2: z_k = (x_k - sum of z_i z_(k-i), 0 < i < k) / (2 z_0) */
+/* z = sqrt(x) with x_0 > 0, from x = z^2:
+ * z_k = (x_k - sum over i = 1 .. k-1 of z_i z_(k-i)) / (2 z_0) */
 static inline double jet_square_root(const double x[], const double z[], int k) {
     if (k == 0) {
         return sqrt(x[0]);

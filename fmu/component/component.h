@@ -29,7 +29,8 @@ enum fmi_kind {
     KIND_CO_SIMULATION_WITH_EVENTS = 1 << 2, /* the importer handles events in event mode */
 };
 
-/* Rule of a call: kinds and states of an instance that allow it. Each FMI version has a table. */
+/* Rule of a call: the kinds and states of an instance that allow it. Each FMI version has a table
+ * of these rules in its own folder. */
 struct call_rule {
     const char *name;
     unsigned kinds;  /* bits of enum fmi_kind */
@@ -104,7 +105,8 @@ MUST_CHECK NONNULL_ARGUMENTS(2, 4,
                                                            const char *token, const char *expected,
                                                            char text[LOG_TEXT_SIZE]);
 
-/* Begins a zeroed component; adapter must outlive it. On failure nothing has to be freed. */
+/* Begins a component, which must be zeroed; adapter must outlive it. On failure nothing has to be
+ * freed. */
 MUST_CHECK NONNULL enum component_status component_begin(struct component *component,
                                                          const struct adapter *adapter,
                                                          enum fmi_kind kind, bool logging_on);
@@ -126,7 +128,8 @@ MUST_CHECK NONNULL bool component_refuse_in_logger(struct component *component, 
 /* Reports NULL in place of an array as component_fail does. Returns false. */
 NONNULL bool component_refuse_arrays(struct component *component, unsigned call, size_t count);
 
-/* True if count values may be accessed: no array is NULL, unless count is 0. Else fails. */
+/* Returns true if count values may be accessed: neither array is NULL, unless count is 0. Otherwise
+ * fails as component_fail. */
 MUST_CHECK NONNULL_ARGUMENTS(1) static inline bool component_check_arrays(
     struct component *component, unsigned call, size_t count, const void *references,
     const void *values) {

@@ -86,7 +86,8 @@ enum component_status continuous_get_nominals(struct component *component, unsig
 enum component_status continuous_get_indicators(struct component *component, unsigned call,
                                                 double indicators[], size_t count);
 
-/* Ends a step; writes whether event mode is needed. enters, terminates: the caller's answers. */
+/* Ends a step of the integrator and writes whether event mode is needed. enters, terminates: the
+ * caller's pointers for its answers. */
 enum component_status continuous_complete_step(struct component *component, unsigned call,
                                                const void *enters, const void *terminates,
                                                bool *is_event);

@@ -1,4 +1,5 @@
-/* All functions of FMI 2.0: checks of arguments, conversion of types and status, nothing else. */
+/* All functions of FMI 2.0: checks of arguments that only FMI has, conversion of types and status,
+ * and nothing else. */
 #include "component.h"
 #include "fmi2Functions.h"
 #include "fmi2_functions.h"

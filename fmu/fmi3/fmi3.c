@@ -1,4 +1,5 @@
-/* All supported functions of FMI 3.0: checks of arguments, conversion of types and status. */
+/* All supported functions of FMI 3.0: checks of arguments that only FMI has, conversion of types
+ * and status, and nothing else. */
 #include "continuous_states.h"
 #include "fmi3_calls.h"
 #include "model_description.h"
@@ -97,7 +98,8 @@ static enum status accept(void *component_pointer, double time, double *end) {
     return status;
 }
 
-/* Prepares steps with these settings, and the snapshot for undoing one: steps allocate nothing. */
+/* Prepares steps with these settings. Allocates the snapshot for undoing a step, since steps
+ * allocate nothing. */
 static enum status prepare_steps(struct fmi3_component *component) {
     component->options.context = component;
     if (component->early_return_allowed) {
@@ -279,7 +281,8 @@ fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
     return fmi3_status(mode_enter_event(instance, CALL_fmi3EnterEventMode));
 }
 
-/* One update decides all modes. Another is needed only after several time events at once. */
+/* One update decides all modes. Another one is needed only if the importer has passed several time
+ * events. */
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
                                     fmi3Boolean *terminateSimulation,
                                     fmi3Boolean *nominalsOfContinuousStatesChanged,

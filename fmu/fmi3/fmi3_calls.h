@@ -106,7 +106,8 @@ struct fmi3_component {
     bool can_set;     /* true if inputs may be set in intermediate update mode */
     bool can_get;     /* true if values may be read in intermediate update mode */
     struct step_options options; /* options of every step */
-    bool is_intermediate[];      /* by row of the table: true if intermediate updates name it */
+    bool is_intermediate[];      /* by row of the table of variables: true if it was named for
+                                    intermediate updates */
 };
 
 _Static_assert((int)COMPONENT_OK == fmi3OK && (int)COMPONENT_WARNING == fmi3Warning &&

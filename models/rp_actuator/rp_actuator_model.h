@@ -1,4 +1,5 @@
-/* Value structure of the drives, to which variables.toml binds the variables, and struct model. */
+/* The drives as the instance runs them: their value structure, to which variables.toml binds the
+ * variables, and their struct model. */
 #pragma once
 
 #include "model.h"

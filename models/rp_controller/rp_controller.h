@@ -19,7 +19,8 @@ struct rp_controller_parameters {
     double Kp[2];             /* 1/s2, >= 0 */
     double Kd[2];             /* 1/s, >= 0 */
     double Ki[2];             /* 1/s3, >= 0; 0: the integral part rests */
-    double inertia[2];        /* kg.m2, kg, > 0: inertias for PD modes and anti-windup */
+    double inertia[2];        /* kg.m2, kg, > 0: effective inertias, of the PD modes and the
+                                 anti-windup */
     double tracking_time;     /* s, > 0: time constant of the anti-windup */
     double limit[2];          /* N.m, N, >= 0: largest magnitude of the efforts */
     double payload_mass;      /* kg, >= 0 */

@@ -4,7 +4,8 @@
 #include "rp_controller_law.h"
 #include "rp_controller_model.h"
 
-/* Writes them from parameters, inputs and states; efforts of a sample do not move. */
+/* Writes them from the parameters, inputs and states; in the sampled form efforts belong to a
+ * sample and do not move. */
 static inline void rp_controller_calculate(struct rp_controller_values *values) {
     const struct rp_controller_parameters *p = &values->parameters;
     const struct rp_controller_inputs *inputs = &values->inputs;
@@ -32,7 +33,8 @@ static inline void rp_controller_calculate(struct rp_controller_values *values) 
     }
 }
 
-/* Derived: J[i + 2 j] = d rates[i] / d w[j] (1/s). One-sided where an effort meets its limit. */
+/* Derived: J[i + 2 j] is the derivative of rates[i] by w[j] (1/s). One-sided where an effort just
+ * meets its limit. */
 void rp_controller_jacobian(const struct rp_controller_parameters *p, bool attached,
                             const struct rp_controller_inputs *inputs, const double w[2],
                             double J[]);

@@ -36,7 +36,8 @@ static inline struct arm law_arm(const struct rp_controller_parameters *p, bool 
     return arm;
 }
 
-/* Efforts (N.m, N) before their limits. attached: the controller knows of a payload on link 2. */
+/* Efforts (N.m, N) that the law asks for, before they are limited. attached: the controller knows
+ * of a payload on link 2. */
 static inline void law_unlimited(const struct rp_controller_parameters *p, bool attached,
                                  const struct rp_controller_inputs *inputs, const real w[2],
                                  real unlimited[2]) {
@@ -56,7 +57,8 @@ static inline void law_unlimited(const struct rp_controller_parameters *p, bool 
     unlimited[1] = p->inertia[1] * v[1] + gravity[1];
 }
 
-/* Brings an effort into [-limit, limit]; from there on it moves with the limit. NaN stays NaN. */
+/* Brings an effort into [-limit, limit]. At a limit and beyond it the effort moves with the limit.
+ * NaN stays NaN. */
 static inline real law_limited(const struct rp_controller_parameters *p, real unlimited, int i) {
     const real limit = p->limit[i];
     if (unlimited >= limit) {

@@ -1,4 +1,5 @@
-/* Value structure of the manipulator, to which variables.toml binds variables; struct model. */
+/* The manipulator as the instance runs it: its value structure, to which variables.toml binds the
+ * variables, and its struct model. */
 #pragma once
 
 #include "model.h"

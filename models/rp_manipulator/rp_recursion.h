@@ -64,7 +64,8 @@ static inline void write_loads(const struct joint_loads *loads, struct rp_joint_
 
 /* ---- Forward -------------------------------------------------------------------------------- */
 
-/* omega' x r + omega x (omega x r): acceleration at r of a body with an unaccelerated origin. */
+/* omega' x r + omega x (omega x r): acceleration of a point fixed to a body whose origin does not
+ * accelerate. */
 static inline struct vector rigid_acceleration(struct vector omega, struct vector domega,
                                                struct vector r) {
     const struct vector centripetal = vector_cross(omega, vector_cross(omega, r));

@@ -27,7 +27,8 @@ enum row { Q1, Q2, W, V, L, P, S, C };
 
 _Static_assert(C + 1 == RP_SERIES_ROWS, "the rows");
 
-/* Sums of x_i z_(n-i) over i = 0 .. n, or of x_(i+1) z_(n-i) where `ahead` stands in the name. */
+/* Sums over i = 0 .. n of a product of two series, x_i z_(n-i), or x_(i+1) z_(n-i) where `ahead`
+ * stands in the name. */
 struct products {
     double P_w, L_c, w_s, w_c;
     double ahead_L_w, ahead_L_P;

@@ -106,7 +106,8 @@ static inline void write_joints(const struct rp_plant_modes *modes, const real r
     values->friction_power = power;
 }
 
-/* Writes the calculated fields. modes: in effect; values has them only after initialization. */
+/* Writes the calculated fields from the parameters, inputs and states. modes: in effect; values has
+ * them only after initialization. */
 static inline void rp_plant_calculate(struct rp_plant_values *values,
                                       const struct rp_plant_modes *modes) {
     const struct rp_plant_parameters *p = &values->parameters;

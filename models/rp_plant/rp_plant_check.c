@@ -110,7 +110,8 @@ static enum status check_stops(const struct rp_plant_parameters *p, int i, char 
     return STATUS_OK;
 }
 
-/* A limit that moves past a joint during a run takes it along; a start outside is a mistake. */
+/* A limit that is moved past a joint while it runs takes the joint along; a start outside is a
+ * mistake. */
 static enum status check_start(const struct rp_plant_values *values, int i, char *text,
                                size_t size) {
     const struct rp_plant_parameters *p = &values->parameters;

@@ -1,4 +1,5 @@
-/* Value structure of the plant, to which variables.toml binds variables, and its struct model. */
+/* The plant as the instance runs it: its value structure, to which variables.toml binds the
+ * variables, and its struct model. */
 #pragma once
 
 #include "model.h"
@@ -54,7 +55,8 @@ extern const struct model_events rp_plant_events;
 /* True if all modes are of their enumerations. */
 bool rp_plant_modes_exist(const struct rp_plant_modes *modes);
 
-/* The Taylor series of a motion in its modes (rp_plant_series.c): states, efforts and wrench. */
+/* The Taylor series of the motion in its modes (rp_plant_series.c): states q1, q2, q1', q2', inputs
+ * tau1, f2 and the wrench. */
 extern const struct series rp_plant_series;
 
 /* reach of struct model_events (rp_plant_series.c). */

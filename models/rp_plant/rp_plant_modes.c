@@ -22,7 +22,8 @@ static void accelerate(const struct rp_plant_inertia *inertia, const bool moves[
     }
 }
 
-/* Returns by how much friction and stop, which takes any push towards it, fall short at rest. */
+/* Returns by how much friction and stop of a joint that stays fall short: a closed stop takes any
+ * push towards it. */
 static double missing_hold(double reaction, double breakaway, int closed) {
     return (closed == 0 ? fabs(reaction) : closed * reaction) - breakaway;
 }

@@ -55,7 +55,8 @@ static inline bool rp_plant_can_stick(const struct rp_plant_parameters *p, int j
            p->stops[joint] == RP_PLANT_STOPS_RIGID;
 }
 
-/* Writes contacts, joints at rest, and their modes while these stay. True if one is at rest. */
+/* Writes the contacts, which joints are at rest, and the joints' modes as long as these stay. True
+ * if one is at rest. */
 bool rp_plant_find_rest(const struct rp_plant_parameters *p, const double q[2], const double dq[2],
                         struct rp_plant_modes *modes, struct rp_plant_rest *rest);
 

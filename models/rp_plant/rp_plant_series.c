@@ -71,7 +71,8 @@ struct series_motion {
 
 _Static_assert(X == (int)RP_SERIES_ROWS, "the rows of the manipulator come first");
 
-/* Where q' is so many times vs, friction is as of a fast joint, but for exp(-36) of the rest. */
+/* Where q' is so many times vs, friction is that of a fast joint: exp(-36) of the difference is
+ * left. */
 static const double fast = 6.0;
 
 /* ---- Efforts of the joints: drives, damping, friction, compliant stops, wrench --------------- */
@@ -153,7 +154,8 @@ static double series_compliant_force(const struct series_motion *m, int i, int k
     return m->p->stop_stiffness[i] * (contact * d[k] - damped);
 }
 
-/* Returns order k of a joint's effort, without wrench. Inline: most is left out for most. */
+/* Returns order k of the effort of a joint, without the wrench. Inline, as most of it is left out
+ * for most joints. */
 ALWAYS_INLINE double series_effort(const struct series_motion *m, int i, int k,
                                    double row[][SERIES_LENGTH]) {
     double effort = jet_input(m->origin, i, k) - m->p->damping[i] * row[W + i][k];
@@ -269,7 +271,8 @@ static void begin_motion(const struct series_origin *origin, double row[][SERIES
 
 /* ---- Motion --------------------------------------------------------------------------------- */
 
-/* Sums of x_i z_(n-i) over i = 0 .. n, or of x_(i+1) z_(n-i) where `ahead` stands in the name. */
+/* Sums over i = 0 .. n of a product of two series, x_i z_(n-i), or x_(i+1) z_(n-i) where `ahead`
+ * stands in the name. */
 struct products {
     double P_w, L_c, w_s, w_c;
     double ahead_L_w, ahead_L_P;

@@ -1,4 +1,5 @@
-/* Equations of an incremental encoder: noise, and the count of a position (README.md). */
+/* Equations of an incremental encoder: noise, and the count that a position gives. The page
+ * README.md derives them. */
 #pragma once
 
 #include <stdint.h>

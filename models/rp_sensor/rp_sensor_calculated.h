@@ -4,7 +4,8 @@
 #include "real.h"
 #include "rp_sensor_model.h"
 
-/* Writes them from the parameters and the counts that are shown now and were a tick before. */
+/* Writes them from the parameters and the counts that are shown now and were shown a tick before.
+ */
 static inline void rp_sensor_calculate(struct rp_sensor_values *values, const int now[2],
                                        const int before[2]) {
     const struct rp_sensor_parameters *p = &values->parameters;

@@ -67,7 +67,8 @@ static enum status update(void *values_pointer, const struct event *event) {
     return STATUS_OK;
 }
 
-/* Ticks are whole, no count is beyond the last, and where none has been written there is none. */
+/* Ticks are counted in whole numbers, no count is beyond the last, and where none has been written
+ * there is none. */
 static bool modes_are_possible(const void *values_pointer, bool is_held) {
     const struct rp_sensor_values *values = values_pointer;
     if (!(values->ticks >= 1.0 && values->ticks <= 0x1p53 &&

@@ -155,7 +155,8 @@ static inline void point_to_point(const struct rp_trajectory_parameters *p, real
     forward_kinematics(p, point);
 }
 
-/* A line apart from the axis turns by less than pi about it: the angle is counted from begin. */
+/* A line that does not meet the axis turns by less than pi about it: the polar angle is counted
+ * from the start. */
 static inline void line(const struct rp_trajectory_parameters *p, real time,
                         struct trajectory_point *point) {
     struct motion from[2];

@@ -14,7 +14,8 @@ struct clock_time {
     double rest; /* remainder of this rounding, s */
 };
 
-/* Returns the exact sum of two doubles (Knuth, Art of Computer Programming 2, section 4.2.2). */
+/* Returns the exact sum of two doubles (Knuth, The Art of Computer Programming, vol. 2,
+ * section 4.2.2). */
 static inline struct clock_time clock_two_sum(double x, double y) {
     const double s = x + y;
     const double y_part = s - x;

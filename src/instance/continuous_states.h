@@ -12,7 +12,8 @@ MUST_CHECK NONNULL bool instance_complete_step(struct instance *instance);
 
 struct discrete_update {
     bool states_changed; /* true if states that are integrated outside have jumped */
-    bool is_incomplete;  /* true with outside integration if the next time event is not later */
+    bool is_incomplete;  /* true with integration from outside if the next time event is not later
+                            than now */
     double next_time;    /* time of the next time event, s; INFINITY if there is none */
 };
 
@@ -24,7 +25,8 @@ MUST_CHECK NONNULL enum status instance_update_discrete_states(struct instance *
 
 MUST_CHECK NONNULL enum status instance_set_time(struct instance *instance, double time);
 
-/* Access all states: count is instance_state_count; if 0, arrays may be NULL. All or nothing. */
+/* Access all states; count must be instance_state_count, the arrays may be NULL if it is 0. All or
+ * nothing. */
 NONNULL size_t instance_state_count(const struct instance *instance);
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_set_states(struct instance *instance, const double x[], size_t count);

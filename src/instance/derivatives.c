@@ -6,7 +6,8 @@
 #include <math.h>
 #include <string.h>
 
-/* Returns the variable if it serves; otherwise NULL, with a message about the expected kind. */
+/* Returns the variable if it serves; otherwise NULL, with a message that says which kind is
+ * expected. */
 static const struct variable *
 find_as(const struct instance *instance, unsigned reference,
         bool (*serves)(const struct instance *, const struct variable *), const char *expected) {
@@ -86,7 +87,8 @@ enum status instance_set_input_derivatives(struct instance *instance, const unsi
     return STATUS_OK;
 }
 
-/* Writes all calculated values' derivatives to first_derivatives and second, perhaps NULL. */
+/* Writes the derivatives of all calculated values to instance->first_derivatives and second, which
+ * may be NULL. */
 static enum status propagate(struct instance *instance, double dt, char *second) {
     const double t = instance->state.time.s;
     const enum status status = instance->model->propagate(instance->memory.values, t, dt,
@@ -222,7 +224,8 @@ static double *double_in(char *structure, const struct variable *variable) {
     return (double *)(void *)(structure + variable->offset);
 }
 
-/* Checks that a value and its derivative are finite. direction: its name, for a message. */
+/* Checks that the value and its derivative are finite. direction: name of the direction of the
+ * derivative, for a message. */
 static enum status check_derivative(const struct instance *instance, const struct variable *unknown,
                                     const char *direction) {
     if (unknown->owner == VARIABLE_OF_MODEL &&

@@ -30,7 +30,8 @@ MUST_CHECK NONNULL_ARGUMENTS(1) enum status
                                         const unsigned knowns[], size_t known_count,
                                         const double v[], double result[]);
 
-/* Writes v^T J, a value per known, for the same unknowns and knowns; v has one per unknown. */
+/* Writes v^T J, one value per known, for the same unknowns and knowns; v has one value per unknown.
+ */
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_get_adjoint_derivative(struct instance *instance, enum known_kinds kinds,
                                     const unsigned unknowns[], size_t unknown_count,

@@ -178,7 +178,8 @@ static struct integrator_start start_of(struct instance *instance) {
         .indicators = instance->model->events != NULL ? describe_indicators(instance) : NULL};
 }
 
-/* Makes the integrator run with the inputs or states set now. A loop, because they are few. */
+/* Makes the integrator run with the inputs or states that are set now. A loop, because they are
+ * few. */
 static void activate(struct instance *instance, struct range range) {
     const double *from = doubles_of(instance->memory.values, range);
     double *to = doubles_of(instance->memory.restart_values, range);

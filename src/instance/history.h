@@ -18,7 +18,8 @@ enum continuation {
 MUST_CHECK NONNULL enum continuation instance_continuation(const struct instance *instance,
                                                            double target);
 
-/* Returns how far from a restart the integrator may go, s: to target or, with rest, the stop. */
+/* Returns how far from a restart the integrator may go, s: to target if inputs move, otherwise to
+ * the stop time. */
 NONNULL double instance_horizon(const struct instance_state *state, struct clock_time restart,
                                 double target, bool inputs_move);
 

@@ -95,7 +95,8 @@ static enum status check_bindings(const struct model_description *description,
     return STATUS_OK;
 }
 
-/* Locates the values of all references. An input reads as set last, also after it moved. */
+/* Locates the values of all references. An input reads as the value set last, also after a step
+ * over which it moved. */
 static void locate_reals(struct instance *instance) {
     for (size_t i = 0; i < instance->description->variable_count; i++) {
         const struct variable *variable = &instance->description->variables[i];
@@ -267,7 +268,8 @@ enum status instance_enter_initialization(struct instance *instance) {
     return STATUS_OK;
 }
 
-/* Returns STATUS_OK if the method can integrate the model; else a message names others. */
+/* Returns STATUS_OK if the chosen method can integrate the model; otherwise a message names methods
+ * that can. */
 static enum status check_method(const struct instance *instance) {
     const enum integrator_method method = (enum integrator_method)instance->state.own.solver_method;
     if (integrator_is_possible(method, &instance->ode)) {

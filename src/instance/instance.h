@@ -30,10 +30,12 @@ MUST_CHECK NONNULL enum status instance_enter_initialization(struct instance *in
 /* Ends initialization. Inconsistent parameters are refused. */
 MUST_CHECK NONNULL enum status instance_exit_initialization(struct instance *instance);
 
-/* Leaves integration to the outside (Model Exchange): without integrator, none is refused. */
+/* Leaves the integration to the outside (Model Exchange): no integrator is set up, so that none is
+ * refused. */
 NONNULL void instance_integrate_outside(struct instance *instance);
 
-/* Allows setting states in event mode, too, from now on; in continuous time they may anyway. */
+/* Allows setting states in event mode, too, from now on; while the time is continuous they may be
+ * set anyway. */
 NONNULL void instance_allow_setting_states(struct instance *instance);
 
 /* Returns the time that the instance has reached, s. */

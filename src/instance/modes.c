@@ -45,7 +45,8 @@ static bool is_timed(const struct instance *instance, const bool *triggered) {
     return triggered != NULL && triggered[instance->model->events->indicator_count];
 }
 
-/* Returns STATUS_OK if the next time event is later: they must not follow without end. */
+/* Returns STATUS_OK if the next time event is later: time events must not follow each other at the
+ * same time without end. */
 static enum status check_next_time(const struct instance *instance, double passed) {
     const double next = instance_next_time(instance);
     if (next > passed) {
@@ -234,7 +235,8 @@ struct arrival {
     double band;
 };
 
-/* True if the indicator falls. At a mode's begin, rounding may let it fall within the band. */
+/* True if the indicator falls. If a mode has just begun at 0, rounding may let it fall, but not
+ * past the band. */
 static bool has_state_fallen(const struct arrival *at, double size) {
     const double ahead = at->z + slope_time * at->slope;
     return at->z <= near_root * size && ahead <= at->z && ahead + at->band <= 0.0;
@@ -323,7 +325,8 @@ void instance_forget_unhandled(struct instance *instance) {
     instance->state.event_point = NO_EVENT;
 }
 
-/* True if some indicator is below 0: otherwise no event can have been missed. */
+/* True if some indicator is below 0: otherwise no event can have been missed, as after most steps.
+ */
 static bool is_any_below(struct instance *instance) {
     const double *x = doubles_of(instance->memory.values, instance->model->states);
     bool is_below = false;
@@ -365,7 +368,8 @@ static enum status forget_past_forces(struct instance *instance, bool triggered[
     return STATUS_OK;
 }
 
-/* True if these three values in equal distances move to 0 and turn before they come there. */
+/* True if an indicator, with these values at three times in equal distances, moves to 0 and turns
+ * before it comes there. */
 static bool turns_before_zero(double z, double ahead, double far_ahead) {
     const double side = z < 0.0 ? -1.0 : 1.0;
     const double slope = side * (ahead - z);

@@ -15,7 +15,8 @@ struct event_counts {
     int of_time;   /* at most max_internal_steps: each ends a part of the step */
 };
 
-/* Counts an event at the current time; fails, with a message, at the first above its limit. */
+/* Counts an event at the current time. Fails, with a message, at the first event above its limit.
+ */
 MUST_CHECK NONNULL enum status instance_count_event(struct instance *instance,
                                                     const bool triggered[],
                                                     struct event_counts *in_step);

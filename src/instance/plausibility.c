@@ -222,7 +222,8 @@ static bool check_structure(const struct instance *instance, const char *values)
     return check_limits(instance, values) && check_kept(instance, values);
 }
 
-/* Checks the event that ended the last step: an indicator or the time causes an unhandled one. */
+/* Checks the event at which the last step ended: an unhandled event has an indicator or the time as
+ * its cause. */
 static bool check_event_point(const struct instance *instance, const struct instance_state *state,
                               const bool unhandled[]) {
     int count = 0;
@@ -267,7 +268,8 @@ static bool check_twins(const struct instance *instance, const struct twin twins
     return true;
 }
 
-/* Checks the instance's variables: they follow from clock, settings and integrator's totals. */
+/* Checks the instance's variables, which follow from its clock, its settings and the integrator's
+ * totals. */
 static bool check_variables(const struct instance *instance, const struct instance_state *state) {
     const struct instance_values *own = &state->own;
     struct instance_values counted = {0};
@@ -322,7 +324,8 @@ static bool check_start(const struct instance *instance, const struct instance_s
             check_twins(instance, of_no_experiment, COUNT(of_no_experiment)));
 }
 
-/* Checks that the history ends at the current time, and that inputs determine its horizon. */
+/* Checks that the integrator's history ends at the current time, and that its horizon follows from
+ * the inputs. */
 static bool check_history_twins(const struct instance *instance, const struct instance_state *state,
                                 const struct polynomial active_inputs[]) {
     const struct twin twins[] = {

@@ -1,4 +1,5 @@
-/* Refuses a state from bytes that no instance can have: a fitting hash does not prove it. */
+/* Refuses a state read from bytes that no instance can be in: a hash that fits does not prove it.
+ */
 #pragma once
 
 #include "state.h"

@@ -13,7 +13,8 @@
 static const char magic[8] = {'C', 'O', 'S', 'I', 'M', 'S', 'T', 'A'};
 enum { FORMAT_VERSION = 2, HASH_SIZE = 8 };
 
-/* Reader, writer or counter of fields of a serialized state, with one sequence of calls. */
+/* Reader, writer or counter of the fields of a serialized state, with one sequence of calls for all
+ * three. */
 struct codec {
     enum { CODEC_COUNTING, CODEC_WRITING, CODEC_READING } mode;
     unsigned char *to;         /* CODEC_WRITING */
@@ -21,7 +22,8 @@ struct codec {
     size_t size;               /* bytes available */
     size_t at;                 /* bytes done */
     bool is_cut_off;           /* true if there were too few bytes */
-    const char *bad_field; /* first field with a value that its type does not have; NULL: none */
+    const char *bad_field; /* name of the first field with a value that its type does not have; NULL
+                              if there is none */
 };
 
 /* ---- Bytes ---------------------------------------------------------------------------------- */
@@ -51,7 +53,8 @@ static void transfer_number(struct codec *codec, uint64_t *number, size_t byte_c
     }
 }
 
-/* Returns the hash FNV-1a, 64 bit (G. Fowler, L. C. Noll, K.-P. Vo): it sees any changed byte. */
+/* Returns the hash FNV-1a, 64 bit (G. Fowler, L. C. Noll, K.-P. Vo). Any change of one byte changes
+ * it. */
 static uint64_t hash(const unsigned char *bytes, size_t count) {
     uint64_t value = 0xcbf29ce484222325u;
     for (size_t i = 0; i < count; i++) {

@@ -1,4 +1,5 @@
-/* Settings of an instance: experiment, parameters, and the integrator's settings from them. */
+/* Settings of an instance: its experiment, its parameters, and the integrator's settings that
+ * follow. */
 #pragma once
 
 #include "state.h"

@@ -102,7 +102,8 @@ enum status instance_restore(struct instance *instance, const struct instance_sn
     return resume(instance);
 }
 
-/* Copies the parts that a step writes: with inputs held, neither next nor current inputs. */
+/* Copies the parts that a step writes. If inputs are held, it writes neither the next inputs nor
+ * the current ones. */
 static void copy_written(const struct instance_memory *memory, bool inputs_are_held, char *to,
                          const char *from) {
     const struct range restart = memory->written_at_restart;

@@ -12,7 +12,8 @@
 
 struct instance_snapshot;
 
-/* Saves the instance into *snapshot, a new one if NULL. tag: a number for the caller. */
+/* Saves the instance into *snapshot: a new one if it is NULL, otherwise over that one. tag: a
+ * number for the caller. */
 MUST_CHECK NONNULL enum status instance_save(struct instance *instance, unsigned tag,
                                              struct instance_snapshot **snapshot);
 
@@ -34,7 +35,8 @@ MUST_CHECK NONNULL enum status instance_snapshot_tag(const struct instance *inst
 MUST_CHECK NONNULL enum status instance_check_own(const struct instance *instance,
                                                   const struct instance_snapshot *snapshot);
 
-/* Saves all that a step can change, for instance_undo: cheaper, as every step may call it. */
+/* Saves all that one step can change, for instance_undo. Cheaper than instance_save: every step may
+ * call it. */
 NONNULL void instance_keep(struct instance *instance, struct instance_snapshot *snapshot);
 
 /* Restores the instance as it was when instance_keep was called, at most one step ago. */

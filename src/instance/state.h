@@ -61,7 +61,8 @@ struct instance_memory {
     struct polynomial *active_inputs;  /* inputs since the last restart */
     bool *unhandled;      /* causes of the unhandled event, like triggered of struct instance */
     char *restart_values; /* value structure at the last restart, with which the integrator runs */
-    char *values;         /* value structure as set and read from outside, with current inputs */
+    char *values; /* value structure of the model, as set and read from outside, with the inputs at
+                     the current time */
 
     char *block;
     size_t size; /* bytes */
@@ -73,8 +74,9 @@ struct instance_memory {
 /* Place and kind of the value of a reference. */
 struct instance_real {
     const double *value; /* NULL if it is no float64 */
-    bool is_calculated;  /* true if the outputs' calculation has to bring it up to date */
-    bool is_kept;        /* true if events keep it: in initialization mode it is calculated, too */
+    bool is_calculated; /* true if the model's outputs calculate it: it has to be brought up to date
+                         */
+    bool is_kept;       /* true if events keep it: in initialization mode it is calculated, too */
 };
 
 /* The fields that each step reads or writes stand first: if many instances are stepped in turn, few
@@ -93,7 +95,8 @@ struct instance {
     bool parameters_are_valid;  /* true if they are consistent, false if not known */
     bool parameters_are_active; /* true if instance_parameters_are_active, false if not known */
     bool history_is_lost;       /* true if the integrator is not where state says: replay first */
-    bool inputs_are_held;       /* true if the next step's inputs equal current_inputs */
+    bool inputs_are_held;       /* true if the inputs of the next step are constant and equal to
+                                   current_inputs, false if not known */
     bool inputs_move; /* true if inputs move since the last restart; if not, u has their values */
     double *u;        /* one value per input, as the right-hand side sees them */
     double (*input_series)[SERIES_INPUT_LENGTH]; /* coefficients of each input */
@@ -104,7 +107,8 @@ struct instance {
 
     struct message_sink sink;
     struct ode ode;
-    double *absolute_tolerances; /* one per state, of the integrator; NULL if there are no events */
+    double *absolute_tolerances; /* one per state, as the integrator has them; NULL if the model has
+                                    no events */
     double *event_tolerances;    /* one per state, at its value at the last event */
     struct indicator *indicators; /* one per indicator, since the last restart */
     double *du;                   /* derivative of each input by the time */
@@ -138,7 +142,8 @@ static inline bool instance_has_integrator(const struct instance *instance) {
     return instance->integrator != NULL && !instance->is_integrated_outside;
 }
 
-/* Returns the largest magnitude (s) of start time and t: times are rounded like it. */
+/* Returns the largest magnitude (s) among the start time and t: times are rounded like numbers of
+ * this size. */
 static inline double instance_size_of_times(const struct instance *instance, double t) {
     return fmax(fabs(t), fabs(instance->state.experiment.start_time));
 }
@@ -241,7 +246,8 @@ static inline size_t instance_input_index(const struct instance *instance,
     return (variable->offset - instance->model->inputs.offset) / sizeof(double);
 }
 
-/* Writes the value; a float64 input's also goes into its polynomial of the next step. */
+/* Writes the value. The value of an input of type float64 also goes into its polynomial of the next
+ * step. */
 static inline void instance_write_field(struct instance *instance, const struct variable *variable,
                                         double value) {
     void *field = instance_field(instance, variable);

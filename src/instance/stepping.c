@@ -31,7 +31,8 @@ struct step {
  * times that then overflow cvode_bdf would try the same step without end. */
 static const double latest_time = 1e300;
 
-/* Refuses times that do not fit. mismatch: of communication_point and instance's time, s. */
+/* Refuses times that do not fit. mismatch: distance of communication_point from the time of the
+ * instance, s. */
 static enum status refuse_times(const struct instance *instance, double communication_point,
                                 double step_size, double mismatch) {
     const struct instance_experiment *experiment = &instance->state.experiment;
@@ -218,7 +219,8 @@ static void end_inputs(const struct step *step) {
 
 /* ---- Parts without an event ----------------------------------------------------------------- */
 
-/* Reports the instance's time to options->accept; true if the step will end earlier. */
+/* Reports the time of the instance to options->accept. Returns true if the step will end earlier.
+ */
 static bool report(struct step *step) {
     const double now = step->instance->state.time.s;
     double end = step->end.s;

@@ -11,11 +11,13 @@
 MUST_CHECK NONNULL enum status instance_do_step(struct instance *instance,
                                                 double communication_point, double step_size);
 
-/* How a step deals with an event; one at its beginning is always handled, to make progress. */
+/* Way in which a step deals with an event. An event at its beginning is always handled, so that
+ * every step makes progress. */
 enum event_handling {
     EVENTS_PASSED, /* the step handles the event and continues */
     EVENTS_END,    /* the step handles the event and ends there */
-    EVENTS_LEFT,   /* the step ends there; discrete states or next step handle it */
+    EVENTS_LEFT,   /* the step ends there and leaves the event unhandled:
+                      instance_update_discrete_states or the next step handles it */
 };
 
 /* Options of a step; each may be NULL. The functions may read values of the instance and return

@@ -120,7 +120,8 @@ const char *variable_type_name(enum variable_type type);
 
 /* ---- Values of the instance ----------------------------------------------------------------- */
 
-/* Values of variables with owner = "instance" (time_variable.toml, solver_variables.toml). */
+/* Values of the variables with owner = "instance" (time_variable.toml, solver_variables.toml).
+ */
 struct instance_values {
     double time;                         /* s */
     int solver_steps;                    /* internal steps since initialization */

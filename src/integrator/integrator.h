@@ -19,7 +19,8 @@ struct integrator;
 /* Returns the name of the method, as in the variable solver_method. */
 const char *integrator_method_name(enum integrator_method method);
 
-/* Returns the fraction of a tolerance for a method to keep it over thousands of restarts. */
+/* Returns the fraction of a tolerance at which the method must run to keep that tolerance over
+ * thousands of restarts. */
 double integrator_tolerance_fraction(enum integrator_method method);
 
 /* Returns the number of internal steps after which the integrator is to be restarted although
@@ -27,7 +28,8 @@ double integrator_tolerance_fraction(enum integrator_method method);
  * starts fresh, and a restart between two advances changes nothing. */
 int64_t integrator_longest_history(enum integrator_method method, bool has_events);
 
-/* True if the method can integrate the ode: only INTEGRATOR_TAYLOR needs the series. */
+/* True if the method can integrate the ode: all can but INTEGRATOR_TAYLOR, which needs the series.
+ */
 NONNULL bool integrator_is_possible(enum integrator_method method, const struct ode *ode);
 
 /* Creates a handle. ode and sink are copied; the data behind their pointers must outlive the
@@ -49,7 +51,8 @@ MUST_CHECK NONNULL enum status integrator_configure(struct integrator *integrato
 MUST_CHECK NONNULL enum status integrator_restart(struct integrator *integrator, const double x[],
                                                   const struct integrator_start *start);
 
-/* Returns, after an advance, how long a first step after a restart can be, s; 0: unknown. */
+/* Returns, after an advance, how long a first internal step can be after a restart here, s; 0 if
+ * unknown. */
 NONNULL double integrator_next_step(const struct integrator *integrator);
 
 /* Returns, after an advance, the end of the last internal step, s since the restart.
@@ -62,7 +65,8 @@ NONNULL_ARGUMENTS(1)
 void integrator_set_observer(struct integrator *integrator, integrator_observer *observer,
                              void *context);
 
-/* Does as integrator_advance if an internal step has passed t already; else returns false. */
+/* Does the same as integrator_advance if an internal step has passed t already; otherwise returns
+ * false and does nothing. */
 MUST_CHECK NONNULL bool integrator_interpolate(struct integrator *integrator, double t, double x[]);
 
 /* Integrates to the time t, not before the t of the last call, in max_steps (>= 1) internal steps

@@ -167,7 +167,8 @@ static double fall_behind(const struct roots_polynomial *p, double s) {
     return INFINITY;
 }
 
-/* True if p, between two roots, is no farther from 0 than `touch` or its rounding. */
+/* True if p, between two roots, is no farther from 0 than `touch` or the rounding of its
+ * coefficients. */
 static bool is_touch(const struct roots_polynomial *p, double begin, double end, double touch) {
     const double s = 0.5 * (begin + end);
     double value = 0.0;
@@ -213,7 +214,8 @@ static double fall_or_end(const struct roots_polynomial *p, const struct fall *f
     return INFINITY;
 }
 
-/* Returns the first s at which p, below the level before, is above it; INFINITY: nowhere. */
+/* Returns the first s at which p, below the level before, is above it; INFINITY if it stays below.
+ */
 static double first_rise(const struct roots_polynomial *p, double level) {
     double c[ROOTS_LENGTH];
     c[0] = level - p->c[0];
@@ -301,7 +303,8 @@ double fall_first(const struct roots_polynomial *p, const struct fall *fall) {
     return s > 0.0 && s <= 1.0 ? fall_or_end(p, fall) : s;
 }
 
-/* Returns fall_first of indicator i; given: the fields of struct fall but for location's. */
+/* Returns fall_first of indicator i; given: the fields of struct fall that do not follow from
+ * location. */
 static double first_fall(const struct location *location, size_t i,
                          const struct roots_polynomial *p, const struct fall *given) {
     struct fall fall = *given;
@@ -331,7 +334,8 @@ static void expand(const struct step_polynomial *step, const struct indicator *i
     }
 }
 
-/* True if the state moves by less than the indicator is above its noise at a restart. */
+/* True if the state moves by less than the indicator is above 0 and above its noise at a restart.
+ */
 static bool is_far_above(const struct step_polynomial *step, const struct indicator *indicator,
                          double value, double noise) {
     const double *row = step->row[indicator->state];

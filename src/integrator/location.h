@@ -18,7 +18,8 @@ struct step_polynomial {
     bool is_from_end;
     int degree;
     double (*row)[SERIES_LENGTH];           /* in `rows` of struct location, or of the method */
-    double (*indicator_row)[SERIES_LENGTH]; /* rows of indicators that `has_row` names, over s */
+    double (*indicator_row)[SERIES_LENGTH]; /* rows of the model's indicators if `has_row` of struct
+                                               location, over the same s */
 };
 
 struct location {
@@ -32,11 +33,12 @@ struct location {
     const double *absolute_tolerances; /* of the states */
     bool *
         has_row; /* by indicator: true if step.indicator_row has it; otherwise it is interpolated */
-    bool *is_armed;   /* by indicator: true if it has been above 0 since the restart */
-    double *noise;    /* by indicator: its distance from 0 at which it need not have risen */
-    double *touch;    /* by indicator, as in struct fall */
-    double *rounding; /* by indicator, at the restart; 0 if not known */
-    bool *triggered;  /* by indicator: true if it is at 0 at `time` */
+    bool *is_armed; /* by indicator: true if it has been above 0 since the restart */
+    double *noise; /* by indicator: how far from 0 it may be, with either sign, without having risen
+                      since the restart */
+    double *touch; /* by indicator, as in struct fall */
+    double *rounding;                    /* by indicator, at the restart; 0 if not known */
+    bool *triggered;                     /* by indicator: true if it is at 0 at `time` */
     struct step_polynomial step;         /* last internal step; methods write it */
     double (*rows)[SERIES_LENGTH];       /* room for the rows of the states */
     double *x;                           /* states at one point */
@@ -68,7 +70,8 @@ static inline bool location_is_active(const struct location *location) {
 NONNULL void location_check_rows(struct location *location, const double x[],
                                  double relative_tolerance);
 
-/* Searches location->step. If it has an event, writes time and indicators of the event. */
+/* Searches location->step. If it has an event, writes its time and the indicators that have
+ * triggered. */
 MUST_CHECK NONNULL enum status location_search(struct location *location);
 
 /* Searches the time from 0 to t, over which the states stay at x. */
@@ -104,7 +107,8 @@ struct fall {
     bool is_restart; /* true if p begins at a restart */
     bool
         *is_armed; /* true if the indicator has been above 0 since the restart; set when it rises */
-    double *noise; /* distance from 0 without having risen; grows if a restart is farther below */
+    double *noise; /* how far from 0 the indicator may be without having risen; grows if it is
+                      farther below 0 at the restart */
 };
 
 /* Returns the first s in (0, 1] at which an indicator falls to 0; INFINITY if it does not fall, or

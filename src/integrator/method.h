@@ -1,12 +1,14 @@
-/* A method of integration: functions for integrator.c, and the initial value problem that it gets.
- * States are arrays here: the types of a solver library stay in the files that use it. */
+/* A method of integration: the functions that its file gives to integrator.c, and the initial value
+ * problem that it gets. States are arrays here: the types of a solver library stay in the files
+ * that use it. */
 #pragma once
 
 #include "location.h"
 
 /* ---- The problem ---------------------------------------------------------------------------- */
 
-/* The ode with settings, limits since the restart, and evaluations. Times in s since then. */
+/* The ode with its settings, the limits since the last restart, and a count of evaluations. Times
+ * in s since the restart. */
 struct problem {
     struct message_sink sink;
     struct ode ode;
@@ -75,7 +77,8 @@ static inline enum status problem_series(struct problem *problem, double t, doub
     return STATUS_NOT_FINITE;
 }
 
-/* True if the method is stuck in front of a time without a right-hand side. */
+/* True if the method is stuck in front of a time at which the right-hand side cannot be evaluated.
+ */
 static inline bool problem_is_stuck(const struct problem *problem) {
     return problem->failed_at >= problem->reached;
 }
@@ -110,7 +113,8 @@ struct method {
     /* Returns the largest number of bytes that create allocates. */
     size_t (*memory_size)(const struct ode *ode);
 
-    /* Allocates all memory of the method; problem outlives it. On failure *memory is NULL. */
+    /* Allocates all memory of the method; nothing is allocated later. problem outlives the memory.
+     * On failure *memory is NULL. */
     enum status (*create)(struct problem *problem, void **memory);
     void (*destroy)(void *memory);
 
@@ -132,7 +136,8 @@ struct method {
      * cannot, so that an advance must. NULL for a method without history. */
     bool (*interpolate)(void *memory, double t, double x[]);
 
-    /* Returns a first step's length after a restart here with the state x, s; 0: unknown. */
+    /* Returns the length of a first internal step after a restart here with the state x, s; 0 if
+     * unknown. */
     double (*next_step)(void *memory, const double x[]);
 };
 

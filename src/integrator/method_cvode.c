@@ -162,7 +162,8 @@ static const double first_step_fraction = 0.1;
  * cut-off says, and not 2.8e-7 s, for 5 % more time. */
 static const double first_step_fraction_after_event = 0.003;
 
-/* Returns the share of the length at which the error of a step of order 1 is the tolerance. */
+/* Returns the fraction of the length at which the error of a step of order 1, about h^2 x'' / 2, is
+ * the tolerance. */
 static double step_of_curvature(const struct problem *problem, double fraction, const double x[],
                                 const double ddx[]) {
     const double relative = problem->settings.relative_tolerance;
@@ -186,7 +187,8 @@ static double first_step_after_restart(const struct problem *problem, const doub
 /* Time over which x'' is measured, s. */
 static const double curvature_time = 1e-6;
 
-/* Returns the length after an event at 0 and x. Writes x'' to ddx; uses problem->location. */
+/* Returns the length after an event at the time 0 and the state x. Writes x'' to ddx; uses the room
+ * of problem->location. */
 static double first_step_after_event(struct problem *problem, const double x[], double ddx[]) {
     const size_t n = problem->ode.state_count;
     const double ahead = fmin(curvature_time, problem->horizon);

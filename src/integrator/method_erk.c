@@ -29,7 +29,8 @@ struct erk {
     /* of the running advance */
     double end;        /* s since the restart */
     double watched;    /* last time that the observer was asked about, s since the restart */
-    bool is_cut_short; /* true if an event before that time, or the observer, ended it */
+    bool is_cut_short; /* true if an event in the step before that time, or the observer there,
+                          ended the advance */
     double *cut_x;     /* the state there */
 
     /* begin of the running internal step, if events are searched */
@@ -42,7 +43,8 @@ struct erk {
 
 /* ---- Observation ---------------------------------------------------------------------------- */
 
-/* Searches the step that has ended at t with the state x; the next one begins there. */
+/* Searches the step that has ended at t with the state x. If it has no event, the next step begins
+ * there. */
 static enum status search(struct erk *erk, double t, const double x[]) {
     struct problem *problem = erk->base.problem;
     const size_t n = problem->ode.state_count;
@@ -95,7 +97,8 @@ static int observe(sunrealtype t, N_Vector x, void *user_data) {
     return erk->is_cut_short ? 1 : 0;
 }
 
-/* Prepares observe for an advance from begin_x to the time end, which writes x. */
+/* Prepares observe for an advance from the state begin_x to the time end, which writes the state to
+ * x. */
 static int begin_watching(struct erk *erk, double end, const double begin_x[], double x[]) {
     struct problem *problem = erk->base.problem;
     const bool is_searched = location_is_active(&problem->location);
@@ -195,7 +198,8 @@ static enum status restart(void *memory, const double x[]) {
     return STATUS_OK;
 }
 
-/* Starts ERKStep from base.x at the time begin; first_step: s, 0 if ARKODE finds one. */
+/* Starts ERKStep from the state in base.x at the time begin; first_step: s, 0 if ARKODE finds one.
+ */
 static int start(struct erk *erk, double begin, double end, double first_step) {
     const bool is_searched = location_is_active(&erk->base.problem->location);
     int flag =
@@ -261,7 +265,8 @@ static int advance_carefully(struct erk *erk, double begin, double end, int64_t 
     return flag;
 }
 
-/* True if the step is too short for ARKODE: hardly more than the rounding of the time. */
+/* True if the step is too short for ARKODE, which refuses steps that change the time by hardly more
+ * than its rounding. */
 static bool is_too_close(double begin, double end) {
     return end - begin <= 8.0 * DBL_EPSILON * end;
 }

@@ -28,10 +28,12 @@ struct taylor {
     struct taylor_series series;
     bool is_searched;     /* true if events are searched since the restart */
     double longest_scale; /* largest time scale of the next step of the running advance, s */
-    double last_length;   /* length of the last step, or given by a restart, s; 0: none */
-    double *end_x;        /* the state at the end of the last step */
-    double *end_dx;       /* the derivative of the polynomial there, by its argument */
-    double passed; /* end of a step past requested times, s since the restart; -INFINITY: none */
+    double last_length; /* length of the last step, or the one given by a restart, s; 0 if there is
+                           none */
+    double *end_x;      /* the state at the end of the last step */
+    double *end_dx;     /* the derivative of the polynomial there, by its argument */
+    double passed; /* end of the step that goes past requested times, s since the restart; -INFINITY
+                      if there is none */
 };
 
 /* ---- Life ----------------------------------------------------------------------------------- */
@@ -146,10 +148,12 @@ static enum status expand(struct taylor *taylor, double t, double length, bool i
     return STATUS_NOT_FINITE;
 }
 
-/* Shortest step to which a reach cuts a step, relative to the time since the restart. */
+/* Shortest step to which the reach of a state cuts a step, relative to the time since the restart.
+ */
 static const double resolution = 0x1p-40;
 
-/* Returns a step (in time scales) in which each state moves from x within its reach. */
+/* Returns a step (in time scales) in which no state moves farther from x, its begin, than it may.
+ */
 static double step_within_reach(struct taylor *taylor, const double x[], double step) {
     const struct taylor_series *series = &taylor->series;
     const struct ode *ode = &series->problem->ode;
@@ -264,7 +268,8 @@ static enum status search(struct taylor *taylor, double end) {
     return location_search(location);
 }
 
-/* Returns an advance's begin, with events the last step's end, and writes the state there. */
+/* Returns the begin of an advance and writes the state there: with events, it is the end of the
+ * last step. */
 static double begin_advance(struct taylor *taylor, const double begin_x[], double x[]) {
     const struct problem *problem = taylor->series.problem;
     const bool has_passed = taylor->is_searched && taylor->passed > problem->reached;

@@ -1,4 +1,5 @@
-/* An initial value problem x' = f(t, x) with its settings: all that method and caller share. */
+/* An initial value problem x' = f(t, x), with the settings of its integration: all that a method
+ * and its caller share. */
 #pragma once
 
 #include "model.h"
@@ -12,7 +13,8 @@
  * step. context: the pointer in struct ode. */
 typedef enum status ode_rhs(double t, const double x[], double dx[], void *context);
 
-/* Writes the Jacobian of f: J[i + state_count j] = df_i / dx_j. Otherwise like ode_rhs. */
+/* Writes the Jacobian of f: J[i + state_count j] is the derivative of f_i by x_j. Otherwise like
+ * ode_rhs. */
 typedef enum status ode_jacobian(double t, const double x[], double J[], void *context);
 
 /* Writes the Taylor coefficients of orders first to last of the solution through rows[i][0] at the
@@ -26,7 +28,8 @@ typedef enum status ode_indicators(double t, const double x[], double z[], void 
 /* Writes a bound of each indicator's rounding error at a restart. */
 typedef void ode_rounding(double rounding[], void *context);
 
-/* Writes how far states may move from x in an internal step, like `reach` of model_events. */
+/* Writes how far each state may move from x within an internal step, like `reach` of struct
+ * model_events. */
 typedef void ode_reach(const double x[], double reach[], void *context);
 
 /* The fields that each step of `taylor` reads stand last, next to the rest of struct problem. */
@@ -83,11 +86,14 @@ struct integrator_statistics {
 /* Start of an integration. Times in s since the restart. */
 struct integrator_start {
     double origin;  /* time of the simulation at the restart, s: for messages only */
-    double horizon; /* > 0: no evaluation and no integrator_advance beyond it; INFINITY: no limit */
+    double horizon; /* > 0: neither the right-hand side is evaluated beyond it, nor may
+                       integrator_advance go there; INFINITY without limit */
     double
         first_step; /* result of integrator_next_step for a solution like this one; 0 if unknown */
-    bool continues; /* true if the solution was integrated up to here: more is likely */
-    const struct indicator *indicators; /* of the ode until the next restart; NULL: no events */
+    bool continues; /* true if the solution is the one that was integrated up to here: further
+                       advances are likely */
+    const struct indicator *indicators; /* indicators of the ode until the next restart; they must
+                                           stay. NULL to search no events */
 };
 
 /* Observes each internal step that ends before the t of an advance; x: the state at its end t (s

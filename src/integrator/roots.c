@@ -68,7 +68,8 @@ double chebyshev_point(int count, int k) {
     return 0.5 - 0.5 * cosine((unsigned)(k * (LAST / (count - 1))));
 }
 
-/* Writes coefficients of Chebyshev polynomials of 2 s - 1 for the values minus the first. */
+/* Writes the coefficients of Chebyshev polynomials of 2 s - 1 for the values minus the first value.
+ */
 static void transform(int count, const double values[], double coefficients[]) {
     const int last = count - 1;
     const int spacing = LAST / last;
@@ -131,7 +132,8 @@ double chebyshev_interpolate(int count, const double values[], double c[]) {
 
 /* ---- Polynomials ---------------------------------------------------------------------------- */
 
-/* A polynomial above 0 right after s = 0: so is its first coefficient that is not 0. */
+/* A polynomial that is above 0 right after s = 0: its first coefficient that is not 0 is above it.
+ */
 struct rising {
     double c[ROOTS_LENGTH];
     int degree;

@@ -58,7 +58,8 @@ NONNULL double horner_compensated(const double c[], int degree, double s);
 
 /* ---- Interpolation at Chebyshev points ------------------------------------------------------ */
 
-/* Largest number of values: more would cost digits of powers of s; halve the step instead. */
+/* Largest number of values. With more, powers of s lose too many digits: interpolate the halves of
+ * the step instead. */
 enum { CHEBYSHEV_LENGTH = 17 };
 
 /* Returns point k of count (3, 5, 9 or 17) in [0, 1], rising; the first is 0 and the last is 1.

@@ -142,7 +142,8 @@ ALWAYS_INLINE double weighted_norm(sunindextype n, const double *x, const double
     return sqrt(sum / (double)n);
 }
 
-/* Writes z = sum c[k] X[k]; z may be one of X: element by element, sums stay in registers. */
+/* Writes z = sum c[k] X[k]; z may be one of X. Proceeds element by element, so that sums stay in
+ * registers. */
 ALWAYS_INLINE void linear_combination(sunindextype n, int count, const double *c, N_Vector *X,
                                       double *z) {
     if (n <= 4) {
@@ -236,7 +237,8 @@ ALWAYS_INLINE sunindextype four(N_Vector x) {
     return 4;
 }
 
-/* Defines these operations for SUNDIALS, for vectors x of length(x): two, four or length_of. */
+/* Defines the operations above as SUNDIALS calls them, for vectors x of length(x): two, four or
+ * length_of. */
 // clang-format off
 #define DEFINE_TABLE(name, length)                                                                 \
     static void name##_linear_sum(sunrealtype a, N_Vector x, sunrealtype b, N_Vector y,            \

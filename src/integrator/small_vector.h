@@ -24,7 +24,8 @@ static inline double *small_vector_data(N_Vector vector) {
     return (double *)vector->content;
 }
 
-/* Makes N_VLinearCombination with that result note its terms' data in order. NULL: no longer. */
+/* Makes N_VLinearCombination with the result x note the data of its terms from now on, in their
+ * order. terms NULL: no longer. */
 void small_vector_note_terms(N_Vector x, struct small_vector_terms *terms);
 
 /* Writes x = sum of data[k] s^(count - 1 - k), length elements: the terms are the coefficients of a

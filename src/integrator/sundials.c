@@ -79,7 +79,8 @@ static const char *explained(const char *text) {
     return text;
 }
 
-/* Returns the length of a time's name in front of text, up to its value; 0: none. */
+/* Returns the length of the name of a time in front of text, up to its value; 0 if there is none.
+ */
 static size_t time_name_length(const char *text) {
     static const char *const names[] = {"t = ", "tcur = ", "tout = ", "tstop = "};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {

@@ -6,7 +6,8 @@
 #include <math.h>
 #include <string.h>
 
-/* Smallest order: an input's last coefficient enters states' two orders before. */
+/* Smallest order: the last coefficient of an input enters the states' coefficients two orders
+ * before. */
 enum { LEAST_ORDER = SERIES_INPUT_LENGTH + 1 };
 
 /* Part of the length that the last terms allow (Jorba and Zou, section 3.2.1). */

@@ -19,7 +19,8 @@ struct taylor_series {
     struct problem *problem;
     int largest_order;
     int order;
-    int expected_order; /* order of a step that lands, at first; the result is independent of it */
+    int expected_order; /* order to which a step that lands is expanded at first; the result does
+                           not depend on it */
     double begin;       /* s since the restart */
     double time_scale;  /* s */
     double step;        /* step for which the series is good; NaN if a term is not finite */

@@ -18,7 +18,8 @@ struct slot {
         *workspace; /* workspace that the thread entered last; of no concern to others */
 };
 
-/* Number of slots: more threads at once in the microseconds of making a solver have to wait. */
+/* Number of slots. More threads at once, each in the few microseconds of making or freeing a
+ * solver, have to wait. */
 enum { SLOTS = 256 };
 
 static struct slot slots[SLOTS];

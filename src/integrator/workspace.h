@@ -37,7 +37,8 @@ NONNULL void workspace_cut(struct workspace *workspace, size_t used);
 MUST_CHECK void *workspace_malloc(size_t size);
 MUST_CHECK void *workspace_calloc(size_t items, size_t size);
 
-/* Returns new memory with the content of `memory`, from this workspace or NULL. */
+/* Returns new memory with the content of `memory`, which comes from the same workspace or is NULL.
+ */
 MUST_CHECK void *workspace_realloc(void *memory, size_t size);
 
 /* Does nothing: memory comes back with the whole workspace. */

@@ -76,7 +76,8 @@ enum status domains_jacobian(const struct domains *model, struct domains_room ro
                                                          : STATUS_OK;
 }
 
-/* Replaces indicators that are not finite by `other` of room.values, signed for values' modes. */
+/* Replaces indicators that are not finite by the indicators of room.values, `other`, with signs for
+ * the modes in values. */
 static void complete_indicators(const struct domains *model, struct domains_room room,
                                 const void *values, double z[], const double other[]) {
     for (int k = 0; k < model->relation_count; k++) {

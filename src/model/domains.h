@@ -20,7 +20,8 @@ struct domains {
     int relation_count;
     const struct relation *relation;
     const size_t *row_of_indicator;
-    size_t own_row; /* row that is 1 in order 0 if it is not in its values' modes */
+    size_t own_row; /* row of the series that is 1 in order 0 if it is not in the modes of its
+                       values */
     void (*write_distances)(const void *values, double t, double distance[]);
 
     /* as in struct model, struct model_events and struct series */

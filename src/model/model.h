@@ -39,7 +39,8 @@ struct indicator {
 
 struct event {
     double t; /* s */
-    /* Per indicator, true if it falls to 0 here. NULL: inputs changed or initialization ends. */
+    /* Per indicator, true if it falls to 0 here. NULL if there is no event: inputs or parameters
+     * have changed, or the initialization ends. */
     const bool *triggered;
     bool is_timed;    /* true at the time that next_time returned */
     const double *du; /* derivative of each input by the time after the event */
@@ -47,7 +48,8 @@ struct event {
     /* Tolerance of each state, in its unit: sum of its relative and absolute tolerance. */
     const double *tolerance;
     int max_events; /* largest number of events that follow each other at one instant */
-    char *reason;   /* room for reason_size bytes, why update fails; NULL: nobody reads it */
+    char *reason; /* room for one line of reason_size bytes: update writes why it fails. NULL if the
+                     caller does not read it */
     size_t reason_size;
 };
 
@@ -61,7 +63,8 @@ static inline double event_shortest_period(double t) {
 struct model_events {
     size_t indicator_count;
     const char *const *indicator_names;
-    struct range modes;           /* int[]: only update writes them. 0 until initialization ends */
+    struct range modes; /* int[]: the right-hand side reads them, only update writes them. 0 until
+                           the initialization ends */
     struct range discrete_states; /* double[]: sums over events, samples; written like modes */
     struct range discrete_inputs; /* int[]: Boolean inputs */
 
@@ -78,7 +81,8 @@ struct model_events {
      * is_held: parameters and states have not been set since the update. */
     bool (*modes_are_possible)(const void *values, bool is_held);
 
-    /* True if all states rest in these modes whatever the inputs are. NULL: there are no states. */
+    /* True if every state's derivative is 0 in these modes, whatever the inputs are. NULL if the
+     * model has no states. */
     bool (*is_at_rest)(const void *values);
 
     /* Writes the kind of each indicator in these modes. */
@@ -132,7 +136,8 @@ struct series {
      * unused rows. */
     size_t row_count;
 
-    /* Row of each INDICATOR_OF_MODEL. NULL if rows have no indicators. */
+    /* Row of each event indicator while its kind is INDICATOR_OF_MODEL. NULL if rows have no
+     * indicators. */
     const size_t *row_of_indicator;
 
     /* Writes the coefficients of the orders first to last (< SERIES_LENGTH) of all rows, from lower
@@ -149,7 +154,8 @@ struct model {
     struct range parameters;  /* all fields that parameters are bound to */
     struct range inputs;      /* double[], all inputs */
     struct range states;      /* double[], all continuous states */
-    struct range derivatives; /* double[], derivatives of the states in order; may overlap them */
+    struct range derivatives; /* double[], time derivative of each state in the order of states; may
+                                overlap states */
 
     /* Writes x' = f(t, x, u, p) to dx. A pure function: parameters are read from values, states and
      * inputs only from x and u. t in s, the rest in the units of variables.toml. */

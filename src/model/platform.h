@@ -11,7 +11,8 @@
 /* The caller must look at the returned status. */
 #define MUST_CHECK __attribute__((warn_unused_result))
 
-/* No pointer argument may be NULL; NONNULL_ARGUMENTS: these ones, counted from 1, may not. */
+/* No pointer argument may be NULL; NONNULL_ARGUMENTS: these arguments, counted from 1, may not be
+ * NULL. */
 #define NONNULL                __attribute__((nonnull))
 #define NONNULL_ARGUMENTS(...) __attribute__((nonnull(__VA_ARGS__)))
 
@@ -34,7 +35,8 @@
 /* Hides all symbols below from the shared object's users, unless one says so itself. */
 #define HIDE_SYMBOLS _Pragma("GCC visibility push(hidden)")
 
-/* Rounds products before they are added: gcc 12 fuses them nevertheless in vectorized sums. */
+/* Rounds products below before they are added. gcc 12 fuses them nevertheless if it vectorizes sums
+ * beside differences. */
 #if defined(__clang__)
 #define NO_FUSED_OPERATIONS _Pragma("STDC FP_CONTRACT OFF")
 #else

@@ -35,7 +35,8 @@ static struct call call_of(const struct relations *model, struct relations_room 
                          t,     du,   inputs_move};
 }
 
-/* Compares all relations. state_errors: location errors of the states, in their units. */
+/* Compares all relations. state_errors: how far from its limit each state may have been located, in
+ * its unit. */
 static void compare(const struct call *call, const double state_errors[],
                     struct compared compared[]) {
     const double inputs = call->inputs_move ? time_error : 0.0; // inputs that do not move are exact
@@ -52,7 +53,8 @@ static bool is_near(const struct compared *compared) {
     return fabs(compared->distance) <= compared->noise;
 }
 
-/* True if the distance tells which mode is right; without a reader NaN is allowed, and counts. */
+/* True if the distance tells which mode is right. Without a reader the distance may be NaN, and
+ * counts. */
 static bool is_sure(const struct compared *compared) {
     const double size = fabs(compared->distance);
     return compared->used ? size >= compared->noise : !(size < compared->noise);
@@ -77,7 +79,8 @@ static bool update_modes(const struct call *call, bool is_exact) {
     return changes;
 }
 
-/* Repeats update_modes until no mode changes; if modes depend in a circle, the last ones stay. */
+/* Repeats update_modes until no mode changes. Modes may depend on each other in a circle: then the
+ * last ones stay. */
 static void update_modes_until_stable(const struct call *call, bool is_exact) {
     for (int count = 0; count <= call->model->relation_count && update_modes(call, is_exact);
          count++) {

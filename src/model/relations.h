@@ -35,7 +35,8 @@ struct given {
 
 struct relations {
     size_t values_size;
-    /* int[]: 1 if initialization has ended; relations' modes; 1 per due event; the model's */
+    /* int[]: 1 if initialization has ended; the mode of each relation; 1 per event that is due;
+     * further modes of the model */
     struct range modes;
     size_t states; /* offset of the states */
     int relation_count, event_count, state_count, input_count;
@@ -48,7 +49,8 @@ struct relations {
     /* Writes the time of each timed relation, s. */
     void (*write_times)(const void *values, double times[]);
     void (*find_due)(const void *values, double t, int due[]);
-    /* Performs an event with right sides of before; a state that jumps gets tolerance 0. */
+    /* Performs an event: right sides use the values before it; a state that jumps gets tolerance 0.
+     */
     void (*change)(void *values, double t, int event, double tolerance[]);
 };
 

@@ -45,7 +45,8 @@ static size_t nan_length(const char *text) {
     return kind_end != NULL ? (size_t)(kind_end - text) + 1 : end;
 }
 
-/* Returns the length of a decimal fraction with more than 15 digits in front of text, else 0. */
+/* Returns the length of the decimal fraction in front of text if it has more than 15 digits,
+ * otherwise 0. */
 static size_t long_fraction_length(const char *text) {
     const size_t whole = strspn(text, "0123456789");
     if (whole == 0 || text[whole] != '.') {

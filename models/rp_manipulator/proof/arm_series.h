@@ -1,4 +1,5 @@
-/* Taylor coefficients in balls: of efforts, and of the motion with derivatives by the origin. */
+/* Taylor coefficients in balls: of efforts and of the arm's motion, with its derivatives along the
+ * variables at the origin. */
 #pragma once
 
 #include "ball.h"
@@ -23,7 +24,8 @@ struct arm_problem {
     int sine_count;
 };
 
-/* Of a step, in s: from begin to end, and since the last communication point and `start`. */
+/* Of a step, in s: from its begin to its end, and since the last communication point and `start`.
+ */
 struct step_times {
     struct ball length, within, elapsed;
 };

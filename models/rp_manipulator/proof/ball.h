@@ -188,7 +188,8 @@ static inline struct ball ball_alternating(struct ball first, struct ball y, dou
     }
 }
 
-/* sin x and 1 - cos x of a midpoint by sin 2x = 2 sin x cos x, 1 - cos 2x = 2 sin^2 x */
+/* sin x and 1 - cos x of a midpoint, by sin 2x = 2 sin x (1 - (1 - cos x)), 1 - cos 2x = 2 sin^2 x
+ */
 static inline void ball_sine_and_versine(struct ball x, struct ball *sine, struct ball *versine) {
     int doublings = 0;
     // NOLINTNEXTLINE(cert-flp30-c, clang-analyzer-security.FloatLoopCounter): halving is exact

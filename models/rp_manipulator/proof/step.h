@@ -152,7 +152,8 @@ static double coordinates_in(double frame[STATES][STATES], struct ball sides[STA
 
 /* ---- Series and box ------------------------------------------------------------------------- */
 
-/* The Taylor polynomial of the centre. False: there are not as many orders as change anything. */
+/* The Taylor polynomial of the centre: as many orders as change anything. False: there are not as
+ * many. */
 static bool expand_centre(const struct arm_problem *problem, const struct states_set *before,
                           struct ball efforts[EFFORTS][ORDERS], struct arm_step *step) {
     struct arm_series series;

@@ -33,7 +33,8 @@ enum rp_plant_joint_mode {
     RP_PLANT_FREE = 2,      /* moves without friction */
 };
 
-/* Contact of a joint with a compliant stop, times the side: 1 at the lower stop, else -1. */
+/* Contact of a joint with a compliant stop, times the side: 1 at the lower stop, -1 at the upper.
+ */
 enum rp_plant_contact {
     RP_PLANT_APART = 0,
     RP_PLANT_PUSHED = 1, /* the stop pushes the joint back */
@@ -51,7 +52,8 @@ struct rp_plant_parameters {
     double armature[2];           /* kg.m2, kg, >= 0: inertia of the drive, seen at the joint */
     double damping[2];            /* N.m.s/rad, N.s/m, >= 0 */
     double coulomb_friction[2];   /* N.m, N, >= 0: of a fast joint */
-    double breakaway_friction[2]; /* N.m, N: of a joint at rest; 0 or at least coulomb_friction */
+    double breakaway_friction[2]; /* N.m, N: of a joint at rest; 0: as coulomb_friction, else not
+                                     below it */
     double stribeck_velocity[2];  /* rad/s, m/s, >= 0: how fast friction falls with the velocity;
                                      above 0 where breakaway_friction is above coulomb_friction */
     double lower[2];              /* rad, m: where the stops are */
@@ -69,7 +71,8 @@ struct rp_plant_parameters {
 
 struct rp_plant_inputs {
     double tau[2];    /* N.m, N: efforts of the drives */
-    double wrench[3]; /* N, N, N.m: along x0 and y0, about z0 on link 2 at the end effector */
+    double wrench[3]; /* N, N, N.m: force along x0 and y0 and moment about z0 that act on link 2 at
+                         the end effector, the origin of frame 2 */
 };
 
 struct rp_plant_modes {
@@ -108,7 +111,8 @@ void rp_plant_motion(const struct rp_plant_parameters *p, const struct rp_plant_
                      const double q[2], const double dq[2], const struct rp_plant_inputs *inputs,
                      struct rp_plant_motion *motion);
 
-/* Derivatives of the reactions by time in these modes, the inputs changing at the rates du. */
+/* Time derivatives of the reactions along the motion in these modes, the inputs changing at the
+ * rates du. */
 void rp_plant_reaction_rates(const struct rp_plant_parameters *p,
                              const struct rp_plant_modes *modes, const double q[2],
                              const double dq[2], const struct rp_plant_inputs *inputs,

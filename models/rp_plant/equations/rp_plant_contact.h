@@ -15,7 +15,8 @@ static inline bool rp_plant_has_contacts(const struct rp_plant_parameters *p, in
     return p->stops[joint] == RP_PLANT_STOPS_COMPLIANT;
 }
 
-/* How near its limit a quantity is at the event there: up to the rounding of the limit. */
+/* How near its limit a quantity is at the event there: that is located far better, up to the
+ * rounding of the limit. */
 static inline double rp_plant_near(double limit) {
     return 1e-9 + 4.0 * DBL_EPSILON * fabs(limit);
 }
@@ -25,7 +26,8 @@ static inline double rp_plant_near(double limit) {
 void rp_plant_find_contacts(const struct rp_plant_parameters *p, const double q[2],
                             const double dq[2], struct rp_plant_modes *modes);
 
-/* Writes contacts after joints' modes: a joint at rest on a limit may begin to move into it. */
+/* After the joints' modes are decided: a joint at rest exactly on a limit is in contact where it
+ * begins to move into the stop. */
 void rp_plant_begin_contacts(const struct rp_plant_parameters *p, const double q[2],
                              const double dq[2], const struct rp_plant_inputs *inputs,
                              struct rp_plant_modes *modes);
@@ -34,6 +36,7 @@ void rp_plant_begin_contacts(const struct rp_plant_parameters *p, const double q
 bool rp_plant_contact_fits(const struct rp_plant_parameters *p, int joint, double q, double dq,
                            int contact);
 
-/* Lets a joint's stop begin or end to push: writes the contact, and the velocity of the event. */
+/* The stop that a joint is in begins or ends to push: writes the contact that follows, and the
+ * velocity at which this happens. */
 void rp_plant_turn_contact(const struct rp_plant_parameters *p, int joint, double *dq,
                            int *contact);

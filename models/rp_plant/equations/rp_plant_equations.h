@@ -369,7 +369,8 @@ void plant_accelerations_jacobian(const struct rp_plant_parameters *p,
                                   const double dq[2], const struct rp_plant_inputs *inputs,
                                   double J[]);
 
-/* First derivatives of the reactions along a curve of positions, velocities and inputs. */
+/* First derivatives of the reactions along a curve of positions, velocities and inputs; the
+ * parameters rest. */
 void plant_reaction_rates(const struct rp_plant_parameters *p, const struct rp_plant_modes *modes,
                           const double q[2], const double dq[2],
                           const struct rp_plant_inputs *inputs, const double q_first[2],
