@@ -51,7 +51,7 @@ class Arm:
 
 
 def control(outputs: list[float]) -> list[float]:
-    """Efforts of a PD controller with gravity compensation."""
+    """Return efforts of a PD controller with gravity compensation."""
     position, velocity, gravity = np.split(np.array(outputs), 3)
     return list(gravity + [60.0, 100.0] * (GOAL - position) - [15.0, 20.0] * velocity)
 
@@ -69,7 +69,7 @@ def joined(name: str, offset: float) -> h.HelicsValueFederate:
 
 
 def run_arm(me: h.HelicsValueFederate, arm: Arm) -> np.ndarray:
-    """Outputs of the arm at all communication points, (STEPS + 1, 6)."""
+    """Return outputs of the arm at all communication points, (STEPS + 1, 6)."""
     outputs = h.helicsFederateRegisterPublication(me, "outputs", h.HELICS_DATA_TYPE_VECTOR)
     efforts = h.helicsFederateRegisterSubscription(me, "controller/efforts")
     try:
@@ -99,7 +99,7 @@ def run_controller(me: h.HelicsValueFederate) -> None:
 
 
 def in_federation() -> np.ndarray:
-    """Outputs of the arm as a federate."""
+    """Return outputs of the arm as a federate."""
     arm = Arm()
     federates = joined("arm", offset=0.0), joined("controller", offset=PERIOD / 2)
     with ThreadPoolExecutor() as threads:

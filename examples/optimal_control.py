@@ -39,7 +39,7 @@ def after_interval(x: ca.MX, u: ca.MX, steps: int = 4) -> ca.MX:
 
 
 def usual_swing(time: float) -> tuple[np.ndarray, np.ndarray]:
-    """States and efforts at a time (s), where positions are polynomials of degree five."""
+    """Return states and efforts at a time (s), where positions are polynomials of degree five."""
     s, way = time / DURATION, (END - START)[:2]
     position = START[:2] + way * (10 * s**3 - 15 * s**4 + 6 * s**5)
     velocity = way * (30 * s**2 - 60 * s**3 + 30 * s**4) / DURATION

@@ -1,7 +1,5 @@
 """Writes checksums of a release, and its bill of materials in CycloneDX."""
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import re
@@ -53,9 +51,8 @@ def packages(project: Path, locks: Path) -> list[Component]:
     names = {re.match(r"[\w.-]+", line)[0].lower() for line in lines}
     locked = {}
     for lock in sorted(locks.glob("*.txt")):
-        for name, version in re.findall(
-            r"^([\w.-]+)==(\S+)", lock.read_text("utf-8"), re.MULTILINE
-        ):
+        found = re.findall(r"^([\w.-]+)==(\S+)", lock.read_text("utf-8"), re.MULTILINE)
+        for name, version in found:
             locked[name.lower()] = version
     return [
         Component(
@@ -102,9 +99,8 @@ def bill_of_materials(
 @program(ValueError)
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        "files", type=Path, nargs="+", help="files of the release, below the output"
-    )
+    text = "files of the release, below the output"
+    parser.add_argument("files", type=Path, nargs="+", help=text)
     parser.add_argument("--output", type=Path, required=True, help="folder for the files")
     parser.add_argument("--version", required=True, help="version of the project")
     parser.add_argument("--license", type=Path, required=True, help="LICENSE of the project")

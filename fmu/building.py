@@ -52,10 +52,7 @@ def _write(folder: Path, texts: dict[str, str]) -> None:
 def build(
     file: ModelFile, references: dict[lock.Key, int], runtimes: list[Runtime], work: Path
 ) -> dict[str, list[tuple[str, Path]]]:
-    """Make all that the FMUs consist of, in the empty folder `work`.
-
-    What they contain, by the version of FMI: names in the archive, and files.
-    """
+    """Make all parts of the FMUs in the empty folder `work`; names and files by version of FMI."""
     declared = write_c(file, references, work)
     provenance = Provenance(runtimes[0].content["version"])
     texts = {
@@ -129,10 +126,7 @@ class Runtime:
 
     @classmethod
     def load(cls, path: Path, of_this_machine: bool) -> Runtime:
-        """Load runtime.json; ModelFileError if it is not there, or no compiler for it.
-
-        For this machine, gcc and clang come before zig.
-        """
+        """Load runtime.json; ModelFileError without it or a compiler: gcc and clang before zig."""
         try:
             content = json.loads(path.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
@@ -167,26 +161,17 @@ class Runtime:
         command = [*self.compiler, *map(str, arguments)]
         environment = os.environ | {"ZIG_LOCAL_CACHE_DIR": str(folder / "zig")}
         try:
-            ended = subprocess.run(
-                command,
-                cwd=folder,
-                env=environment,
-                capture_output=True,
-                encoding="utf-8",
-                errors="replace",
-                check=False,
-            )
+            text = {"capture_output": True, "encoding": "utf-8", "errors": "replace"}
+            ended = subprocess.run(command, cwd=folder, env=environment, check=False, **text)
         except OSError as error:
-            raise ModelFileError(
-                f"{command[0]}: cannot be run: {error.strerror}; {INSTALL}"
-            ) from None
+            why = f"{error.strerror}; {INSTALL}"
+            raise ModelFileError(f"{command[0]}: cannot be run: {why}") from None
         if ended.returncode:
             lines = [line for line in ended.stderr.splitlines() if "error" in line]
             reason = (lines or ended.stderr.splitlines() or ["no message"])[0]
             # the C is right: what fails is the compiler
-            raise ModelFileError(
-                f"{command[0]}: {reason:.300}; gcc and clang need binutils, {INSTALL}"
-            )
+            way_out = f"gcc and clang need binutils, {INSTALL}"
+            raise ModelFileError(f"{command[0]}: {reason:.300}; {way_out}")
 
     def sources(self, version: str, own: Library, root: Path) -> Manifest:
         """Return all sources of a version's shared object, with the model's own part."""

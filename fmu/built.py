@@ -6,8 +6,6 @@ project/, musl/ ...  the sources it names, the same for all, and all that these 
 playground/          the page for a browser
 """
 
-from __future__ import annotations
-
 import argparse
 import io
 import json
@@ -23,7 +21,7 @@ from source_code import SourceFolder, manifest
 
 
 def collect(build: Path) -> dict[str, bytes]:
-    """Names and contents for the platform that this folder has been built for."""
+    """Return names and contents for the platform that this folder has been built for."""
     file = build / "runtime" / "runtime.json"
     text = file.read_text(encoding="utf-8")
     content = json.loads(text)

@@ -5,8 +5,6 @@
 models/README.md says which C it reads.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

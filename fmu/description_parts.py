@@ -1,7 +1,5 @@
 """What the model descriptions of all versions of FMI have in common."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 
 from declaration.load import Declaration
@@ -19,7 +17,7 @@ LOG_CATEGORIES = {
 
 
 def texts_of(declaration: Declaration, provenance: Provenance) -> dict[str, str]:
-    """Attributes of the root: what the model is and where it comes from."""
+    """Return attributes of the root: what the model is and where it comes from."""
     model = declaration.model
     texts = {
         "author": provenance.author,
@@ -56,7 +54,7 @@ def add_items(parent: ET.Element, variable: Enumeration) -> None:
 
 
 def value_attributes(variable: Variable) -> dict[str, str]:
-    """Attributes start, min and max, of those that the variable has."""
+    """Return attributes start, min and max, of those that the variable has."""
     if isinstance(variable, Boolean):
         return {} if variable.start is None else {"start": str(variable.start).lower()}
     values = {key: getattr(variable, key) for key in ("start", "min", "max")}
@@ -72,14 +70,9 @@ def add_log_categories(root: ET.Element, prefix: str) -> None:
 
 
 def add_experiment(root: ET.Element, experiment: Experiment) -> None:
-    ET.SubElement(
-        root,
-        "DefaultExperiment",
-        startTime=repr(experiment.start),
-        stopTime=repr(experiment.stop),
-        tolerance=repr(experiment.tolerance),
-        stepSize=repr(experiment.step),
-    )
+    numbers = {"startTime": experiment.start, "stopTime": experiment.stop}
+    numbers |= {"tolerance": experiment.tolerance, "stepSize": experiment.step}
+    ET.SubElement(root, "DefaultExperiment", {key: repr(x) for key, x in numbers.items()})
 
 
 def document(root: ET.Element) -> str:

@@ -7,8 +7,6 @@ to the page, and links to files that are not in the FMU become plain text. Equal
 bytes.
 """
 
-from __future__ import annotations
-
 import argparse
 import html
 import shutil
@@ -60,9 +58,8 @@ class FormulaError(Exception):
 def mathml(latex: str, display: str) -> str:
     """Convert a formula without dollar signs to a math element, "inline" or "block" (`display`).
 
-
-    FormulaError if it does not convert: the converter passes on unknown commands and does not
-    notice a missing argument, so its result is searched for signs of either.
+    The converter passes on unknown commands and misses no argument: FormulaError if its result has
+    signs of either.
     """
     try:
         root = ET.fromstring(convert(latex, display=display))
@@ -144,11 +141,7 @@ def prepare_tables(tokens: Iterable[Token]) -> None:
 
 
 def readme_page(readme: Path) -> tuple[str, list[Path], list[tuple[str, str]]]:
-    """Write README.md as the inside of an HTML body.
-
-    Also its local images, which the HTML refers to by their names, and identifier and text (HTML)
-    of each heading of level 2.
-    """
+    """Write README.md as an HTML body; also images, and (id, HTML text) of level-2 headings."""
 
     def formula(latex: str, options: dict[str, bool]) -> str:
         try:

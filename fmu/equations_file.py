@@ -593,10 +593,7 @@ def _given(
 
 
 def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
-    """Read and check a file; solver_names: of the variables that every model has.
-
-    ModelFileError if something in it is wrong.
-    """
+    """Read and check a file for a model that has `solver_names`, too; ModelFileError."""
     with placed(path):
         text, tables = tables_of(path)
         try:

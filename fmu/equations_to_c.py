@@ -5,8 +5,6 @@ entry of [where] that the lock file does not name is no variable of the FMU. Ter
 a file cannot declare, come from another file.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys
@@ -20,7 +18,7 @@ from program import program
 
 
 def toml(declared: dict[str, Any]) -> str:
-    """Text of a variables.toml."""
+    """Return the text of a variables.toml."""
     lines = []
     for title, content in declared.items():
         tables = {title: content} if title in ("model", "experiment") else {}

@@ -4,8 +4,6 @@ Prints the names of the files in the folder of the output: first the lock file, 
 the one beside the file with equations.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile
@@ -28,12 +26,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("file", type=Path, help="the file of the model")
     parser.add_argument("--output", type=Path, required=True, help="folder for the files")
-    parser.add_argument(
-        "--runtime", type=Path, nargs="+", required=True, help="runtime.json of each platform"
-    )
-    parser.add_argument(
-        "--of-this-machine", action="store_true", help="that is the platform: any compiler will do"
-    )
+    text = "runtime.json of each platform"
+    parser.add_argument("--runtime", type=Path, nargs="+", required=True, help=text)
+    text = "that is the platform: any compiler will do"
+    parser.add_argument("--of-this-machine", action="store_true", help=text)
     arguments = parser.parse_args()
     try:
         file = read(arguments.file, declaration.solver_names())
@@ -42,9 +38,8 @@ def main() -> int:
         runtimes = [Runtime.load(path, arguments.of_this_machine) for path in arguments.runtime]
         with tempfile.TemporaryDirectory() as work:
             built = build(file, references, runtimes, Path(work).resolve())
-            (arguments.output / lock_file.name).write_text(
-                lock.text(file.name, references), encoding="utf-8", newline="\n"
-            )
+            text = lock.text(file.name, references)
+            (arguments.output / lock_file.name).write_text(text, encoding="utf-8", newline="\n")
             names = [lock_file.name]
             for version, entries in built.items():
                 names.append((Path(PLACES[version]) / f"{file.name}.fmu").as_posix())

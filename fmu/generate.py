@@ -3,8 +3,6 @@
 declaration/schema.py describes that file.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys
@@ -26,7 +24,7 @@ def write_if_changed(path: Path, text: str) -> None:
 
 
 def source_files(folder: Path) -> list[str]:
-    """Names of the files that a source-code FMU is compiled from."""
+    """Return the names of the files that a source-code FMU is compiled from."""
     names = sorted(path.name for path in folder.glob("*.c"))
     if not names:
         raise FileNotFoundError(f"{folder}: has no C files")
@@ -53,14 +51,10 @@ def main() -> None:
     parser.add_argument("--output", type=Path, required=True, help="folder for the files")
     parser.add_argument("--version", default="0.0.0", help="version of the project")
     parser.add_argument("--license", type=Path, help="LICENSE of the project")
-    parser.add_argument(
-        "--sources",
-        type=Path,
-        help="folder of the FMU's C files: write only a description that names them",
-    )
-    parser.add_argument(
-        "--fmi", choices=["fmi2", "fmi3"], default="fmi2", help="its version, with --sources"
-    )
+    text = "folder of the FMU's C files: write only a description that names them"
+    parser.add_argument("--sources", type=Path, help=text)
+    text = "its version, with --sources"
+    parser.add_argument("--fmi", choices=["fmi2", "fmi3"], default="fmi2", help=text)
     arguments = parser.parse_args()
     declaration = load(arguments.variables)
     texts = license_texts(arguments.license) if arguments.license else {}

@@ -1,7 +1,5 @@
 """Packs an FMU: a zip archive whose bytes depend only on the contents of its files."""
 
-from __future__ import annotations
-
 import argparse
 import struct
 import sys
@@ -37,18 +35,12 @@ def collect(entries: list[str]) -> list[tuple[str, Path]]:
 
 
 def pack(archive: Path, files: list[tuple[str, Path]]) -> None:
-    """Write the archive to a temporary name and rename it, so that a broken one never stays.
-
-    Libraries for macOS may have the same name: they become one.
-    """
+    """Write the archive to a temporary name and rename it; join libraries for macOS of one name."""
     contents: dict[str, list[bytes]] = {}
     for name, path in files:
         contents.setdefault(name, []).append(path.read_bytes())
     archive.parent.mkdir(parents=True, exist_ok=True)
-    with (
-        atomic_write(archive) as temporary,
-        zipfile.ZipFile(temporary, "w") as target,
-    ):
+    with atomic_write(archive) as temporary, zipfile.ZipFile(temporary, "w") as target:
         for name, parts in sorted(contents.items()):
             info = zipfile.ZipInfo(name, FIXED_DATE)
             info.create_system = UNIX
@@ -63,10 +55,7 @@ def pack(archive: Path, files: list[tuple[str, Path]]) -> None:
 
 
 def universal(libraries: Sequence[bytes]) -> bytes:
-    """One library with the code of several processors, as lipo makes it.
-
-    ValueError if one is not for macOS, or two are for one processor.
-    """
+    """Join libraries for macOS as lipo does; ValueError for others, or two for one processor."""
     parts = {}
     for library in libraries:
         processor, kind = struct.unpack_from("<II", library.ljust(12, b"\0"), 4)
@@ -80,9 +69,8 @@ def universal(libraries: Sequence[bytes]) -> bytes:
         page = PAGES[processor]
         gap = -(end + len(body)) % 2**page
         body += bytes(gap) + library
-        head += struct.pack(
-            ">IIIII", processor, kind, end + len(body) - len(library), len(library), page
-        )
+        place = end + len(body) - len(library), len(library), page
+        head += struct.pack(">IIIII", processor, kind, *place)
     return head + body
 
 

@@ -4,8 +4,6 @@ FMUs share most of their sources, and systems contain FMUs: archives are cut whe
 begin, and those of stored archives in them. `rparm.shipped` puts them together again.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import zipfile
@@ -41,7 +39,7 @@ def write_pieces(release: Path, folder: Path) -> None:
 
 
 def _beginnings(archive: Path | IO[bytes], offset: int, content: bytes) -> list[int]:
-    """Where files of an archive begin, and those of stored archives in it."""
+    """Return where files of an archive begin, and those of stored archives in it."""
     cuts = []
     with zipfile.ZipFile(archive) as opened:
         for entry in opened.infolist():

@@ -1,8 +1,6 @@
 """Shared by the programs of this folder: how they end, how they read and write files, and the
 origin of an FMU (version, author, license, copyright, date)."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 import os
@@ -19,9 +17,7 @@ class WrongInputError(Exception):
     """A mistake in a file: its name, the place and the reason in one line."""
 
 
-def program(
-    *expected: type[Exception],
-) -> Callable[[Callable[[], None]], Callable[[], int]]:
+def program(*expected: type[Exception]) -> Callable[[Callable[[], None]], Callable[[], int]]:
     """Make `main` return 0, or 2 after a line on standard error for a mistake of the user's."""
 
     def decorate(main: Callable[[], None]) -> Callable[[], int]:
@@ -51,10 +47,7 @@ def read_text(path: Path) -> str:
 
 @contextmanager
 def atomic_write(path: Path) -> Iterator[Path]:
-    """Yield a temporary path to write to, which becomes `path` at the end.
-
-    The file appears complete or not at all: on failure the temporary one is removed.
-    """
+    """Yield a temporary path, which becomes `path` at the end, or is removed on failure."""
     temporary = path.with_name(f".{os.getpid()}.{path.name}")
     try:
         yield temporary
@@ -75,10 +68,7 @@ class Provenance:
 
 
 def license_texts(path: Path) -> dict[str, str]:
-    """Return author, license and copyright from a LICENSE.
-
-    It has "NAME License" and "Copyright (c) YEAR, AUTHOR".
-    """
+    """Return author, license and copyright from a file with "NAME License" and "Copyright (c)"."""
     text = read_text(path)
     title = re.match(r"(.+) License\n", text)
     notice = re.search(r"^Copyright \(c\) [-\d]+, (.+)$", text, re.MULTILINE)

@@ -5,8 +5,6 @@ cross-check, and its parameters as a parameter set of SSP; beside them fmi-ls-ma
 says what each file is (FMI Layered Standard References 1.0.0-alpha.1).
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tomllib
@@ -79,9 +77,7 @@ def tag(name: str) -> str:
     return f"{{{NAMESPACES[prefix]}}}{local}"
 
 
-# ---- the parameter set
-
-
+# ---- The parameter set ---------------------------------------------------------------------------
 def parameter_set(scenario: Scenario, declaration: Declaration) -> str:
     """Text of the .ssv (SSP 1.0) with the values that are not the start values of the FMU."""
     root = ET.Element(
@@ -103,12 +99,11 @@ def parameter_set(scenario: Scenario, declaration: Declaration) -> str:
 
 
 def typed(variable: Variable, value: Any, place: str) -> tuple[str, dict[str, str]]:
-    """Element for a value, with its attributes."""
+    """Return the element for a value, with its attributes."""
     if isinstance(variable, Enumeration):
         if not isinstance(value, str) or value not in variable.items:
-            raise WrongInputError(
-                f"{place} = {value!r:.40} is not one of {', '.join(variable.items)}"
-            )
+            known = ", ".join(variable.items)
+            raise WrongInputError(f"{place} = {value!r:.40} is not one of {known}")
         return "Enumeration", {"value": value}
     wanted = {"float64": (int, float), "int32": (int,), "boolean": (bool,)}
     if type(value) not in wanted[variable.type]:
@@ -129,40 +124,31 @@ def add_units(root: ET.Element, names: Sequence[str], declaration: Declaration) 
         ET.SubElement(unit, tag("ssc:BaseUnit"), exponents)
 
 
-# ---- the manifest
-
-
+# ---- The manifest --------------------------------------------------------------------------------
 def manifest(model: str, scenarios: Sequence[Scenario]) -> str:
-    """Text of fmi-ls-manifest.xml."""
+    """Return the text of fmi-ls-manifest.xml."""
     root = ET.Element("fmiReferences")
     root.set(tag("fmi-ls:fmi-ls-name"), NAME)
     root.set(tag("fmi-ls:fmi-ls-version"), VERSION)
     root.set(tag("fmi-ls:fmi-ls-description"), DESCRIPTION)
     for scenario in scenarios:
         for ending, (role, kind, what) in FILES.items():
-            ET.SubElement(
-                root,
-                "Related",
-                source=f"{scenario.name}/{file_name(model, ending)}",
-                role=role,
-                type=kind,
-                description=f"{what} ({scenario.title})",
-            )
+            source = f"{scenario.name}/{file_name(model, ending)}"
+            related = {"source": source, "role": role, "type": kind}
+            ET.SubElement(root, "Related", related, description=f"{what} ({scenario.title})")
     return document(root)
 
 
 def file_name(model: str, ending: str) -> str:
-    """Name of a file of a scenario: after the model where the cross-check has it so."""
+    """Return the name of a file of a scenario: after the model where the cross-check has it so."""
     return model + ending if ending.startswith("_") else ending
 
 
-# ---- all files
-
-
+# ---- All files -----------------------------------------------------------------------------------
 def files(
     declaration: Declaration, names: Sequence[str], folder: Path
 ) -> Iterator[tuple[str, bytes]]:
-    """Name and content of each file; folder: of the model."""
+    """Return name and content of each file; folder: of the model."""
     model = declaration.model.name
     scenarios = [read(folder / "scenarios" / f"{name}.toml") for name in names]
     yield MANIFEST, manifest(model, scenarios).encode()

@@ -1,8 +1,7 @@
 /* Stands in front of every file of a source-code FMU (source_code.py), in place of options of the
  * compiler in the project's build. The headers of the system come first: they keep their own
  * symbols. */
-#ifndef SOURCE_CODE_H
-#define SOURCE_CODE_H
+#pragma once
 
 #include <errno.h>
 #include <float.h>
@@ -21,5 +20,3 @@
 
 HIDE_SYMBOLS
 NO_FUSED_OPERATIONS
-
-#endif

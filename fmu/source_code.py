@@ -9,8 +9,6 @@ The functions of musl get other names. Compilers know the standard ones and calc
 in their own way, and a program that links the FMU statically has them already.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -83,7 +81,7 @@ class Include:
 
 
 def includes(text: str) -> Iterator[Include]:
-    """Directives that are not in a comment."""
+    """Return directives that are not in a comment."""
     code = COMMENT.sub(lambda comment: re.sub(r"[^\n]", " ", comment[0]), text)
     for line in INCLUDE.finditer(code):
         yield Include(line.start(), line.end(), line[1] == '"', line[2])
@@ -101,7 +99,7 @@ def without_comments(text: str) -> str:
 
 
 def read(path: Path) -> str:
-    """Text of a file in any encoding."""
+    """Return the text of a file in any encoding."""
     try:
         return path.read_bytes().decode("utf-8", "surrogateescape")
     except OSError as error:
@@ -166,7 +164,7 @@ class SourceFolder:
         return f"{root}_{source.name}"
 
     def root_of(self, path: Path) -> tuple[str, str]:
-        """Name of the root that a file is from, and its path below."""
+        """Return the name of the root that a file is from, and its path below."""
         for name, folder in self.roots:
             if path.is_relative_to(folder):
                 return name, path.relative_to(folder).as_posix()
@@ -179,7 +177,7 @@ class SourceFolder:
             raise WrongInputError(f"{origin}: would be sources/{name}, as {other}")
 
     def with_relative_includes(self, path: Path, name: str, library: Library) -> str:
-        """Text of a file that is called `name` in sources/."""
+        """Return the text of a file that is called `name` in sources/."""
         text = read(path)
         if self.root_of(path)[0] in WITHOUT_COMMENTS:
             text = without_comments(text)
@@ -210,7 +208,7 @@ class SourceFolder:
 
 
 def load(path: Path) -> Manifest:
-    """Manifest that the build wrote."""
+    """Return the manifest that the build wrote."""
     try:
         content = json.loads(read(path))
         return manifest(content["libraries"], content["roots"], path.parent)

@@ -10,8 +10,6 @@ plotly/                    the library that draws on pages
 RPARM_RELEASE names the folder of a release that is there; without it, one is built here.
 """
 
-from __future__ import annotations
-
 import gzip
 import lzma
 import os
@@ -29,22 +27,10 @@ from pieces import write_pieces  # noqa: E402
 
 SHARE = "rparm/share"
 OF_MODELS = (".csv", ".json", ".py", ".ssd", ".svg", ".toml")
-OF_FMU = (
-    "fmu/**/*.py",
-    "fmu/**/*.toml",
-    "fmu/**/*.in",
-    "fmu/*.css",
-    "fmu/*.html",
-    "src/instance/*.toml",
-)
-OF_RELEASES = (
-    "bill_of_materials",
-    "built",
-    "derive",
-    "pieces",
-    "references",
-    "wheel",
-)  # not for a model
+OF_FMU = ("fmu/**/*.py", "fmu/**/*.toml", "fmu/**/*.in", "fmu/*.css", "fmu/*.html")
+OF_FMU += ("src/instance/*.toml",)
+# modules that are not for a model
+OF_RELEASES = ("bill_of_materials", "built", "derive", "pieces", "references", "wheel")
 OF_PLAIN_C = "plain_c"  # folder of fmu: reads the C of models, not files with equations
 FOR_TESTS = ("_in", "sampled", "tightest")  # ends of names of tables that no command reads
 

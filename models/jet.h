@@ -7,8 +7,7 @@
  *
  * The recurrences are those of Griewank and Walther, Evaluating Derivatives (2nd edition, SIAM
  * 2008), section 13.2. */
-#ifndef JET_H
-#define JET_H
+#pragma once
 
 #include "model.h"
 
@@ -97,5 +96,3 @@ static inline double jet_atan2(const double y[], const double x[], const double 
     }
     return sum / (k * r2[0]);
 }
-
-#endif

@@ -3,8 +3,7 @@
  * Compiled as they stand they give values. The build reads the same text and derives from it what
  * else is needed: Jacobians, and derivatives along a curve. README.md says which C it understands.
  */
-#ifndef REAL_H
-#define REAL_H
+#pragma once
 
 #include <math.h>
 #include <stdbool.h>
@@ -23,5 +22,3 @@ static inline real moving_as(real x, real y) {
     (void)y;
     return x;
 }
-
-#endif

@@ -25,8 +25,6 @@ Files = Mapping[str, tuple[np.ndarray, Columns]]
 
 
 # ---- Scenarios -----------------------------------------------------------------------------------
-
-
 def input_table(scenario: Scenario, names: Sequence[str]) -> np.ndarray:
     """Return the inputs at every communication point, (n + 1, names)."""
     table = np.empty((len(scenario.times), len(names)))
@@ -67,8 +65,6 @@ def _write_table(path: Path, times: np.ndarray, names: Sequence[str], table: np.
 
 
 # ---- Systems -------------------------------------------------------------------------------------
-
-
 def variants(system: Path, components: Iterable[str]) -> dict[str, dict[str, Value]]:
     """Return the parameters of every variant of the system in a folder, ``component.name``."""
     found: dict[str, dict[str, Value]] = {}

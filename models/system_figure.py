@@ -23,7 +23,7 @@ def distance(outcome: Outcome, arm: str) -> np.ndarray:
 
 
 def tracking_error(arm: str) -> Measure:
-    """Largest distance of the end effector from its reference."""
+    """Return the largest distance of the end effector from its reference."""
     return Measure(
         "tracking error",
         "mm",

@@ -129,11 +129,7 @@ def _drop_output(stream: TextIO | None = None) -> None:
 
 
 def _as_program() -> int:
-    """Run `main`; a signal as Ctrl-C ends it after temporary files are removed.
-
-    Compiled code of libraries may turn the exception of a signal into another one: whatever
-    arrives after a signal counts as its end.
-    """
+    """Run `main`; whatever a library's code makes of a signal, it ends after files are removed."""
     received = handle_endings()
     try:
         return main()

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rparm import files, project, proof
-from rparm.building import build
+from rparm.building import build as build
 from rparm.errors import UserError, hint
 from rparm.federation import federation, network
 from rparm.files import written
@@ -30,15 +30,7 @@ if TYPE_CHECKING:
     from rparm.linearization.linear import Linear
 
 
-__all__ = [
-    "Scenario", "System", "Table", "build", "fmu", "identify", "linearize", "run_campaign",
-    "simulate",
-]  # fmt: skip
-
-
 # ---- Runs ----------------------------------------------------------------------------------------
-
-
 class Table(Mapping[str, np.ndarray]):
     """Columns of a run, by the names of variables; "time" is the first.
 
@@ -175,8 +167,7 @@ class Scenario:
     """
 
     def __init__(self, name: str | Path) -> None:
-        own = Path(name).suffix.lower() == ".toml"
-        self.path = Path(name) if own else project.scenario_file(str(name))
+        self.path = project.scenario_file(name)
         self.title = scenarios.title(self.path)
 
     def run(self, *, fmi: int = 2, tolerance: float | None = None) -> Table:
@@ -332,8 +323,6 @@ def _units(model: Model) -> dict[str, str | None]:
 
 
 # ---- Studies -------------------------------------------------------------------------------------
-
-
 def linearize(
     fmu_or_ssp: str | Path,
     *,

@@ -57,15 +57,10 @@ def _made(file: Path, runtimes: list[Path], of_this_machine: bool, work: Path) -
     environment = {"ZIG_GLOBAL_CACHE_DIR": str(project.cache_folder("zig"))}
     environment |= dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(work))
     environment["PYTHONIOENCODING"] = "utf-8:surrogateescape"  # names of files may be no UTF-8
-    ended = run_group(
-        [*command, "--", file],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        env=project.child_environment() | environment,
-        encoding="utf-8",
-        errors="surrogateescape",
-    )
+    environment = project.child_environment() | environment
+    pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    text = {"encoding": "utf-8", "errors": "surrogateescape"}
+    ended = run_group([*command, "--", file], env=environment, **pipes, **text)
     if ended.returncode:
         lines = ended.stderr.strip().splitlines() or [f"{tool} ended with {ended.returncode}"]
         raise UserError(one_line(lines[-1]))
@@ -83,11 +78,8 @@ def _put(files: dict[Path, Path]) -> None:
         for place, file in files.items():
             with written(place):
                 place.parent.mkdir(parents=True, exist_ok=True)
-                if file.suffix == ".toml" and place.is_file() and _same(file, place):
+                is_lock = file.suffix == ".toml" and place.is_file()
+                if is_lock and file.read_bytes() == place.read_bytes():
                     continue  # a lock file that has all: its folder may be read-only
             stack.enter_context(written(place))
             shutil.copyfile(file, stack.enter_context(whole(place)))
-
-
-def _same(file: Path, other: Path) -> bool:
-    return file.read_bytes() == other.read_bytes()

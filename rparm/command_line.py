@@ -51,12 +51,9 @@ def function(command: str, form: str) -> Any:
 
 
 def parsed(arguments: Sequence[str]) -> argparse.Namespace:
-    """Parse the options of the command that `arguments` ask for; `command` is its name.
+    """Parse the command's options, and its name as `command`; raise Answered if none is to run.
 
-    Names and options without a command are for `run`. Only the module of the command is
-    imported, because some take long.
-
-    UserError if something in them is wrong. Raises Answered if no command is to run.
+    Names and options without a command are for `run`. UserError if something in them is wrong.
     """
     first, *rest = arguments
     while first in COMMON and rest:  # may stand in front of the command
@@ -86,11 +83,8 @@ def _help(names: Sequence[str]) -> str:
 
 def parser(command: str) -> argparse.ArgumentParser:
     """Return the parser of a command's options."""
-    made = _Parser(
-        prog=f"{PROGRAM} {command}",
-        epilog=EPILOG,
-        allow_abbrev=False,  # --json is looked for before anything is parsed
-    )
+    # no abbreviations: --json is looked for before anything is parsed
+    made = _Parser(prog=f"{PROGRAM} {command}", epilog=EPILOG, allow_abbrev=False)
     function(command, "add_{}_options")(made)
     add_common(made)
     return made
@@ -114,19 +108,17 @@ class _Parser(argparse.ArgumentParser):
         return options
 
 
+def add_flag(parser: argparse.ArgumentParser, option: str, text: str) -> None:
+    """Add an option without a value."""
+    parser.add_argument(option, action="store_true", help=text)
+
+
 def add_common(parser: argparse.ArgumentParser) -> None:
     """Add the options of all commands."""
-    parser.add_argument(
-        "--json",
-        action="store_true",
-        help="print one JSON document on standard output, and all else on standard error",
-    )
-    parser.add_argument(
-        "--quiet", action="store_true", help="print the last line only, and what is wrong"
-    )
-    parser.add_argument(
-        "--open", action="store_true", help="then show what was written in a browser"
-    )
+    text = "print one JSON document on standard output, and all else on standard error"
+    add_flag(parser, "--json", text)
+    add_flag(parser, "--quiet", "print the last line only, and what is wrong")
+    add_flag(parser, "--open", "then show what was written in a browser")
 
 
 def add_system(
@@ -155,41 +147,30 @@ def add_report(parser: argparse.ArgumentParser, part: str = "") -> None:
     folder = project.report_folder(part)
     # its name until version 0.1
     parser.add_argument("--report", type=Path, default=folder, help=argparse.SUPPRESS)
-    parser.add_argument(
-        "--output",
-        dest="report",
-        type=Path,
-        metavar="DIR",
-        default=folder,
-        help=f"folder for pages and results (default: {project.from_root(folder)})",
-    )
+    text = f"folder for pages and results (default: {project.from_root(folder)})"
+    _add_folder(parser, "report", text, folder)
 
 
 def add_output(parser: argparse.ArgumentParser, text: str) -> None:
     """Add the folder for other files than pages and results."""
-    parser.add_argument("--output", type=Path, metavar="DIR", help=text)
+    _add_folder(parser, "output", text)
 
 
 def add_document(parser: argparse.ArgumentParser) -> None:
     """Add the folder for the document, for a command that writes nothing else."""
-    parser.add_argument(
-        "--output",
-        dest="document",
-        type=Path,
-        metavar="DIR",
-        help="write what --json prints into this folder, too",
-    )
+    _add_folder(parser, "document", "write what --json prints into this folder, too")
+
+
+def _add_folder(
+    parser: argparse.ArgumentParser, kind: str, text: str, default: Path | None = None
+) -> None:
+    parser.add_argument("--output", dest=kind, type=Path, metavar="DIR", default=default, help=text)
 
 
 def add_silence(parser: argparse.ArgumentParser, default: float, text: str) -> None:
     """Add the longest time that something may be silent."""
-    parser.add_argument(
-        "--silence",
-        type=_seconds,
-        metavar="TIME",
-        default=default,
-        help=f"{text} (default: {default:g} s)",
-    )
+    text = f"{text} (default: {default:g} s)"
+    parser.add_argument("--silence", type=_seconds, metavar="TIME", default=default, help=text)
 
 
 def number(text: str) -> int:
@@ -257,9 +238,8 @@ def _seconds(text: str) -> float:
         seconds = typed_quantity(text, SECONDS)
         if seconds >= 1:
             return seconds
-    raise argparse.ArgumentTypeError(
-        f"expected 1 s or more: a number, or one with s, ms, cs or ks, got {text!r}"
-    )
+    form = "a number, or one with s, ms, cs or ks"
+    raise argparse.ArgumentTypeError(f"expected 1 s or more: {form}, got {text!r}")
 
 
 def _version(text: str) -> str:

@@ -23,8 +23,6 @@ DELAY = 1.0  # s, shorter activities show nothing
 
 
 # ---- Streams -------------------------------------------------------------------------------------
-
-
 def is_quiet() -> bool:
     """Return whether the user wants to see the end only."""
     return _quiet
@@ -38,11 +36,8 @@ def results_stream(as_json: bool, quiet: bool) -> Iterator[TextIO | None]:
     try:
         with ExitStack() as stack:
             if real is not None and (as_json or quiet):
-                null = stack.enter_context(
-                    Path(os.devnull).open(
-                        "w", encoding="utf-8", errors="backslashreplace", newline="\n"
-                    )
-                )
+                text = {"encoding": "utf-8", "errors": "backslashreplace", "newline": "\n"}
+                null = stack.enter_context(Path(os.devnull).open("w", **text))
                 elsewhere = null if quiet or sys.stderr is None else sys.stderr
                 real = stack.enter_context(_apart(real, elsewhere))
                 stack.enter_context(redirect_stdout(elsewhere))
@@ -90,8 +85,6 @@ def _plain(value: Any) -> Any:
 
 
 # ---- Lines and tables ----------------------------------------------------------------------------
-
-
 def width() -> int:
     """Return the columns to fill: as many as the terminal has, within limits."""
     return max(min(WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns), LEAST)
@@ -128,17 +121,15 @@ def verdict_line(failed: Iterable[str], done: Sized, name: str) -> str:
         return f"passed: {counted(done, name)}"
     some = [*names[:NAMED], f"{len(names) - NAMED} more"] if len(names) > NAMED + 1 else names
     text = f"failed: {counted(names, name)}"
-    return textwrap.shorten(
-        f"{text}: {', '.join(some)}", max(width(), len(text)), placeholder=" ..."
-    )
+    whole = f"{text}: {', '.join(some)}"
+    return textwrap.shorten(whole, max(width(), len(text)), placeholder=" ...")
 
 
 class Table:
     """Rows under a head, each printed when it is known.
 
-    `names` are of all rows to come: they set the width of the first column, which is cut if
-    it has no room. `columns` are titles with the widths of their columns, `gap` blanks apart. The
-    last column is aligned to the left and `result` characters wide; 0: there is none.
+    `names`, of all rows to come, set the width of the first column, which is cut if it has no room.
+    `columns` are titles with widths, `gap` blanks apart; the last one is `result` wide (0: none).
     """
 
     def __init__(
@@ -184,34 +175,22 @@ def plain_table(title: str, head: Sequence[str], rows: Sequence[Sequence[object]
 
 def remark(text: str) -> None:
     """Print a text, wrapped and indented."""
-    wrapped = textwrap.wrap(
-        text, width(), initial_indent=INDENT, subsequent_indent=2 * INDENT, break_on_hyphens=False
-    )
+    indents = {"initial_indent": INDENT, "subsequent_indent": 2 * INDENT}
+    wrapped = textwrap.wrap(text, width(), break_on_hyphens=False, **indents)
     print(*wrapped, sep="\n", flush=True)
 
 
 # ---- Progress ------------------------------------------------------------------------------------
-
-
 class Progress(AbstractContextManager["Progress"]):
-    """A live bar on stderr, once an activity has taken about a second; nothing if not a terminal.
-
-    Call it with the number of steps (or of what `counted` names) done since the last call.
-    """
+    """Live bar on a terminal's stderr, after about a second; call it with the steps just done."""
 
     def __init__(self, label: str, total: int, counted: str = "steps") -> None:
         self._bar = None
         if sys.stderr.isatty() and not is_quiet():
             from tqdm import tqdm  # takes time
 
-            self._bar = tqdm(
-                total=total,
-                desc=label,
-                unit=f" {counted}",
-                unit_scale=total >= 10_000,
-                delay=DELAY,
-                leave=False,
-            )
+            unit = {"unit": f" {counted}", "unit_scale": total >= 10_000}
+            self._bar = tqdm(total=total, desc=label, delay=DELAY, leave=False, **unit)
 
     def __exit__(self, *_: object) -> None:
         if self._bar is not None:

@@ -43,8 +43,6 @@ class UnreadableError(UnplacedError):
 
 
 # ---- Files that are given ------------------------------------------------------------------------
-
-
 def check_regular(path: Path) -> None:
     """Refuse a device, pipe or socket, whose content may never end; a folder is allowed."""
     try:
@@ -131,16 +129,11 @@ def number_in(text: str) -> float:
 
 
 def difference(later: float, earlier: float) -> float:
-    """Return the difference of two numbers as they are written, rounded once.
-
-    Doubles of times that count from 1970 are 0.2 microseconds apart: their difference is as coarse.
-    """
+    """Subtract decimals as written: doubles of times since 1970 are 0.2 microseconds apart."""
     return float(Decimal(repr(float(later))) - Decimal(repr(float(earlier))))
 
 
 # ---- Files that are written ----------------------------------------------------------------------
-
-
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
     """Give a temporary path to write to; it becomes `path` at the end, or is removed on failure."""
@@ -164,10 +157,7 @@ def written(path: str | Path) -> Iterator[None]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text; its folder is made, and the file appears complete or not at all.
-
-    Characters for bytes of a file name that is not UTF-8 are escaped, as in JSON.
-    """
+    """Write a text, complete or not at all, to a folder that is made; escape bytes not of UTF-8."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
@@ -230,8 +220,6 @@ def from_folder(path: Path, folder: Path) -> str:
 
 
 # ---- Trajectories --------------------------------------------------------------------------------
-
-
 def csv_failure(path: Path, way_out: str = "") -> Failure:
     """Return a function that makes the user's errors of a file; they end with the way out."""
 
@@ -250,20 +238,15 @@ def write_trajectory(
     digits: int | None = 17,
     short_times: bool = False,
 ) -> None:
-    """Write trajectories, (rows, names), over times in s; the file appears complete or not at all.
-
-    `digits` are the significant ones; None, and for times `short_times`: as many as are needed to
-    read the same number back.
-    """
+    """Write (rows, names) over times (s), complete or not at all; None: all digits of doubles."""
     import numpy as np  # takes long
 
     form = _shortest if digits is None else f"{{:.{digits}g}}".format
     of_time = _shortest if short_times else form
     with whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
         file.write(",".join(f'"{name}"' for name in ("time", *names)) + "\n")
-        for time, row in zip(
-            *(np.asarray(x, float).tolist() for x in (times, values)), strict=True
-        ):
+        lists = (np.asarray(x, float).tolist() for x in (times, values))
+        for time, row in zip(*lists, strict=True):
             file.write(",".join([of_time(time), *map(form, row)]) + "\n")
 
 
@@ -272,11 +255,7 @@ def _shortest(value: float) -> str:
 
 
 def read_trajectory(path: Path, failure: Failure) -> tuple[tuple[str, ...], "np.ndarray"]:
-    """Read trajectories that `write_trajectory` wrote; in an installed package they are compressed.
-
-    Returns the names of all columns, the first is "time", and the finite table (rows, names) of at
-    least one row.
-    """
+    """Read names, "time" first, and a finite table (rows, names); installed, it is compressed."""
     import numpy as np  # takes long
 
     try:

@@ -77,17 +77,12 @@ def temporary_folder(within: Path | None = None) -> Iterator[Path]:
 
 
 def run_group(command: Sequence[object], **options: Any) -> subprocess.CompletedProcess:
-    """Run a program to its end, as subprocess.run does; `options` are Popen's.
-
-    If this is interrupted, it is killed, with the programs that it started where there are process
-    groups: they write files, too.
-    """
+    """Run a program as subprocess.run does; an interruption kills its whole process group."""
     child = None
     try:
         with uninterrupted():
-            child = subprocess.Popen(
-                command, process_group=0 if os.name == "posix" else None, **options
-            )
+            group = 0 if os.name == "posix" else None
+            child = subprocess.Popen(command, process_group=group, **options)
         output, errors = child.communicate()
     except BaseException:
         if child is not None:

@@ -102,11 +102,10 @@ def is_scenario(name: str, models: Path) -> bool:
 
 
 def plan(arguments: Sequence[str], models: Path) -> list[str]:
-    """Return the words that run.sh reads.
+    """Return the words that run.sh reads, "-" for none.
 
-    They are the lock to install ("-": none), the target to build ("-": none), "yes" or "no" for
-    --quiet and for --json, and the command to put in front of the arguments ("-": none). The target
-    "overview" asks for the help on everything.
+    They are the lock to install, the target to build ("overview": help on everything), "yes" or
+    "no" for --quiet and for --json, and the command to put in front of the arguments.
     """
     end = arguments.index("--") if "--" in arguments else len(arguments)
     options = arguments[:end]

@@ -61,9 +61,8 @@ def check_current_folder() -> None:
     try:
         Path.cwd()
     except OSError as error:
-        raise UserError(
-            f"the current folder cannot be used: {reason(error)}; change to another one"
-        ) from None
+        text = f"{reason(error)}; change to another one"
+        raise UserError(f"the current folder cannot be used: {text}") from None
 
 
 def fmi_version(given: object) -> str | None:
@@ -85,9 +84,11 @@ def scenario_files() -> dict[str, Path]:
     return dict(sorted(found.items()))
 
 
-def scenario_file(name: str) -> Path:
-    """Return the scenario called `name`; UserError if there is none."""
-    found = scenario_files()
+def scenario_file(given: str | Path, folder: Path = Path()) -> Path:
+    """Return a scenario: a file in a folder, or one of the project; UserError if there is none."""
+    if Path(given).suffix.lower() == ".toml":
+        return folder / given
+    name, found = str(given), scenario_files()
     if name not in found:
         guess = did_you_mean(name, found)
         raise UserError(f"no scenario {name!r}{guess} ({PROGRAM} list names them)")
@@ -118,10 +119,7 @@ def models() -> dict[str, Path]:
 
 
 def model(name: str) -> Path:
-    """Return the folder of a model, by its own name or its FMU's.
-
-    A UserError lists the known ones.
-    """
+    """Return the folder of a model, by its own name or its FMU's; a UserError lists known ones."""
     known = models()
     for folder in known.values():
         if name == folder.name or is_built_from(name, folder):
@@ -214,10 +212,7 @@ def built_names(suffix: str) -> list[str]:
 
 
 def built(folder: Path, suffix: str, option: str = "", version: str = VERSIONS[0]) -> Path:
-    """Return the FMU (.fmu) or SSP (.ssp) built from a folder, of a version of FMI.
-
-    UserError if it is not there; names `option`, which takes another file, if it is given.
-    """
+    """Return the FMU or SSP built from a folder; a UserError names an `option` for another file."""
     kind = suffix.removeprefix(".").upper()
     if INSTALLED:
         for name in shipped.names():

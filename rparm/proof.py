@@ -41,33 +41,19 @@ ASSUMED = "the equations of motion, exact parameters and inputs as given, and IE
 
 
 # ---- Enclosures ----------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Enclosure:
-    """Intervals that contain the exact motion: |exact - (high + low)| <= radius.
+    """Intervals that contain the exact motion: |exact - (high + low)| <= radius."""
 
-    Attributes
-    ----------
-    times : ndarray, shape (n + 1,)
-        Communication points in s; fewer than asked for if the proof stopped.
-    names : tuple of str
-        States and outputs; outputs have the inputs of the step before, first ones those after.
-    high, low, radius : ndarrays, shape (n + 1, names)
-        In the units of the variables.
-    stopped : float or None
-        Time in s up to which the proof holds, if it does not to the end.
-    starts : tuple of Start
-        Pieces of the start that were proven one by one.
-    """
-
+    # (n + 1,), communication points in s; fewer than asked for if the proof stopped
     times: np.ndarray
+    # states and outputs, which have the inputs of the step before, at the start of that after
     names: tuple[str, ...]
-    high: np.ndarray
+    high: np.ndarray  # (n + 1, names), in the variables' units, as `low` and `radius`
     low: np.ndarray
     radius: np.ndarray
-    stopped: float | None
-    starts: tuple[Start, ...]
+    stopped: float | None  # s, the time up to which the proof holds, if it does not to the end
+    starts: tuple[Start, ...]  # pieces of the start that were proven one by one
 
     def of(self, names: Sequence[str]) -> "Enclosure":
         """Return the intervals of these variables."""
@@ -95,16 +81,8 @@ class Prover:
     ) -> Enclosure:
         """Enclose all motions of a scenario at its communication points.
 
-        A start that is too broad for one proof is halved, and so are its halves.
-
-        Parameters
-        ----------
-        within : mapping of str to float, optional
-            By how much the start of states may be off, in their units.
-        progress : callable, optional
-            Called with 1 after each communication step.
-        seconds : float
-            Time after which to give up a proof, with a UserError.
+        The start of states may be off by `within`; if too broad for a proof, it is halved, and its
+        halves, too. `progress` gets 1 after each step. UserError if a proof takes over `seconds`.
         """
         off = within or {}
         start = {n: (float(scenario.start_values[n]), off.get(n, 0.0)) for n in self.states}
@@ -187,11 +165,7 @@ class Prover:
         enclosure: Enclosure,
         progress: Callable[[int], object] | None = None,
     ) -> tuple[int, int]:
-        """Prove again, with certificates, and check every claim of them, and single operations.
-
-        How many steps and operations are confirmed. UserError if one is not, or if the intervals
-        are not those of `enclosure`.
-        """
+        """Prove again, check all claims and operations, count both; UserError for a wrong one."""
         checked = [self._check(scenario, start, progress) for start in enclosure.starts]
         steps = sum(count for count, _ in checked)
         again = reduce(hull, (answer for _, answer in checked))
@@ -212,12 +186,8 @@ class Prover:
         with tempfile.TemporaryDirectory() as folder:
             certificate = Path(folder) / "certificate"
             problem = list(self.problem(scenario, start))
-            points = subprocess.run(
-                [program, certificate],
-                input="".join(problem),
-                capture_output=True,
-                encoding="utf-8",
-            ).stdout.splitlines()
+            question = {"input": "".join(problem), "capture_output": True, "encoding": "utf-8"}
+            points = subprocess.run([program, certificate], **question).stdout.splitlines()
             try:
                 with certificate.open(encoding="utf-8") as claims:
                     count = checker.check(problem, points, claims, progress)
@@ -241,9 +211,8 @@ def prover_of(path: Path) -> Prover:
     known = provers()
     if name not in known:
         names = ", ".join(known) or "none"
-        raise UserError(
-            f"{path}: expected a model whose motion can be proven ({names}), got {name}"
-        )
+        expected = f"expected a model whose motion can be proven ({names})"
+        raise UserError(f"{path}: {expected}, got {name}")
     return known[name]
 
 
@@ -300,15 +269,9 @@ def _watched(lines: Iterable[str], progress: Callable[[int], object] | None) -> 
 
 
 def is_nearest(values: np.ndarray, enclosure: Enclosure, rows: np.ndarray) -> np.ndarray:
-    """Return which values are proven to be the doubles nearest to the exact ones.
+    """Return which values (rows, names) are proven to be the doubles nearest to the exact ones.
 
-    0 is so up to `UNDERFLOW`, because intervals are no narrower there.
-
-    Parameters
-    ----------
-    values : ndarray, shape (rows, names)
-    rows : ndarray of int, shape (rows,)
-        Communication points of the values.
+    `rows` are their communication points. 0 is so up to `UNDERFLOW`: intervals are no narrower.
     """
     distance = distances(values, enclosure, rows)
     side = (enclosure.high[rows] - values) + enclosure.low[rows]  # where the exact value is
@@ -324,8 +287,6 @@ def distances(values: np.ndarray, enclosure: Enclosure, rows: np.ndarray) -> np.
 
 
 # ---- Proven errors -------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class ProvenError:
     """Of one variable in one run."""
@@ -389,11 +350,8 @@ def error_bounds(
     progress: Callable[[int], object] | None = None,
 ) -> np.ndarray:
     """Bound the errors in a run, (communication points, names), in the names' units."""
-    run = replace(
-        scenario,
-        parameters=scenario.parameters | {METHOD: fmu.model.variables[METHOD].items[method]},
-        reference_every=1,
-    )
+    parameters = scenario.parameters | {METHOD: fmu.model.variables[METHOD].items[method]}
+    run = replace(scenario, parameters=parameters, reference_every=1)
     result = simulation.simulate(fmu, run, tolerance_of(method, tolerance), progress)
     values = _columns(result.names, result.values, enclosure.names)
     return distances(values, enclosure, np.arange(len(enclosure.times)))
@@ -404,8 +362,8 @@ def errors_of_run(
 ) -> Mapping[str, ProvenError] | None:
     """Bound the errors of a run at the points that were recorded; None: nothing is proven.
 
-    That is so of models without a prover, where the proof does not come to the end, and of
-    scenarios of more than `most_steps` communication steps or that take more than `SECONDS`.
+    So it is without a prover, where a proof does not come to the end or takes more than
+    `LONGEST_RUN` s, and for more than `most_steps` communication steps.
     """
     program = provers().get(scenario.model)
     if program is None or len(scenario.times) > most_steps + 1:
@@ -426,21 +384,13 @@ def errors_of_run(
 def largest_errors(
     errors: np.ndarray, enclosure: Enclosure, rows: np.ndarray | None = None
 ) -> dict[str, ProvenError]:
-    """Return the largest proven errors of all variables of an enclosure, by name.
-
-    Parameters
-    ----------
-    errors : ndarray, shape (points, names)
-    rows : ndarray of int, shape (points,), optional
-        Communication points of the errors; default: all.
-    """
+    """Return the largest of errors (points, names) by name; `rows`: their communication points."""
     times = enclosure.times if rows is None else enclosure.times[rows]
     worst = np.argmax(errors, axis=0)
+    radius = enclosure.radius.max(axis=0)
     return {
-        name: ProvenError(
-            float(errors[worst[i], i]), float(times[worst[i]]), float(enclosure.radius[:, i].max())
-        )
-        for i, name in enumerate(enclosure.names)
+        name: ProvenError(float(errors[at, i]), float(times[at]), float(radius[i]))
+        for i, (name, at) in enumerate(zip(enclosure.names, worst, strict=True))
     }
 
 
@@ -451,19 +401,13 @@ def proven_reference(fmu: Fmu, scenario: Scenario, enclosure: Enclosure) -> Prov
     around = enclosure.of(expected.names)
     nearest = is_nearest(expected.values, around, rows)
     within = distances(around.high[rows], around, rows)
-    wrong = tuple(
-        WrongValue(
-            expected.path,
-            int(row) + 2,
-            expected.names[i],
-            float(expected.values[row, i]),
-            float(around.high[rows[row], i]),
-            float(within[row, i]),
-        )
-        for row, i in np.argwhere(~nearest)[:SHOWN]
-    )
+    wrong = []
+    for row, i in np.argwhere(~nearest)[:SHOWN]:
+        numbers = expected.values[row, i], around.high[rows[row], i], within[row, i]
+        place = expected.path, int(row) + 2, expected.names[i]
+        wrong.append(WrongValue(*place, *map(float, numbers)))
     radius = float(around.radius[rows].max())
-    return ProvenReference(nearest.size, int(nearest.sum()), radius, wrong)
+    return ProvenReference(nearest.size, int(nearest.sum()), radius, tuple(wrong))
 
 
 def _columns(names: Sequence[str], values: np.ndarray, wanted: Sequence[str]) -> np.ndarray:

@@ -12,11 +12,10 @@ from rparm.systems.comparison import BOUND, Measure, Outcome
 from rparm.units import milliseconds, seconds, short, unit, verdict
 
 NONE = "-"
+SWEEP = ("tolerances", "errors", "violations", "passed")  # keys of the document
 
 
 # ---- Tables --------------------------------------------------------------------------------------
-
-
 class RunTable:
     """Runs of scenarios, a row each; `with_tight`: at their own tolerance and at the tightest."""
 
@@ -86,9 +85,8 @@ class FederationTable:
         shown = [f"{us:.1f}" if us < 10_000 else f"{us:.0f}" for us in times]
         self._table.row(name, [_count(steps), short(difference, 1), *shown], verdict(passed))
         if not passed:
-            console.remark(
-                f"difference {short(difference, 1)}, above its bound {short(self._bound)}"
-            )
+            bound = f"above its bound {short(self._bound)}"
+            console.remark(f"difference {short(difference, 1)}, {bound}")
 
 
 class VariantTable:
@@ -137,15 +135,11 @@ def print_measured(run: Run) -> None:
     """Print how far a run is from what was measured."""
     for compared in comparisons(run.scenario, run.result):
         known = unit(run.fmu.model.variables[compared.name].unit)
-        console.remark(
-            f"{run.scenario.name}: {compared.name} is {compared.rms:.3g} {known} RMS "
-            f"from {compared.source}"
-        )
+        rms = f"{compared.rms:.3g} {known} RMS from {compared.source}"
+        console.remark(f"{run.scenario.name}: {compared.name} is {rms}")
 
 
 # ---- The document --------------------------------------------------------------------------------
-
-
 @dataclass
 class Done:
     chosen: Sequence[Scenario]  # of the project
@@ -177,7 +171,7 @@ def _scenario(done: Done, scenario: Scenario) -> dict[str, object]:
         "warnings": scenario.questions,
         "runs": [_run(run) for run in runs],
         "failures": [{"tolerance": f.tolerance, "error": f.text} for f in failures],
-        "sweep": _sweep(sweeps[0]) if sweeps else None,
+        "sweep": {key: getattr(sweeps[0], key) for key in SWEEP} if sweeps else None,
     }
 
 
@@ -200,15 +194,6 @@ def _run(run: Run) -> dict[str, object]:
     if run.twin is not None:
         found["twin"] = {"fmi_version": run.twin.fmi_version, "differing": run.twin.differing}
     return found
-
-
-def _sweep(sweep: Sweep) -> dict[str, object]:
-    return {
-        "tolerances": sweep.tolerances,
-        "errors": sweep.errors,
-        "violations": sweep.violations,
-        "passed": sweep.passed,
-    }
 
 
 def _study(study: Convergence) -> dict[str, object]:

@@ -77,9 +77,8 @@ def _write(path: Path, content: bytes, is_program: bool = False) -> None:
             if is_program:
                 temporary.chmod(0o755)
     except OSError as error:
-        raise UserError(
-            f"{path}: cannot be written: {reason(error)}; RPARM_CACHE names another folder"
-        ) from error
+        text = f"{reason(error)}; RPARM_CACHE names another folder"
+        raise UserError(f"{path}: cannot be written: {text}") from error
 
 
 @functools.cache

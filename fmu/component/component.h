@@ -1,8 +1,7 @@
 /* The part of an FMI instance that all versions share: its state, its kind, its log and the rules
  * of its calls. It knows no version: each adapter gives a struct adapter, makes its own structure
  * begin with a struct component, and converts status and types. */
-#ifndef COMPONENT_H
-#define COMPONENT_H
+#pragma once
 
 #include "derivatives.h"
 #include "instance.h"
@@ -176,5 +175,3 @@ enum component_status component_set_logging(struct component *component, bool on
  */
 NONNULL void component_make_harmless(const struct adapter *adapter, const char *text,
                                      char out[LOG_TEXT_SIZE]);
-
-#endif

@@ -1,6 +1,5 @@
 /* Model description of this FMU; defined by the generated variables.c. */
-#ifndef MODEL_DESCRIPTION_H
-#define MODEL_DESCRIPTION_H
+#pragma once
 
 #include "variables.h"
 
@@ -8,5 +7,3 @@ extern const struct model_description model_description;
 
 /* Instantiation token of FMI 3.0; FMI 2.0 has the GUID of the description. */
 extern const char model_token_fmi3[];
-
-#endif

@@ -1,7 +1,6 @@
 /* Calls that all versions of FMI share: modes, values, derivatives, continuous time and FMU states.
  * Each function takes the number of the call it serves. */
-#ifndef SHARED_CALLS_H
-#define SHARED_CALLS_H
+#pragma once
 
 #include "component.h"
 #include "continuous_states.h"
@@ -116,5 +115,3 @@ enum component_status fmu_state_serialize(struct component *component, unsigned 
 enum component_status fmu_state_deserialize(struct component *component, unsigned call,
                                             const unsigned char bytes[], size_t size,
                                             void **fmu_state);
-
-#endif

@@ -1,7 +1,5 @@
 """Writes what C needs of a declaration: value_references.h and the table in variables.c."""
 
-from __future__ import annotations
-
 from declaration.load import Declaration
 from declaration.schema import Enumeration, Variable
 
@@ -15,8 +13,7 @@ def value_references(declaration: Declaration) -> str:
     prefix = macro_prefix(name)
     lines = [
         "/* Generated from variables.toml. */",
-        f"#ifndef {prefix}_VALUE_REFERENCES_H",
-        f"#define {prefix}_VALUE_REFERENCES_H",
+        "#pragma once",
         "",
         f'#define {prefix}_NAME "{name}"',
         f'#define {prefix}_GUID "{declaration.guid}"',
@@ -25,8 +22,6 @@ def value_references(declaration: Declaration) -> str:
         "enum {",
         *(f"    {prefix}_{n} = {v.reference}," for n, v in declaration.variables.items()),
         "};",
-        "",
-        "#endif",
     ]
     return "\n".join(lines) + "\n"
 
@@ -131,5 +126,5 @@ def table_row(name: str, variable: Variable, structure: str) -> str:
 
 
 def c_number(value: float | None, otherwise: str) -> str:
-    """Text of a double that reads back as the same value."""
+    """Return the text of a double that reads back as the same value."""
     return otherwise if value is None else repr(float(value))

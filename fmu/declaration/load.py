@@ -1,7 +1,5 @@
 """Reads a variables.toml and what it includes, file by file, and checks all of it together."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import tomllib
@@ -13,20 +11,7 @@ from typing import Any
 from program import WrongInputError
 from pydantic import ValidationError
 
-from declaration.schema import (
-    TYPES,
-    Change,
-    Experiment,
-    File,
-    Float64,
-    Include,
-    Item,
-    Model,
-    Table,
-    Terminal,
-    Unit,
-    Variable,
-)
+from declaration import schema
 
 LONGEST_SHOWN = 60  # characters of a value in a message
 UNITS = Path(__file__).with_name("units.toml")  # of all models
@@ -37,8 +22,8 @@ class DeclarationError(WrongInputError):
 
 
 def files_of(
-    path: Path, file: File, including: tuple[Path, ...] = ()
-) -> Iterator[tuple[Path, File]]:
+    path: Path, file: schema.File, including: tuple[Path, ...] = ()
+) -> Iterator[tuple[Path, schema.File]]:
     """Yield the files that a file includes, with their changes, and the file itself at the end."""
     if path.resolve() in including:
         raise DeclarationError(f"{path}: includes itself")
@@ -47,7 +32,9 @@ def files_of(
         included = path.parent / include.file
         for source, other in files_of(included, read(included), (*including, path.resolve())):
             taken = {
-                name: changed(variable, include, left.pop(name, Change()), f"{path}: change {name}")
+                name: changed(
+                    variable, include, left.pop(name, schema.Change()), f"{path}: change {name}"
+                )
                 for name, variable in other.variables.items()
                 if include.only is None or name in include.only
             }
@@ -57,7 +44,9 @@ def files_of(
     yield path, file
 
 
-def changed(variable: Variable, include: Include, change: Change, place: str) -> Variable:
+def changed(
+    variable: schema.Variable, include: schema.Include, change: schema.Change, place: str
+) -> schema.Variable:
     """Return a variable of an included file as the including one has it."""
     keys = variable.model_dump(by_alias=True, exclude_unset=True)
     for old, new in include.fields.items():
@@ -78,7 +67,7 @@ def changed(variable: Variable, include: Include, change: Change, place: str) ->
         raise DeclarationError(f"{place}: {reason(mistake, type(variable), key)}") from None
 
 
-def read(path: Path) -> File:
+def read(path: Path) -> schema.File:
     """Read one file and check each of its tables."""
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -89,10 +78,10 @@ def read(path: Path) -> File:
     return check(path, document)
 
 
-def check(path: Path, document: dict[str, Any]) -> File:
+def check(path: Path, document: dict[str, Any]) -> schema.File:
     """Check each table of a file, which is or could be at this path."""
     try:
-        return File.model_validate(document)
+        return schema.File.model_validate(document)
     except ValidationError as error:
         raise DeclarationError(f"{path}: {first_mistake(error)}") from None
 
@@ -105,36 +94,36 @@ def first_mistake(error: ValidationError) -> str:
     return ": ".join([*words, reason(mistake, table, key)])
 
 
-def place_of(location: list[str | int]) -> tuple[list[str], type[Table], str]:
+def place_of(location: list[str | int]) -> tuple[list[str], type[schema.Table], str]:
     """Return words for a table of the file, its class, and the path of the value within it."""
     match location:
         case ["model", *keys]:
-            words, table = ["[model]"], Model
+            words, table = ["[model]"], schema.Model
         case ["experiment", *keys]:
-            words, table = ["[experiment]"], Experiment
+            words, table = ["[experiment]"], schema.Experiment
         case ["include", number, *keys]:
-            words, table = [f"include[{number}]"], Include
+            words, table = [f"include[{number}]"], schema.Include
         case ["changes", name, *keys]:
-            words, table = [f"change {name}"], Change
+            words, table = [f"change {name}"], schema.Change
         case ["units", name, *keys]:
-            words, table = [f"unit {name}"], Unit
-        case ["variables", name, kind, "items", item, *keys] if kind in TYPES:
-            words, table = [f"variable {name}", f"item {item}"], Item
-        case ["variables", name, kind, *keys] if kind in TYPES:
-            words, table = [f"variable {name}"], TYPES[kind]
+            words, table = [f"unit {name}"], schema.Unit
+        case ["variables", name, kind, "items", item, *keys] if kind in schema.TYPES:
+            words, table = [f"variable {name}", f"item {item}"], schema.Item
+        case ["variables", name, kind, *keys] if kind in schema.TYPES:
+            words, table = [f"variable {name}"], schema.TYPES[kind]
         case ["variables", name, *keys]:
-            words, table = [f"variable {name}"], Variable
+            words, table = [f"variable {name}"], schema.Variable
         case ["terminals", name, *keys]:
             while len(keys) > 1 and keys[0] == "terminals":
                 name, keys = f"{name}.{keys[1]}", keys[2:]
-            words, table = [f"terminal {name}"], Terminal
+            words, table = [f"terminal {name}"], schema.Terminal
         case keys:
-            words, table = [], File
+            words, table = [], schema.File
     path = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys)
     return words, table, path.removeprefix(".")
 
 
-def reason(mistake: Any, table: type[Table], key: str) -> str:
+def reason(mistake: Any, table: type[schema.Table], key: str) -> str:
     """Say why the value of a key is wrong, or why the table is, if `key` is empty."""
     context = mistake.get("ctx", {})
     subject = f"{key} = {shown(mistake['input'])} " if key else ""
@@ -142,21 +131,23 @@ def reason(mistake: Any, table: type[Table], key: str) -> str:
         case "missing":
             return f"{key} is missing"
         case "extra_forbidden":
-            for kind, of_kind in TYPES.items():
-                if table is of_kind and any(key in keys_of(other) for other in TYPES.values()):
+            for kind, of_kind in schema.TYPES.items():
+                if table is of_kind and any(
+                    key in keys_of(other) for other in schema.TYPES.values()
+                ):
                     return f"{kind} variables have no {key}"
             return f"unknown key '{key}', expected one of {', '.join(keys_of(table))}"
         case "model_type" | "dict_type":
             return f"{subject}is not a table"
         case "union_tag_invalid":
-            return f"type = {shown(context['tag'])} should be one of {', '.join(TYPES)}"
+            return f"type = {shown(context['tag'])} should be one of {', '.join(schema.TYPES)}"
         case "value_error":
             subject = "the name " if mistake["loc"][-1] == "[key]" else subject
             return f"{subject}{context['error']}"
     return subject + mistake["msg"].removeprefix("Input ")
 
 
-def keys_of(table: type[Table]) -> list[str]:
+def keys_of(table: type[schema.Table]) -> list[str]:
     return [field.alias or name for name, field in table.model_fields.items()]
 
 
@@ -174,11 +165,11 @@ class Declaration:
     """All that is declared of a model; its variables are sorted by value reference."""
 
     path: Path  # of its variables.toml
-    model: Model
-    experiment: Experiment
-    units: dict[str, Unit]
-    variables: dict[str, Variable]
-    terminals: dict[str, Terminal]
+    model: schema.Model
+    experiment: schema.Experiment
+    units: dict[str, schema.Unit]
+    variables: dict[str, schema.Variable]
+    terminals: dict[str, schema.Terminal]
 
     @property
     def guid(self) -> str:
@@ -207,10 +198,10 @@ def load(path: Path) -> Declaration:
     return assemble(path, read(path))
 
 
-def assemble(path: Path, file: File) -> Declaration:
+def assemble(path: Path, file: schema.File) -> Declaration:
     """Read all that a file, which is or could be at this path, declares with its includes."""
     units = dict(read(UNITS).units)
-    variables: dict[str, Variable] = {}
+    variables: dict[str, schema.Variable] = {}
     places: dict[str, str] = {}
     for source, part in files_of(path, file):
         for name, unit in part.units.items():
@@ -230,11 +221,11 @@ def assemble(path: Path, file: File) -> Declaration:
     check_indicators(file.model.event_indicators, variables, f"{path}: [model]")
     check_terminals(file.terminals, variables, f"{path}: terminal ")
     by_reference = sorted(variables.items(), key=lambda item: item[1].reference)
-    used = {v.unit: units[v.unit] for v in variables.values() if isinstance(v, Float64)}
+    used = {v.unit: units[v.unit] for v in variables.values() if isinstance(v, schema.Float64)}
     return Declaration(path, file.model, file.experiment, used, dict(by_reference), file.terminals)
 
 
-def check_references(variables: dict[str, Variable], places: dict[str, str]) -> None:
+def check_references(variables: dict[str, schema.Variable], places: dict[str, str]) -> None:
     """Check that value references are unique, and that there is one independent variable."""
     owners: dict[int, str] = {}
     for name, variable in variables.items():
@@ -249,25 +240,21 @@ def check_references(variables: dict[str, Variable], places: dict[str, str]) -> 
 
 
 def check_names(
-    variables: dict[str, Variable], units: dict[str, Unit], places: dict[str, str]
+    variables: dict[str, schema.Variable], units: dict[str, schema.Unit], places: dict[str, str]
 ) -> None:
     """Check that units and variables that are referred to are declared."""
     for name, variable in variables.items():
-        if isinstance(variable, Float64) and variable.unit not in units:
+        if isinstance(variable, schema.Float64) and variable.unit not in units:
             where = f"neither in {UNITS.name} nor among [units]"
             raise DeclarationError(f"{places[name]}: unit '{variable.unit}' is {where}")
-        listed = [
-            *(variable.dependencies or []),
-            *variable.parameters,
-            *(variable.initially or []),
-        ]
+        listed = [*(variable.dependencies or []), *variable.parameters, *(variable.initially or [])]
         listed += [variable.derivative_of] if variable.derivative_of is not None else []
         for other in listed:
             if other not in variables:
                 raise DeclarationError(f"{places[name]}: '{other}' is not declared")
 
 
-def check_dependencies(variables: dict[str, Variable], places: dict[str, str]) -> None:
+def check_dependencies(variables: dict[str, schema.Variable], places: dict[str, str]) -> None:
     """Check that variables depend on what the model structure knows, and that events can."""
     states = {v.derivative_of for v in variables.values()}
     for name, variable in variables.items():
@@ -282,7 +269,7 @@ def check_dependencies(variables: dict[str, Variable], places: dict[str, str]) -
                 raise DeclarationError(f"{places[name]}: '{other}' is not a parameter")
 
 
-def check_indicators(names: list[str], variables: dict[str, Variable], place: str) -> None:
+def check_indicators(names: list[str], variables: dict[str, schema.Variable], place: str) -> None:
     """Check that the event indicators are calculated locals that can cross 0."""
     for i, name in enumerate(names):
         where = f"{place}: event_indicators[{i}]"
@@ -299,7 +286,7 @@ def check_indicators(names: list[str], variables: dict[str, Variable], place: st
 
 
 def check_terminals(
-    terminals: dict[str, Terminal], variables: dict[str, Variable], place: str
+    terminals: dict[str, schema.Terminal], variables: dict[str, schema.Variable], place: str
 ) -> None:
     """Check that members are inputs and outputs, and that flows are continuous."""
     for name, terminal in terminals.items():

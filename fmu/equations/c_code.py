@@ -19,7 +19,7 @@ Leaves = Mapping[tuple[str, str], str]  # where C has a leaf, by its operation a
 
 
 def number(value: float) -> str:
-    """A double that reads back as the same."""
+    """Return a double that reads back as the same."""
     if math.isnan(value):
         return "NAN"
     return f"({value!r})" if math.copysign(1.0, value) < 0 else repr(value)
@@ -41,10 +41,7 @@ def formula(op: str, *given: str) -> str:
 
 
 class Code:
-    """Statements, to which each value that is asked for is added once.
-
-    With an `outer` code, values that do not move are calculated there.
-    """
+    """Statements, each value once; values that do not move are calculated in an `outer` code."""
 
     def __init__(self, leaves: Leaves, prefix: str = "n", outer: Code | None = None) -> None:
         self.leaves, self.prefix, self.outer = leaves, prefix, outer
@@ -52,7 +49,7 @@ class Code:
         self.known: dict[Value, str] = {}
 
     def of(self, root: Value) -> str:
-        """C expression of a value, without operators."""
+        """Return the C expression of a value, without operators."""
         if self.outer and not root.moves:
             return self.outer.of(root)
         for value in in_order([root], self.known):
@@ -71,7 +68,7 @@ class Code:
         return self.constant(formula(value.op, *given), c_type)
 
     def constant(self, of: str, c_type: str = "double") -> str:
-        """Name of a new constant."""
+        """Return the name of a new constant."""
         name = f"{self.prefix}{len(self.lines)}"
         self.lines.append(f"const {c_type} {name} = {of};")
         return name
@@ -84,7 +81,7 @@ class Code:
 
 
 def indented(lines: list[str]) -> list[str]:
-    """Lines of a block."""
+    """Return lines of a block."""
     return [f"    {line}" for line in lines]
 
 

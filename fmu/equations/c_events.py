@@ -39,7 +39,7 @@ def leaves(file: ModelFile) -> Leaves:
 
 
 def arrays(file: ModelFile) -> Leaves:
-    """Where functions of (values, t, x, u) have them."""
+    """Return where functions of (values, t, x, u) have them."""
     own = {("state", v.name): f"x[{i}]" for i, v in enumerate(file.of("states"))}
     own |= {("input", v.name): f"u[{i}]" for i, v in enumerate(file.of("inputs"))}
     return {**leaves(file), **own}
@@ -188,7 +188,7 @@ class Events:
         return code.lines + lines
 
     def _due(self) -> list[str]:
-        """Whether each event of the file is due."""
+        """Return whether each event of the file is due."""
         code = Code(leaves(self.file))
         for i, event in enumerate(self.file.events):
             during = "" if event.during is None else f" && {code.of(event.during.value)}"
@@ -265,10 +265,7 @@ class Events:
 
 
 def _guards(graph: Graph, roots: Iterable[tuple[Value, Value | None]]) -> Guards:
-    """Return, for each mode that is read, under which modes and parameters it is.
-
-    roots: values that are needed, each with its condition.
-    """
+    """Return under which modes and parameters each mode is read; `roots` are values, conditions."""
     found: Guards = {}
     modes: dict[Value, list[Value]] = {}  # by the distance that they follow from
     for relation in graph.relations.values():

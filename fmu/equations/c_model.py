@@ -18,7 +18,7 @@ FOLLOWED = "relations_followed(&relations, ROOM, values, t, &copy)"
 
 
 def header(file: ModelFile) -> str:
-    """Text of equations.h."""
+    """Return the text of equations.h."""
     events = Events(file)
     groups = _ranges(file) | {
         "calculated": [FIELD.format(v.name) for v in file.calculated],
@@ -33,7 +33,7 @@ def header(file: ModelFile) -> str:
 
 
 def source(file: ModelFile) -> str:
-    """Text of equations.c."""
+    """Return the text of equations.c."""
     events = Events(file)
     series = Series(file.graph, *_followed(file, events), leaves(file))
     has_domains = bool(events.located) and _may_end(file)
@@ -115,7 +115,7 @@ def _series(series: Series, has_domains: bool) -> dict[str, object]:
 
 
 def _may_end(file: ModelFile) -> bool:
-    """Whether there are values beyond an event that are not finite."""
+    """Return whether there are values beyond an event that are not finite."""
     roots = [v.value for v in file.of("states", "where", "outputs")]
     roots += [relation.distance for relation in file.graph.located]
     return any(v.op in FALLIBLE and v.arguments[-(v.op == "/")].moves for v in in_order(roots))

@@ -25,10 +25,7 @@ from rparm.expressions.expression import in_order
 
 
 class Series:
-    """The rows of a series, and the parts of the C function that writes them.
-
-    rates: the derivative of each state; followed: further values that need a row.
-    """
+    """Rows of a series: of states by their `rates` and of `followed`, and C that writes them."""
 
     def __init__(
         self, graph: Graph, rates: Mapping[Value, Value], followed: list[Value], leaves: Leaves
@@ -131,7 +128,7 @@ class Series:
         return self._coefficients[value]
 
     def _coefficient(self, value: Value) -> str:
-        """C expression of coefficient k > 0, without operators; writes it to its row."""
+        """Return the C expression of coefficient k > 0, without operators; writes it to its row."""
         if not value.moves:
             return "0.0"
         leaf = self.later.leaves.get((value.op, value.name), "")
@@ -163,13 +160,12 @@ class Series:
         if value.op not in (*STEEP, *GROWING):
             return found
         are_finite = reduce(
-            partial(self.graph.value, "and"),
-            (self.graph.value("isfinite", g) for _, g, _ in pairs),
+            partial(self.graph.value, "and"), (self.graph.value("isfinite", g) for _, g, _ in pairs)
         )
         return f"{self.start.of(are_finite)} ? {found} : {self._where_steep(value)}"
 
     def _where_steep(self, value: Value) -> str:
-        """Coefficient of a function whose derivative is not finite: as if it stayed the same.
+        """Return a coefficient, where a derivative is infinite, as if the function did not change.
 
         The method sees at the end of a step whether this fits. Some powers have a series.
         """

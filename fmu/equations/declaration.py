@@ -36,12 +36,12 @@ CAUSALITIES = {
 
 
 def solver_names() -> list[str]:
-    """Names of the variables that models get without declaring them."""
+    """Return the names of the variables that models get without declaring them."""
     return [name for path in (TIME, SOLVER, EVENTS) for name in read_declaration(path).variables]
 
 
 def keys(file: ModelFile) -> list[Key]:
-    """Name and kind of each variable, in the order in which they get value references."""
+    """Return name and kind of each variable, in the order in which they get value references."""
     return [
         *((variable.name, CAUSALITIES[variable.section]) for variable in file.variables.values()),
         *((f"der_{state.name}", "local") for state in file.of("states")),
@@ -121,7 +121,7 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
 
 
 def page(file: ModelFile) -> str:
-    """Text of README.md: the description and the file itself."""
+    """Return the text of README.md: the description and the file itself."""
     runs = re.findall("`+", file.text)
     fence = "`" * max(3, 1 + max(map(len, runs), default=0))
     plain = "".join(f"\\{c}" if c in string.punctuation else c for c in file.description)
@@ -179,7 +179,7 @@ def _fixed(file: ModelFile) -> frozenset[Leaf]:
 
 
 def _unit(units: dict[str, dict[str, int]], exponents: dict[str, int], name: str = "") -> str:
-    """Name of a unit with these exponents, which is in `units` then."""
+    """Return the name of a unit with these exponents, which is in `units` then."""
     exponents = {base: exponent for base, exponent in exponents.items() if exponent}
     if not name:
         same = [other for other, unit in units.items() if unit == exponents]

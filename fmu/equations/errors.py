@@ -16,17 +16,14 @@ NEVER_STEEPER_THAN_1 = ("sin", "cos", "atan", "tanh")
 
 
 class Errors:
-    """C expressions of errors, as constants of a code that has the values.
-
-    given: the errors of leaves; all others are exact.
-    """
+    """C expressions of errors, as constants of a code; leaves without `given` errors are exact."""
 
     def __init__(self, code: Code, given: Leaves) -> None:
         self.code, self.given = code, given
         self.known: dict[Value, str] = {}
 
     def of(self, root: Value) -> str:
-        """Error of a value, >= 0 in its unit."""
+        """Return the error of a value, >= 0 in its unit."""
         for value in in_order([root], self.known):
             error = self._error(value)
             is_name = error == NONE or error.isidentifier()

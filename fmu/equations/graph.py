@@ -99,8 +99,8 @@ class Relation:
 class Graph:
     """Makes values, and finds those that exist.
 
-    A relation of values that move is a switch: its result is a mode, which changes at events only.
-    `relations` has the relations by the names of their modes.
+    A relation of values that move is a switch: its result is a mode, which changes at events only;
+    `relations` has them by mode.
     """
 
     known: dict[tuple, Value] = field(default_factory=dict)
@@ -346,17 +346,17 @@ class Graph:
 
 
 def is_runtime(value: Value) -> bool:
-    """Whether it may be 0 in one call and not in another."""
+    """Return whether it may be 0 in one call and not in another."""
     return any(op in RUNTIME for op, _ in value.leaves)
 
 
 def is_unknown(value: Value) -> bool:
-    """Whether it is an "if" whose first branch says that a relation is not defined."""
+    """Return whether it is an "if" whose first branch says that a relation is not defined."""
     return value.op == "if" and math.isnan(value.arguments[1].number)
 
 
 def is_number(value: Value, number: float) -> bool:
-    """Whether it is this constant."""
+    """Return whether it is this constant."""
     return value.op == "number" and value.number == number
 
 

@@ -4,8 +4,6 @@ NAME.lock.toml beside the file has a line for each variable that ever was: its n
 its value reference. It grows and never changes.
 """
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 
@@ -24,10 +22,7 @@ def path_of(model: Path) -> Path:
 
 
 def references(path: Path, wanted: list[Key]) -> dict[Key, int]:
-    """References of all variables that the lock file has and of those wanted; does not write it.
-
-    ModelFileError if it cannot be used.
-    """
+    """Return references of all variables in the lock file, or wanted; ModelFileError."""
     found = _read(path) if path.exists() else {}
     following = max([0, *found.values()]) + 1
     for key in wanted:
@@ -42,7 +37,7 @@ def references(path: Path, wanted: list[Key]) -> dict[Key, int]:
 
 
 def text(name: str, found: dict[Key, int]) -> str:
-    """Text of the lock file."""
+    """Return the text of the lock file."""
     lines = [
         f'[[variables]]\nname = "{key[0]}"\nkind = "{key[1]}"\nreference = {reference}\n'
         for key, reference in sorted(found.items(), key=lambda item: item[1])

@@ -22,10 +22,7 @@ LEAVES = {
 
 
 def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
-    """Read and check a file, and give each expression its value.
-
-    solver_names: of the variables that every model has. ModelFileError if something is wrong.
-    """
+    """Read and check a file for values of its expressions; ModelFileError if something is wrong."""
     file = equations_file.read(path, solver_names)
     # without states nothing is integrated: outputs follow at once
     graph = file.graph = Graph(has_switches=bool(file.of("states") or file.events))

@@ -3,8 +3,7 @@
  * Exchange) and section 4.2.4 (Co-Simulation) of the specification, as data. Functions that need no
  * instance, and FreeInstance, are always allowed. Derivatives and nominal values can also be read
  * in initialization mode: they are known there, and FMI 3.0 allows it. */
-#ifndef FMI2_FUNCTIONS_H
-#define FMI2_FUNCTIONS_H
+#pragma once
 
 /* X(name, kinds, states), in the names of fmi2.c */
 #define FMI2_FUNCTION_LIST(X)                                                                      \
@@ -55,5 +54,3 @@
     X(GetIntegerStatus, CO_SIMULATION, TERMINATED | STEP_COMPLETE | STEP_FAILED)                   \
     X(GetBooleanStatus, CO_SIMULATION, TERMINATED | STEP_COMPLETE | STEP_FAILED)                   \
     X(GetStringStatus, CO_SIMULATION, TERMINATED | STEP_COMPLETE | STEP_FAILED)
-
-#endif

@@ -1,30 +1,14 @@
 """Writes modelDescription.xml of FMI 2.0 (section 2.2 of the specification)."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 
+import description_parts
 from declaration.load import Declaration, DeclarationError
 from declaration.schema import Enumeration, Float64, Unit, Variable
-from description_parts import (
-    add_experiment,
-    add_items,
-    add_log_categories,
-    add_units,
-    document,
-    texts_of,
-    type_name,
-    value_attributes,
-)
 from program import Provenance
 
-TYPES = {
-    "float64": "Real",
-    "int32": "Integer",
-    "enumeration": "Enumeration",
-    "boolean": "Boolean",
-}
+TYPES = {"float64": "Real", "int32": "Integer", "enumeration": "Enumeration", "boolean": "Boolean"}
 
 
 def model_description(
@@ -39,29 +23,28 @@ def model_description(
         fmiVersion="2.0",
         modelName=model.name,
         guid=declaration.guid,
-        **texts_of(declaration, provenance),
+        **description_parts.texts_of(declaration, provenance),
         variableNamingConvention="flat",
         numberOfEventIndicators=str(len(model.event_indicators)),
     )
     add_interfaces(root, model.name, sources)
-    add_units(root, declaration.units)
+    description_parts.add_units(root, declaration.units)
     add_types(root, variables)
-    add_log_categories(root, "fmi2")
-    add_experiment(root, declaration.experiment)
+    description_parts.add_log_categories(root, "fmi2")
+    description_parts.add_experiment(root, declaration.experiment)
     scalars = ET.SubElement(root, "ModelVariables")
     for name, variable in variables.items():
         add_variable(scalars, name, variable, index, declaration.units)
     add_structure(root, variables, index)
-    return document(root)
+    return description_parts.document(root)
 
 
 def with_aliases(declaration: Declaration) -> dict[str, Variable]:
-    """All variables, and after each state that is the derivative of another one its alias.
+    """Return all variables, and after each state that is the derivative of another one its alias.
 
     Importers expect each state derivative among the initial unknowns, and no variable that has a
-    start value, as states do. So the alias, der_STATE, is the derivative: it has the value
-    reference of the state, and no start value. The state is not marked as a derivative: importers
-    take each variable that is for the derivative of a further state.
+    start value, as states do. So the alias, der_STATE, is the derivative, with the state's value
+    reference and no start value; marked themselves, states would be for a further state.
     """
     variables: dict[str, Variable] = {}
     for name, variable in declaration.variables.items():
@@ -113,30 +96,22 @@ def add_types(root: ET.Element, variables: dict[str, Variable]) -> None:
         return
     definitions = ET.SubElement(root, "TypeDefinitions")
     for name, variable in enumerations.items():
-        simple = ET.SubElement(definitions, "SimpleType", name=type_name(name))
+        simple = ET.SubElement(definitions, "SimpleType", name=description_parts.type_name(name))
         enumeration = ET.SubElement(simple, "Enumeration")
-        add_items(enumeration, variable)
+        description_parts.add_items(enumeration, variable)
 
 
 def add_variable(
     parent: ET.Element, name: str, variable: Variable, index: dict[str, str], units: dict[str, Unit]
 ) -> None:
-    attributes = {
-        "description": variable.description,
-        "causality": variable.causality,
-        "variability": variable.variability,
-        "initial": variable.initial,
-    }
-    scalar = ET.SubElement(
-        parent,
-        "ScalarVariable",
-        name=name,
-        valueReference=str(variable.reference),
-        **{key: text for key, text in attributes.items() if text},
-    )
+    keys = {"name": name, "valueReference": str(variable.reference)}
+    for key in ("description", "causality", "variability", "initial"):
+        if text := getattr(variable, key):
+            keys[key] = text
+    scalar = ET.SubElement(parent, "ScalarVariable", keys)
     element = ET.SubElement(scalar, TYPES[variable.type])
     if isinstance(variable, Enumeration):
-        element.set("declaredType", type_name(name))
+        element.set("declaredType", description_parts.type_name(name))
     if isinstance(variable, Float64):
         element.set("unit", variable.unit)
         for display in list(units[variable.unit].display)[:1]:
@@ -145,7 +120,7 @@ def add_variable(
         element.set("derivative", index[variable.derivative_of])
     if variable.reinit:
         element.set("reinit", "true")
-    for key, text in value_attributes(variable).items():
+    for key, text in description_parts.value_attributes(variable).items():
         element.set(key, text)
     if isinstance(variable, Float64) and variable.nominal is not None:
         element.set("nominal", repr(variable.nominal))

@@ -6,8 +6,7 @@
  * in configuration mode. Some functions answer in more states, because importers call them there:
  * those that return constants in every state, fmi3SetTime and fmi3GetOutputDerivatives in event
  * mode. */
-#ifndef FMI3_CALLS_H
-#define FMI3_CALLS_H
+#pragma once
 
 #include "component.h"
 #include "fmi3Functions.h"
@@ -129,5 +128,3 @@ bool fmi3_check_count(struct component *component, enum fmi3_call call, size_t c
  * component_fail. Other modes are not checked here. */
 bool fmi3_check_access(struct component *component, unsigned call, bool setting,
                        const fmi3ValueReference references[], size_t count);
-
-#endif

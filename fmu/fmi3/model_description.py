@@ -1,33 +1,17 @@
 """Writes the XML files of FMI 3.0: modelDescription.xml (section 2.4 of the specification),
 terminalsAndIcons.xml (section 2.4.9) and buildDescription.xml (section 2.5.1.4.1)."""
 
-from __future__ import annotations
-
 import struct
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import description_parts
 from declaration.load import Declaration
 from declaration.schema import Enumeration, Float64, Terminal, Unit, Variable
-from description_parts import (
-    add_experiment,
-    add_items,
-    add_log_categories,
-    add_units,
-    document,
-    texts_of,
-    type_name,
-    value_attributes,
-)
 from program import Provenance
 
-TYPES = {
-    "float64": "Float64",
-    "int32": "Int32",
-    "enumeration": "Enumeration",
-    "boolean": "Boolean",
-}
+TYPES = {"float64": "Float64", "int32": "Int32", "enumeration": "Enumeration", "boolean": "Boolean"}
 HALF_WIDTH = 100.0  # of the icon, in units of the coordinate system
 MM_PER_UNIT = 0.1
 PNG_START = b"\x89PNG\r\n\x1a\n"
@@ -40,19 +24,19 @@ def model_description(declaration: Declaration, provenance: Provenance) -> str:
         fmiVersion="3.0",
         modelName=model.name,
         instantiationToken=declaration.token("fmi3"),
-        **texts_of(declaration, provenance),
+        **description_parts.texts_of(declaration, provenance),
         variableNamingConvention="flat",
     )
     add_interfaces(root, model.name, has_events=model.has_events)
-    add_units(root, declaration.units)
+    description_parts.add_units(root, declaration.units)
     add_types(root, declaration)
-    add_log_categories(root, "fmi3")
-    add_experiment(root, declaration.experiment)
+    description_parts.add_log_categories(root, "fmi3")
+    description_parts.add_experiment(root, declaration.experiment)
     elements = ET.SubElement(root, "ModelVariables")
     for name, variable in variables.items():
         add_variable(elements, name, variable, declaration)
     add_structure(root, declaration)
-    return document(root)
+    return description_parts.document(root)
 
 
 def add_interfaces(root: ET.Element, identifier: str, *, has_events: bool) -> None:
@@ -91,20 +75,20 @@ def add_types(root: ET.Element, declaration: Declaration) -> None:
             add_float_type(definitions, variable, declaration.units)
     for name, variable in declaration.variables.items():
         if isinstance(variable, Enumeration):
-            enumeration = ET.SubElement(definitions, "EnumerationType", name=type_name(name))
-            add_items(enumeration, variable)
+            type_name = description_parts.type_name(name)
+            enumeration = ET.SubElement(definitions, "EnumerationType", name=type_name)
+            description_parts.add_items(enumeration, variable)
 
 
 def float_type_name(variable: Float64) -> str:
-    """Name of the type of a floating-point number, for example "Float64 in rad/s"."""
+    """Return the name of the type of a floating-point number, for example "Float64 in rad/s"."""
     nominal = "" if variable.nominal is None else f", nominal {variable.nominal!r}"
     return f"Float64 in {variable.unit}{nominal}"
 
 
 def add_float_type(parent: ET.Element, variable: Float64, units: dict[str, Unit]) -> None:
-    element = ET.SubElement(
-        parent, "Float64Type", name=float_type_name(variable), unit=variable.unit
-    )
+    keys = {"name": float_type_name(variable), "unit": variable.unit}
+    element = ET.SubElement(parent, "Float64Type", keys)
     for display in list(units[variable.unit].display)[:1]:
         element.set("displayUnit", display)
     if variable.nominal is not None:
@@ -112,7 +96,7 @@ def add_float_type(parent: ET.Element, variable: Float64, units: dict[str, Unit]
 
 
 def has_intermediate_update(variable: Variable) -> bool:
-    """Whether the variable can be accessed inside a step, as fmi3.c has it."""
+    """Return whether the variable can be accessed inside a step, as fmi3.c has it."""
     is_continuous = isinstance(variable, Float64) and variable.variability == "continuous"
     return is_continuous and variable.owner == "model" and variable.causality in ("input", "output")
 
@@ -120,19 +104,13 @@ def has_intermediate_update(variable: Variable) -> bool:
 def add_variable(
     parent: ET.Element, name: str, variable: Variable, declaration: Declaration
 ) -> None:
-    element = ET.SubElement(
-        parent,
-        TYPES[variable.type],
-        name=name,
-        valueReference=str(variable.reference),
-        description=variable.description,
-        causality=variable.causality,
-        variability=variable.variability,
-    )
+    keys = {"name": name, "valueReference": str(variable.reference)}
+    keys |= {key: getattr(variable, key) for key in ("description", "causality", "variability")}
+    element = ET.SubElement(parent, TYPES[variable.type], keys)
     if variable.initial is not None:
         element.set("initial", variable.initial)
     if isinstance(variable, Enumeration):
-        element.set("declaredType", type_name(name))
+        element.set("declaredType", description_parts.type_name(name))
     if isinstance(variable, Float64):
         element.set("declaredType", float_type_name(variable))
     if has_intermediate_update(variable):
@@ -142,7 +120,7 @@ def add_variable(
         element.set("derivative", str(state.reference))
     if variable.reinit:
         element.set("reinit", "true")
-    for key, text in value_attributes(variable).items():
+    for key, text in description_parts.value_attributes(variable).items():
         element.set(key, text)
 
 
@@ -152,13 +130,11 @@ def add_structure(root: ET.Element, declaration: Declaration) -> None:
     structure = ET.SubElement(root, "ModelStructure")
     states = {v.derivative_of for v in variables.values() if v.derivative_of is not None}
     derivatives = {v.derivative_of: n for n, v in variables.items() if v.derivative_of is not None}
+    calculated = [n for n, v in variables.items() if v.is_unknown and v.initial == "calculated"]
     for section, names in (
         ("Output", [n for n, v in variables.items() if v.causality == "output"]),
         ("ContinuousStateDerivative", [derivatives[n] for n in variables if n in states]),
-        (
-            "InitialUnknown",
-            [n for n, v in variables.items() if v.is_unknown and v.initial == "calculated"],
-        ),
+        ("InitialUnknown", calculated),
         ("EventIndicator", declaration.model.event_indicators),
     ):
         for name in names:
@@ -166,29 +142,20 @@ def add_structure(root: ET.Element, declaration: Declaration) -> None:
             later = (unknown.dependencies or []) + unknown.parameters
             is_initial = section == "InitialUnknown"
             knowns = unknown.initial_knowns(variables) if is_initial else later
-            ET.SubElement(
-                structure,
-                section,
-                valueReference=str(unknown.reference),
-                dependencies=" ".join(
-                    str(reference)
-                    for reference in sorted(variables[known].reference for known in knowns)
-                ),
-            )
+            dependencies = map(str, sorted(variables[known].reference for known in knowns))
+            keys = {"valueReference": str(unknown.reference)}
+            ET.SubElement(structure, section, keys, dependencies=" ".join(dependencies))
 
 
 def terminals_and_icons(declaration: Declaration) -> str:
-    """Return the text of terminalsAndIcons.xml.
-
-    The icon is model.png beside the declaration, if it exists.
-    """
+    """Return the text of terminalsAndIcons.xml; the icon is model.png beside the declaration."""
     root = ET.Element("fmiTerminalsAndIcons", fmiVersion="3.0")
     icon = declaration.path.with_name("model.png")
     if icon.is_file():
         add_icon(root, icon)
     if declaration.terminals:
         add_terminals(ET.SubElement(root, "Terminals"), declaration.terminals)
-    return document(root)
+    return description_parts.document(root)
 
 
 def add_icon(root: ET.Element, icon: Path) -> None:
@@ -198,9 +165,8 @@ def add_icon(root: ET.Element, icon: Path) -> None:
     box = {"x1": -HALF_WIDTH, "y1": -half_height, "x2": HALF_WIDTH, "y2": half_height}
     corners = {key: repr(value) for key, value in box.items()}
     graphics = ET.SubElement(root, "GraphicalRepresentation")
-    ET.SubElement(
-        graphics, "CoordinateSystem", corners, suggestedScalingFactorTo_mm=repr(MM_PER_UNIT)
-    )
+    scale = {"suggestedScalingFactorTo_mm": repr(MM_PER_UNIT)}
+    ET.SubElement(graphics, "CoordinateSystem", corners | scale)
     ET.SubElement(graphics, "Icon", corners)
 
 
@@ -214,32 +180,19 @@ def png_size(path: Path) -> tuple[int, int]:
 def add_terminals(parent: ET.Element, terminals: Mapping[str, Terminal]) -> None:
     """Write terminals, each with its members and the terminals in it."""
     for name, terminal in terminals.items():
-        element = ET.SubElement(
-            parent,
-            "Terminal",
-            name=name,
-            matchingRule=terminal.rule,
-            description=terminal.description,
-        )
+        keys = {"name": name, "matchingRule": terminal.rule, "description": terminal.description}
+        element = ET.SubElement(parent, "Terminal", keys)
         for kind, member, variable in terminal.members:
-            ET.SubElement(
-                element,
-                "TerminalMemberVariable",
-                variableName=variable,
-                memberName=member,
-                variableKind=kind,
-            )
+            keys = {"variableName": variable, "memberName": member, "variableKind": kind}
+            ET.SubElement(element, "TerminalMemberVariable", keys)
         add_terminals(element, terminal.terminals)
 
 
 def build_description(identifier: str, sources: Sequence[str]) -> str:
-    """Return the text of buildDescription.xml.
-
-    sources: files beside it, each compiled by itself.
-    """
+    """Return the text of buildDescription.xml; `sources` beside it are compiled one by one."""
     root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
     files = ET.SubElement(configuration, "SourceFileSet", language="C11")
     for name in sources:
         ET.SubElement(files, "SourceFile", name=name)
-    return document(root)
+    return description_parts.document(root)

@@ -280,10 +280,7 @@ class Guards:
 
 
 class Scope:
-    """Texts of the values that are known in a block and those around it.
-
-    wanted: the values that this block is for.
-    """
+    """Texts of known values in a block and around it; the block is for values `wanted`."""
 
     def __init__(self, path: Path, wanted: set[Value], outer: Scope | None = None) -> None:
         self.path, self.wanted, self.outer = path, wanted, outer
@@ -301,11 +298,7 @@ class Scope:
 
 
 class Blocks:
-    """Statements that give targets, lvalues of C, their values.
-
-    names: what values are called. enumerators: names of whole numbers, by an integer leaf. taken:
-    names that are not free.
-    """
+    """Statements that give lvalues of C (`targets`) values; `enumerators` name whole numbers."""
 
     def __init__(
         self,

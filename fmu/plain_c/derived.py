@@ -116,10 +116,9 @@ class Curve:
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is to be derived from a function.
+    """A "jacobian", "rates" (first derivatives along a curve) or "derivatives" (both) to derive.
 
-    kind: "jacobian", "rates" (first derivatives along a curve) or "derivatives" (first and second).
-    of: the arguments that it writes, if not of all. by: the arguments that move.
+    `of`: the arguments that the function writes, if not of all. `by`: the arguments that move.
     """
 
     name: str
@@ -282,9 +281,8 @@ class Function:
 
     def _variables(self) -> list[Place]:
         """Return parts of the arguments that move, in their order."""
-        return [
-            place for name in self.wanted.by for place in self._parts((name,), self.kinds[name])
-        ]
+        moving = self.wanted.by
+        return [place for name in moving for place in self._parts((name,), self.kinds[name])]
 
     def _parts(self, place: Place, kind: Any) -> list[Place]:
         kind = pointed(kind)
@@ -435,7 +433,7 @@ def c_name(kind: Any) -> str:
 
 
 def parameter_name(text: str) -> str:
-    """Name of a parameter in its declaration."""
+    """Return the name of a parameter in its declaration."""
     return text.replace("*", " ").split()[-1].partition("[")[0]
 
 

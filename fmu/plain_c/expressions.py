@@ -1,7 +1,5 @@
 """Expressions of interpreted C: their types and values."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -39,8 +37,8 @@ ARGUMENTS |= dict.fromkeys(ROUNDING, 1)
 class Expressions(Memory):
     """Calculates expressions.
 
-    doubles_move: double is a number with derivatives, as real is. is_exact: operations with 0 and 1
-    stay, which keeps signs of zeros. warn: gets warnings.
+    doubles_move: double has derivatives, as real. is_exact: operations with 0 and 1 stay, which
+    keeps signs of zeros. warn: gets warnings.
     """
 
     def __init__(

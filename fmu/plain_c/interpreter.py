@@ -43,10 +43,7 @@ class Interpreter(Expressions):
     # ---- Functions -------------------------------------------------------------------------------
 
     def run(self, name: str, leaf_of: LeafOf) -> tuple[Any, dict[tuple[str | int, ...], Any]]:
-        """Run a function; return its result, and what it writes to its arguments, by their paths.
-
-        leaf_of gives the parts of arguments that the function reads.
-        """
+        """Run a function; return result and writes, by paths. `leaf_of` gives what it reads."""
         try:
             return self._run(name, leaf_of)
         except RecursionError:

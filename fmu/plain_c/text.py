@@ -4,8 +4,6 @@ A small preprocessor reads include guards and `#include "name.h"`; pycparser rea
 rules that users read are in models/README.md.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -151,11 +149,7 @@ def _joined(found: re.Match[str]) -> str:
 
 # ---- Parser --------------------------------------------------------------------------------------
 def read(path: Path, folders: Iterable[Path] = (), ignored: Iterable[str] = ()) -> Program:
-    """Read the declarations of a file, with all that it includes.
-
-    folders: where included files are, besides the file's own folder. ignored: names of headers that
-    are not opened.
-    """
+    """Read the declarations of a file, with includes from `folders` but for `ignored` headers."""
     preprocessor = Preprocessor(folders, ignored)
     preprocessor.add(path)
     text = '# 1 "prelude"\n' + PRELUDE + "\n".join(preprocessor.lines)

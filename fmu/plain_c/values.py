@@ -4,8 +4,6 @@ A whole number is an int, a table over an integer leaf, or a choice. What is kno
 the text resolves conditions: a mode that is 2 is not 3.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -25,10 +23,7 @@ MIRRORED = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "==", "!=": "!="}
 
 @dataclass(frozen=True)
 class Table:
-    """What follows from an integer leaf: a result for each of its possible values.
-
-    results is None for a leaf whose possible values are not known: the leaf itself.
-    """
+    """Results for all values of an integer leaf; None: the leaf itself, of unknown values."""
 
     leaf: Value
     results: tuple[tuple[int, Any], ...] | None

@@ -56,8 +56,6 @@ def study_coupling(ssp: Path, report: Path) -> dict[str, dict[str, object]]:
 
 
 # ---- Picture of a run ----------------------------------------------------------------------------
-
-
 def figure(ssp: Ssp, outcome: Outcome) -> Figure:
     """Joints over their references, tracking errors, efforts, and the end effector's path."""
     with mpl.rc_context(STYLE):

@@ -39,11 +39,10 @@ Columns = dict[str, np.ndarray]
 
 @dataclass(frozen=True)
 class Method:
-    """One way to step the machine.
+    """A way to step the machine.
 
-    The payload changes at 0.2005 s and 3.7005 s. These are communication points for the master,
-    which passes the change on at once. For Ecos, whose times are sums of steps, they are in the
-    middle of a step, so that the payload always changes half a step later.
+    The payload changes at 0.2005 s and 3.7005 s: points for the master, which passes it on at once;
+    in the middle of a step for Ecos, whose times are sums of steps, so that it is half a step late.
     """
 
     name: str
@@ -53,19 +52,12 @@ class Method:
     inputs: str = "held"
 
 
+FEWER = (4000, 6000, 8000, 12000, 16000)  # steps per second
 METHODS = (
     Method("Ecos", 1, (5000, 7000, 9000, 11000, 13000, 15000)),
     Method("Jacobi, inputs held", 1, (4000, 6000, 8000, 10000, 12000, 16000), "jacobi"),
-    Method(
-        "Jacobi, inputs extrapolated", 2, (4000, 6000, 8000, 12000, 16000), "jacobi", "extrapolated"
-    ),
-    Method(
-        "Gauss-Seidel, inputs extrapolated",
-        2,
-        (4000, 6000, 8000, 12000, 16000),
-        "gauss_seidel",
-        "extrapolated",
-    ),
+    Method("Jacobi, inputs extrapolated", 2, FEWER, "jacobi", "extrapolated"),
+    Method("Gauss-Seidel, inputs extrapolated", 2, FEWER, "gauss_seidel", "extrapolated"),
 )
 
 
@@ -78,7 +70,7 @@ def parameters(opened: Ssp, variant: str) -> dict[str, dict[str, Value]]:
 
 
 def reference(variant: str) -> Columns:
-    """Columns of the solution in continuous time, by name."""
+    """Return columns of the solution in continuous time, by name."""
     path = project.references(FOLDER) / variant / "monolithic.csv"
     names, table = files.read_trajectory(path, files.csv_failure(path))
     return dict(zip(names, table.T, strict=True))
@@ -92,7 +84,7 @@ def run(
     per_second: int,
     stop: float = STOP,
 ) -> Columns:
-    """Values at the times of the reference up to `stop` in s, by name."""
+    """Return values at the times of the reference up to `stop` in s, by name."""
     every = per_second // ROWS_PER_SECOND
     values = parameters(opened, variant)
     if not method.order:
@@ -106,10 +98,10 @@ def run(
 
 
 def limit(runs: Sequence[Columns], per_second: Sequence[int], power: int) -> tuple[Columns, float]:
-    """Values for a step that goes to 0, and by which factor rounding of the runs grows at most.
+    """Return values for a step that goes to 0, and by which factor rounding of runs grows at most.
 
-    The `runs` differ by their steps. Errors are taken for a polynomial in the step that begins with
-    `power` and has as many terms as there are runs but one.
+    The `runs` differ by their steps. Errors are a polynomial in the step from `power` on, with as
+    many terms as there are runs but one.
     """
     steps = per_second[0] / np.array(per_second)
     terms = steps[:, None] ** np.array([0, *range(power, power + len(runs) - 1)])
@@ -122,10 +114,9 @@ def limit(runs: Sequence[Columns], per_second: Sequence[int], power: int) -> tup
 
 
 def largest_error(columns: Columns, expected: Columns) -> tuple[float, str]:
-    """Largest difference of all variables, relative to the largest value of each, and whose it is.
+    """Return the largest difference relative to the largest value of each variable, and its name.
 
-    As the errors of `rparm.runs.comparison`, but never relative to a sum. `columns` have the first
-    rows of `expected`, or all.
+    No error is relative to a sum, as in `rparm.runs.comparison`. `columns` may have fewer rows.
     """
     errors = {
         name: float(
@@ -140,14 +131,12 @@ def largest_error(columns: Columns, expected: Columns) -> tuple[float, str]:
 
 
 def tracking_error(columns: Columns) -> float:
-    """Largest distance of the end effector from its reference, m."""
+    """Return the largest distance of the end effector from its reference, m."""
     away = (columns[f"plant.ee_{x}"] - columns[f"trajectory.ee_{x}_ref"] for x in "xy")
     return float(np.hypot(*away).max())
 
 
 # ---- the picture ---------------------------------------------------------------------------------
-
-
 def draw(measured: Mapping[tuple[str, str], tuple[list[float], float]]) -> Figure:
     """Errors over the step, and the error of the limit, by variant and method."""
     with mpl.rc_context(STYLE):

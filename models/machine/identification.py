@@ -28,12 +28,7 @@ TRUE = {
     "coulomb_friction2": 0.6,
 }
 # what a data sheet would say
-START = {
-    "damping1": 0.2,
-    "damping2": 5.0,
-    "coulomb_friction1": 0.3,
-    "coulomb_friction2": 0.5,
-}
+START = {"damping1": 0.2, "damping2": 5.0, "coulomb_friction1": 0.3, "coulomb_friction2": 0.5}
 FLAT = {"g": 0.0}
 CIRCLE = {
     "start_time": 0.2,

@@ -24,7 +24,7 @@ EXPERIMENT = (START, STOP, 1 / STEPS_PER_SECOND)
 
 
 def contact_force(outcome: Outcome) -> float:
-    """Largest force of the wall, N."""
+    """Return the largest force of the wall, N."""
     return float(np.max(outcome.column("environment.wall_force")))
 
 
@@ -69,8 +69,6 @@ REST = Rest(
 
 
 # ---- Picture of a run ----------------------------------------------------------------------------
-
-
 def figure(ssp: Ssp, outcome: Outcome) -> Figure:
     """Joints over their references, errors, efforts, modes, motors, wall, and the path."""
     with mpl.rc_context(STYLE):

@@ -23,7 +23,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from rparm.models.machine.systems import SEQUENCE, direct, run_in_ecos, write_system
+from rparm.models.machine.systems import SEQUENCE, direct, run_in_ecos
 
 from rparm import project
 from rparm.fmi.fmu_file import Fmu
@@ -35,7 +35,6 @@ from rparm.systems.ssp import Ssp
 FOLDER = Path(__file__).resolve().parent
 
 # ---- Theory --------------------------------------------------------------------------------------
-
 State = tuple[float, ...]
 Step = Callable[["Contact", float, State], State]
 
@@ -65,21 +64,15 @@ class Contact:
 def least_damping(
     contact: Contact, step: float, order: str = "jacobi", inputs: str = "held"
 ) -> float:
-    """Damping above which the contact is stable, to leading order in the step, N.s/m.
-
-    The step (s) is small against the period of the contact, whose damping is not used; with held
-    inputs neither is its mass.
-    """
+    """Return the damping (N.s/m) above which a contact is stable, to leading order of a step."""
     if inputs == "held":
         return AGE[order] * step * contact.stiffness
     return EXTRAPOLATED[order] * contact.stiffness**2 * step**3 / contact.mass
 
 
 # ---- The discrete loop, exactly ------------------------------------------------------------------
-
-
 def _moved(contact: Contact, h: float, x: float, v: float, f: float, df: float) -> State:
-    """Position, velocity and acceleration after a step with the force f + df t against x."""
+    """Return position, velocity and acceleration after a step with the force f + df t against x."""
     m = contact.mass
     return (
         x + h * v - (f / 2 + df * h / 6) * h**2 / m,
@@ -127,12 +120,11 @@ _STEPS: dict[tuple[str, str], tuple[Step, int]] = {
 def transition(
     contact: Contact, step: float, order: str = "jacobi", inputs: str = "held"
 ) -> np.ndarray:
-    """Matrix that leads from one communication point to the next, shape (n, n).
+    """Return the matrix from one communication point to the next, shape (n, n).
 
-    The state is the deviation from the equilibrium: depth (m) and velocity into the wall (m/s),
-    then the past on which the next step depends. In Jacobi order it is the force (N) on the mass,
-    in Gauss-Seidel order nothing; with extrapolated inputs it is force and slope (N/s), in Jacobi
-    order after the acceleration (m/s2).
+    It acts on depth (m) and velocity (m/s) from the equilibrium, then on the past: in Jacobi order
+    the force (N) on the mass; with extrapolated inputs force and slope (N/s), in Jacobi order after
+    the acceleration (m/s2).
     """
     function, size = _STEPS[order, inputs]
     return np.array([function(contact, step, tuple(unit)) for unit in np.eye(size).tolist()]).T
@@ -141,7 +133,7 @@ def transition(
 def eigenvalues(
     contact: Contact, step: float, order: str = "jacobi", inputs: str = "held"
 ) -> np.ndarray:
-    """Eigenvalues of `transition`, the largest first, shape (n,)."""
+    """Return eigenvalues of `transition`, the largest first, shape (n,)."""
     found = np.linalg.eigvals(transition(contact, step, order, inputs))
     return found[np.argsort(-np.abs(found))]
 
@@ -176,7 +168,6 @@ def exact_least_damping(
 
 
 # ---- The machine ---------------------------------------------------------------------------------
-
 # The slide, pushed by a constant force, rests in the wall and is moved a little out of its
 # equilibrium. The depth then obeys x_n+2 = s x_n+1 - p x_n + c, and p, the square of the factor of
 # growth in a step, is 1 at the limit.
@@ -230,8 +221,6 @@ def _product(depth: np.ndarray) -> float:
 
 
 # ---- Ecos ----------------------------------------------------------------------------------------
-
-
 def in_ecos(opened: Ssp) -> Measure:
 
     def measure(stiffness: float, damping: float) -> np.ndarray:
@@ -241,14 +230,7 @@ def in_ecos(opened: Ssp) -> Measure:
     return measure
 
 
-def write_pressed(opened: Ssp, path: Path, stiffness: float, damping: float) -> None:
-    """An SSP of the machine whose slide is pressed to the wall."""
-    write_system(opened, path, pressed(stiffness, damping), STEPS * STEP, STEP)
-
-
 # ---- rparm's master ------------------------------------------------------------------------------
-
-
 def under_master(opened: Ssp, fmus: Mapping[str, Fmu], order: str, inputs: str) -> Measure:
     """Runs the machine under rparm's master; the controller sees the joints themselves."""
     connections = direct(opened.system.connections)
@@ -265,8 +247,6 @@ def under_master(opened: Ssp, fmus: Mapping[str, Fmu], order: str, inputs: str) 
 
 
 # ---- the picture ---------------------------------------------------------------------------------
-
-
 def draw(measured: Mapping[str, list[float]], in_engine: list[float]) -> Figure:
     """Limits over the stiffness: theory, exact eigenvalues, and what has been measured."""
     with mpl.rc_context(STYLE):

@@ -4,8 +4,7 @@
  * Arrays have one element per joint: torques and angles of joint 1 (N.m, rad), forces and
  * displacements of joint 2 (N, m). A gear ratio is motor angle over joint variable (1, rad/m). The
  * functions of rp_actuator_equations.h are pure and take their arguments as they are. */
-#ifndef RP_ACTUATOR_H
-#define RP_ACTUATOR_H
+#pragma once
 
 struct rp_actuator_parameters {
     double torque_constant[2]; /* k in N.m/A, > 0; the back-EMF constant in V.s/rad is the same */
@@ -20,5 +19,3 @@ struct rp_actuator_inputs {
     double effort_cmd[2]; /* N.m, N */
     double dq[2];         /* rad/s, m/s */
 };
-
-#endif

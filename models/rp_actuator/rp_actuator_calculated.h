@@ -1,6 +1,5 @@
 /* The calculated fields of struct rp_actuator_values. */
-#ifndef RP_ACTUATOR_CALCULATED_H
-#define RP_ACTUATOR_CALCULATED_H
+#pragma once
 
 #include "rp_actuator_equations.h"
 #include "rp_actuator_model.h"
@@ -29,5 +28,3 @@ void rp_actuator_jacobian(const struct rp_actuator_parameters *p,
  * its limits; at and beyond one it moves as this limit does. */
 void rp_actuator_derivatives(const struct rp_actuator_values *values,
                              struct rp_actuator_values *first, struct rp_actuator_values *second);
-
-#endif

@@ -1,6 +1,5 @@
 /* The equations of a drive. rp_actuator.h explains symbols and limits. */
-#ifndef RP_ACTUATOR_EQUATIONS_H
-#define RP_ACTUATOR_EQUATIONS_H
+#pragma once
 
 #include "real.h"
 #include "rp_actuator.h"
@@ -61,5 +60,3 @@ static inline void drive_current_rates(const struct rp_actuator_parameters *p,
         rates[i] = drive_current_rate(p, limited, current[i], i);
     }
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* The drives as the instance runs them: their value structure, to which variables.toml binds the
  * variables, and their struct model. */
-#ifndef RP_ACTUATOR_MODEL_H
-#define RP_ACTUATOR_MODEL_H
+#pragma once
 
 #include "model.h"
 #include "rp_actuator.h"
@@ -19,5 +18,3 @@ struct rp_actuator_values {
 };
 
 extern const struct model rp_actuator_model;
-
-#endif

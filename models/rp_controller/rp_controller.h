@@ -4,8 +4,7 @@
  * Arrays have one element per joint: angles and torques of joint 1 (rad, N.m), displacements and
  * forces of joint 2 (m, N), with their rates. All functions are pure: they read their inputs, write
  * their trailing outputs, keep nothing, allocate nothing. Inputs are taken as they are. */
-#ifndef RP_CONTROLLER_H
-#define RP_CONTROLLER_H
+#pragma once
 
 #include "rp_manipulator.h"
 
@@ -53,5 +52,3 @@ struct rp_controller_inputs {
  *
  * The efforts are u brought into [-limit, limit]. Rates of the integral parts (rad/s3, m/s3):
  * Ki e + (effort - u) / (M tracking_time) where Ki > 0, else 0. */
-
-#endif

@@ -1,6 +1,5 @@
 /* The calculated fields of struct rp_controller_values. */
-#ifndef RP_CONTROLLER_CALCULATED_H
-#define RP_CONTROLLER_CALCULATED_H
+#pragma once
 
 #include "rp_controller_law.h"
 #include "rp_controller_model.h"
@@ -47,5 +46,3 @@ void rp_controller_jacobian(const struct rp_controller_parameters *p, bool attac
 void rp_controller_derivatives(const struct rp_controller_values *values,
                                struct rp_controller_values *first,
                                struct rp_controller_values *second);
-
-#endif

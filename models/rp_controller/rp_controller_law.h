@@ -1,6 +1,5 @@
 /* The control law, which rp_controller.h explains. */
-#ifndef RP_CONTROLLER_LAW_H
-#define RP_CONTROLLER_LAW_H
+#pragma once
 
 #include "rp_controller.h"
 #include "rp_payload.h"
@@ -89,5 +88,3 @@ static inline void law_integral_rates(const struct rp_controller_parameters *p, 
         rates[i] = law_integral_rate(p, inputs, unlimited[i], i);
     }
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* The controller as the instance runs it: its value structure, to which variables.toml binds the
  * variables, and its struct model. */
-#ifndef RP_CONTROLLER_MODEL_H
-#define RP_CONTROLLER_MODEL_H
+#pragma once
 
 #include "model.h"
 #include "rp_controller.h"
@@ -47,5 +46,3 @@ struct rp_controller_values {
 };
 
 extern const struct model rp_controller_model;
-
-#endif

@@ -31,7 +31,7 @@ def acting(recorded: Recorded, name: str) -> np.ndarray | None:
 
 
 def ghost(recorded: Recorded) -> dict[str, np.ndarray] | None:
-    """Joint variables of the reference, unless it covers the arm."""
+    """Return joint variables of the reference, unless it covers the arm."""
     if not recorded.references:
         return None
     reference = {name: recorded.references[name] for name in JOINTS}
@@ -40,6 +40,6 @@ def ghost(recorded: Recorded) -> dict[str, np.ndarray] | None:
 
 
 def geometry(values: Mapping[str, Value]) -> dict[str, Any]:
-    """Lengths of the arm in m, and gravity in m/s2."""
+    """Return lengths of the arm in m, and gravity in m/s2."""
     lengths = {name: values[name] for name in ("a", "l1", "lc1", "g")}
     return lengths | {"stops": None, "wall": None, "payload": None}

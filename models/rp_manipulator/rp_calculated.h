@@ -1,6 +1,5 @@
 /* The right-hand side and the calculated fields of struct rp_values. */
-#ifndef RP_CALCULATED_H
-#define RP_CALCULATED_H
+#pragma once
 
 #include "rp_model.h"
 #include "rp_recursion.h"
@@ -46,5 +45,3 @@ void rp_jacobian(const struct rp_parameters *p, const double x[4], const double 
  * The other fields of first and second give the curve. */
 void rp_derivatives(const struct rp_values *values, struct rp_values *first,
                     struct rp_values *second);
-
-#endif

@@ -1,8 +1,7 @@
 /* The equations of the notes, (1)-(15): kinematics and the Euler-Lagrange formulation. See
  * rp_manipulator.h for equation numbers, frames and symbols. A comment that begins with a number
  * stands above this equation of the notes. */
-#ifndef RP_EQUATIONS_H
-#define RP_EQUATIONS_H
+#pragma once
 
 #include "real.h"
 #include "rp_manipulator.h"
@@ -188,5 +187,3 @@ static inline void arm_accelerations(const struct rp_parameters *p, const real q
     const struct arm arm = arm_in_state(p, q, dq);
     arm_forward_dynamics(&arm, tau, ddq);
 }
-
-#endif

@@ -14,8 +14,7 @@
  * All functions are pure: they read their inputs, write their trailing outputs, keep nothing,
  * allocate nothing. Inputs are taken as they are; results for parameters that
  * rp_parameters_check refuses, and for states that overflow, may be infinite or NaN. */
-#ifndef RP_MANIPULATOR_H
-#define RP_MANIPULATOR_H
+#pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -43,5 +42,3 @@ struct rp_joint_loads {
     double f2[3];   /* N; f2[2] drives joint 2 */
     double tau2[3]; /* N.m */
 };
-
-#endif

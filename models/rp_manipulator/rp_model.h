@@ -1,7 +1,6 @@
 /* The manipulator as the instance runs it: its value structure, to which variables.toml binds the
  * variables, and its struct model. */
-#ifndef RP_MODEL_H
-#define RP_MODEL_H
+#pragma once
 
 #include "model.h"
 #include "rp_manipulator.h"
@@ -27,5 +26,3 @@ struct rp_values {
 };
 
 extern const struct model rp_model;
-
-#endif

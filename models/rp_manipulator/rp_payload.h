@@ -1,6 +1,5 @@
 /* A body fixed to link 2. */
-#ifndef RP_PAYLOAD_H
-#define RP_PAYLOAD_H
+#pragma once
 
 #include "rp_equations.h"
 
@@ -29,5 +28,3 @@ static inline void arm_attach(struct arm *arm, const struct payload *payload, re
     arm->L = arm->l1 + arm->q[1];
     arm->J = arm->m1 * arm->lc1 * arm->lc1 + arm->I1z + arm->I2z + arm->m2 * arm->L * arm->L;
 }
-
-#endif

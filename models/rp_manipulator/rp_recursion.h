@@ -1,8 +1,7 @@
 /* The Newton-Euler recursion of the notes, (16)-(27). It shares no equation of motion with
  * rp_equations.h, which it checks. A comment that begins with a number stands above this equation
  * of the notes. */
-#ifndef RP_RECURSION_H
-#define RP_RECURSION_H
+#pragma once
 
 #include "rp_equations.h"
 
@@ -139,5 +138,3 @@ static inline struct joint_loads loads_of_motion(const struct arm *arm, const re
     loads.tau1.y = moving_as(loads.tau1.y, tau[0]);
     return loads;
 }
-
-#endif

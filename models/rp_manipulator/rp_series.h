@@ -1,6 +1,5 @@
 /* The Taylor series of the arm's motion. */
-#ifndef RP_SERIES_H
-#define RP_SERIES_H
+#pragma once
 
 #include "model.h"
 #include "rp_manipulator.h"
@@ -16,5 +15,3 @@ extern const struct series rp_series;
 void rp_series_extend(const struct rp_parameters *parameters, const double friction[2],
                       const struct series_origin *origin, int first, int last,
                       double row[][SERIES_LENGTH]);
-
-#endif

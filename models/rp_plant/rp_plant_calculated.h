@@ -1,6 +1,5 @@
 /* The calculated fields of struct rp_plant_values. */
-#ifndef RP_PLANT_CALCULATED_H
-#define RP_PLANT_CALCULATED_H
+#pragma once
 
 #include "rp_plant_equations.h"
 #include "rp_plant_model.h"
@@ -141,5 +140,3 @@ static inline void rp_plant_calculate(struct rp_plant_values *values,
  * stop or a limit of friction, derivatives belong to the side on which the joint is. */
 void rp_plant_derivatives(const struct rp_plant_values *values, const struct rp_plant_modes *modes,
                           struct rp_plant_values *first, struct rp_plant_values *second);
-
-#endif

@@ -1,7 +1,6 @@
 /* The plant as the instance runs it: its value structure, to which variables.toml binds the
  * variables, and its struct model. */
-#ifndef RP_PLANT_MODEL_H
-#define RP_PLANT_MODEL_H
+#pragma once
 
 #include "model.h"
 #include "rp_plant.h"
@@ -64,5 +63,3 @@ extern const struct series rp_plant_series;
 void rp_plant_reach(const void *values, const double x[], double reach[]);
 
 extern const struct model rp_plant_model;
-
-#endif

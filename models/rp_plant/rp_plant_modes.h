@@ -1,6 +1,5 @@
 /* Which joints stick, slide or move freely: decided for both at once, by velocities and forces. */
-#ifndef RP_PLANT_MODES_H
-#define RP_PLANT_MODES_H
+#pragma once
 
 #include "model.h"
 #include "rp_plant_contact.h"
@@ -105,5 +104,3 @@ static inline void rp_plant_modes_in_effect(const struct rp_plant_values *values
         }
     }
 }
-
-#endif

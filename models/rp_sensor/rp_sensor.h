@@ -1,7 +1,6 @@
 /* Equations of an incremental encoder: noise, and the count that a position gives. The page
  * README.md derives them. */
-#ifndef RP_SENSOR_H
-#define RP_SENSOR_H
+#pragma once
 
 #include <stdint.h>
 
@@ -24,5 +23,3 @@ double rp_sensor_noise(int seed, int channel, uint64_t tick);
  * -RP_SENSOR_COUNT_MAX to RP_SENSOR_COUNT_MAX. Both arguments in the same unit; position is no NaN,
  * resolution above 0. */
 int rp_sensor_count(double position, double resolution);
-
-#endif

@@ -1,6 +1,5 @@
 /* The calculated fields of struct rp_sensor_values that are real. */
-#ifndef RP_SENSOR_CALCULATED_H
-#define RP_SENSOR_CALCULATED_H
+#pragma once
 
 #include "real.h"
 #include "rp_sensor_model.h"
@@ -16,5 +15,3 @@ static inline void rp_sensor_calculate(struct rp_sensor_values *values, const in
         values->dq_measured[i] = (counts - before[i]) * p->resolution[i] / p->sample_time;
     }
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* The sensor as the instance runs it: its value structure, to which variables.toml binds the
  * variables, and its struct model. It has no continuous states; the samples are modes. */
-#ifndef RP_SENSOR_MODEL_H
-#define RP_SENSOR_MODEL_H
+#pragma once
 
 #include "model.h"
 #include "rp_sensor.h"
@@ -38,5 +37,3 @@ struct rp_sensor_values {
 };
 
 extern const struct model rp_sensor_model;
-
-#endif

@@ -1,6 +1,5 @@
 /* Arithmetic with a quantity that moves: the rules of sum, product, quotient and chain. */
-#ifndef MOTION_H
-#define MOTION_H
+#pragma once
 
 #include "real.h"
 
@@ -85,5 +84,3 @@ static inline struct motion motion_atan2(struct motion y, struct motion x) {
     const real rest = area_acceleration - 2.0 * (velocity * half_r2_rate);
     return (struct motion){atan2(y.position, x.position), velocity, rest / r2};
 }
-
-#endif

@@ -2,8 +2,7 @@
  * position of the joints to another, along a straight line, along a circle. Symbols and formulas as
  * in README.md. The equations are in rp_trajectory_equations.h. No function allocates, prints or
  * has state. */
-#ifndef RP_TRAJECTORY_H
-#define RP_TRAJECTORY_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -59,5 +58,3 @@ bool rp_trajectory_is_attached(const struct rp_trajectory_parameters *p, double 
 /* Smallest distance (m) of the line or the swept arc from the axis of joint 1; the nearest point
  * goes to nearest. INFINITY for point_to_point, every point of which can be reached. */
 double rp_trajectory_distance(const struct rp_trajectory_parameters *p, double nearest[2]);
-
-#endif

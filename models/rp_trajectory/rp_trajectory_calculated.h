@@ -1,6 +1,5 @@
 /* The calculated fields of struct rp_trajectory_values that are real. */
-#ifndef RP_TRAJECTORY_CALCULATED_H
-#define RP_TRAJECTORY_CALCULATED_H
+#pragma once
 
 #include "rp_trajectory_equations.h"
 #include "rp_trajectory_model.h"
@@ -23,5 +22,3 @@ static inline void rp_trajectory_calculate(struct rp_trajectory_values *values, 
 void rp_trajectory_derivatives(const struct rp_trajectory_values *values, double time,
                                struct rp_trajectory_values *values_first, double time_first,
                                struct rp_trajectory_values *values_second, double time_second);
-
-#endif

@@ -1,6 +1,5 @@
 /* The equations of the reference motions. README.md derives them. */
-#ifndef RP_TRAJECTORY_EQUATIONS_H
-#define RP_TRAJECTORY_EQUATIONS_H
+#pragma once
 
 #include "motion.h"
 #include "rp_trajectory.h"
@@ -220,5 +219,3 @@ static inline void trajectory_evaluate(const struct rp_trajectory_parameters *p,
         circle(p, time, point);
     }
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* The reference motions as the instance runs them: their value structure, to which variables.toml
  * binds the variables, and their struct model. No state and no input. */
-#ifndef RP_TRAJECTORY_MODEL_H
-#define RP_TRAJECTORY_MODEL_H
+#pragma once
 
 #include "model.h"
 #include "rp_trajectory.h"
@@ -28,5 +27,3 @@ struct rp_trajectory_values {
 };
 
 extern const struct model rp_trajectory_model;
-
-#endif

@@ -6,7 +6,7 @@ units in the file become numbers in the units of their variables.
 
 import hashlib
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
@@ -24,7 +24,7 @@ from rparm.runs import scenario
 from rparm.runs.scenario import MAX_STEPS, Scenario
 from rparm.systems import ssp
 from rparm.systems.master import start_value
-from rparm.systems.ssp import Ssp
+from rparm.systems.ssp import Connection, Ssp
 from rparm.units import quantity
 
 
@@ -39,6 +39,7 @@ class Base(ABC):
     archives: dict[str, bytes]  # FMUs by their hash
     tolerance: float | None = None
     questions: tuple[str, ...] = ()  # to ask the user about the scenario or system
+    _fed: Collection[str] = ()  # inputs that outputs feed
 
     def __init__(
         self,
@@ -85,19 +86,17 @@ class Base(ABC):
         return self._variables[name]
 
     def settable(self, name: str) -> tuple[int, Variable]:
-        """Return a variable that a run may start from.
-
-        WrongValueError if there is none of that name.
-        """
+        """Find a variable that a run may start from, or an input to hold; or WrongValueError."""
         component, variable = self.variable(name)
         if variable.follows:
             raise WrongValueError(variable.why_it_follows)
-        if not variable.can_start:
+        is_free = variable.is_a(INPUTS) and variable.type == "Real" and name not in self._fed
+        if not (variable.can_start or is_free):
             raise WrongValueError(f"{name!r} is not a parameter or the start value of a state")
         return component, variable
 
     def start_values(self) -> dict[str, Value]:
-        """Start values of all variables, by the names that a campaign uses."""
+        """Return start values of all variables, by the names that a campaign uses."""
         return {
             f"{prefix}{name}": value
             for prefix, model in self._models.items()
@@ -128,13 +127,6 @@ class ScenarioBase(Base):
         for name, column in given.inputs.items():
             (self._switches if column.dtype == bool else self._reals)[name] = column
 
-    def settable(self, name: str) -> tuple[int, Variable]:
-        """Find a variable to set; also an input, which then is constant."""
-        component, variable = self.variable(name)
-        if variable.is_a(INPUTS) and variable.type == "Real":
-            return component, variable
-        return super().settable(name)
-
     def hold(self, name: str, value: float) -> int:
         """Return the column of a held input, which is `value` throughout from now on."""
         self._reals[name] = np.full(len(self.times), value)
@@ -148,21 +140,14 @@ class ScenarioBase(Base):
         def references(names: Sequence[str]) -> tuple[int, ...]:
             return tuple(variables[name].reference for name in names)
 
-        return [
-            Component(
-                name=self._scenario.name,
-                archive=self._hash,
-                values=self._given[""] | {name: value for (_, name), value in fixed.items()},
-                reals=Part(
-                    references(list(self._reals)),
-                    tuple(range(len(self._reals))),
-                    references([name for _, name in read]),
-                ),
-                switches=Part(
-                    references(list(self._switches)), tuple(range(len(self._switches))), ()
-                ),
-            )
-        ]
+        reals, switches = list(self._reals), list(self._switches)
+        outputs = references([name for _, name in read])
+        parts = (
+            Part(references(reals), tuple(range(len(reals))), outputs),
+            Part(references(switches), tuple(range(len(switches))), ()),
+        )
+        values = self._given[""] | {name: value for (_, name), value in fixed.items()}
+        return [Component(self._scenario.name, self._hash, values, *parts)]
 
     @property
     def hashes(self) -> dict[str, str]:
@@ -202,34 +187,25 @@ class SystemBase(Base):
         contents = {name: opened.fmu(name).read_bytes() for name in self._names}
         self._hashes = {name: _sha256(content) for name, content in contents.items()}
         self.archives = {self._hashes[name]: content for name, content in contents.items()}
-        self._fed = {f"{c.end_component}.{c.end_connector}" for c in self._system.connections}
-
-    def settable(self, name: str) -> tuple[int, Variable]:
-        """Find a variable to set; also an input that nothing feeds, which then is constant."""
-        component, variable = self.variable(name)
-        if variable.is_a(INPUTS) and variable.type == "Real" and name not in self._fed:
-            return component, variable
-        return super().settable(name)
+        self._fed = {c.end for c in self._system.connections}
 
     def components(
         self, read: Sequence[tuple[int, str]], fixed: Mapping[tuple[int, str], Value]
     ) -> list[Component]:
-        connections = self._system.connections
-        fed = {
-            kind: [
-                c
-                for c in connections
-                if self._ssp.variable(f"{c.start_component}.{c.start_connector}").type == kind
-            ]
-            for kind in ("Real", "Boolean")
-        }
-        for c in connections:
-            if self._ssp.variable(f"{c.start_component}.{c.start_connector}").type not in fed:
+        fed: dict[str, list[Connection]] = {"Real": [], "Boolean": []}
+        for c in self._system.connections:
+            kind = self._ssp.variable(c.start).type
+            if kind not in fed:
                 raise UserError(f"{self.path}: {c}: is neither Real nor Boolean")
+            fed[kind].append(c)
+
+        def source(c: Connection) -> tuple[int, str]:
+            return self._names.index(c.start_component), c.start_connector
+
         outputs = {"Real": list(read), "Boolean": []}
         for kind, known in outputs.items():
-            sources = [(self._names.index(c.start_component), c.start_connector) for c in fed[kind]]
-            known[:] = sorted(dict.fromkeys([*known, *sources]), key=lambda key: key[0])
+            every = dict.fromkeys([*known, *map(source, fed[kind])])
+            known[:] = sorted(every, key=lambda key: key[0])
         result = []
         for i, name in enumerate(self._names):
             parts = {}
@@ -237,25 +213,15 @@ class SystemBase(Base):
                 incoming = [c for c in fed[kind] if c.end_component == name]
                 parts[kind] = Part(
                     tuple(self._reference(i, c.end_connector) for c in incoming),
-                    tuple(
-                        known.index((self._names.index(c.start_component), c.start_connector))
-                        for c in incoming
-                    ),
+                    tuple(known.index(source(c)) for c in incoming),
                     tuple(self._reference(i, variable) for j, variable in known if j == i),
                 )
-            values = self._started(name)
+            with self._ssp.unpacked_fmu(name) as fmu:
+                given = self._parameters.get(name, {}).items()
+                values = {x: start_value(fmu, name, x, value) for x, value in given}
             values |= {variable: value for (j, variable), value in fixed.items() if j == i}
-            result.append(
-                Component(name, self._hashes[name], values, parts["Real"], parts["Boolean"])
-            )
+            result.append(Component(name, self._hashes[name], values, *parts.values()))
         return result
-
-    def _started(self, component: str) -> dict[str, Value]:
-        with self._ssp.unpacked_fmu(component) as fmu:
-            return {
-                name: start_value(fmu, component, name, value)
-                for name, value in self._parameters.get(component, {}).items()
-            }
 
     def _reference(self, component: int, variable: str) -> int:
         return self.models[component].variables[variable].reference
@@ -277,9 +243,7 @@ def opened(
     times = campaign.time.model_dump(exclude_none=True)
     if campaign.scenario is not None:
         with _said_of(where):
-            own = Path(campaign.scenario).suffix.lower() == ".toml"
-            beside = where.parent / campaign.scenario
-            file = beside if own else project.scenario_file(campaign.scenario)
+            file = project.scenario_file(campaign.scenario, where.parent)
             subject = scenario.subject_of(file)
         path = given or project.fmu_of(subject, "--fmu")
         model = read_model(path)
@@ -333,13 +297,8 @@ def _system_times(opened: Ssp, given: Mapping[str, float]) -> np.ndarray:
 
 
 # ---- Values with units ---------------------------------------------------------------------------
-
-
 def in_si(campaign: Campaign, base: Base, where: object) -> Campaign:
-    """Return the campaign with numbers for values with units.
-
-    UserError, at `where`, if one is wrong.
-    """
+    """Replace values with units by numbers; UserError, at `where`, if a value is wrong."""
     converter = _Converter(base, where)
     content = campaign.model_dump(exclude_unset=True)
     for name, distribution in content["parameters"].items():

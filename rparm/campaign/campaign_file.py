@@ -266,10 +266,7 @@ def read(path: Path) -> Campaign:
 
 
 def checked(content: Mapping[str, Any], where: object) -> Campaign:
-    """Return a campaign of its content.
-
-    UserError if anything in it is wrong, beginning with `where`.
-    """
+    """Return the campaign of this content; a UserError begins with `where`."""
     try:
         return Campaign.model_validate(content)
     except ValidationError as error:

@@ -24,18 +24,9 @@ from uuid import uuid4
 from weakref import WeakSet
 
 import dask
+import distributed
 import numpy as np
 from dask.system import CPU_COUNT
-from distributed import (
-    Client,
-    Future,
-    Nanny,
-    Scheduler,
-    Security,
-    SpecCluster,
-    Worker,
-    as_completed,
-)
 from distributed.client import ClosedClientError, FutureCancelledError, WorkerStartTimeoutError
 from distributed.core import Status
 from distributed.scheduler import KilledWorker
@@ -77,8 +68,6 @@ EXPECTED = "an address as tls://192.168.0.1:8786"
 
 
 # ---- Blocks --------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class _Block:
     """A block that is under way."""
@@ -93,7 +82,7 @@ class Engine:
 
     def __init__(
         self,
-        client: Client,
+        client: distributed.Client,
         campaign: Campaign,
         job: Job,
         archives: Mapping[str, bytes],
@@ -103,7 +92,7 @@ class Engine:
         self._client, self._campaign, self._job = client, campaign, job
         self._points, self._results = points, results
         self._address = client.scheduler.address
-        self._futures: WeakSet[Future] = WeakSet()
+        self._futures: WeakSet[distributed.Future] = WeakSet()
         self._lost = GONE  # why futures are cancelled
         # workers may have other campaigns, or this one twice
         self._plugin = f"rparm-campaign-{uuid4()}"
@@ -163,7 +152,7 @@ class Engine:
 
     def _run(self, blocks: Sequence[int], done: Callable[[int], object]) -> None:
         waiting = iter(blocks)
-        tasks = as_completed()
+        tasks = distributed.as_completed()
         under_way: dict[str, _Block] = {}
         self._fill(waiting, tasks, under_way)
         for future in tasks:
@@ -177,7 +166,7 @@ class Engine:
             self._fill(waiting, tasks, under_way)
 
     def _fill(
-        self, waiting: Iterator[int], tasks: as_completed, under_way: dict[str, _Block]
+        self, waiting: Iterator[int], tasks: distributed.as_completed, under_way: dict[str, _Block]
     ) -> None:
         """Submit blocks until enough are under way for all workers, later ones too."""
         ahead = AHEAD * max(self._threads, 1)
@@ -188,13 +177,13 @@ class Engine:
             under_way[future.key] = block
             tasks.add(future)
 
-    def _submit(self, runs: Sequence[int], points: np.ndarray) -> Future:
+    def _submit(self, runs: Sequence[int], points: np.ndarray) -> distributed.Future:
         targets = self._points.targets(points, self._job)
         future = self._client.submit(run_block, self._plugin, runs, targets, pure=False)
         self._futures.add(future)
         return future
 
-    def _rows(self, future: Future, block: _Block) -> Rows:
+    def _rows(self, future: distributed.Future, block: _Block) -> Rows:
         """Return the results of a task; run by run if it has killed too many workers."""
         if future.status == "finished":
             return future.result()
@@ -212,7 +201,7 @@ class Engine:
             nothing = np.full((1, len(self._job.measures)), np.nan)
             return Rows(np.array([run], np.int64), nothing, [DIED], {})
 
-    def _error(self, future: Future) -> BaseException:
+    def _error(self, future: distributed.Future) -> BaseException:
         if future.status == "cancelled" or self._client.status != "running":
             raise UserError(f"{self._lost}; {RESUMES}")
         return future.exception()
@@ -233,21 +222,18 @@ def _joined(parts: Sequence[Rows]) -> Rows:
 
 
 # ---- The cluster ---------------------------------------------------------------------------------
-
-
 @contextmanager
 def opened_cluster(
     scheduler: str | None,
     workers: int | None,
     folder: Path,
-    security: Security | None = None,
+    security: distributed.Security | None = None,
     dashboard: bool = False,
-) -> Iterator[Client]:
-    """Return a cluster's client; UserError if the scheduler cannot be reached.
+) -> Iterator[distributed.Client]:
+    """Return a client of a cluster; UserError if the scheduler at its address cannot be reached.
 
-    Without the address of a scheduler that runs elsewhere, and certificates for it, the cluster is
-    made on this machine: `workers` processes, by default one per core, with their files in
-    `folder`. There, Dask shows its pages (`dashboard`) to all users, who can change nothing.
+    Without an address the cluster is made on this machine: `workers` processes, by default one per
+    core, with files in `folder`. There Dask shows all users its pages (`dashboard`), to look at.
     """
     logging.disable(logging.CRITICAL)  # the errors that are raised here say it
     try:
@@ -264,9 +250,9 @@ def opened_cluster(
 
 
 @contextmanager
-def _connected(address: str, security: Security | None) -> Iterator[Client]:
+def _connected(address: str, security: distributed.Security | None) -> Iterator[distributed.Client]:
     try:
-        client = Client(address, timeout=20, security=security)
+        client = distributed.Client(address, timeout=20, security=security)
     except (TimeoutError, OSError, ValueError, RuntimeError) as error:
         raise UserError(f"{address}: the scheduler cannot be reached: {one_line(error)}") from None
     with client:
@@ -281,52 +267,41 @@ class _NoPages:
         pass
 
 
-class _Scheduler(_NoPages, Scheduler):
+class _Scheduler(_NoPages, distributed.Scheduler):
     pass
 
 
-class _Worker(_NoPages, Worker):
+class _Worker(_NoPages, distributed.Worker):
     pass
 
 
 @contextmanager
-def _local(count: int, folder: Path, dashboard: bool) -> Iterator[Client]:
-    security = Security.temporary()
+def _local(count: int, folder: Path, dashboard: bool) -> Iterator[distributed.Client]:
+    security = distributed.Security.temporary()
     common = {"host": LOCAL, "protocol": "tls://", "security": security}
-    scheduler = {
-        "cls": Scheduler if dashboard else _Scheduler,
-        "options": {
-            **common,
-            "dashboard": dashboard,
-            "dashboard_address": f"{LOCAL}:0" if dashboard else None,
-        },
-    }
-    worker = {
-        "cls": Nanny,
-        "options": {
-            **common,
-            "worker_class": _Worker,
-            "nthreads": 1,
-            "memory_limit": 1 / count,  # share of the machine's memory
-            "local_directory": str(folder),
-            "silence_logs": logging.CRITICAL,
-        },
+    pages = {"dashboard": dashboard, "dashboard_address": f"{LOCAL}:0" if dashboard else None}
+    kind = distributed.Scheduler if dashboard else _Scheduler
+    options = {
+        "worker_class": _Worker,
+        "nthreads": 1,
+        "memory_limit": 1 / count,  # share of the machine's memory
+        "local_directory": str(folder),
+        "silence_logs": logging.CRITICAL,
     }
     with ExitStack() as stack:
         with uninterrupted():  # a cluster that is half made cannot be closed
             # without workers at first: one that dies while it starts would end the cluster
             try:
-                made = SpecCluster(
-                    scheduler=scheduler,
-                    worker=worker,
+                made = distributed.SpecCluster(
+                    scheduler={"cls": kind, "options": common | pages},
+                    worker={"cls": distributed.Nanny, "options": common | options},
                     security=security,
                     silence_logs=logging.CRITICAL,
                 )
             except RuntimeError as error:  # it waits for a connection until it gives up
-                raise UserError(
-                    f"the campaign's processes cannot connect at {LOCAL}: {one_line(error)}"
-                ) from error
-            client = stack.enter_context(Client(stack.enter_context(made)))
+                text = f"the campaign's processes cannot connect at {LOCAL}"
+                raise UserError(f"{text}: {one_line(error)}") from error
+            client = stack.enter_context(distributed.Client(stack.enter_context(made)))
         made.sync(_keep_signals_from_children)
         keeper = PeriodicCallback(partial(_keep_workers, made, count), RESTART_EVERY)
         stack.callback(made.loop.add_callback, keeper.stop)
@@ -346,7 +321,7 @@ async def _keep_signals_from_children() -> None:
         block()
 
 
-def _keep_workers(made: SpecCluster, count: int) -> None:
+def _keep_workers(made: distributed.SpecCluster, count: int) -> None:
     """Replace workers that died while starting; nannies restart the others."""
     for name, nanny in list(made.workers.items()):
         if nanny.status in (Status.failed, Status.closed):
@@ -355,16 +330,13 @@ def _keep_workers(made: SpecCluster, count: int) -> None:
 
 
 # ---- Certificates --------------------------------------------------------------------------------
-
-
 def security_for(
     address: str, ca: Path | None, cert: Path | None, key: Path | None
-) -> Security | None:
+) -> distributed.Security | None:
     """Return the TLS settings of a client of the scheduler at `address`; None without certificates.
 
-    Files in PEM form: the certificate of the authority that signs all others, and the client's own
-    with its private key; without them, those of Dask's configuration. UserError if they do not fit
-    the address or cannot be used.
+    Files in PEM form; Dask's configuration has those that are not given. UserError if they do not
+    fit the address or cannot be used.
     """
     given = dict(zip(OPTIONS, (ca, cert, key), strict=True))
     named = [option for option, path in given.items() if path is not None]
@@ -378,21 +350,16 @@ def security_for(
         missing = ", ".join(option for option in OPTIONS if option not in named)
         raise UserError(f"{missing}: missing, {address} needs {', '.join(OPTIONS)}")
     _check_credentials(ca, cert, key)
-    return Security(
-        require_encryption=True,
-        tls_ca_file=str(ca),
-        tls_client_cert=str(cert),
-        tls_client_key=str(key),
-    )
+    files = {"tls_ca_file": str(ca), "tls_client_cert": str(cert), "tls_client_key": str(key)}
+    return distributed.Security(require_encryption=True, **files)
 
 
-def _configured_security(address: str) -> Security:
-    made = Security(require_encryption=True)
+def _configured_security(address: str) -> distributed.Security:
+    made = distributed.Security(require_encryption=True)
     ca, cert, key = made.tls_ca_file, made.tls_client_cert, made.tls_client_key
     if not ca or not cert:
-        raise UserError(
-            f"{address}: needs certificates: {', '.join(OPTIONS)}, or those of Dask's configuration"
-        )
+        options = f"{', '.join(OPTIONS)}, or those of Dask's configuration"
+        raise UserError(f"{address}: needs certificates: {options}")
     if not any("\n" in text for text in (ca, cert, key or "")):  # else not files, but their text
         _check_credentials(Path(ca), Path(cert), Path(key or cert))
     return made
@@ -415,7 +382,5 @@ def _check_credentials(ca: Path, cert: Path, key: Path) -> None:
     try:
         context.load_cert_chain(cert, key, password=lambda: "")
     except OSError:
-        raise UserError(
-            f"{cert}, {key}: are not a certificate and its private key without a password, in PEM "
-            "form"
-        ) from None
+        expected = "a certificate and its private key without a password, in PEM form"
+        raise UserError(f"{cert}, {key}: are not {expected}") from None

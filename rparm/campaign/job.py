@@ -19,8 +19,6 @@ FINAL_INTEGER = "final_integer"
 
 
 # ---- Measures ------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Recorded:
     """Recorded values of a run."""
@@ -139,8 +137,6 @@ def _log_sum(growth):
 
 
 # ---- The job -------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Component:
     """An instance of an FMU."""

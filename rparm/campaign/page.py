@@ -21,17 +21,6 @@ from rparm.campaign.job import LYAPUNOV, Job
 from rparm.campaign.planning import FAILURE, RUN, sampling_problem
 from rparm.campaign.results import MANIFEST, Results
 from rparm.report import pages
-from rparm.report.pages import (
-    ERROR_COLORS,
-    INDEX,
-    MUTED,
-    RUN_COLOR,
-    STYLE,
-    Command,
-    Table,
-    save_figure,
-    write_page,
-)
 from rparm.units import minus
 
 QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
@@ -55,12 +44,10 @@ FEWEST = 6  # of these, below many bars
 COLOURS = "viridis"  # in order of brightness, also for the colour-blind
 NARROW = 1e-3  # of a value: a smaller variation is drawn as a difference, to be written short
 # names come from a user's file: no mathematics
-TEXTS = STYLE | {"text.parse_math": False}
+TEXTS = pages.STYLE | {"text.parse_math": False}
 
 
 # ---- Statistics of the table ---------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Failure:
     """Runs that have failed for the same reason, whatever numbers it has."""
@@ -118,31 +105,20 @@ def sobol_indices(campaign: Campaign, values: np.ndarray) -> list[Index]:
     rows = saltelli_groups(campaign, values)
     if len(rows) < 2 or np.ptp(rows) == 0:
         return []
+    options = {"num_resamples": RESAMPLES, "conf_level": CONFIDENCE, "seed": campaign.seed}
     found: Mapping[str, np.ndarray] = sobol.analyze(
-        sampling_problem(campaign),
-        rows.ravel(),
-        calc_second_order=False,
-        num_resamples=RESAMPLES,
-        conf_level=CONFIDENCE,
-        seed=campaign.seed,
+        sampling_problem(campaign), rows.ravel(), calc_second_order=False, **options
     )
     rows = np.column_stack([found[key] for key in ("S1", "S1_conf", "ST", "ST_conf")])
     return [Index(name, *row) for name, row in zip(campaign.parameters, rows.tolist(), strict=True)]
 
 
 # ---- The page ------------------------------------------------------------------------------------
-
-
 class Page:
     """Written into the folder of the results; `command` makes it again."""
 
     def __init__(
-        self,
-        campaign: Campaign,
-        job: Job,
-        results: Results,
-        units: Mapping[str, str],
-        command: str,
+        self, campaign: Campaign, job: Job, results: Results, units: Mapping[str, str], command: str
     ) -> None:
         self.campaign, self.job, self.folder, self.again = campaign, job, results.folder, command
         self.table = results.table([*results.columns, FAILURE])
@@ -156,8 +132,8 @@ class Page:
         manifest = json.loads((self.folder / MANIFEST).read_text(encoding="utf-8"))
         found = self.indices()
         pages.write_assets(self.folder)
-        return write_page(
-            self.folder / INDEX,
+        return pages.write_page(
+            self.folder / pages.INDEX,
             "campaign.html",
             root="",
             title=self.campaign.title,
@@ -176,34 +152,33 @@ class Page:
             maps=[self.map(i) for i in range(len(self.campaign.maps))],
         )
 
-    def command(self, run: int) -> Command:
-        return Command(f"{self.again} --replay {run}")
+    def command(self, run: int) -> pages.Command:
+        return pages.Command(f"{self.again} --replay {run}")
 
     def drawn(self, columns: Iterable[str]) -> tuple[list[str], str]:
         """Return the columns that fit into a picture, and a note on the others."""
         columns = list(columns)
         left = columns[DRAWN:]
-        text = (
-            f"The picture leaves out {left[0]} and what is below it in the table." if left else ""
-        )
-        return columns[:DRAWN], text
+        rest = "and what is below it in the table."
+        text = f"The picture leaves out {left[0]} {rest}" if left else ""
+        return columns[:DRAWN], text if left else ""
 
     # ---- Distributions ---------------------------------------------------------------------------
 
-    def distributions(self) -> Table | None:
+    def distributions(self) -> pages.Table | None:
         """Return table and picture; None if no run has a value."""
         there = [name for name, values in self.kept.items() if np.isfinite(values).any()]
         if not there:
             return None
         drawn, note = self.drawn(there)
         picture = distributions_figure({self.labels[name]: self.kept[name] for name in drawn})
-        save_figure(picture, self.folder / "distributions.png")
+        pages.save_figure(picture, self.folder / "distributions.png")
         head = ["kept", "smallest", "5 %", "median", "95 %", "largest", "runs without a value"]
         rows = [
             [self.labels[name], *map(_rounded, quantiles(values)), _lacking(values)]
             for name, values in self.kept.items()
         ]
-        return Table("Distributions", head, rows, note)
+        return pages.Table("Distributions", head, rows, note)
 
     def missing(self) -> list[str]:
         """Say which columns have no value in runs that did not fail."""
@@ -223,26 +198,21 @@ class Page:
         found = {name: sobol_indices(self.campaign, x) for name, x in self.kept.items()}
         return {name: rows for name, rows in found.items() if rows}
 
-    def indices_table(self, found: Mapping[str, list[Index]]) -> Table | None:
+    def indices_table(self, found: Mapping[str, list[Index]]) -> pages.Table | None:
         """Return table and picture; None if there are none."""
         if not found:
             return None
         drawn, note = self.drawn(found)
         picture = indices_figure({self.labels[name]: found[name] for name in drawn})
-        save_figure(picture, self.folder / "indices.png")
+        pages.save_figure(picture, self.folder / "indices.png")
         head = ["kept", "parameter", "first order", "±", "total", "±", "groups of runs"]
-        rows = [
-            [
-                name,
-                row.parameter,
-                *(f"{x:.3f}" for x in (row.first, row.first_confidence)),
-                *(f"{x:.3f}" for x in (row.total, row.total_confidence)),
-                len(saltelli_groups(self.campaign, self.kept[name])),
-            ]
-            for name, rows in found.items()
-            for row in rows
-        ]
-        return Table("Sobol' indices", head, rows, note)
+        rows = []
+        for name, indices in found.items():
+            groups = len(saltelli_groups(self.campaign, self.kept[name]))
+            for x in indices:
+                numbers = (x.first, x.first_confidence, x.total, x.total_confidence)
+                rows.append([name, x.parameter, *(f"{number:.3f}" for number in numbers), groups])
+        return pages.Table("Sobol' indices", head, rows, note)
 
     def doubts(self, found: Mapping[str, list[Index]]) -> list[str]:
         """Warn about indices that say little."""
@@ -269,20 +239,16 @@ class Page:
 
     # ---- Runs ------------------------------------------------------------------------------------
 
-    def worst(self, column: str) -> Table:
-        names = list(self.campaign.parameters)
-        head = [RUN, *(self.labels[name] for name in (column, *names)), "run it again"]
+    def worst(self, column: str) -> pages.Table:
+        names = [column, *self.campaign.parameters]
+        head = [RUN, *(self.labels[name] for name in names), "run it again"]
         rows = [
-            [
-                run,
-                *(_rounded(self.table[name][run]) for name in (column, *names)),
-                self.command(run),
-            ]
+            [run, *(_rounded(self.table[name][run]) for name in names), self.command(run)]
             for run in worst(self.table[column])
         ]
-        return Table(f"Largest {column}", head, rows)
+        return pages.Table(f"Largest {column}", head, rows)
 
-    def failures_table(self) -> Table:
+    def failures_table(self) -> pages.Table:
         head = ["runs", "the first", "its reason", "run it again"]
         shown, left = self.failures[:LISTED], self.failures[LISTED:]
         rows = [[x.count, x.run, x.reason, self.command(x.run)] for x in shown]
@@ -290,7 +256,7 @@ class Page:
         if left:
             count = sum(failure.count for failure in left)
             note += f" {count} runs with {len(left)} other reasons are not shown."
-        return Table("Failed runs", head, rows, note)
+        return pages.Table("Failed runs", head, rows, note)
 
     def map(self, number: int) -> tuple[object, list[str], int]:
         """Draw a map as its file says; return it, its labels, and the number of runs in it."""
@@ -300,7 +266,7 @@ class Page:
         there = int(np.isfinite(columns).all(axis=0).sum())
         if there:
             labels = [self.labels[name] for name in (drawn.x, drawn.y, drawn.colour)]
-            save_figure(heat_map_figure(labels, *columns), self.folder / f"map_{number}.png")
+            pages.save_figure(heat_map_figure(labels, *columns), self.folder / f"map_{number}.png")
         return drawn, [self.labels[name] for name in names], there
 
 
@@ -313,8 +279,6 @@ def _lacking(values: np.ndarray) -> int:
 
 
 # ---- Pictures ------------------------------------------------------------------------------------
-
-
 def distributions_figure(table: Mapping[str, np.ndarray]) -> Figure:
     """Draw histograms of columns, (runs,) each, by their labels."""
     rows = math.ceil(len(table) / COLUMNS)
@@ -333,7 +297,7 @@ def _histogram(axes: Axes, values: np.ndarray, label: str) -> None:
     smallest, largest = float(values.min()), float(values.max())
     if 0 < largest - smallest < math.inf:
         values, label = _centred(values, label)
-        axes.hist(values, bins=BINS, color=RUN_COLOR)
+        axes.hist(values, bins=BINS, color=pages.RUN_COLOR)
         axes.xaxis.set_major_locator(MaxNLocator(4))
         axes.xaxis.set_major_formatter(_tick)
         axes.yaxis.set_major_locator(MaxNLocator(5, integer=True))
@@ -376,16 +340,9 @@ def indices_figure(found: Mapping[str, Sequence[Index]]) -> Figure:
                 ("total", [x.total for x in rows], [x.total_confidence for x in rows]),
             )
             for i, (kind, values, half) in enumerate(kinds):
-                one.bar(
-                    middle + 0.36 * (i - 0.5),
-                    values,
-                    0.34,
-                    yerr=half,
-                    color=(RUN_COLOR, ERROR_COLORS[0])[i],
-                    ecolor=MUTED,
-                    capsize=4,
-                    label=kind,
-                )
+                color = (pages.RUN_COLOR, pages.ERROR_COLORS[0])[i]
+                style = {"color": color, "ecolor": pages.MUTED, "capsize": 4, "label": kind}
+                one.bar(middle + 0.36 * (i - 0.5), values, 0.34, yerr=half, **style)
             width = max(COLUMNS * LONGEST_LINE // len(rows), FEWEST)
             one.set_xticks(middle, [fill(row.parameter, width) for row in rows])
             one.set_ylabel("Sobol' index")

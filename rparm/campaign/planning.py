@@ -40,8 +40,6 @@ SMALLEST = 2.0**-54  # a normal distribution is cut there, where its values are 
 
 
 # ---- The job -------------------------------------------------------------------------------------
-
-
 def plan(campaign: Campaign, base: Base, where: object, also: Sequence[str] = ()) -> Job:
     """Return the job, which records `also`, too; UserError, at `where`, for a mistake."""
     return _Planner(campaign, base, where).job(also)
@@ -74,10 +72,8 @@ class _Planner:
         reals, switches = base.held
         first = np.cumsum([0, *(len(c.reals.outputs) for c in components)])
         columns = [
-            len(reals.names)
-            + first[component]
-            + components[component].reals.outputs.index(self.base.variable(name)[1].reference)
-            for name, component in ((name, base.variable(name)[0]) for name in watched)
+            len(reals.names) + first[c] + components[c].reals.outputs.index(variable.reference)
+            for c, variable in map(base.variable, watched)
         ]
         self.check_columns(measures)
         return Job(
@@ -316,8 +312,6 @@ def constants(campaign: Campaign, base: Base) -> dict[str, float]:
 
 
 # ---- Points --------------------------------------------------------------------------------------
-
-
 class Sampler:
     def __init__(self, campaign: Campaign) -> None:
         self._campaign = campaign

@@ -124,10 +124,8 @@ class Results:
             raise UserError(f"{path}: cannot be read: {reason(error)}; {other}") from None
         for key, value in self._manifest.items():
             if not isinstance(found, dict) or found.get(key) != value:
-                raise UserError(
-                    f"{path}: has another {key}: the folder holds the results of another "
-                    f"campaign, {other}"
-                )
+                campaign = f"the folder holds the results of another campaign, {other}"
+                raise UserError(f"{path}: has another {key}: {campaign}")
 
     def _check_blocks(self) -> None:
         """Refuse blocks of another campaign, whose manifest has been lost."""
@@ -153,10 +151,8 @@ class Results:
         needed = ROOM * (rows + files + recorded * len(self._job.trajectories))
         free = shutil.disk_usage(there).free
         if needed > free:
-            raise UserError(
-                f"{self.folder}: {self._campaign.count} runs need about {_size(needed)}, "
-                f"the disk has {_size(free)}"
-            )
+            runs = f"{self._campaign.count} runs need about {_size(needed)}"
+            raise UserError(f"{self.folder}: {runs}, the disk has {_size(free)}")
 
     # ---- Blocks ----------------------------------------------------------------------------------
 
@@ -215,9 +211,8 @@ class Results:
             table = pa.table(columns, schema=self._schema)
             self._write(self.block_path(block), table, f"block {block}")
         except (OSError, pa.ArrowException) as error:
-            raise UserError(
-                f"{self.folder}: the results cannot be written: {reason(error)}; {RESUMES}"
-            ) from error
+            text = f"the results cannot be written: {reason(error)}; {RESUMES}"
+            raise UserError(f"{self.folder}: {text}") from error
 
     def trajectory_path(self, run: int) -> Path:
         """Return the file of a run of which everything is kept."""
@@ -267,10 +262,7 @@ def _manifest(campaign: Campaign, job: Job, text: str) -> dict[str, object]:
         "runs": campaign.count,
         "blocks": campaign.blocks,
         "sha256": job.hashes,
-        "versions": {
-            "python": platform.python_version(),
-            **{name: version(name) for name in PACKAGES},
-        },
+        "versions": {"python": platform.python_version()} | {x: version(x) for x in PACKAGES},
     }
 
 

@@ -37,12 +37,8 @@ class Runner(AbstractContextManager["Runner"]):
         self._job, self._fmus = job, fmus
         self._stack = ExitStack()
         self._instances: list[Instance] = []
-        self._stepper = Stepper(
-            [c.reals for c in job.components],
-            [c.switches for c in job.components],
-            len(job.reals.names),
-            len(job.switches.names),
-        )
+        parts = [c.reals for c in job.components], [c.switches for c in job.components]
+        self._stepper = Stepper(*parts, len(job.reals.names), len(job.switches.names))
         self._points = np.arange(1, job.steps + 1)
         self._held = job.reals.values.copy()
         self._record = np.empty((len(job.times), len(job.watched)))
@@ -150,16 +146,9 @@ class Runner(AbstractContextManager["Runner"]):
 
     def _advance(self) -> None:
         job = self._job
-        _, failure = self._stepper.advance(
-            job.times,
-            self._held,
-            job.switches.values,
-            self._points,
-            job.columns,
-            self._record[1:],
-            self._tangent,
-            self._growth,
-        )
+        given = job.times, self._held, job.switches.values, self._points, job.columns
+        found = self._record[1:], self._tangent, self._growth
+        _, failure = self._stepper.advance(*given, *found)
         if failure is not None:
             raise failure
 
@@ -219,8 +208,6 @@ class Workshop:
 
 
 # ---- Workers of Dask -----------------------------------------------------------------------------
-
-
 class Plugin(WorkerPlugin):
     """FMUs and job of a campaign on a worker, which may serve others, too."""
 

@@ -64,10 +64,8 @@ class Work:
         """Make the runs of some blocks; `progress` is called with the number of those made."""
         from rparm.campaign.engine import Engine  # takes long
 
-        engine = Engine(
-            client, self.campaign, self.job, self.base.archives, self.points, self.results
-        )
-        engine.run(blocks, progress)
+        given = self.campaign, self.job, self.base.archives, self.points, self.results
+        Engine(client, *given).run(blocks, progress)
 
     def table(self) -> dict[str, np.ndarray]:
         """Read all columns, (runs,) each: parameters, measures, reasons of failures."""
@@ -83,9 +81,8 @@ def opened(
 ) -> Iterator[Work]:
     """Open the work of a campaign's file; UserError if anything in it is wrong.
 
-    By default, the FMU or SSP is the built one, and results go to the folder that the file names,
-    or else to the project's. `ask` is called with questions to the user: values that are hardly
-    meant so.
+    By default, the FMU or SSP is the built one, and the file or the project names the folder.
+    `ask` is called with questions to the user: values that are hardly meant so.
     """
     given = campaign_file.read(file)
     with bases.opened(given, fmu, file) as base:
@@ -101,8 +98,6 @@ def opened(
 
 
 # ---- One run again -------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Replay:
     parameters: dict[str, float]
@@ -206,10 +201,7 @@ def _data(base: Base, job: Job, given: dict[str, float], record: np.ndarray) -> 
     outputs = dict(zip(job.watched, record.T, strict=True))
     curves = [result_curve(x, outputs[x]) for x in base.states() or list(outputs)]
     rows = thinned([curve.values for curve in curves])
-    plots = [
-        Plot(curve.name, unit(base.variable(curve.name)[1].unit), [curve.at(rows)])
-        for curve in curves
-    ]
+    plots = [Plot(x.name, unit(base.variable(x.name)[1].unit), [x.at(rows)]) for x in curves]
     moving = motion.of_recorded(base.folder, _recorded(base, job, given, outputs), rows)
     return RunData("run", "", job.times[rows], plots, motion=moving)
 
@@ -229,7 +221,7 @@ def _recorded(
 
 
 def _values(base: Base, job: Job, given: dict[str, float]) -> dict[str, object]:
-    """Start values of all variables in this run."""
+    """Return start values of all variables in this run."""
     is_system = len(job.components) > 1
     fixed = {
         f"{component.name}.{name}" if is_system else name: value

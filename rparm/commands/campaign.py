@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rparm import console, project
-from rparm.command_line import Ended, add_output, count, number, retyped
+from rparm.command_line import Ended, add_flag, add_output, count, number, retyped
 from rparm.console import Progress
 from rparm.errors import UserError, one_line
 from rparm.files import from_here, written
@@ -32,44 +32,30 @@ def add_campaign_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "file", nargs="?", metavar="FILE.toml", help="the campaign, or the name of one of --list"
     )
-    parser.add_argument(
-        "--list", action="store_true", help="name the project's campaigns, run nothing"
-    )
+    add_flag(parser, "--list", "name the project's campaigns, run nothing")
     parser.add_argument(
         "--fmu", type=Path, metavar="PATH", help="the FMU or SSP (default: that in build/)"
     )
     folder = project.from_root(project.campaign_folder("NAME"))
     add_output(parser, f"folder for the results (default: that in the file, or {folder})")
-    parser.add_argument(
-        "--replay",
-        type=number,
-        metavar="N",
-        help="run only run N again; writes all its Real outputs and a page",
-    )
+    text = "run only run N again; writes all its Real outputs and a page"
+    parser.add_argument("--replay", type=number, metavar="N", help=text)
     where = parser.add_mutually_exclusive_group()
-    where.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="a scheduler that runs elsewhere, as tls://192.168.0.1:8786; with tcp://, whoever "
-        "reaches it or its workers runs code there",
+    text = (
+        "a scheduler that runs elsewhere, as tls://192.168.0.1:8786; with tcp://, whoever reaches "
+        "it or its workers runs code there"
     )
-    where.add_argument(
-        "--workers",
-        type=count,
-        metavar="N",
-        help="processes on this machine (default: one per core)",
-    )
+    where.add_argument("--scheduler", metavar="ADDRESS", help=text)
+    text = "processes on this machine (default: one per core)"
+    where.add_argument("--workers", type=count, metavar="N", help=text)
     for name, text in (
         ("ca", "certificate of the authority that signs those of scheduler, workers and client"),
         ("cert", "certificate of the client"),
         ("key", "its private key"),
     ):
         parser.add_argument(f"--tls-{name}", type=Path, metavar="PEM", help=f"for tls://: {text}")
-    parser.add_argument(
-        "--no-dashboard",
-        action="store_true",
-        help="no pages of Dask on this machine, which all its users can read",
-    )
+    text = "no pages of Dask on this machine, which all its users can read"
+    add_flag(parser, "--no-dashboard", text)
 
 
 def do_campaign(options: argparse.Namespace) -> Ended:

@@ -91,10 +91,7 @@ def _words(kind: str, names: Iterable[str], pattern: str = "") -> dict[str, Any]
         before = files["preamble"]["bash"]
         bash.append(f'{files["bash"]} "$1"')
         zsh += f" 'files:file:_files -g \"{pattern}\"'"
-    preamble = {
-        "bash": before + _function(function, bash),
-        "zsh": _function(function, [zsh]),
-    }
+    preamble = {"bash": before + _function(function, bash), "zsh": _function(function, [zsh])}
     return {"bash": function, "zsh": function, "tcsh": f"({words})", "preamble": preamble}
 
 

@@ -6,16 +6,9 @@ import shlex
 from pathlib import Path
 
 from rparm import console, project
-from rparm.command_line import Ended, add_document, add_fmi, add_output
+from rparm.command_line import Ended, add_document, add_flag, add_fmi, add_output
 from rparm.errors import UserError
-from rparm.files import (
-    check_for_windows,
-    copied,
-    create,
-    from_folder,
-    from_here,
-    written,
-)
+from rparm.files import check_for_windows, copied, create, from_folder, from_here, written
 from rparm.project import VERSIONS
 from rparm.runs import scenario
 
@@ -56,11 +49,8 @@ def add_new_options(parser: argparse.ArgumentParser) -> None:
         "NAME.toml."
     )
     parser.add_argument("name", metavar="NAME", help="name of the scenario, or path of its file")
-    parser.add_argument(
-        "--model",
-        metavar="MODEL",
-        help="what to simulate, or a file .fmu (default: the model with the most scenarios)",
-    )
+    text = "what to simulate, or a file .fmu (default: the model with the most scenarios)"
+    parser.add_argument("--model", metavar="MODEL", help=text)
     add_output(parser, "folder for the file (default: this one, or that of the path)")
 
 
@@ -118,9 +108,8 @@ def add_new_model_options(parser: argparse.ArgumentParser) -> None:
 
 def do_new_model(options: argparse.Namespace) -> Ended:
     if not MODEL_NAME.fullmatch(options.name):
-        raise UserError(
-            f"{options.name!r} is no name for a model: a letter, then letters, digits, _"
-        )
+        wrong = f"{options.name!r} is no name for a model"
+        raise UserError(f"{wrong}: a letter, then letters, digits, _")
     check_for_windows(options.name)
     path = (options.output or Path()) / f"{options.name}.toml"
     with written(path):
@@ -137,9 +126,7 @@ def add_build_options(parser: argparse.ArgumentParser) -> None:
         "keeps the value references."
     )
     parser.add_argument("file", metavar="FILE.toml", type=Path, help="the file with the equations")
-    parser.add_argument(
-        "--platforms", action="store_true", help="for all platforms, by zig, not for this machine"
-    )
+    add_flag(parser, "--platforms", "for all platforms, by zig, not for this machine")
     add_output(parser, "folder for the FMUs (default: the current one)")
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rparm import console, project
-from rparm.command_line import Ended, add_report, file_or_name, names, pairs, retyped
+from rparm.command_line import Ended, add_flag, add_report, file_or_name, names, pairs, retyped
 from rparm.errors import UserError, placed
 from rparm.files import check_writable, from_here, number_in, written
 from rparm.units import SECONDS, typed_quantity
@@ -41,21 +41,12 @@ def add_identify_options(parser: argparse.ArgumentParser) -> None:
     several("--start", "NAME=VALUE", "where the fit begins; of states that are not measured, too")
     several("--columns", "NAME=COLUMN", "columns whose name is another one; time=COLUMN, too")
     several("--units", "NAME=UNIT", "units of columns that have other ones, as deg or mm")
-    parser.add_argument(
-        "--delay", action="store_true", help="estimate by how much measured values are late, too"
-    )
-    parser.add_argument(
-        "--validate", type=Path, metavar="LOG.csv", help="run this log with the result"
-    )
-    parser.add_argument(
-        "--segment",
-        metavar="TIME",
-        default=SEGMENT,
-        help=f"length of a segment (default: {SEGMENT} s)",
-    )
-    parser.add_argument(
-        "--demo", action="store_true", help="make a log from a system of the project, and use it"
-    )
+    add_flag(parser, "--delay", "estimate by how much measured values are late, too")
+    text = "run this log with the result"
+    parser.add_argument("--validate", type=Path, metavar="LOG.csv", help=text)
+    text = f"length of a segment (default: {SEGMENT} s)"
+    parser.add_argument("--segment", metavar="TIME", default=SEGMENT, help=text)
+    add_flag(parser, "--demo", "make a log from a system of the project, and use it")
     add_report(parser, PART)
 
 

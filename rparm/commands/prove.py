@@ -3,12 +3,11 @@
 import argparse
 from collections.abc import Collection, Mapping
 from dataclasses import asdict
-from pathlib import Path
 
 import numpy as np
 
 from rparm import console, project, proof
-from rparm.command_line import Ended, add_report, add_tolerance, retyped
+from rparm.command_line import Ended, add_flag, add_report, add_tolerance, retyped
 from rparm.console import Progress
 from rparm.errors import UserError, WrongValueError, placed
 from rparm.files import check_writable, from_here, written
@@ -32,19 +31,13 @@ def add_prove_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "name", nargs="?", metavar="SCENARIO", help="a scenario, or a file FILE.toml of your own"
     )
-    parser.add_argument("--all", action="store_true", help="all references, as without a scenario")
+    add_flag(parser, "--all", "all references, as without a scenario")
     parser.add_argument("--method", metavar="NAME", help="only this method of integration")
     add_tolerance(parser, "relative tolerance of the runs (default: that of the scenario)")
-    parser.add_argument(
-        "--within",
-        metavar="VALUE",
-        help="by how much the start may be off: with a unit (0.1deg), the states of that unit",
-    )
-    parser.add_argument(
-        "--check",
-        action="store_true",
-        help="check every step of the proof by a second program, in other arithmetic",
-    )
+    text = "by how much the start may be off: with a unit (0.1deg), the states of that unit"
+    parser.add_argument("--within", metavar="VALUE", help=text)
+    text = "check every step of the proof by a second program, in other arithmetic"
+    add_flag(parser, "--check", text)
     add_report(parser)
 
 
@@ -58,8 +51,7 @@ def do_prove(options: argparse.Namespace) -> Ended:
     if options.all:
         raise UserError(f"--all: expected no scenario with it, got {options.name!r}")
     check_writable(options.report)
-    own = Path(options.name).suffix.lower() == ".toml"
-    path = Path(options.name) if own else project.scenario_file(options.name)
+    path = project.scenario_file(options.name)
     program = proof.prover_of(path)
     with Fmu(project.built(program.folder, ".fmu")) as fmu:
         scenario = scenarios.load(path, fmu.model)
@@ -67,13 +59,10 @@ def do_prove(options: argparse.Namespace) -> Ended:
         within = _within(options.within, program, fmu)
         enclosure = _enclosure(program, scenario, within)
         if enclosure.stopped is not None:
-            return Ended(
-                1,
-                f"failed: the proof holds up to {enclosure.stopped!r} s, no further",
-                {"holds_up_to": enclosure.stopped},
-            )
+            text = f"failed: the proof holds up to {enclosure.stopped!r} s, no further"
+            return Ended(1, text, {"holds_up_to": enclosure.stopped})
         good = None
-        if _has_reference(path):
+        if path.resolve() in {file.resolve() for file in project.scenario_files().values()}:
             exact = _enclosure(program, scenario, {}) if within else enclosure
             good = _reference(fmu, scenario, exact)
         states = enclosure.of(program.states)
@@ -85,19 +74,12 @@ def do_prove(options: argparse.Namespace) -> Ended:
     print(f"page: {from_here(page)}")
     checked = _checked(program, {scenario: enclosure}) if options.check else {}
     largest = max(e.error for errors in found.values() for e in errors.values())
-    document = {
-        "methods": {m: {n: asdict(e) for n, e in errors.items()} for m, errors in found.items()}
-    }
-    document |= {"reference": asdict(good)} if good else {}
+    methods = {m: {n: asdict(e) for n, e in errors.items()} for m, errors in found.items()}
+    document = {"methods": methods} | ({"reference": asdict(good)} if good else {})
     document |= {"page": page.absolute()} | checked
     if good and not good.passed:
         return Ended(1, _verdict([good]), document, page=page)
     return Ended(0, f"largest proven error: {rounded_up(largest, 2)}", document, page=page)
-
-
-def _has_reference(path: Path) -> bool:
-    """Return whether it is one of the project's scenarios, which all have references."""
-    return path.resolve() in {file.resolve() for file in project.scenario_files().values()}
 
 
 def _reference(fmu: Fmu, scenario: Scenario, enclosure: Enclosure) -> ProvenReference:
@@ -152,11 +134,7 @@ def _enclosure(program: Prover, scenario: Scenario, within: dict[str, float]) ->
 
 
 def _runs(
-    fmu: Fmu,
-    scenario: Scenario,
-    enclosure: Enclosure,
-    methods: list[str],
-    tolerance: float | None,
+    fmu: Fmu, scenario: Scenario, enclosure: Enclosure, methods: list[str], tolerance: float | None
 ) -> tuple[dict[str, dict[str, proof.ProvenError]], dict[str, np.ndarray]]:
     """Print the largest errors of runs by each method; return these, and all errors by run."""
     units = [fmu.model.variables[name].unit for name in enclosure.names]

@@ -7,7 +7,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from rparm import console, project, result_tables
-from rparm.command_line import Ended, add_fmi, add_report, add_tolerance
+from rparm.command_line import Ended, add_flag, add_fmi, add_report, add_tolerance
 from rparm.commands.files import do_list
 from rparm.console import Progress
 from rparm.errors import UserError, did_you_mean, placed, together
@@ -26,9 +26,7 @@ from rparm.runs.scenario import Scenario
 from rparm.units import counted, short
 
 SUFFIX = ".toml"
-FIRST, TWIN = (
-    VERSIONS  # versions of FMI: the one that runs, and the one that has to give the same bits
-)
+FIRST, TWIN = VERSIONS  # of FMI: the one that runs, and the one that has to give the same bits
 QUICK = 20.0  # s, longest sweep that runs by default for a named scenario
 
 
@@ -39,19 +37,11 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
         "errors. Without names, measures the order of convergence in the communication step "
         "too. The FMUs are of FMI 2.0; those of FMI 3.0 must give the same bits."
     )
-    parser.add_argument(
-        "names",
-        nargs="*",
-        metavar="NAME",
-        help="scenarios, or files FILE.toml of your own (default: all scenarios)",
-    )
-    parser.add_argument("--list", action="store_true", help="name the scenarios, run nothing")
-    parser.add_argument(
-        "--fmu",
-        type=Path,
-        metavar="PATH",
-        help="the FMU, for the scenarios of its model (default: that of each model)",
-    )
+    text = "scenarios, or files FILE.toml of your own (default: all scenarios)"
+    parser.add_argument("names", nargs="*", metavar="NAME", help=text)
+    add_flag(parser, "--list", "name the scenarios, run nothing")
+    text = "the FMU, for the scenarios of its model (default: that of each model)"
+    parser.add_argument("--fmu", type=Path, metavar="PATH", help=text)
     add_fmi(parser, None, "run only FMUs of this version of FMI")
     add_report(parser)
     add_tolerance(parser, "run at this relative tolerance only, without the sweep")
@@ -63,7 +53,10 @@ def do_run(options: argparse.Namespace) -> Ended:
         return do_list(options)
     with ExitStack() as stack:
         chosen, own, fmus, twins = _open(options, stack)
-        _check(options, chosen, own, fmus)
+        for scenario in (*chosen, *own) if options.tolerance is not None else ():
+            with placed(f"--tolerance: {scenario.name}"):
+                model = fmus[scenario.model].model
+                model.check_tolerance(options.tolerance, scenario.parameters)
         for scenario in (*chosen, *own):
             texts = (f"{from_here(scenario.path)}: {x}" for x in scenario.questions)
             console.messages("warning", texts)
@@ -117,29 +110,13 @@ def _ended(done: Done, report: Path, page: Path) -> Ended:
     return Ended(1 if wrong else 0, verdict, document, page=page)
 
 
-def _check(
-    options: argparse.Namespace,
-    chosen: Sequence[Scenario],
-    own: Sequence[Scenario],
-    fmus: Mapping[str, Fmu],
-) -> None:
-    """Refuse a tolerance for all scenarios that one of them cannot be run at."""
-    if options.tolerance is None:
-        return
-    for scenario in (*chosen, *own):
-        with placed(f"--tolerance: {scenario.name}"):
-            model = fmus[scenario.model].model
-            model.check_tolerance(options.tolerance, scenario.parameters)
-
-
 def _open(
     options: argparse.Namespace, stack: ExitStack
 ) -> tuple[list[Scenario], list[Scenario], dict[str, Fmu], dict[str, Fmu]]:
     """Return scenarios of the options, or all; users' own; FMUs by their models; and their twins.
 
-    An FMU is opened once, and every scenario of its model is checked against it. Without names, one
-    that is given runs only the scenarios of its model. There are twins if no FMU and no version of
-    FMI is given, of the models whose scenarios have references.
+    Without names, a given FMU runs only the scenarios of its model. There are twins, of models
+    whose scenarios have references, if no FMU and no version of FMI is given.
     """
     given = stack.enter_context(Fmu(options.fmu)) if options.fmu else None
     if given is not None and options.fmi is not None:

@@ -1,12 +1,12 @@
 """`system` and `coupling`: run systems, compare them, study what their coupling costs."""
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
 from rparm import console, project
-from rparm.command_line import Ended, add_report, add_system
+from rparm.command_line import Ended, add_flag, add_report, add_system
 from rparm.errors import UserError, did_you_mean, hint, together
 from rparm.files import check_writable, from_here, written
 from rparm.project import PROGRAM
@@ -15,7 +15,7 @@ from rparm.report.overview import Entry
 from rparm.report.system_page import Section
 from rparm.result_tables import VariantTable
 from rparm.systems import comparison, ecos, master, ssp
-from rparm.systems.comparison import Outcome, Reference
+from rparm.systems.comparison import Outcome
 from rparm.units import counted
 
 
@@ -24,20 +24,12 @@ def add_system_options(parser: argparse.ArgumentParser) -> None:
         "Runs the variants of the systems in Ecos and compares every variable with the reference."
     )
     add_system(parser)
-    parser.add_argument(
-        "names",
-        nargs="*",
-        metavar="NAME",
-        help="variants, or systems with all theirs (default: all)",
-    )
+    text = "variants, or systems with all theirs (default: all)"
+    parser.add_argument("names", nargs="*", metavar="NAME", help=text)
     add_report(parser)
-    parser.add_argument(
-        "--pictures",
-        type=Path,
-        metavar="DIR",
-        help="draw each variant into a picture in this folder, too",
-    )
-    parser.add_argument("--list", action="store_true", help="name the systems and their variants")
+    text = "draw each variant into a picture in this folder, too"
+    parser.add_argument("--pictures", type=Path, metavar="DIR", help=text)
+    add_flag(parser, "--list", "name the systems and their variants")
 
 
 def do_system(options: argparse.Namespace) -> Ended:
@@ -62,8 +54,7 @@ def do_system(options: argparse.Namespace) -> Ended:
         with written(options.report):
             for system, names in chosen:
                 system_page.remove(options.report, system.name, names)
-        plans = [(system, _references(system, names)) for system, names in chosen]
-        return _run(plans, options)
+        return _run(chosen, options)
 
 
 def _paths(options: argparse.Namespace) -> list[Path]:
@@ -109,17 +100,12 @@ def _choose(systems: Sequence[Section], names: Sequence[str]) -> list[tuple[Sect
     return chosen
 
 
-def _references(section: Section, names: Sequence[str]) -> dict[str, Reference]:
-    return {
-        name: comparison.load_reference(section.ssp, name, section.folder, section.study.EXPERIMENT)
-        for name in names
-    }
-
-
-def _run(
-    plans: Sequence[tuple[Section, Mapping[str, Reference]]], options: argparse.Namespace
-) -> Ended:
-    """Run the plans; a row appears as a variant ends, and its files are written then."""
+def _run(chosen: Sequence[tuple[Section, Sequence[str]]], options: argparse.Namespace) -> Ended:
+    """Run variants; a row appears as a variant ends, and its files are written then."""
+    plans = []
+    for system, names in chosen:
+        given = system.folder, system.study.EXPERIMENT
+        plans.append((system, {n: comparison.load_reference(system.ssp, n, *given) for n in names}))
     outcomes: list[Outcome] = []
     failures: dict[str, UserError] = {}
     entries: list[Entry] = []
@@ -142,7 +128,20 @@ def _run(
                     entries.append(system_page.write_failed(options.report, section, name, error))
                 continue
             table.row(outcome)
-            rows.append(_row(section, outcome))
+            measures = {m.name: (m.value(outcome), m.unit) for m in section.study.MEASURES}
+            rows.append(
+                {
+                    "system": section.name,
+                    "name": outcome.variant,
+                    "steps": outcome.steps,
+                    "error": outcome.error,
+                    "worst": outcome.worst,
+                    "bound": comparison.BOUND,
+                    "measures": {m: {"value": v, "unit": u} for m, (v, u) in measures.items()},
+                    "seconds": outcome.run.wall_time,
+                    "passed": outcome.passed,
+                }
+            )
             console.messages(name, outcome.run.messages)
             with written(options.report):
                 entries.append(system_page.write_variant(options.report, section, outcome))
@@ -151,9 +150,8 @@ def _run(
 
                 with written(options.pictures):
                     options.pictures.mkdir(parents=True, exist_ok=True)
-                    save_figure(
-                        section.study.figure(section.ssp, outcome), options.pictures / f"{name}.png"
-                    )
+                    figure = section.study.figure(section.ssp, outcome)
+                    save_figure(figure, options.pictures / f"{name}.png")
             outcomes.append(outcome)
         print()
     with written(options.report):
@@ -165,22 +163,6 @@ def _run(
     if failures:
         return Ended(2, verdict, document, together(list(failures.values())), index)
     return Ended(1 if failed else 0, verdict, document, page=index)
-
-
-def _row(section: Section, outcome: Outcome) -> dict[str, object]:
-    return {
-        "system": section.name,
-        "name": outcome.variant,
-        "steps": outcome.steps,
-        "error": outcome.error,
-        "worst": outcome.worst,
-        "bound": comparison.BOUND,
-        "measures": {
-            m.name: {"value": m.value(outcome), "unit": m.unit} for m in section.study.MEASURES
-        },
-        "seconds": outcome.run.wall_time,
-        "passed": outcome.passed,
-    }
 
 
 def add_coupling_options(parser: argparse.ArgumentParser) -> None:

@@ -60,8 +60,6 @@ OPERATIONS |= {name: BUILT_IN.get(name) or getattr(math, name) for name in FUNCT
 
 
 # ---- The tree ------------------------------------------------------------------------------------
-
-
 class ExpressionError(ValueError):
     """A mistake in an expression, in one line that begins with the column (from 1)."""
 
@@ -119,18 +117,8 @@ def finite_number(given: Any) -> float:
 
 
 # ---- Kinds of its parts --------------------------------------------------------------------------
-
-
 def check_kinds(root: Node, expected: str = NUMBER, conditions: Collection[str] = ()) -> None:
-    """Raise ExpressionError where a part is of the wrong kind.
-
-    Parameters
-    ----------
-    expected : str
-        `NUMBER` or `CONDITION`: kind of the whole.
-    conditions : collection of str
-        Names of Booleans; all others are numbers.
-    """
+    """Raise ExpressionError where a part is of the wrong kind; `conditions` are Booleans' names."""
     for node in in_order([root]):
         for number, argument in enumerate(node.arguments):
             is_condition = node.op in LOGIC or (node.op == "if" and number == 0)
@@ -139,10 +127,8 @@ def check_kinds(root: Node, expected: str = NUMBER, conditions: Collection[str] 
 
 
 def _check(node: Node, expected: str, conditions: Collection[str]) -> None:
-    is_condition = node.op in ("literal", *LOGIC, *RELATIONS) or (
-        node.op == "name" and node.name in conditions
-    )
-    found = CONDITION if is_condition else NUMBER
+    is_condition = node.op == "name" and node.name in conditions
+    found = CONDITION if is_condition or node.op in ("literal", *LOGIC, *RELATIONS) else NUMBER
     if found != expected:
         constants = {"number": "the number", "literal": "true" if node.value else "false"}
         what = node.name or constants.get(node.op, repr(node.op))
@@ -150,8 +136,6 @@ def _check(node: Node, expected: str, conditions: Collection[str]) -> None:
 
 
 # ---- Its parser ----------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class Token:
     """A number, name or operator; at the end of the text one of kind "end"."""
@@ -308,12 +292,9 @@ class _Parser:
         self.expect(")")
         count = len(further.arguments) if further else FUNCTIONS[function.text]
         if len(arguments) != (count or max(2, len(arguments))):
-            wanted = count or "2 or more"
-            raise ExpressionError(
-                function.column,
-                f"{function.text}: expected {wanted} argument{'s' * (count != 1)}, "
-                f"got {len(arguments)}",
-            )
+            wanted = f"{count or '2 or more'} argument{'s' * (count != 1)}"
+            text = f"{function.text}: expected {wanted}, got {len(arguments)}"
+            raise ExpressionError(function.column, text)
         if further:
             return further.of(arguments, function.column)
         if count:
@@ -347,8 +328,6 @@ for _name, _arguments, _body in (
 
 
 # ---- Values --------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Expression:
     """A number that follows from others. A name may have dots: ``component.variable``."""
@@ -362,10 +341,7 @@ class Expression:
         return names(self.tree)
 
     def value(self, values: Mapping[str, float]) -> float:
-        """Return the value for the values of the names.
-
-        ArithmeticError, ValueError if it is not defined or too large.
-        """
+        """Return the value; ArithmeticError, ValueError if it is not defined or too large."""
         result = evaluated(self.tree, values)
         if not math.isfinite(result):
             raise ValueError("is not a finite number")
@@ -382,10 +358,7 @@ def parsed(text: str) -> Expression:
 
 
 def evaluated(root: Node, values: Mapping[str, float]) -> float:
-    """Evaluate a tree whose kinds are right; a branch that is not taken need not have a value.
-
-    ArithmeticError, ValueError if it has none.
-    """
+    """Evaluate a tree of right kinds, not its branches that are not taken; errors as in `value`."""
     known: dict[Node, float] = {}
     todo = [root]
     while todo:

@@ -40,10 +40,7 @@ PRODUCT = re.compile(r"([^/()]+)(?:/(?:([^./()]+)|\(([^/()]+)\)))?")  # a.b, a/b
 
 
 def exponents(text: str) -> dict[str, int]:
-    """Return the exponents of the base units and rad in a product of symbols, as FMI writes it.
-
-    ValueError if it is none.
-    """
+    """Return exponents of base units and rad in a product of symbols; ValueError if it is none."""
     product = PRODUCT.fullmatch(text)
     if product is None or (text.startswith("1") and text != "1" and not text.startswith("1/")):
         raise ValueError(f"unit {text!r} is no product of SI symbols such as kg.m/s2")
@@ -52,9 +49,8 @@ def exponents(text: str) -> dict[str, int]:
         for factor in part.split(".") if part and part != "1" else ():
             symbol = FACTOR.fullmatch(factor)
             if symbol is None or symbol[1] not in SYMBOLS:
-                raise ValueError(
-                    f"unit {text!r}: {factor!r} is no SI symbol with an exponent, such as s2"
-                )
+                expected = "SI symbol with an exponent, such as s2"
+                raise ValueError(f"unit {text!r}: {factor!r} is no {expected}")
             power = sign * int(symbol[2] or 1)
             for base, exponent in SYMBOLS[symbol[1]].items():
                 found[base] = found.get(base, 0) + power * exponent
@@ -77,19 +73,9 @@ def shown(unit: Unit | Mapping[str, int]) -> str:
 
 
 def unit_of(root: Node, units: Mapping[str, Unit], expected: Unit | None = None) -> Unit:
-    """Return the unit of an expression whose kinds are right; 1 for a condition and for a number.
+    """Return the unit of an expression of right kinds; 1 for a condition and for a number.
 
-    Parameters
-    ----------
-    units : mapping of str to Unit
-        Of all names that are numbers, `time` among them.
-    expected : Unit, optional
-        What the expression is assigned to.
-
-    Raises
-    ------
-    ExpressionError
-        where units do not fit.
+    `units` has all names that are numbers, `time` too. ExpressionError where units do not fit.
     """
     found: dict[Node, Unit | None] = {}  # None: a number, which takes any unit
     for node in in_order([root]):
@@ -148,9 +134,8 @@ def _power(node: Node, given: list[Unit | None]) -> Unit | None:
         return base
     value = _literal(node.arguments[1])
     if value is None:
-        raise ExpressionError(
-            node.column, f"'**': expected a number as exponent of what has unit {shown(base)}"
-        )
+        text = f"expected a number as exponent of what has unit {shown(base)}"
+        raise ExpressionError(node.column, f"'**': {text}")
     return times(ONE, base, value.limit_denominator(LARGEST_ROOT))
 
 

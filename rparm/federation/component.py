@@ -30,8 +30,6 @@ LEAVE = 2.0  # s, for work and processes to end after a failure
 
 
 # ---- Parts of a system ---------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Source:
     """Source of an input: value `index` of those that `component` publishes."""
@@ -60,9 +58,8 @@ class Part:
             return
         (here, own), (there, foreign) = self.system.rsplit(" ", 1), other.rsplit(" ", 1)
         if here != there:
-            raise UserError(
-                f"{self.component}: its variant is {here!r}, that of the federation is {there!r}"
-            )
+            variants = f"its variant is {here!r}, that of the federation is {there!r}"
+            raise UserError(f"{self.component}: {variants}")
         raise UserError(
             f"{self.component}: its SSP is not that of the federation (SHA-256 {own[:12]}..., "
             f"expected {foreign[:12]}...): copy the file"
@@ -77,23 +74,23 @@ def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
         raise UserError(f"{ssp.path}: has no variant {variant!r}{known}")
     published = {name: model.real_outputs for name, model in ssp.models.items()}
     whole = f"{variant} {hashlib.sha256(ssp.path.read_bytes()).hexdigest()}"
+
+    def source(c: Connection) -> Source:
+        return Source(c.start_component, published[c.start_component].index(c.start_connector))
+
     made = {}
     for component in system.components:
         name = component.name
         incoming = [c for c in real_connections(ssp) if c.end_component == name]
         others = [c for c in system.connections if c not in real_connections(ssp)]
+        constant = [c.start_connector for c in others if c.start_component == name]
         made[name] = Part(
             component=name,
             parameters=system.parameter_sets[variant].get(name, {}),
             published=tuple(published[name]),
             inputs=tuple(c.end_connector for c in incoming),
-            sources=tuple(
-                Source(c.start_component, published[c.start_component].index(c.start_connector))
-                for c in incoming
-            ),
-            constant=tuple(
-                dict.fromkeys(c.start_connector for c in others if c.start_component == name)
-            ),
+            sources=tuple(map(source, incoming)),
+            constant=tuple(dict.fromkeys(constant)),
             rounds=len(system.components) + 1,
             times=system.times,
             system=whole,
@@ -102,26 +99,17 @@ def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
 
 
 def real_connections(ssp: Ssp) -> Sequence[Connection]:
-    return [
-        c
-        for c in ssp.system.connections
-        if ssp.variable(f"{c.start_component}.{c.start_connector}").type == "Real"
-    ]
+    return [c for c in ssp.system.connections if ssp.variable(c.start).type == "Real"]
 
 
 # ---- The process ---------------------------------------------------------------------------------
-
-
 def run_component(
     part: Part, fmu: Fmu, address: str, silence: float, is_gone: Callable[[], bool] = lambda: False
 ) -> None:
-    """Step a component from the first to the last communication point.
+    """Step a component to the last communication point; UserError if it or the federation fails.
 
     A call of the FMU, and silence of the broker at `address`, may last `silence` s. `is_gone` says
     whether the process that started this one has ended.
-
-    UserError if the FMU fails, the federation steps something else or ends, or an output changes
-    that must not.
     """
     name = part.component
     federate = Federate(name, address, sorted({s.component for s in part.sources}))
@@ -219,8 +207,6 @@ class _Stepper:
 
 
 # ---- Watching ------------------------------------------------------------------------------------
-
-
 def run_watched(
     work: Callable[[], Result], look: Callable[[], None], end: Callable[[BaseException], None]
 ) -> Result:

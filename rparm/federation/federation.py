@@ -48,19 +48,15 @@ def run(
 ) -> Record:
     """Run a variant, each component in its own process, with the broker at `address`.
 
-    Components `elsewhere` are stepped by other machines: they are waited for. A process that is
-    silent for `silence` s ends the federation. `progress` is called with the number of steps made,
-    `connected` when all components have been initialized and the first step begins.
-
-    UserError if a process fails; its text is the first one that one of them gave.
+    Components `elsewhere` are stepped by other machines. A process that is silent for `silence` s
+    ends the federation. `progress` gets the number of steps made; `connected` is called before the
+    first step. UserError if a process fails, with the first text that one of them gave.
     """
     made = parts(ssp, variant)
     whole = next(iter(made.values())).system
     local = [component for component in made if component not in elsewhere]
-    started = {
-        c: [*arguments(ssp.path, variant, c, address), "--silence", str(silence), "--owned"]
-        for c in local
-    }
+    further = ["--silence", str(silence), "--owned"]
+    started = {c: [*arguments(ssp.path, variant, c, address), *further] for c in local}
     recorder = Federate(RECORDER, address, list(made), publishes=False)
     with (
         temporary_folder() as folder,
@@ -68,9 +64,7 @@ def run(
         _processes(started, folder) as processes,
     ):
         still, stuck = Silence(recorder, silence), Silence(recorder, 2.0 * silence)
-        ended = (
-            itertools.count()
-        )  # looks since a process here has failed, perhaps as the federation ended
+        ended = itertools.count()  # looks since a process here has failed, perhaps at the end
 
         def look() -> None:
             failure = _failure(processes, folder)
@@ -157,8 +151,6 @@ def _recorded(
 
 
 # ---- Processes -----------------------------------------------------------------------------------
-
-
 @contextmanager
 def _processes(
     commands: Mapping[str, list[str]], folder: Path
@@ -170,13 +162,9 @@ def _processes(
     try:
         for component, command in commands.items():
             with (folder / component).open("wb") as log, uninterrupted():
-                processes[component] = subprocess.Popen(
-                    [sys.executable, "-P", "-m", "rparm", *command],
-                    stdin=subprocess.PIPE,
-                    stdout=log,
-                    stderr=subprocess.STDOUT,
-                    env=environment,
-                )
+                streams = {"stdin": subprocess.PIPE, "stdout": log, "stderr": subprocess.STDOUT}
+                whole = [sys.executable, "-P", "-m", "rparm", *command]
+                processes[component] = subprocess.Popen(whole, env=environment, **streams)
         yield processes
     finally:
         for process in processes.values():

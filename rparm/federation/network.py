@@ -45,8 +45,6 @@ _is_separate = False
 
 
 # ---- Addresses -----------------------------------------------------------------------------------
-
-
 def check_host_has_address() -> None:
     """Refuse a machine where HELICS finds no address, not even 127.0.0.1, as no other IPv4 one."""
     try:
@@ -87,9 +85,8 @@ def check_address_is_free(address: str) -> None:
 def wait_for_listener(address: str, seconds: float, say: Callable[[], object]) -> None:
     """Wait until something listens at `address`; `say` so, if it does not yet.
 
-    HELICS would wait too, but print that it does, several times a second.
-
-    UserError if nothing has listened there after `seconds`, or the host is unknown.
+    HELICS would print that it waits, several times a second. UserError after `seconds`, or if the
+    host is unknown.
     """
     place = check_address(address)
     latest = time.monotonic() + seconds
@@ -126,8 +123,6 @@ def _refusal_to_listen(host: str, port: int) -> str:
 
 
 # ---- HELICS --------------------------------------------------------------------------------------
-
-
 def helics() -> Any:
     """Import the package helics; UserError if it is not installed."""
     try:
@@ -156,10 +151,8 @@ class Broker(AbstractContextManager["Broker"]):
         h = self._h = helics()
         self._questions = _Questions()
         self._address = address
-        options = (
-            f"-f {count} --maxfederates={count} --brokerkey={key()} --local_interface={address} "
-            f"{QUIET}"
-        )
+        options = f"-f {count} --maxfederates={count} --brokerkey={key()} "
+        options += f"--local_interface={address} {QUIET}"
         try:
             self._broker = h.helicsCreateBroker(NETWORK, "", options)
         except h.HelicsException as error:
@@ -247,11 +240,7 @@ class _Questions:
 
 
 class Federate:
-    """A process in a federation: publishes one vector, under its name, reads those of `sources`.
-
-    All federates make the same exchanges. The first number of a vector is the count of exchanges
-    before it: what is read is of the present exchange, or an error.
-    """
+    """Process that publishes a vector, and reads those of `sources`, each with its exchange."""
 
     def __init__(
         self, name: str, address: str, sources: Sequence[str], publishes: bool = True
@@ -287,13 +276,11 @@ class Federate:
                 if TOO_EARLY not in str(error) or not left:
                     raise
         if self._publishes:
-            self._publication = h.helicsFederateRegisterGlobalPublication(
-                self._federate, self._name, h.HELICS_DATA_TYPE_VECTOR, ""
-            )
-        self._subscriptions = {
-            source: h.helicsFederateRegisterSubscription(self._federate, source, "")
-            for source in self._sources
-        }
+            kind = self._name, h.HELICS_DATA_TYPE_VECTOR, ""
+            publish = h.helicsFederateRegisterGlobalPublication
+            self._publication = publish(self._federate, *kind)
+        subscribe = partial(h.helicsFederateRegisterSubscription, self._federate)
+        self._subscriptions = {source: subscribe(source, "") for source in self._sources}
 
     def _information(self) -> Any:
         """Return the settings that HELICS needs to make the federate."""
@@ -302,15 +289,12 @@ class Federate:
         h.helicsFederateInfoSetCoreTypeFromString(info, NETWORK)
         # not one that another federate of this process has
         h.helicsFederateInfoSetCoreName(info, f"{self._name}-{secrets.token_hex(8)}")
-        h.helicsFederateInfoSetCoreInitString(
-            info,
-            f"--federates=1 --broker_address={self._address} --network_timeout={JOIN:g}s {QUIET}",
-        )
+        options = f"--federates=1 --broker_address={self._address} --network_timeout={JOIN:g}s"
+        h.helicsFederateInfoSetCoreInitString(info, f"{options} {QUIET}")
         h.helicsFederateInfoSetBrokerKey(info, key())
         h.helicsFederateInfoSetTimeProperty(info, h.HELICS_PROPERTY_TIME_DELTA, 1.0)
-        h.helicsFederateInfoSetIntegerProperty(
-            info, h.HELICS_PROPERTY_INT_LOG_LEVEL, h.HELICS_LOG_LEVEL_NO_PRINT
-        )
+        level = h.HELICS_PROPERTY_INT_LOG_LEVEL, h.HELICS_LOG_LEVEL_NO_PRINT
+        h.helicsFederateInfoSetIntegerProperty(info, *level)
         return info
 
     def system(self) -> str:
@@ -338,10 +322,7 @@ class Federate:
         self._h.helicsPublicationPublishVector(self._publication, vector)
 
     def read(self) -> Mapping[str, Sequence[float]]:
-        """Read the values that sources published before the last exchange.
-
-        UserError if none arrived.
-        """
+        """Read all values that sources published before the last exchange, or raise UserError."""
         values = {}
         for source, place in self._subscriptions.items():
             count, *values[source] = self._h.helicsInputGetVector(place)
@@ -394,8 +375,6 @@ class Federate:
 
 
 # ---- Standard error ------------------------------------------------------------------------------
-
-
 def separate_messages() -> None:
     """Give Python its own standard error from now on: to be called as the program starts."""
     global _is_separate

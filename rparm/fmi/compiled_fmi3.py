@@ -103,14 +103,11 @@ def _do_step(row, time, length, final):
 @cfunc(STATUS(ROW, POINTER, SIZE, POINTER, SIZE, POINTER, POINTER), cache=True)
 def _derivative(row, unknowns, unknown_count, knowns, known_count, direction, result):
     given = unknowns, unknown_count, knowns, known_count
-    return _call(
-        row[DERIVATIVE], (row[INSTANCE], *given, direction, known_count, result, unknown_count)
-    )
+    further = direction, known_count, result, unknown_count
+    return _call(row[DERIVATIVE], (row[INSTANCE], *given, *further))
 
 
 ADAPTERS = (
     _set_real, _get_real, _set_boolean, _get_boolean, _do_step, _derivative, _get_integer,
 )  # fmt: skip
-
-
 ADDRESSES = tuple(adapter.address for adapter in ADAPTERS)

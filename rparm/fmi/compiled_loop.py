@@ -26,24 +26,14 @@ from rparm.fmi.fmi_instance import DISCARD, TERMINATED, Instance
 
 FUNCTIONS = {
     "2.0": (
-        "fmi2SetReal",
-        "fmi2GetReal",
-        "fmi2SetBoolean",
-        "fmi2GetBoolean",
-        "fmi2DoStep",
-        "fmi2GetDirectionalDerivative",
-        "fmi2GetInteger",
+        "fmi2SetReal", "fmi2GetReal", "fmi2SetBoolean", "fmi2GetBoolean", "fmi2DoStep",
+        "fmi2GetDirectionalDerivative", "fmi2GetInteger",
     ),
     "3.0": (
-        "fmi3SetFloat64",
-        "fmi3GetFloat64",
-        "fmi3SetBoolean",
-        "fmi3GetBoolean",
-        "fmi3DoStep",
-        "fmi3GetDirectionalDerivative",
-        "fmi3GetInt32",
+        "fmi3SetFloat64", "fmi3GetFloat64", "fmi3SetBoolean", "fmi3GetBoolean", "fmi3DoStep",
+        "fmi3GetDirectionalDerivative", "fmi3GetInt32",
     ),
-}
+}  # fmt: skip
 SET_REAL, GET_REAL, SET_BOOLEAN, GET_BOOLEAN, DO_STEP, DERIVATIVE, GET_INTEGER = range(7)
 _POINTER = ir.IntType(8).as_pointer()
 _SIZE = ir.IntType(64)
@@ -53,8 +43,6 @@ COLUMNS = 8  # component and addresses of its functions
 
 
 # ---- Calls of an FMU -----------------------------------------------------------------------------
-
-
 def function_names(instance: Instance) -> tuple[str, ...]:
     """Return the names of the functions that an instance is called by."""
     return FUNCTIONS[instance.fmu.model.fmi_version]
@@ -118,12 +106,7 @@ def directional_derivative(
     return signature, generate
 
 
-# ---- True)\nclass Part=Values --------------------------------------------------------------------
-
-
 # ---- Values --------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Part:
     """Variables of one type, Real or Boolean, that a component exchanges."""
@@ -188,16 +171,8 @@ class Tangent:
 
 
 # ---- The loop ------------------------------------------------------------------------------------
-
-
-# ---- The loop ------------------------------------------------------------------------------------
-
-
 def component_calls(instances: Sequence[Instance]) -> np.ndarray:
-    """Return each component with its functions' addresses for the loop, then a part for adapters.
-
-    (instances, 2 * COLUMNS), without a copy: an adapter is given the address of its part.
-    """
+    """Return a row per component: its functions' addresses, then a part that adapters refer to."""
     calls = np.zeros((len(instances), 2 * COLUMNS), np.int64)
     for row, instance in zip(calls, instances, strict=True):
         called, adapted = row[:COLUMNS], row[COLUMNS:]
@@ -283,10 +258,7 @@ def read_outputs(calls, reals, switches):
 
 @njit(cache=True, nogil=True)
 def _deviation_rate(calls, derivatives, states, deviation, rate):
-    """Write the derivative by time of a deviation of the first component's states to `rate`.
-
-    Returns the status of the FMU.
-    """
+    """Write the rate of a deviation of the first component's states; return the FMU's status."""
     return directional_derivative(
         calls[0, 1 + DERIVATIVE],
         calls[0, 0],
@@ -332,6 +304,8 @@ def advance(
 ):
     """Make all steps from times[0], where outputs have been read.
 
+    Returns status, function, component and step of the call that failed; status 0 if none did.
+
     Parameters
     ----------
     calls : (components, 2 * COLUMNS) of component_calls
@@ -339,19 +313,11 @@ def advance(
     held, held_switches : (n + 1, held values), zero-order hold: over the step from times[i]
     reals, switches : tuples of Wires
     points : (rows,)
-        Indices of the times, increasing from 1 on, at which outputs are read: all, where components
-        are connected.
+        Indices of times, from 1 on, at which outputs are read: all, if components are connected.
     watched : (variables,) columns among the Reals
-    record : (rows, variables)
-        Values that an importer reads after the step to times[points[j]].
+    record : (rows, variables) read after the step to times[points[j]]
     tangent : fields of Tangent, empty if no deviation is carried along
-    growth : (n,)
-        Factor by which each step lengthens the deviation: filled if one is carried along.
-
-    Returns
-    -------
-    status, function, component, step
-        The call that failed; status 0 if none did.
+    growth : (n,) factor by which each step lengthens the deviation, if there is one
     """
     derivatives, states, discrete_reals, discrete_integers, deviation = tangent
     carried = len(states) > 0
@@ -401,9 +367,8 @@ def advance(
             status, jumps = _changes(calls, discrete_reals, GET_REAL, numbers[0], numbers[1])
             if status >= DISCARD:
                 return status, GET_REAL, 0, i
-            status, turns = _changes(
-                calls, discrete_integers, GET_INTEGER, integers[0], integers[1]
-            )
+            old, new = integers[0], integers[1]
+            status, turns = _changes(calls, discrete_integers, GET_INTEGER, old, new)
             if status >= DISCARD:
                 return status, GET_INTEGER, 0, i
             if jumps or turns:
@@ -416,11 +381,6 @@ def advance(
 
 
 # ---- For its callers -----------------------------------------------------------------------------
-
-
-# ---- For its callers -----------------------------------------------------------------------------
-
-
 class Stepper:
     """Steps components whose Reals and Booleans are wired to each other and to held inputs."""
 
@@ -457,20 +417,10 @@ class Stepper:
     ) -> tuple[int, UserError | None]:
         """Make steps as `advance` explains; return how many were made, and why not all of them."""
         tangent = Tangent.none() if tangent is None else tangent
-        calls, reals, switches = self._state()
-        *failed, step = advance(
-            calls,
-            times,
-            held,
-            held_switches,
-            reals,
-            switches,
-            points,
-            watched,
-            record,
-            tangent.fields,
-            np.empty(0) if growth is None else growth,
-        )
+        calls, *wires = self._state()
+        found = record, tangent.fields, np.empty(0) if growth is None else growth
+        given = calls, times, held, held_switches, *wires, points, watched
+        *failed, step = advance(*given, *found)
         try:
             self._check(failed, f"in the step from t = {float(times[step])!r} s")
         except UserError as error:

@@ -73,14 +73,8 @@ class InputPolynomials:
 class SavedState:
     """The state of an instance at some time; its functions raise FMICallException if they fail."""
 
-    def __init__(
-        self,
-        component: c_void_p,
-        get: Callable[..., object],
-        put: Callable[..., object],
-        free: Callable[..., object],
-    ) -> None:
-        self._component, self._get, self._put, self._free = component, get, put, free
+    def __init__(self, component: c_void_p, *calls: Callable[..., object]) -> None:
+        self._component, (self._get, self._put, self._free) = component, calls
         self._state = c_void_p()
 
     def take(self) -> None:
@@ -98,10 +92,9 @@ class SavedState:
 
 
 class Instance(ABC):
-    """One instance of an FMU: a context manager that instantiates, terminates and frees it.
+    """Instance of an FMU: a context manager that instantiates, terminates and frees it.
 
-    The FMU stays open as long as the instance, which has the `name` in messages;
-    `input_polynomials` is for `smooth_inputs`.
+    The FMU stays open as long. `name` is for messages, `input_polynomials` for `smooth_inputs`.
     """
 
     # of the version of FMI
@@ -190,9 +183,8 @@ class Instance(ABC):
         self._status = error.status
         known = error.status in range(len(STATUS_NAMES))
         name = STATUS_NAMES[error.status] if known else str(error.status)
-        return UserError(
-            f"{self.name}: {error.function} {when} failed ({name}){self._last_message()}"
-        )
+        text = f"{error.function} {when} failed ({name}){self._last_message()}"
+        return UserError(f"{self.name}: {text}")
 
     @contextmanager
     def explained(self, when: str) -> Iterator[None]:
@@ -286,9 +278,8 @@ class Instance(ABC):
         found = np.zeros((len(unknowns), len(knowns)))
         for column, name in enumerate(knowns if rows else ()):
             with self.explained(f"({name})"):
-                found[:, column] = self.fmi.getDirectionalDerivative(
-                    rows, [variables[name].reference], [1.0]
-                )
+                known = [variables[name].reference]
+                found[:, column] = self.fmi.getDirectionalDerivative(rows, known, [1.0])
         return found
 
     @abstractmethod

@@ -50,14 +50,8 @@ BINARY, SOURCE = re.compile(r"binaries/[^/]+/[^/]+"), re.compile(r"sources/.+\.c
 
 
 # ---- Archives ------------------------------------------------------------------------------------
-
-
 def unpack(path: Path, folder: Path, kind: str, only: str | None = None) -> dict[str, int]:
-    """Unpack an archive, or one file of it, to an empty folder; nothing is written elsewhere.
-
-    Returns the bytes of all files in the archive, by their names: relative paths with "/".
-    UnreadableError for whatever is wrong with what should be an FMU or SSP (`kind`).
-    """
+    """Unpack an archive, or one file, to an empty folder; bytes by path, or UnreadableError."""
     check_regular(path)
     if path.is_dir():
         raise UnreadableError(f"is a folder, expected an {kind}")
@@ -88,9 +82,8 @@ def read_xml(path: Path) -> etree._ElementTree:
     """Parse an unpacked XML file; UnreadableError if it is none, too large, or has a DOCTYPE."""
     size = path.stat().st_size
     if size > LARGEST_XML:
-        raise UnreadableError(
-            f"has {size / 1e6:.0f} MB, expected at most {LARGEST_XML / 1e6:.0f} MB"
-        )
+        most = f"expected at most {LARGEST_XML / 1e6:.0f} MB"
+        raise UnreadableError(f"has {size / 1e6:.0f} MB, {most}")
     parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True)
     try:  # from bytes: given a name, libxml2 takes it for a URL
         tree = etree.fromstring(path.read_bytes(), parser).getroottree()
@@ -141,9 +134,8 @@ def _check(entries: Sequence[zipfile.ZipInfo]) -> None:
     # unpacking ends at the sizes that the archive declares: they can be relied on
     content = sum(entry.file_size for entry in entries)
     if content > LARGEST_CONTENT:
-        raise UnreadableError(
-            f"has {content / 1e6:.0f} MB inside, expected at most {LARGEST_CONTENT / 1e6:.0f} MB"
-        )
+        most = f"expected at most {LARGEST_CONTENT / 1e6:.0f} MB"
+        raise UnreadableError(f"has {content / 1e6:.0f} MB inside, {most}")
     places: dict[tuple[str, ...], zipfile.ZipInfo] = {}
     for entry in entries:
         # zipfile cuts the name at a null character, and may take another one from an extra field
@@ -161,9 +153,8 @@ def _check(entries: Sequence[zipfile.ZipInfo]) -> None:
         for length in range(1, len(place)):
             above = places.get(place[:length])
             if above is not None and not above.is_dir():
-                raise UnreadableError(
-                    f"{_shown(above.filename)} is a file, and a folder of {_shown(entry.filename)}"
-                )
+                folder = f"a folder of {_shown(entry.filename)}"
+                raise UnreadableError(f"{_shown(above.filename)} is a file, and {folder}")
 
 
 def _leads_up(part: str) -> bool:
@@ -184,10 +175,7 @@ def _wrong_entry(entry: zipfile.ZipInfo) -> str:
 
 
 def _place(name: str) -> tuple[str, ...]:
-    """Return where a file is unpacked: one place for names that are one file on some system.
-
-    Windows ignores case and drops blanks and dots at the end; macOS knows one form of an accent.
-    """
+    """Return a place for names that are one file under Windows (case, ends) or macOS (accents)."""
     parts = unicodedata.normalize("NFC", name).casefold().split("/")
     return tuple(part.rstrip(" .") for part in parts if part not in ("", "."))
 
@@ -197,14 +185,11 @@ def _shown(name: str) -> str:
 
 
 # ---- FMUs ----------------------------------------------------------------------------------------
-
-
 class Fmu(AbstractContextManager["Fmu"]):
-    """An FMU that is unpacked; a context manager that removes the unpacked copy.
+    """FMU unpacked in the folder `within`, a temporary one by default; removed at the end.
 
     Raises UserError if the file is no FMU of the `kind`, co-simulation or model exchange, of a
-    known version of FMI, that runs on this platform. The copy is made in the folder `within`, or
-    where temporary files are. Messages name the FMU by `shown`, where it lies in another archive.
+    known version of FMI, that runs on this platform. Messages name it `shown`, if in an archive.
     """
 
     def __init__(
@@ -270,9 +255,8 @@ def describe(path: Path, kind: str = CO_SIMULATION) -> Described:
             raise
         except (UnreadableError, ValidationError, ValueError) as error:
             raise UnreadableError(f"wrong {DESCRIPTION}: {one_line(error)}") from error
-        except (
-            Exception
-        ) as error:  # fmpy raises bare exceptions, and others for input it does not expect
+        # fmpy raises bare exceptions, and others for input that it does not expect
+        except Exception as error:
             kind = "" if type(error) is Exception else f"fmpy fails with {type(error).__name__}: "
             raise UnreadableError(f"wrong {DESCRIPTION}: {kind}{one_line(error)}") from error
 
@@ -283,9 +267,8 @@ class _WrongKindError(UnreadableError):
     def __init__(self, root: etree._Element, kind: str) -> None:
         found = f"FMI {root.get('fmiVersion')}"
         found += " for model exchange" if root.find("ModelExchange") is not None else ""
-        super().__init__(
-            f"expected an FMU of FMI {' or '.join(VERSIONS)} for {kind}, found {found}"
-        )
+        expected = f"an FMU of FMI {' or '.join(VERSIONS)} for {kind}"
+        super().__init__(f"expected {expected}, found {found}")
 
 
 def _interface(description: ModelDescription, kind: str) -> Any:
@@ -304,11 +287,9 @@ def _read(folder: Path, kind: str) -> ModelDescription:
     if _interface(description, kind) is None:
         raise _WrongKindError(root, kind)
     if description.fmiVersion == "3.0":  # fmpy does not read it
-        for node, interface in (
-            ("CoSimulation", description.coSimulation),
-            ("ModelExchange", description.modelExchange),
-        ):
+        for interface in (description.coSimulation, description.modelExchange):
             if interface is not None:
+                node = "CoSimulation" if interface is description.coSimulation else "ModelExchange"
                 given = root.find(node).get("providesDirectionalDerivatives")
                 interface.providesDirectionalDerivative = given in ("true", "1")
     return description
@@ -320,16 +301,13 @@ def _for_this_platform(path: Path, shown: Path, kind: str = CO_SIMULATION) -> tu
         found = describe(path, kind)
     identifier = _interface(found.description, kind).modelIdentifier
     if not re.fullmatch(r"[A-Za-z_]\w*", identifier, re.ASCII):
-        raise UserError(
-            f"{shown}: expected a C identifier as modelIdentifier, found {show(identifier)}"
-        )
+        expected = "expected a C identifier as modelIdentifier"
+        raise UserError(f"{shown}: {expected}, found {show(identifier)}")
     platforms = sorted({name.split("/")[1] for name in found.sizes if BINARY.fullmatch(name)})
     wanted = INSTANCES[found.model.fmi_version, kind].PLATFORMS
     here = [platform for platform in wanted if platform in platforms]
     if not here:
         way_out = "; `fmpy compile` makes one" if any(map(SOURCE.fullmatch, found.sizes)) else ""
-        raise UserError(
-            f"{shown}: has no binary for {' or '.join(wanted)} "
-            f"(has: {', '.join(platforms) or 'none'}){way_out}"
-        )
+        has = f"(has: {', '.join(platforms) or 'none'})"
+        raise UserError(f"{shown}: has no binary for {' or '.join(wanted)} {has}{way_out}")
     return found, here[0]

@@ -74,12 +74,7 @@ class Variable:
         return self.causality == "parameter" or is_state
 
     def checked(self, given: Any) -> Value:
-        """Return the value to set, from what a user gives.
-
-        That is a number, a text with a number and its unit, or the name of an Enumeration's item.
-
-        WrongValueError if it is not of the variable's type or out of range.
-        """
+        """Return the value for a number, a text with a unit, or an item's name; WrongValueError."""
         if self.type not in TYPES.values():
             raise WrongValueError(f"is of type {self.type}, which cannot be set here")
         if self.type == "Enumeration":
@@ -182,16 +177,11 @@ class Model:
         """Refuse a tolerance that the method of these values, or of start values, cannot reach."""
         smallest = self.smallest_tolerance(values)
         if tolerance < smallest:
-            method = self.method(values)
-            raise WrongValueError(
-                f"expected at least {short(smallest)}, the smallest of {method}, got {tolerance!r}"
-            )
+            least = f"{short(smallest)}, the smallest of {self.method(values)}"
+            raise WrongValueError(f"expected at least {least}, got {tolerance!r}")
 
     def find(self, name: str, kind: str) -> Variable:
-        """Return a variable of one of `KINDS`.
-
-        WrongValueError, with all of these, if it is none.
-        """
+        """Return a variable of one of `KINDS`; a WrongValueError names all of these."""
         variable = self.variables.get(name)
         if variable is not None and variable.is_a(kind):
             return variable
@@ -205,14 +195,10 @@ class Model:
 
 
 def described(description: ModelDescription) -> Model:
-    """Return the model that a description of FMI 2.0 or 3.0 declares.
-
-    Of its capabilities those for co-simulation, or for model exchange if it has no others.
-
-    ValueError if a start value or a limit is not a number.
-    """
+    """Return the declared model, for co-simulation if it can; ValueError for a wrong number."""
     slave = description.coSimulation
     capabilities = slave or description.modelExchange
+    interpolates = slave and (slave.canInterpolateInputs or slave.providesIntermediateUpdate)
     displays = {
         unit.name: {x.name: display_unit(x.factor, x.offset) for x in unit.displayUnits}
         for unit in description.unitDefinitions
@@ -236,9 +222,7 @@ def described(description: ModelDescription) -> Model:
             for v in description.modelVariables
         },
         states=tuple(derivatives),
-        interpolates_inputs=bool(
-            slave and (slave.canInterpolateInputs or slave.providesIntermediateUpdate)
-        ),
+        interpolates_inputs=bool(interpolates),
         gives_output_derivatives=bool(slave and (slave.maxOutputDerivativeOrder or 0) >= 1),
         saves_states=bool(capabilities.canGetAndSetFMUstate),
         gives_directional_derivatives=bool(capabilities.providesDirectionalDerivative),
@@ -259,9 +243,8 @@ def _experiment(given: DefaultExperiment | None) -> Experiment:
     def number(text: str | None) -> float | None:
         return float(text) if text and math.isfinite(float(text)) else None
 
-    return Experiment(
-        *map(number, (texts.startTime, texts.stopTime, texts.stepSize, texts.tolerance))
-    )
+    every = texts.startTime, texts.stopTime, texts.stepSize, texts.tolerance
+    return Experiment(*map(number, every))
 
 
 # types of FMI 2.0 and FMI 3.0 -> type of `Variable`

@@ -108,17 +108,15 @@ class Fmi2Instance(Instance):
         self.fmi.fmi2DoStep(self.fmi.component, start, length, final)
 
     def saved_state(self) -> SavedState:
-        fmi = self.fmi
-        return SavedState(
-            fmi.component, fmi.fmi2GetFMUstate, fmi.fmi2SetFMUstate, fmi.fmi2FreeFMUstate
-        )
+        calls = (getattr(self.fmi, f"fmi2{name}FMUstate") for name in ("Get", "Set", "Free"))
+        return SavedState(self.fmi.component, *calls)
 
 
 class Fmi3Instance(Instance):
-    """An instance of an FMU of FMI 3.0.
+    """Instance of an FMU of FMI 3.0.
 
-    FMI 3.0 has no derivatives of inputs: in a step, the FMU asks for the values of the inputs at
-    times inside of it (intermediate update), and gets them from the polynomials or functions.
+    It has no derivatives of inputs: in a step the FMU asks for the inputs at times inside of it
+    (intermediate update), and gets them from the polynomials or functions.
     """
 
     PLATFORMS = (fmpy.platform_tuple,)
@@ -141,9 +139,7 @@ class Fmi3Instance(Instance):
             requiredIntermediateVariables=self._references(self.smooth_inputs) if smooth else None,
         )
         self._log_warnings()
-        self._inputs: Callable[[float], object] | None = (
-            None  # sets the inputs at a time in a step, s
-        )
+        self._inputs: Callable[[float], object] | None = None  # sets them at a time in a step, s
         self._start = 0.0  # s, of the present step
         self._raised: BaseException | None = None  # in a callback, where it would be lost
 
@@ -234,10 +230,8 @@ class Fmi3Instance(Instance):
             raise UserError(f"{self.name}: the FMU ends the simulation at t = {time!r} s")
 
     def saved_state(self) -> SavedState:
-        fmi = self.fmi
-        return SavedState(
-            fmi.component, fmi.fmi3GetFMUState, fmi.fmi3SetFMUState, fmi.fmi3FreeFMUState
-        )
+        calls = (getattr(self.fmi, f"fmi3{name}FMUState") for name in ("Get", "Set", "Free"))
+        return SavedState(self.fmi.component, *calls)
 
 
 class _ModelExchange(Instance):

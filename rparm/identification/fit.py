@@ -54,8 +54,6 @@ REJECTED = 0.01  # probability below which residuals are not taken for noise
 
 
 # ---- Residuals -----------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Linear:
     """Residuals of a segment, (rows,), linear in what is changed, at one point."""
@@ -72,10 +70,7 @@ class Linear:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Segments and parameters to fit.
-
-    Numbers of a point are `z` (parameters,) and `x` (segments, states), states in their scales.
-    """
+    """Segments and parameters to fit; `x` (segments, states) are states in their scales."""
 
     simulator: Simulator
     parameters: Parameters
@@ -112,9 +107,8 @@ class Problem:
     def tried(self, z: np.ndarray, x: np.ndarray, before: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the cost of a point, and the start states there, (segments, states).
 
-        Where the FMU refuses a start state of `x`, what it takes of the step from `before` is left:
-        a joint starts at a stop, for example. The cost is the sum of the squares of all residuals,
-        infinite where nothing helps.
+        Where the FMU refuses a start state of `x`, at a stop for example, the rest of the step from
+        `before` is taken. The cost is the sum of the residuals' squares, inf where nothing helps.
         """
 
         def of(i: int) -> tuple[float, np.ndarray]:
@@ -135,13 +129,7 @@ class Problem:
         return float(digits * np.sqrt(rows) / CENTRAL_STEP)
 
     def linear(self, z: np.ndarray, x: np.ndarray, is_exact: bool = False) -> list[Linear]:
-        """Return all segments, linear at a point.
-
-        Parameters
-        ----------
-        is_exact : bool
-            Whether differences are central: twice the runs, an error of the second order.
-        """
+        """Return segments, linear at a point; `is_exact` takes central differences: more runs."""
 
         def of(i: int) -> Linear:
             return self._linear(self.segments[i], z, x[i], is_exact)
@@ -184,8 +172,6 @@ def _late(times: np.ndarray, values: np.ndarray, delay: float) -> np.ndarray:
 
 
 # ---- The fit -------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Solution:
     """Result of a fit."""
@@ -286,8 +272,6 @@ class _Arrow:
 
 
 # ---- Intervals -----------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Reduced:
     """A segment whose start state is as good as can be, whatever the parameters."""
@@ -340,10 +324,7 @@ class Covariances:
 
 
 def covariances(segments: Sequence[Reduced], known: np.ndarray) -> Covariances:
-    """Return the covariances of the parameters at the indices `known`.
-
-    The others are taken as given.
-    """
+    """Return the covariances of the parameters at the indices `known`, the others as given."""
     n = len(known)
     tables = [segment.by_parameters[:, known] for segment in segments]
     inverse = np.linalg.inv(sum(table.T @ table for table in tables)) if n else np.empty((0, 0))
@@ -371,12 +352,8 @@ def covariances(segments: Sequence[Reduced], known: np.ndarray) -> Covariances:
 def _degrees(norms: np.ndarray, overlaps: np.ndarray) -> np.ndarray:
     """Return degrees of freedom (known,): two moments are a chi-squared number's.
 
-    Parameters
-    ----------
-    norms : ndarray, shape (segments, known)
-        Variance of the move by a segment, if segments were independent.
-    overlaps : ndarray, shape (segments, known, known)
-        What they share, as they are fitted together; the last axis is the parameter.
+    `norms` (segments, known) are variances of the move by a segment, if segments were independent;
+    `overlaps` (segments, known, known) what they share, the last axis is the parameter.
     """
     found = np.empty(norms.shape[1])
     for k in range(len(found)):
@@ -387,8 +364,6 @@ def _degrees(norms: np.ndarray, overlaps: np.ndarray) -> np.ndarray:
 
 
 # ---- Combinations without effect -----------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Combination:
     """Parameters of which the log shows the joint effect only, or one without effect."""
@@ -407,14 +382,9 @@ class Combination:
 
 
 class Effects:
-    """Effects of parameters on the residuals, as columns that may depend on each other.
+    """Effects (rows, parameters) on the residuals of numbers of order 1; some depend on others.
 
-    Parameters
-    ----------
-    effects : ndarray, shape (rows, parameters)
-        Derivatives of the residuals by numbers of order 1.
-    rounding : float
-        Length that a column of these has where there is no effect.
+    A column without effect has a length up to `rounding`.
     """
 
     def __init__(self, effects: np.ndarray, rounding: float) -> None:
@@ -451,13 +421,7 @@ class Effects:
 
 
 def combinations(effects: Effects, slopes: np.ndarray, names: Sequence[str]) -> list[Combination]:
-    """Name what cannot be known.
-
-    Parameters
-    ----------
-    slopes : ndarray, shape (parameters,)
-        Derivatives of the parameters by the numbers of `effects`, in their units.
-    """
+    """Name what cannot be known; `slopes`: parameters' derivatives by the numbers of `effects`."""
     found = [Combination((names[i],), None) for i in np.flatnonzero(~effects.there)]
     classes = _classes(effects)
     found += [_sum(effects.table, slopes, names, group) for group in classes if len(group) > 1]
@@ -492,11 +456,7 @@ def _sum(
 
 
 def _circuits(effects: Effects, classes: Sequence[Sequence[int]]) -> list[list[int]]:
-    """Return the sets of three columns or more, one of a class, that depend on each other.
-
-    Small ones come first. There are as many as combinations without effect, each with a column that
-    the others lack.
-    """
+    """Return the sets of three columns or more, one of a class, that depend, small ones first."""
     columns = [group[0] for group in classes]
     if len(columns) < 3:
         return []
@@ -524,8 +484,6 @@ def _circuits(effects: Effects, classes: Sequence[Sequence[int]]) -> list[list[i
 
 
 # ---- Whiteness of the residuals ------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Whiteness:
     """Of the residuals of one output."""
@@ -542,11 +500,7 @@ class Whiteness:
 
 
 def whiteness(segments: Sequence[Reduced], outputs: int) -> list[Whiteness]:
-    """Test the residuals of each output, over pairs of rows within segments.
-
-    A start state that is estimated from a segment's rows makes its residuals a little correlated:
-    by the projection of the noise, which is known and taken off.
-    """
+    """Test the residuals of each output in segments, without what start states correlate."""
     return [_of_output(segments, outputs, k) for k in range(outputs)]
 
 

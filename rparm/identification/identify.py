@@ -1,6 +1,7 @@
 """Identification in one call, from the request to the results, and validation by another log."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import numpy as np
 
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.model import Value
 from rparm.identification import fit, logs
 from rparm.identification.fit import (
     Combination,
@@ -67,27 +69,17 @@ class Validation:
 def validate(
     fmu: Fmu, request: Request, known: Checked, values: Mapping[str, float], noise: np.ndarray
 ) -> Validation:
-    """Run the log `request.validation` with `values` of the parameters.
-
-    Its start states are fitted: the first one for the run in one go, and each for chi2.
-    """
+    """Run a log with `values`: its first start state is fitted to one run, and each to chi2."""
     assert request.validation is not None
     time = request.columns.get("time", "time")
     recording = logs.read(request.validation, known.reals, known.switches, known.outputs, time)
     segments = logs.segments(recording, request.segment)
-    states, outputs = state_names(fmu), list(known.outputs)
-    fixed = {name: value for name, value in values.items() if name != DELAY}
-    none = Parameters([], {})
-    names = list(known.reals), list(known.switches), outputs
-    with Simulator(
-        fmu, [], states, *names, {**known.settings, **fixed}, request.tolerance
-    ) as simulator:
-        guessed = guess_start(fmu, segments, outputs, known.starts)
-        guessed = admitted_start(simulator, segments, none, guessed)
-        scales = start_scales(guessed)
-        problem = Problem(simulator, none, segments, noise, scales, values.get(DELAY, 0.0))
+    outputs = list(known.outputs)
+    settings = {**known.settings, **{n: value for n, value in values.items() if n != DELAY}}
+    with _problem(fmu, request, known, segments, noise, Parameters([], {}), settings) as given:
         # the first rows show values from before the start, later by the delay
-        found = fit.fit(problem, guessed / scales)
+        problem = replace(given[0], delay=values.get(DELAY, 0.0))
+        found = fit.fit(problem, given[1])
         whole = _whole(recording, segments[0])
         try:
             predicted = replace(problem, segments=[whole]).predicted(whole, found.z, found.x[0])
@@ -209,10 +201,7 @@ class _Fitted:
 
 
 def identify(fmu: Fmu, request: Request) -> Identification:
-    """Fit parameters of an FMU to logs.
-
-    UserError if something in the request or in a log is wrong, or the FMU does not run.
-    """
+    """Fit parameters of an FMU to logs; UserError if the request, a log or a run is wrong."""
     known = checked(request, fmu)
     lead = LEAD * request.segment if request.with_delay else 0.0
     columns = known.reals, known.switches, known.outputs, request.columns.get("time", "time")
@@ -222,7 +211,10 @@ def identify(fmu: Fmu, request: Request) -> Identification:
     fitted = _fitted(fmu, request, known, segments, noise)
     z, parameters = fitted.solution.z, known.parameters
     if request.with_delay:
-        _check_delay(parameters.values(z)[parameters.names.index(DELAY)], lead)
+        delay = parameters.values(z)[parameters.names.index(DELAY)]
+        if abs(delay) > lead:
+            bound = f"{lead:.4g} s, a tenth of a segment"
+            raise UserError(f"{DELAY}: {delay:.4g} s is longer than {bound}")
 
     # the known parameters
     at_limit = parameters.at_limit(z)
@@ -268,29 +260,36 @@ def _fitted(
     fmu: Fmu, request: Request, known: Checked, segments: Sequence[Segment], noise: np.ndarray
 ) -> _Fitted:
     """Fit parameters and start states."""
-    names = list(known.reals), list(known.switches), list(known.outputs)
-    states = state_names(fmu)
-    with Simulator(
-        fmu, known.names, states, *names, known.settings, request.tolerance
-    ) as simulator:
-        guessed = guess_start(fmu, segments, names[2], known.starts)
-        guessed = admitted_start(simulator, segments, known.parameters, guessed)
-        scales = start_scales(guessed)
-        problem = Problem(simulator, known.parameters, segments, noise, scales)
-        found = fit.fit(problem, guessed / scales)
+    start = fmu, request, known, segments, noise, known.parameters, known.settings
+    with _problem(*start) as (problem, guessed):
+        found = fit.fit(problem, guessed)
         pieces = [reduced(each) for each in problem.linear(found.z, found.x, True)]
         predicted = [
             problem.predicted(segment, found.z, x)
             for segment, x in zip(segments, found.x, strict=True)
         ]
-    return _Fitted(found, found.x * scales, predicted, pieces, problem.rounding())
+    return _Fitted(found, found.x * problem.scales, predicted, pieces, problem.rounding())
 
 
-def _check_delay(delay: float, longest: float) -> None:
-    if abs(delay) > longest:
-        raise UserError(
-            f"{DELAY}: {delay:.4g} s is longer than {longest:.4g} s, a tenth of a segment"
-        )
+@contextmanager
+def _problem(
+    fmu: Fmu,
+    request: Request,
+    known: Checked,
+    segments: Sequence[Segment],
+    noise: np.ndarray,
+    parameters: Parameters,
+    settings: Mapping[str, Value],
+) -> Iterator[tuple[Problem, np.ndarray]]:
+    """Yield a problem with running instances, and first start states (segments, states)."""
+    estimated = [name for name in parameters.names if name != DELAY]
+    names = list(known.reals), list(known.switches), list(known.outputs)
+    states = state_names(fmu)
+    with Simulator(fmu, estimated, states, *names, settings, request.tolerance) as simulator:
+        guessed = guess_start(fmu, segments, names[2], known.starts)
+        guessed = admitted_start(simulator, segments, parameters, guessed)
+        scales = start_scales(guessed)
+        yield Problem(simulator, parameters, segments, noise, scales), guessed / scales
 
 
 def _estimates(
@@ -338,15 +337,7 @@ def _ends(
     widths: np.ndarray,
     covariance: np.ndarray,
 ) -> np.ndarray:
-    """Return the ends (parameters, 2) of the intervals, in the parameters' units.
-
-    Parameters
-    ----------
-    widths : ndarray, shape (parameters,)
-        Half intervals of the fit's numbers.
-    covariance : ndarray, shape (known, known)
-        Of those at `basis`.
-    """
+    """Return the ends (parameters, 2) of intervals; `widths` and `covariance` (`basis`) of fits."""
     ends = np.empty((len(z), 2))
     slopes = parameters.slopes(z)[:, basis]
     deviations = np.sqrt(np.maximum(np.diag(covariance), 1e-300))

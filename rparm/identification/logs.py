@@ -63,10 +63,7 @@ def read(
     outputs: Mapping[str, Column],
     time: str = "time",
 ) -> Recording:
-    """Read a log's columns of inputs and outputs.
-
-    UserError if one is not there, holds what is no number, or does not change where it should.
-    """
+    """Read a log's columns; UserError if one is missing, holds no number, or wrongly stays."""
     every = (*outputs.values(), *switches.values(), *reals.values())
     log = inputs.read_log(path).columns(time, [column.name for column in every])
     times, values = log.times, log.values * [column.scale for column in every]
@@ -118,14 +115,10 @@ def _filled(recording: Recording) -> Recording:
 
 
 def segments(recording: Recording, length: float, lead: float = 0.0) -> list[Segment]:
-    """Cut a recording at its gaps, and what is between them into pieces of about `length`.
+    """Cut a recording at its gaps, and between them into pieces of about `length` s.
 
-    UserError if nothing is long enough.
-
-    Parameters
-    ----------
-    length, lead : float
-        s; a segment is simulated from `lead` before its first measured value that counts.
+    A segment is simulated from `lead` s before its first measured value that counts. UserError if
+    nothing is long enough.
     """
     times, least = recording.times, (FEWEST_ROWS - 1) * recording.step
     if length < least * (1 - 1e-9):
@@ -172,9 +165,8 @@ def segment_of(recording: Recording, start: int, first: int, last: int) -> Segme
 def noise(recordings: Sequence[Recording]) -> np.ndarray:
     """Return the standard deviation (outputs,) of the measured values' noise, whatever they follow.
 
-    The third differences of what is smooth are small, those of noise are as large as it is: divided
-    ones, as rows may be missing and times irregular. A log in counts has at least the noise of
-    rounding.
+    Divided third differences of noise are as large as it is, others small; times may be irregular.
+    A log in counts has at least the noise of rounding.
     """
     there = [np.isfinite(r.measured).all(axis=1) for r in recordings]
     measured = [r.measured[rows] for r, rows in zip(recordings, there, strict=True)]

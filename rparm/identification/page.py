@@ -15,22 +15,11 @@ from rparm.identification.identify import Identification
 from rparm.identification.request import DELAY
 from rparm.report import pages
 from rparm.report.overview import FAILED, RAN
-from rparm.report.pages import (
-    ERROR_COLORS,
-    INDEX,
-    MUTED,
-    RUN_COLOR,
-    STYLE,
-    RunPage,
-    Table,
-    save_figure,
-    write_page,
-)
 from rparm.report.run_data import Curve, Plot, RunData, thinned
 from rparm.units import minus, number, unit
 
 PICTURE = "correlations.png"
-TEXTS = STYLE | {"text.parse_math": False}
+TEXTS = pages.STYLE | {"text.parse_math": False}
 DARK = 0.6  # cells of a larger correlation
 MOST_NUMBERS = 10  # parameters, whose correlations are written into their cells
 
@@ -40,10 +29,10 @@ def write(
 ) -> Path:
     """Write the page and its picture into a folder; its path. `again` is what makes it again."""
     picture = figure_of(found.whiteness, found.known, found.covariances.scatter)
-    save_figure(picture, folder / PICTURE)
+    pages.save_figure(picture, folder / PICTURE)
     pages.write_assets(folder)
     logs = ", ".join(recording.path.name for recording in found.recordings)
-    page = RunPage(
+    page = pages.RunPage(
         title=f"{found.model}: identified parameters",
         description=f"Fitted to {logs}: multiple shooting, with a start state for each segment.",
         status=RAN if found.passed else FAILED,
@@ -62,7 +51,7 @@ def write(
         overview=False,
     )
     values = {"root": "", "page": page, "data": page.data and page.data.json()}
-    return write_page(folder / INDEX, "run.html", **values)
+    return pages.write_page(folder / pages.INDEX, "run.html", **values)
 
 
 # ---- Plots ---------------------------------------------------------------------------------------
@@ -105,7 +94,7 @@ def _validation(found: Identification, model: Model, times: np.ndarray) -> list[
 
 
 # ---- Tables --------------------------------------------------------------------------------------
-def _tables(found: Identification, model: Model, true: Mapping[str, float]) -> list[Table]:
+def _tables(found: Identification, model: Model, true: Mapping[str, float]) -> list[pages.Table]:
     return [
         _parameters(found, true),
         _outputs(found, model),
@@ -113,7 +102,7 @@ def _tables(found: Identification, model: Model, true: Mapping[str, float]) -> l
     ]
 
 
-def _parameters(found: Identification, true: Mapping[str, float]) -> Table:
+def _parameters(found: Identification, true: Mapping[str, float]) -> pages.Table:
     head = ["parameter", "value", "low", "high", "classical low", "classical high", "start", "unit"]
     rows = []
     for parameter in found.checked.parameters.every:
@@ -127,7 +116,7 @@ def _parameters(found: Identification, true: Mapping[str, float]) -> Table:
         head.insert(2, "true")
         for row in rows:
             row.insert(2, results.text(true.get(str(row[0]))))
-    return Table(
+    return pages.Table(
         "Parameters",
         head,
         rows,
@@ -136,7 +125,7 @@ def _parameters(found: Identification, true: Mapping[str, float]) -> Table:
     )
 
 
-def _outputs(found: Identification, model: Model) -> Table:
+def _outputs(found: Identification, model: Model) -> pages.Table:
     head = ["output", "noise", "residuals", "unit", "Ljung-Box", "p", "white"]
     rows = []
     differences = [
@@ -151,7 +140,7 @@ def _outputs(found: Identification, model: Model) -> Table:
         sizes = f"{noise:.3g}", f"{rms:.3g}", unit(model.variables[name].unit)
         is_white = "yes" if test.is_white else "no"
         rows.append([name, *sizes, f"{test.statistic:.4g}", f"{test.p:.2g}", is_white])
-    return Table(
+    return pages.Table(
         "Measured outputs",
         head,
         rows,
@@ -165,7 +154,7 @@ def _lags(found: Identification) -> int:
     return max(len(test.correlations) for test in found.whiteness.values())
 
 
-def _second(found: Identification, model: Model) -> Table:
+def _second(found: Identification, model: Model) -> pages.Table:
     second = found.validation
     assert second is not None
     rows = [
@@ -175,7 +164,7 @@ def _second(found: Identification, model: Model) -> Table:
         )
     ]
     late = " and the delay" if DELAY in found.estimates else ""
-    return Table(
+    return pages.Table(
         f"Validation on {second.recording.path.name}",
         ["output", "RMS of the error", "unit", "follows for"],
         rows,
@@ -207,12 +196,12 @@ def _autocorrelations(axes: Axes, tests: Mapping[str, Whiteness]) -> None:
     width = 0.8 / max(len(tests), 1)
     for i, (name, test) in enumerate(tests.items()):
         lags = np.arange(1, len(test.correlations) + 1)
-        colour = (RUN_COLOR, *ERROR_COLORS)[i % (1 + len(ERROR_COLORS))]
+        colour = (pages.RUN_COLOR, *pages.ERROR_COLORS)[i % (1 + len(pages.ERROR_COLORS))]
         places = lags + (i - (len(tests) - 1) / 2) * width
         axes.bar(places, test.correlations, width, color=colour, label=name)
     bound = max((test.bound for test in tests.values()), default=0.0)
     for level in (-bound, bound):
-        axes.axhline(level, color=MUTED, linestyle=(0, (5, 3)), linewidth=1)
+        axes.axhline(level, color=pages.MUTED, linestyle=(0, (5, 3)), linewidth=1)
     axes.set_title("autocorrelation of the residuals; 95 % of noise is between the lines", size=9)
     axes.set_xlabel("lag in rows")
     axes.legend()

@@ -22,9 +22,7 @@ from rparm.fmi.model import INITIAL, INPUTS, METHOD, PARAMETERS, Model, Value, V
 from rparm.identification.logs import LENGTH, Column
 from rparm.units import quantity
 
-CLOSEST = np.log(
-    1e-6
-)  # to a limit, of the distance at the start: from here on a parameter is at it
+CLOSEST = np.log(1e-6)  # of the distance from a limit at the start: nearer, a parameter is at it
 LARGEST = 700.0  # whose exponential is a double: ends of very long intervals
 DELAY = "delay"  # between the outputs and their measured values
 FASTEST = "taylor", "erk"  # methods of integration, for steps as short as a log's
@@ -32,8 +30,6 @@ ABOVE = ">"  # in "name>other": the parameter stays above the other one
 
 
 # ---- Parameters ----------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Parameter:
     """A parameter of the FMU, or the delay of what was measured."""
@@ -47,10 +43,7 @@ class Parameter:
     scale: float = 0.0  # of one without limits; 0: its start
 
     def check(self, low: float) -> None:
-        """Check that the start is inside; `low` is its limit from below.
-
-        WrongValueError if it is not, or lies on the limit.
-        """
+        """Check that the start is inside, above `low` from below; else WrongValueError."""
         unit = f" {self.unit}" if self.unit else ""
         for limit, is_in, word in (
             (low, self.start > low, "above"),
@@ -63,21 +56,13 @@ class Parameter:
 
 
 class Parameters:
-    """All that are estimated.
-
-    Parameters
-    ----------
-    fixed : mapping
-        Values of the parameters that are not estimated, for those that are `above` them.
-    """
+    """All parameters to estimate; `fixed` has the values of others, which some are `above`."""
 
     def __init__(self, every: Sequence[Parameter], fixed: Mapping[str, float]) -> None:
         self.every, self._fixed = tuple(every), fixed
         self.names = tuple(parameter.name for parameter in every)
-        start = dict(zip(self.names, (p.start for p in every), strict=True))
-        self._low = {
-            p.name: (fixed | start)[p.above] if p.above else p.least for p in every
-        }  # at the start
+        known = {**fixed, **{p.name: p.start for p in every}}
+        self._low = {p.name: known[p.above] if p.above else p.least for p in every}  # at the start
         self._order = sorted(range(len(every)), key=lambda i: bool(every[i].above))
 
     def __len__(self) -> int:
@@ -141,8 +126,6 @@ class Parameters:
 
 
 # ---- The request ---------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Request:
     """Request of a user; all names are variables of the FMU."""
@@ -348,8 +331,6 @@ def _column(request: Request, variable: Variable) -> Column:
 
 
 # ---- The demo ------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Demo:
     """A log and what to ask of it."""

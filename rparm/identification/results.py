@@ -66,10 +66,7 @@ def _estimate(x: Estimate) -> dict[str, object]:
 
 
 def rows(found: Identification, true: Mapping[str, float]) -> list[tuple[str, list[str], str]]:
-    """Name, cells and unit of each parameter, then of the sums that are known.
-
-    Cells are the value and its interval, and the true value if some are known.
-    """
+    """Name, cells (value, interval and, if some are known, true value) and unit of each result."""
     units = {p.name: p.unit or "" for p in found.checked.parameters.every}
     every = [(name, x, units[name]) for name, x in found.estimates.items()]
     for each in found.combinations:
@@ -97,8 +94,6 @@ def text(number: float | None, digits: int = DIGITS) -> str:
 
 
 # ---- Files ---------------------------------------------------------------------------------------
-
-
 def write_files(found: Identification, folder: Path, model: Model) -> list[Path]:
     """Write the files; their paths."""
     values = {**found.checked.settings, **found.values}

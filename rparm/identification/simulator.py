@@ -30,16 +30,8 @@ SHIFTS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 0.5)  # towards the middle of all states, 
 class Simulator:
     """Instances of an FMU, one for each thread; a context manager that frees them.
 
-    Parameters
-    ----------
-    parameters, states, inputs, outputs : sequence of str
-        What differs between runs, and what is read; of the inputs, the Real ones.
-    switches : sequence of str
-        The Boolean inputs.
-    settings : mapping
-        Values of other variables, the same in all runs.
-    tolerance : float
-        Relative, of the integrator.
+    `parameters` and `states` differ between runs, `settings` do not; `inputs` are Reals, `switches`
+    Booleans; `outputs` are read. The `tolerance` is relative.
     """
 
     def __init__(
@@ -79,10 +71,7 @@ class Simulator:
         return list(self._pool.map(function, tasks))
 
     def run(self, segment: Segment, values: np.ndarray) -> np.ndarray:
-        """Run a segment; return the outputs (rows, outputs) at its rows.
-
-        UserError if the FMU refuses `values`, those of parameters and states, or fails.
-        """
+        """Run with values of parameters and states; outputs (rows, outputs), or UserError."""
         if not hasattr(self._own, "runner"):
             self._own.runner = _Runner(self)
             self._runners.append(self._own.runner)
@@ -146,22 +135,15 @@ class _Runner:
     def _advance(self, segment: Segment) -> np.ndarray:
         record = np.empty((len(segment.times), len(self._watched)))
         record[0] = self._stepper.reals.values[self._watched]
-        _, failure = self._stepper.advance(
-            segment.times,
-            segment.inputs,
-            segment.switches,
-            np.arange(1, len(segment.times)),
-            self._watched,
-            record[1:],
-        )
+        given, points = (segment.inputs, segment.switches), np.arange(1, len(segment.times))
+        where = points, self._watched, record[1:]
+        _, failure = self._stepper.advance(segment.times, *given, *where)
         if failure is not None:
             raise failure
         return record
 
 
 # ---- Start states --------------------------------------------------------------------------------
-
-
 def state_names(fmu: Fmu) -> list[str]:
     """Return the names of the states; UserError if one cannot be set."""
     for name in fmu.model.states:
@@ -228,10 +210,7 @@ def start_scales(states: np.ndarray) -> np.ndarray:
 def admitted_start(
     simulator: Simulator, segments: Sequence[Segment], parameters: Parameters, states: np.ndarray
 ) -> np.ndarray:
-    """Return states near `states` (segments, states) that the FMU starts from.
-
-    What was measured a hair past a stop, for example, is moved inward. UserError if nothing helps.
-    """
+    """Move `states` (segments, states) inward until the FMU starts there; UserError if never."""
     values = parameters.values(np.zeros(len(parameters)))
     values = values[: len(simulator.names) - states.shape[1]]
     middle = (states.min(axis=0) + states.max(axis=0)) / 2

@@ -37,22 +37,12 @@ MOVED = 1e-6  # in the unit of the moved variable
 
 @dataclass(frozen=True)
 class LargestStep:
-    """The limit of one way to step.
-
-    Attributes
-    ----------
-    order, inputs : str
-        As in `rparm.systems.master`.
-    step : float
-        s; 0: unstable at every step; inf: stable at all that were tried.
-    frequency : float
-        Hz, of the motion that neither grows nor dies out at this step; nan if there is none.
-    """
+    """Limit of one way to step; `order` and `inputs` as in `rparm.systems.master`."""
 
     order: str
     inputs: str
-    step: float
-    frequency: float
+    step: float  # s; 0: unstable at every step; inf: stable at all that were tried
+    frequency: float  # Hz, of the motion that neither grows nor dies out at this step; nan: none
 
 
 def largest_steps(
@@ -60,26 +50,15 @@ def largest_steps(
     connections: Sequence[Connection],
     ways: Sequence[tuple[str, str]] = tuple((o, i) for o in ORDERS for i in INPUT_MODES),
 ) -> list[LargestStep]:
-    """Find the limit of each way to step; empty if no signal comes back through connections.
-
-    Parameters
-    ----------
-    parts : mapping of str to Linear
-        Components by name, in the order of stepping.
-    ways : sequence of (str, str)
-        Orders and inputs.
-    """
+    """Find the limit of each way to step `parts`, in their order; empty if there is no loop."""
     loop = looped(parts, connections)
     if not loop.parts:
         return []
     poles = connected(loop.parts, loop.connections).poles
     rates = np.abs(poles[poles != 0])
     rates = rates if len(rates) else np.ones(1)
-    tried = np.geomspace(
-        FASTEST / rates.max(),
-        SLOWEST / rates.min(),
-        1 + math.ceil(math.log(SLOWEST / FASTEST * rates.max() / rates.min(), RATIO)),
-    )
+    count = 1 + math.ceil(math.log(SLOWEST / FASTEST * rates.max() / rates.min(), RATIO))
+    tried = np.geomspace(FASTEST / rates.max(), SLOWEST / rates.min(), count)
     held = cache(lambda name, step: hold(loop.parts[name].A, loop.parts[name].B, step))
 
     def eigenvalues(step: float, way: tuple[str, str]) -> np.ndarray:
@@ -121,8 +100,8 @@ def transition(
 ) -> np.ndarray:
     """Return the matrix from one communication point to the next, shape (n, n).
 
-    It acts on the deviations of all states, then all outputs, then, if inputs are extrapolated, the
-    slopes of all outputs; each by component. `held` gives `hold` of a component, at a step.
+    It acts on the deviations of all states, all outputs, and slopes of outputs, if inputs are
+    extrapolated; each by component. `held` gives `hold` of a component, at a step.
     """
     held = held or (lambda name, step: hold(parts[name].A, parts[name].B, step))
     sloped = inputs == "extrapolated"
@@ -175,8 +154,6 @@ def _layout(
 
 
 # ---- Measured ------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Limit:
     """The largest stable step of a way to step."""
@@ -262,17 +239,7 @@ def study_steps(path: Path, rest: Rest) -> dict[str, object]:
 
 
 def growth(master: Master, step: float, signals: Sequence[str]) -> float:
-    """Fit the largest eigenvalue of the map between points of a run, by least squares.
-
-    Parameters
-    ----------
-    master : Master
-        Initialized, a little out of an equilibrium.
-    step : float
-        s.
-    signals : sequence of str
-        Values that the motion shows in.
-    """
+    """Fit the largest eigenvalue of the map over `step` s, by signals of a run near equilibrium."""
     rows = master.run(master.time + np.arange(STEPS + 1) * step)[EARLY:]
     moved = np.diff(rows[:, [master.names.index(name) for name in signals]], axis=0)
     scaled = moved / np.abs(moved).max(axis=0)

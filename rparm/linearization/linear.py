@@ -104,9 +104,7 @@ class Linear:
     @property
     def _labels(self) -> dict[str, list[str]]:
         names = {"inputs": self.inputs, "outputs": self.outputs, "states": self.states}
-        return {
-            kind: [name.replace(".", "_") for name in own] for kind, own in names.items() if own
-        }
+        return {k: [name.replace(".", "_") for name in own] for k, own in names.items() if own}
 
     def select(
         self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
@@ -142,10 +140,7 @@ class Linear:
 
 
 def hold(A: np.ndarray, B: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the state after `step` s by the state at its begin, by inputs, and by their slopes.
-
-    Shapes (n, n), (n, m), (n, m): x(h) = F x + G u + S u', where u is the value at the beginning.
-    """
+    """Return F, G, S, shapes (n, n), (n, m), (n, m), of x(h) = F x + G u + S u', u at the begin."""
     n, m = B.shape
     if not n:
         return np.zeros((0, 0)), np.zeros((0, m)), np.zeros((0, m))
@@ -184,13 +179,11 @@ def _places(known: Sequence[str], wanted: Sequence[str] | None, option: str) -> 
 
 
 # ---- Matrices ------------------------------------------------------------------------------------
-
-
 def eigenvalues(A: np.ndarray) -> np.ndarray:
     """Return eigenvalues of A, shape (n,): those that are 0 exactly so, also if they are multiple.
 
-    States that influence each other form a block. Blocks are taken one by one, each in units that
-    suit it: so neither units nor fast poles of other blocks cost accuracy.
+    States that influence each other form a block, taken by itself in units that suit it: neither
+    units nor fast poles of other blocks cost accuracy.
     """
     both = closure(A.T != 0)
     both &= both.T
@@ -253,13 +246,8 @@ def scales(A: np.ndarray) -> np.ndarray:
 
 
 # ---- Of an FMU -----------------------------------------------------------------------------------
-
-
 def linear_model(instance: Instance) -> Linear:
-    """Linearize an instance after its initialization, with all states.
-
-    UserError if a value is not finite.
-    """
+    """Linearize an initialized instance, with all states; UserError if a value is not finite."""
     model = instance.fmu.model
     variables = model.variables.values()
     inputs = [v.name for v in variables if v.causality == "input" and v.type == "Real"]
@@ -303,15 +291,7 @@ def require_derivatives(fmu: Fmu) -> None:
 
 
 class FmuSubject(ExitStack):
-    """One FMU to linearize; a context manager, which keeps one instance.
-
-    Parameters
-    ----------
-    fmu : Fmu
-        Open as long as this; of either kind.
-    time : float
-        s.
-    """
+    """Open FMU of either kind to linearize at a time (s); a context manager with an instance."""
 
     def __init__(self, fmu: Fmu, time: float = 0.0) -> None:
         super().__init__()
@@ -382,13 +362,11 @@ def is_settable(variable: Variable) -> bool:
 
 
 # ---- States without rates ------------------------------------------------------------------------
-
-
 def held_states(found: Linear, model: Model) -> list[str]:
     """Return states that stand still whatever inputs and states do: velocities, and what they move.
 
-    A velocity is held if it and its derivative are 0, and no state or input changes its derivative,
-    though the FMU declares that some do. A position is held if only held velocities move it.
+    A velocity is held if it and its derivative are 0 and nothing changes its derivative, though the
+    FMU declares that something does; a position, if only held velocities move it.
     """
     responses = np.hstack([found.A, found.B]) != 0
     is_still = (found.rates == 0) & (found.x == 0) & ~responses.any(axis=1)
@@ -403,15 +381,12 @@ def held_states(found: Linear, model: Model) -> list[str]:
 
 
 def is_sampled(
-    found: Linear,
-    model: Model,
-    outputs: Sequence[str],
-    next_event: Callable[[], float | None],
+    found: Linear, model: Model, outputs: Sequence[str], next_event: Callable[[], float | None]
 ) -> bool:
     """Return whether `outputs` follow inputs only at ticks.
 
-    That is so if all that depend on inputs are discrete, and if no state or input changes one of
-    the others now and the FMU announces a time event.
+    It is so if all that depend on inputs are discrete, or do not change with them now while the FMU
+    announces a time event.
     """
     following = [name for name in outputs if _depends_on_inputs(model, name)]
     rows = [found.outputs.index(name) for name in following if name in found.outputs]
@@ -427,8 +402,6 @@ def _depends_on_inputs(model: Model, name: str) -> bool:
 
 
 # ---- The point -----------------------------------------------------------------------------------
-
-
 class Subject(Protocol):
     """Subject to linearize: an FMU or a system."""
 
@@ -444,16 +417,10 @@ class Subject(Protocol):
 def checked_point(
     subject: Subject, given: Mapping[str, Any], with_outputs: bool = False
 ) -> tuple[dict[str, Value], dict[str, float]]:
-    """Return values to set, and values that outputs are to have; in the variables' units.
+    """Return values to set, and values of outputs (`with_outputs`), in the variables' units.
 
-    UserError if a variable is unknown, cannot be set, or does not take the value.
-
-    Parameters
-    ----------
-    given : mapping
-        Numbers, or texts with or without a unit ("30deg"), by name.
-    with_outputs : bool
-        Whether outputs may be given.
+    `given` are numbers or texts as "30deg" by name. UserError if a variable is unknown, cannot be
+    set, or does not take the value.
     """
     values: dict[str, Value] = {}
     targets: dict[str, float] = {}

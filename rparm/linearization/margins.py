@@ -9,14 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rparm.linearization import responses
 from rparm.linearization.linear import Linear, cleared, zeros
-from rparm.linearization.responses import (
-    bounded_response,
-    frequencies,
-    frequency_response,
-    minimal,
-    suited,
-)
 
 ROUNDING = 1e-12  # relative, of a real part that is 0
 DECADES = 2  # below the slowest and above the fastest pole, zero or crossing: where to search
@@ -26,51 +20,28 @@ BISECTIONS = 60
 
 @dataclass(frozen=True)
 class Crossing:
-    """A frequency at which L has the gain 1 or the phase -180 degrees.
+    """A frequency at which L has the gain 1 or the phase -180 degrees."""
 
-    Attributes
-    ----------
-    frequency : float
-        rad/s.
-    value : complex
-        L there.
-    """
-
-    frequency: float
-    value: complex
+    frequency: float  # rad/s
+    value: complex  # L there
 
 
 @dataclass(frozen=True)
 class Margins:
-    """Margins of a loop; nan or inf if nothing of the kind makes it unstable.
+    """Margins of a loop; nan or inf if nothing of the kind makes it unstable."""
 
-    Attributes
-    ----------
-    stable : bool
-        Whether the closed loop is stable; if not, it has no margins: they are nan.
-    gain_up, gain_down : float
-        Factors of the loop's gain, above and below 1, at which it loses stability; inf and 0 if
-        none does.
-    phase : float
-        Further lag in degrees.
-    delay : float
-        Further delay in s.
-    gain_crossings, phase_crossings : tuple of Crossing
-        Where the gain is 1, and where the phase is -180 degrees.
-    """
-
-    stable: bool
-    gain_up: float
-    gain_down: float
-    phase: float
-    delay: float
-    gain_crossings: tuple[Crossing, ...]
-    phase_crossings: tuple[Crossing, ...]
+    stable: bool  # without it, all margins are nan
+    gain_up: float  # factor of the loop's gain at which it loses stability
+    gain_down: float  # another one, below 1; 0: none
+    phase: float  # further lag in degrees
+    delay: float  # further one in s
+    gain_crossings: tuple[Crossing, ...]  # where the gain is 1
+    phase_crossings: tuple[Crossing, ...]  # where the phase is -180 degrees
 
 
 def open_loop(broken: Linear) -> Linear:
     """Return L of a system that is broken: one input, and the output that fed it; minimal."""
-    return minimal(replace(broken, C=-broken.C, D=-broken.D))
+    return responses.minimal(replace(broken, C=-broken.C, D=-broken.D))
 
 
 def margins(loop: Linear) -> Margins:
@@ -100,7 +71,7 @@ def margins(loop: Linear) -> Margins:
 
 def _ends(loop: Linear) -> Iterator[Crossing]:
     """Return the ends of L where it is real: at 0, if it has no pole there, and at infinity."""
-    value, bound = (each[0] for each in bounded_response(loop)(np.zeros(1)))
+    value, bound = (each[0] for each in responses.bounded_response(loop)(np.zeros(1)))
     if loop.poles.all() and abs(value) > bound:
         yield Crossing(0.0, complex(value))
     if loop.D[0, 0]:
@@ -109,34 +80,25 @@ def _ends(loop: Linear) -> Iterator[Crossing]:
 
 def closed(loop: Linear) -> Linear:
     """Close the loop: from the request at the break to the value there."""
-    back = loop.B @ loop.C / (1 + loop.D[0, 0])
-    return replace(
-        loop,
-        A=cleared(loop.A - back, np.abs(loop.A) + np.abs(back)),
-        B=loop.B / (1 + loop.D[0, 0]),
-        C=loop.C / (1 + loop.D[0, 0]),
-        D=loop.D / (1 + loop.D[0, 0]),
-    )
+    through = 1 + loop.D[0, 0]
+    back = loop.B @ loop.C / through
+    A = cleared(loop.A - back, np.abs(loop.A) + np.abs(back))
+    return replace(loop, A=A, B=loop.B / through, C=loop.C / through, D=loop.D / through)
 
 
 def searched(loop: Linear) -> np.ndarray:
     """Return frequencies in rad/s between which L has one crossing at most, ascending.
 
-    Crossings are zeros of L(s) L(-s) - 1 and of L(s) - L(-s) on the axis. Rounding moves those that
-    eigenvalues give, so they only say where to look, as poles and zeros do.
+    Crossings are zeros of L(s) L(-s) - 1 and L(s) - L(-s) on the axis. Rounding moves them as
+    eigenvalues, so they only say where to look, as poles and zeros do.
     """
-    scale = suited(loop.A, loop.B, loop.C)
+    scale = responses.suited(loop.A, loop.B, loop.C)
     A, B, C, D = loop.A * scale / scale[:, None], loop.B / scale[:, None], loop.C * scale, loop.D
     none = np.zeros_like(A)
-    gains = zeros(
-        np.block([[A, none], [-C.T @ C, -A.T]]),
-        np.vstack([B, -C.T @ D]),
-        np.hstack([D @ C, B.T]),
-        D @ D - 1,
-    )
-    turns = zeros(
-        np.block([[A, none], [none, -A]]), np.vstack([B, -B]), np.hstack([C, -C]), np.zeros((1, 1))
-    )
+    whole = np.block([[A, none], [-C.T @ C, -A.T]])
+    gains = zeros(whole, np.vstack([B, -C.T @ D]), np.hstack([D @ C, B.T]), D @ D - 1)
+    whole = np.block([[A, none], [none, -A]])
+    turns = zeros(whole, np.vstack([B, -B]), np.hstack([C, -C]), np.zeros((1, 1)))
     poles = np.array([*loop.poles, *closed(loop).poles])
     rates = np.abs(poles[poles != 0]) if poles.any() else np.ones(1)
 
@@ -146,15 +108,15 @@ def searched(loop: Linear) -> np.ndarray:
 
     found = near(np.concatenate([gains, turns]))
     steep = [*poles, *near(zeros(A, B, C, D))]
-    return frequencies(steep, [*np.abs(found), *np.abs(found.imag)], DECADES)
+    return responses.frequencies(steep, [*np.abs(found), *np.abs(found.imag)], DECADES)
 
 
 def _crossings(
     loop: Linear, grid: np.ndarray, function: Callable[[np.ndarray], np.ndarray]
 ) -> Iterator[Crossing]:
     """Find where a function of L changes its sign, also if it is 0 at a frequency of the grid."""
-    response = frequency_response(loop)
-    values, bounds = bounded_response(loop)(grid)
+    response = responses.frequency_response(loop)
+    values, bounds = responses.bounded_response(loop)(grid)
     clear = np.flatnonzero(np.abs(function(values)) > bounds)
     signs = np.sign(function(values[clear]))
     changes = np.flatnonzero(signs[:-1] != signs[1:])

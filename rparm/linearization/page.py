@@ -15,22 +15,10 @@ from rparm.linearization.margins import Margins, closed, searched
 from rparm.linearization.responses import frequencies, frequency_response, sampled_response
 from rparm.linearization.study import Study
 from rparm.report import pages
-from rparm.report.pages import (
-    DASHED,
-    ERROR_COLORS,
-    INDEX,
-    INK,
-    MUTED,
-    RUN_COLOR,
-    STYLE,
-    Table,
-    save_figure,
-    write_page,
-)
 from rparm.units import milliseconds
 
 Picture = tuple[str, str]  # file without its suffix, and its description
-Part = tuple[Table, str, list[Picture]]
+Part = tuple[pages.Table, str, list[Picture]]
 NONE = "–"
 LISTED = 12  # names in a sentence
 REAL = 1e-6  # of a pole: a smaller real or imaginary part is rounding, as of poles that are equal
@@ -65,7 +53,7 @@ MATRICES = (
     "A row for each derivative of a state and each output, a column for each state and input. "
     "Units are those of the variables, and s."
 )
-TEXTS = STYLE | {"text.parse_math": False}
+TEXTS = pages.STYLE | {"text.parse_math": False}
 MOST_DRAWN = 2  # inputs and outputs that are drawn: with more, curves would share a colour
 ROUNDING = 1e-12  # of the largest response: less is none
 AROUND = 2.0  # decades beyond the poles that a Bode diagram shows
@@ -91,17 +79,15 @@ def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
     if found.largest:
         parts.append((steps_table(list(found.largest)), STEPS, []))
     if len(linear.states):
-        save_figure(poles_figure(linear, step, found.loop), folder / "poles.png")
+        pages.save_figure(poles_figure(linear, step, found.loop), folder / "poles.png")
         parts.append((poles_table(found), POLES, [("poles", "Poles")]))
-    pictures = _pictures(folder, found, step)
-    if pictures:
-        shown = Table("Answers", [], [])
-        parts.append((shown, PICTURES, pictures))
+    if pictures := _pictures(folder, found, step):
+        parts.append((pages.Table("Answers", [], []), PICTURES, pictures))
     parts.append((point_table(found), POINT, []))
     parts.append((matrices_table(found), MATRICES, []))
     name = f"{found.path.stem}, {found.variant}" if found.variant else found.path.stem
-    return write_page(
-        folder / INDEX,
+    return pages.write_page(
+        folder / pages.INDEX,
         "linearization.html",
         root="",
         title=f"{name}: linear model",
@@ -114,9 +100,9 @@ def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
 def _pictures(folder: Path, found: Study, step: float | None) -> list[Picture]:
     """Draw Bode, Nyquist and steps: of the loop where it is broken, else of inputs and outputs."""
     if found.loop is not None:
-        save_figure(bode_figure(found.loop, step, found.margins), folder / "bode.png")
-        save_figure(nyquist_figure(found.loop, step), folder / "nyquist.png")
-        save_figure(steps_figure(closed(found.loop), None), folder / "steps.png")
+        pages.save_figure(bode_figure(found.loop, step, found.margins), folder / "bode.png")
+        pages.save_figure(nyquist_figure(found.loop, step), folder / "nyquist.png")
+        pages.save_figure(steps_figure(closed(found.loop), None), folder / "steps.png")
         return [
             ("bode", "Bode diagram of the loop"),
             ("nyquist", "Nyquist diagram of the loop"),
@@ -125,8 +111,8 @@ def _pictures(folder: Path, found: Study, step: float | None) -> list[Picture]:
     shown = drawn(found.linear)
     if not shown.inputs or not shown.outputs:
         return []
-    save_figure(bode_figure(shown, step), folder / "bode.png")
-    save_figure(steps_figure(shown, step), folder / "steps.png")
+    pages.save_figure(bode_figure(shown, step), folder / "bode.png")
+    pages.save_figure(steps_figure(shown, step), folder / "steps.png")
     return [("bode", "Bode diagram"), ("steps", "Answers to steps")]
 
 
@@ -134,15 +120,11 @@ def _not_drawn(found: Study) -> list[str]:
     linear = found.linear
     if found.loop is not None or max(len(linear.inputs), len(linear.outputs)) <= MOST_DRAWN:
         return []
-    return [
-        f"Pictures show the first {MOST_DRAWN} outputs that respond, and inputs; --inputs and "
-        "--outputs choose."
-    ]
+    first = f"the first {MOST_DRAWN} outputs that respond, and inputs"
+    return [f"Pictures show {first}; --inputs and --outputs choose."]
 
 
 # ---- Tables and texts ----------------------------------------------------------------------------
-
-
 def notes(found: Study) -> list[str]:
     """Say what has been left out, in a sentence each."""
     linear, texts = found.linear, []
@@ -167,14 +149,13 @@ def notes(found: Study) -> list[str]:
             )
     if found.margins is not None and not found.margins.stable:
         texts.append("The closed loop is unstable here: it has no margins.")
+    least = 1e-8 * max(1.0, float(np.abs(linear.x).max(initial=0.0)))
     moving = [
         f"{name}' = {rate:.6g}"
-        for name, rate, may_move in zip(
-            linear.states, linear.rates, linear.are_positions, strict=True
-        )
-        if abs(rate) > 1e-8 * max(1.0, float(np.abs(linear.x).max(initial=0.0)))
-        and (may_move or not found.trimmed)  # else rounding
-    ]
+        for name, rate, is_position in zip(
+            linear.states, linear.rates, linear.are_positions, strict=True)
+        if abs(rate) > least and (is_position or not found.trimmed)  # else rounding
+    ]  # fmt: skip
     if moving and found.trimmed:
         texts.append(f"In steady motion: {_names(moving)}.")
     elif moving:
@@ -190,31 +171,29 @@ def _names(names: list[str] | tuple[str, ...]) -> str:
     return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
-def point_table(found: Study) -> Table:
+def point_table(found: Study) -> pages.Table:
     """Return the values of states and inputs."""
     rows = [[name, value, found.units.get(name, "")] for name, value in found.linear.at.items()]
-    return Table("The point", ["variable", "value", "unit"], rows)
+    return pages.Table("The point", ["variable", "value", "unit"], rows)
 
 
-def equilibrium_table(found: Study) -> Table:
+def equilibrium_table(found: Study) -> pages.Table:
     """Return the trimmed values, and the range where friction or a stop leaves one."""
     rows = []
     for name in found.trimmed:
         ends = found.linear.intervals.get(name, (math.nan, math.nan))
         numbers = _short(found.linear.at[name]), *map(_or_none, ends)
         rows.append([name, *numbers, found.units.get(name, "")])
-    return Table("Equilibrium", ["variable", "value", "from", "to", "unit"], rows)
+    return pages.Table("Equilibrium", ["variable", "value", "from", "to", "unit"], rows)
 
 
-def poles_table(found: Study) -> Table:
+def poles_table(found: Study) -> pages.Table:
     """Return poles, conjugate pairs in one row."""
     values = found.linear.poles
     rows = []
     for exact in values:
         size = abs(exact)
-        pole = complex(
-            *(part if abs(part) > REAL * size else 0.0 for part in (exact.real, exact.imag))
-        )
+        pole = complex(*(x if abs(x) > REAL * size else 0.0 for x in (exact.real, exact.imag)))
         if pole.imag < 0:
             continue  # its conjugate stands for both
         is_pair = pole.imag > 0
@@ -228,10 +207,10 @@ def poles_table(found: Study) -> Table:
             ]
         )
     head = ["real part (1/s)", "imaginary (rad/s)", "frequency (Hz)", "damping", "1/real (s)"]
-    return Table("Poles" if found.loop is None else "Poles of the broken loop", head, rows)
+    return pages.Table("Poles" if found.loop is None else "Poles of the broken loop", head, rows)
 
 
-def margins_table(found: Margins) -> Table:
+def margins_table(found: Margins) -> pages.Table:
     """Return the margins of a loop; those that it does not have are "–"."""
     rows = [
         ["gain, up to times", _or_none(found.gain_up)],
@@ -241,10 +220,10 @@ def margins_table(found: Margins) -> Table:
     ]
     crossings = [f"{x.frequency / (2 * math.pi):.4g} Hz" for x in found.gain_crossings]
     rows.append(["the loop's gain is 1 at", ", ".join(crossings) or NONE])
-    return Table("Margins", ["margin", "value"], rows)
+    return pages.Table("Margins", ["margin", "value"], rows)
 
 
-def steps_table(found: list[LargestStep] | tuple[LargestStep, ...]) -> Table:
+def steps_table(found: list[LargestStep] | tuple[LargestStep, ...]) -> pages.Table:
     """Return the largest stable step of each way to step."""
     rows = []
     for x in found:
@@ -252,18 +231,17 @@ def steps_table(found: list[LargestStep] | tuple[LargestStep, ...]) -> Table:
         text = text if math.isfinite(x.step) else "no limit found"
         rows.append([x.order.replace("_", "-"), x.inputs, text, _or_none(x.frequency)])
     head = ["order", "inputs", "largest stable step", "frequency (Hz)"]
-    return Table("Largest stable communication step", head, rows)
+    return pages.Table("Largest stable communication step", head, rows)
 
 
-def matrices_table(found: Study) -> Table:
+def matrices_table(found: Study) -> pages.Table:
     """Return the matrix [A B; C D]."""
     linear = found.linear
     whole = np.block([[linear.A, linear.B], [linear.C, linear.D]])
     names = (*(f"{name}'" for name in linear.states), *linear.outputs)
-    rows = [
-        [name, *(_short(float(x)) for x in row)] for name, row in zip(names, whole, strict=True)
-    ]
-    return Table("A, B, C and D", ["", *linear.states, *linear.inputs], rows)
+    pairs = zip(names, whole, strict=True)
+    rows = [[name, *(_short(float(x)) for x in row)] for name, row in pairs]
+    return pages.Table("A, B, C and D", ["", *linear.states, *linear.inputs], rows)
 
 
 def _short(number: float) -> str:
@@ -275,8 +253,6 @@ def _or_none(number: float) -> str:
 
 
 # ---- Pictures ------------------------------------------------------------------------------------
-
-
 def bode_figure(model: Linear, step: float | None, found: Margins | None = None) -> Figure:
     """Draw gain and phase of each output by each input, with margins of a loop."""
     with mpl.rc_context(TEXTS):
@@ -292,13 +268,13 @@ def bode_figure(model: Linear, step: float | None, found: Margins | None = None)
                 below = _below(grid, one, step)
                 name = f"{label}, held for {milliseconds(step)}"
                 response = sampled_response(one, step)(below)
-                _bode(gain, phase, response, below, color, name, DASHED)
+                _bode(gain, phase, response, below, color, name, pages.DASHED)
         for axes, level in ((gain, 0.0), (phase, -180.0)):
             if step is not None:
-                axes.axvline(0.5 / step, color=MUTED, linewidth=0.8, linestyle=":")
+                axes.axvline(0.5 / step, color=pages.MUTED, linewidth=0.8, linestyle=":")
             for crossing in found.gain_crossings if found else ():
-                axes.axvline(crossing.frequency / (2 * math.pi), color=INK, linewidth=0.8)
-                axes.axhline(level, color=INK, linewidth=0.8)
+                axes.axvline(crossing.frequency / (2 * math.pi), color=pages.INK, linewidth=0.8)
+                axes.axhline(level, color=pages.INK, linewidth=0.8)
         gain.set_ylabel("gain (dB)")
         phase.set_ylabel("phase (degrees)")
         phase.set_xlabel("frequency (Hz)")
@@ -322,9 +298,8 @@ def _bode(
     hertz = grid / (2 * math.pi)
     gain.semilogx(hertz, decibels, color=color, linestyle=line, label=label)
     turned = np.degrees(np.unwrap(np.angle(values)))
-    phase.semilogx(
-        hertz, turned - 360 * np.round((turned[0] + 90) / 360), color=color, linestyle=line
-    )
+    turned -= 360 * np.round((turned[0] + 90) / 360)
+    phase.semilogx(hertz, turned, color=color, linestyle=line)
 
 
 def nyquist_figure(loop: Linear, step: float | None) -> Figure:
@@ -337,10 +312,10 @@ def nyquist_figure(loop: Linear, step: float | None) -> Figure:
         if step is not None:
             below = _below(grid, loop, step)
             name = f"held for {milliseconds(step)}"
-            _nyquist(axes, sampled_response(loop, step)(below), DASHED, name)
+            _nyquist(axes, sampled_response(loop, step)(below), pages.DASHED, name)
         circle = np.exp(1j * np.linspace(0, 2 * math.pi, 200))
-        axes.plot(circle.real, circle.imag, color=MUTED, linewidth=0.8, linestyle=":")
-        axes.plot(-1, 0, "+", color=ERROR_COLORS[0], markersize=14, markeredgewidth=2)
+        axes.plot(circle.real, circle.imag, color=pages.MUTED, linewidth=0.8, linestyle=":")
+        axes.plot(-1, 0, "+", color=pages.ERROR_COLORS[0], markersize=14, markeredgewidth=2)
         axes.set_xlim(-FARTHEST, FARTHEST)
         axes.set_ylim(-FARTHEST, FARTHEST)
         axes.set_aspect("equal")
@@ -352,8 +327,8 @@ def nyquist_figure(loop: Linear, step: float | None) -> Figure:
 
 def _nyquist(axes: Axes, values: np.ndarray, line: object, label: str) -> None:
     values = np.where(np.abs(values) < POLE_GAIN, values, np.nan)
-    axes.plot(values.real, values.imag, color=RUN_COLOR, linestyle=line, label=label)
-    axes.plot(values.real, -values.imag, color=RUN_COLOR, linestyle=line, alpha=0.35)
+    axes.plot(values.real, values.imag, color=pages.RUN_COLOR, linestyle=line, label=label)
+    axes.plot(values.real, -values.imag, color=pages.RUN_COLOR, linestyle=line, alpha=0.35)
 
 
 def steps_figure(model: Linear, step: float | None) -> Figure:
@@ -391,16 +366,15 @@ def poles_figure(model: Linear, step: float | None, loop: Linear | None = None) 
     with mpl.rc_context(TEXTS):
         figure = Figure(figsize=(9, 4.2), layout="constrained")
         plain, sampled = figure.subplots(1, 2)
-        plain.axvline(0, color=INK, linewidth=0.8)
-        plain.plot(
-            model.poles.real, model.poles.imag, "x", color=RUN_COLOR, label="poles", markersize=9
-        )
+        plain.axvline(0, color=pages.INK, linewidth=0.8)
+        style = {"color": pages.RUN_COLOR, "label": "poles", "markersize": 9}
+        plain.plot(model.poles.real, model.poles.imag, "x", **style)
         height = FLATTEST * np.abs(model.poles).max(initial=1.0)
         low, high = plain.get_ylim()
         plain.set_ylim(min(low, -height), max(high, height))
         if loop is not None:
             found = closed(loop).poles
-            style = {"color": ERROR_COLORS[0], "label": "when it is closed", "markersize": 11}
+            style = {"color": pages.ERROR_COLORS[0], "label": "when it is closed", "markersize": 11}
             plain.plot(found.real, found.imag, "+", **style)
         plain.set_xlabel("real part (1/s): left of 0 dies out")
         plain.set_ylabel("imaginary part (rad/s)")
@@ -409,9 +383,9 @@ def poles_figure(model: Linear, step: float | None, loop: Linear | None = None) 
             sampled.set_visible(False)
         else:
             circle = np.exp(1j * np.linspace(0, 2 * math.pi, 200))
-            sampled.plot(circle.real, circle.imag, color=INK, linewidth=0.8)
+            sampled.plot(circle.real, circle.imag, color=pages.INK, linewidth=0.8)
             found = np.linalg.eigvals(hold(model.A, model.B, step)[0])
-            sampled.plot(found.real, found.imag, "x", color=RUN_COLOR, markersize=9)
+            sampled.plot(found.real, found.imag, "x", color=pages.RUN_COLOR, markersize=9)
             sampled.set_aspect("equal")
             sampled.set_xlabel(f"held for {milliseconds(step)}: within the circle dies out")
     return figure
@@ -436,7 +410,7 @@ def _channels(model: Linear) -> Iterator[tuple[str, Linear]]:
 
 def _colors() -> Iterator[str]:
     while True:
-        yield from (RUN_COLOR, *ERROR_COLORS)
+        yield from (pages.RUN_COLOR, *pages.ERROR_COLORS)
 
 
 def _grid(model: Linear, found: Margins | None = None) -> np.ndarray:

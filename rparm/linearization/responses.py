@@ -104,18 +104,10 @@ def sampled_response(model: Linear, step: float) -> Response:
 
 
 def frequencies(steep: Iterable[complex], further: Iterable[float], decades: float) -> np.ndarray:
-    """Choose frequencies in rad/s, ascending, that show what a response does.
+    """Choose ascending frequencies in rad/s, dense around poles and zeros, on both sides of each.
 
-    They are dense around poles and zeros, lie on both sides of each, and go beyond all of them.
-
-    Parameters
-    ----------
-    steep : iterable of complex
-        Poles and zeros, 1/s; those that are 0 are none.
-    further : iterable of float
-        Other frequencies to have on both sides.
-    decades : float
-        How far to go beyond the slowest and the fastest.
+    `steep` are poles and zeros in 1/s, without 0; `further` are other frequencies to surround. The
+    result goes `decades` beyond the slowest and the fastest.
     """
     steep = np.array([p for p in steep if p != 0], complex)
     sides = np.abs([*steep, *steep.imag, *further])
@@ -133,13 +125,8 @@ def frequencies(steep: Iterable[complex], further: Iterable[float], decades: flo
 
 
 # ---- The minimal part ----------------------------------------------------------------------------
-
-
 def minimal(model: Linear) -> Linear:
-    """Leave out states that inputs do not move or outputs do not see: `dropped`, `hidden`.
-
-    If several move together, some of them stand for all.
-    """
+    """Leave out states that inputs do not move or outputs do not see; some may stand for others."""
     ways = closure(model.A.T != 0)
     is_between = (model.B.any(axis=1) @ ways) & (ways @ model.C.any(axis=0))
     kept, rest = np.flatnonzero(is_between), np.flatnonzero(~is_between)
@@ -168,13 +155,9 @@ def minimal(model: Linear) -> Linear:
 
 def suited(A: np.ndarray, B: np.ndarray, C: np.ndarray) -> np.ndarray:
     """Return units of states that suit the ways from inputs to outputs, too, shape (n,)."""
-    sizes = np.block(
-        [
-            [np.abs(A), np.abs(B).sum(axis=1, keepdims=True)],
-            [np.abs(C).sum(axis=0, keepdims=True), np.zeros((1, 1))],
-        ]
-    )
-    found = scales(sizes)
+    above = [np.abs(A), np.abs(B).sum(axis=1, keepdims=True)]
+    below = [np.abs(C).sum(axis=0, keepdims=True), np.zeros((1, 1))]
+    found = scales(np.block([above, below]))
     return found[:-1] / found[-1]
 
 
@@ -189,9 +172,8 @@ class _Rule:
 def _rule(A: np.ndarray, B: np.ndarray) -> _Rule | None:
     """Find sums of states that are 0 for ever if they are at first, if there are any.
 
-    Such a sum is a left eigenvector of A that B is orthogonal to: w^T [A - p, B] = 0. Rows and
-    columns of this matrix are scaled, as a fast mode behind a chain of slow states moves them
-    little, but not by rounding.
+    Such a sum is a left eigenvector of A that B is orthogonal to: w^T [A - p, B] = 0. Scaling shows
+    a fast mode behind a chain of slow states, which moves them little, but not by rounding.
     """
     one = np.eye(len(A))
     for found in eigenvalues(A):
@@ -211,10 +193,7 @@ def _rule(A: np.ndarray, B: np.ndarray) -> _Rule | None:
 
 
 def _equilibrated(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Scale rows and columns so that entries are near 1; return the matrix and the rows' factors.
-
-    The sum of the squares of the entries' logarithms is least.
-    """
+    """Scale rows and columns so that entries are near 1; return matrix and factors of rows."""
     i, j = np.nonzero(matrix)
     count, n = len(i), len(matrix)
     places = np.zeros((count, sum(matrix.shape)))

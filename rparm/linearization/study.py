@@ -28,79 +28,38 @@ Document = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """Request for a linear model.
+    """Request for a linear model."""
 
-    Attributes
-    ----------
-    what : path or str
-        An FMU or SSP, or the name of one of the project.
-    at : mapping
-        Values of states, inputs and parameters, with `free` also of outputs: numbers in the
-        variables' units, or texts with a unit; by name, in a system "component.variable". Of what
-        is in `free`, the first guess.
-    time : float, optional
-        s; default: the start of the FMU's default experiment, or of the system.
-    free : sequence of str
-        States and inputs that are moved until the point is an equilibrium.
-    inputs, outputs : sequence of str, optional
-        Those of the linear model; default: all.
-    variant : str
-        Of a system; "": the first.
-    cut : str
-        The input of a system at which the loop is broken; "": none.
-    without : sequence of str
-        Components of a system to take as ideal.
-    version : str
-        Of FMI, if `what` is a name.
-    kind : str
-        Of the FMU: model exchange, which says when something is sampled, or co-simulation; "":
-        the first that it has.
-    """
-
-    what: str | Path
+    what: str | Path  # an FMU or SSP, or the name of one of the project
+    # values by name, in the variables' units or with a unit: states, inputs, parameters, with
+    # `free` also outputs, and first guesses
     at: Mapping[str, Any] = field(default_factory=dict)
+    # s; None: the start of the FMU's default experiment, or of the system
     time: float | None = None
-    free: Sequence[str] = ()
-    inputs: Sequence[str] | None = None
-    outputs: Sequence[str] | None = None
-    variant: str = ""
-    cut: str = ""
-    without: Sequence[str] = ()
-    version: str = VERSIONS[0]
+    free: Sequence[str] = ()  # states and inputs that are moved until the point is an equilibrium
+    inputs: Sequence[str] | None = None  # None: all
+    outputs: Sequence[str] | None = None  # None: all
+    variant: str = ""  # of a system; "": the first
+    cut: str = ""  # input of a system at which the loop is broken; "": none
+    without: Sequence[str] = ()  # components of a system to take as ideal
+    version: str = VERSIONS[0]  # of FMI, if `what` is a name
+    # model exchange, which says when something is sampled, or co-simulation; "": the first that the
+    # FMU has
     kind: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """Linear model with all that was asked for.
-
-    Attributes
-    ----------
-    path : Path
-    linear : Linear
-        Without held states.
-    units : dict of str to str
-        Of its variables that have one.
-    trimmed : sequence of str
-        What was moved until the point was an equilibrium.
-    variant : str
-        "" if it is an FMU.
-    largest : list of LargestStep
-        Of a system that is not broken and has a loop.
-    loop : Linear, optional
-        L where the system is broken.
-    margins : Margins, optional
-        Of `loop`.
-    """
+    """Linear model with all that was asked for."""
 
     path: Path
-    linear: Linear
-    units: Mapping[str, str]
-    trimmed: Sequence[str] = ()
-    variant: str = ""
-    largest: Sequence[LargestStep] = ()
-    loop: Linear | None = None
-    margins: Margins | None = None
+    linear: Linear  # without held states
+    units: Mapping[str, str]  # of variables that have one
+    trimmed: Sequence[str] = ()  # variables that were moved until the point was an equilibrium
+    variant: str = ""  # "" of an FMU
+    largest: Sequence[LargestStep] = ()  # of a system that is not broken and has a loop
+    loop: Linear | None = None  # L where the system is broken
+    margins: Margins | None = None  # of `loop`
 
 
 def study(request: Request) -> Study:
@@ -139,7 +98,7 @@ def _of_system(path: Path, request: Request) -> Study:
         found = _chosen(whole, trimmed, request)
         units = _units(subject, found)
         if subject.cut is not None:
-            source = f"{subject.cut.start_component}.{subject.cut.start_connector}"
+            source = subject.cut.start
             loop = open_loop(whole.select([request.cut], [source]))
             return Study(path, found, units, request.free, variant, (), loop, margins(loop))
         largest = largest_steps(parts, subject.connections, subject.ways)
@@ -151,17 +110,14 @@ def _path(request: Request) -> Path:
     if path.suffix.lower() in (".fmu", ".ssp"):
         return path
     systems, models = project.systems(), project.models()
-    for folder in systems.values():
-        if name == folder.name or project.is_built_from(name, folder):
-            return project.built(folder, ".ssp", version=request.version)
-    for folder in models.values():
-        if name == folder.name or project.is_built_from(name, folder):
-            return project.built(folder, ".fmu", version=request.version)
+    for suffix, folders in ((".ssp", systems), (".fmu", models)):
+        for folder in folders.values():
+            if name == folder.name or project.is_built_from(name, folder):
+                return project.built(folder, suffix, version=request.version)
     known = [*models, *systems]
     guess = did_you_mean(name, [*known, *project.built_names(".fmu"), *project.built_names(".ssp")])
-    raise UserError(
-        f"{name}: expected a file .fmu or .ssp, or a name{guess} (known: {', '.join(known)})"
-    )
+    expected = "expected a file .fmu or .ssp, or a name"
+    raise UserError(f"{name}: {expected}{guess} (known: {', '.join(known)})")
 
 
 def _opened(path: Path, kind: str) -> Fmu:
@@ -192,8 +148,6 @@ def _units(subject: FmuSubject | SystemSubject, found: Linear) -> dict[str, str]
 
 
 # ---- Files ---------------------------------------------------------------------------------------
-
-
 def document(found: Study, step: float | None) -> Document:
     """Return all results as names, numbers and lists; with a `step` (s) also the sampled model."""
     linear = found.linear
@@ -206,9 +160,7 @@ def document(found: Study, step: float | None) -> Document:
         "held": list(linear.held),
         "poles": pairs(linear.poles),
         "left_out": list(linear.left_out),
-        "intervals": {
-            name: [finite(end) for end in ends] for name, ends in linear.intervals.items()
-        },
+        "intervals": {name: list(map(finite, ends)) for name, ends in linear.intervals.items()},
     }
     if step is not None:
         transition, forced = linear.sampled(step)
@@ -222,12 +174,8 @@ def document(found: Study, step: float | None) -> Document:
         result["variant"] = found.variant
     if found.largest:
         result["largest_steps"] = [
-            {
-                "order": x.order,
-                "inputs": x.inputs,
-                "step": finite(x.step),
-                "frequency": finite(x.frequency),
-            }
+            {"order": x.order, "inputs": x.inputs}
+            | {"step": finite(x.step), "frequency": finite(x.frequency)}
             for x in found.largest
         ]
     if found.margins is not None:
@@ -265,9 +213,8 @@ def save(path: Path, found: Study, step: float | None) -> None:
 
 
 def _save_json(path: Path, found: Document, _linear: Linear) -> None:
-    path.write_text(
-        json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8", newline="\n"
-    )
+    text = json.dumps(found, indent=1, allow_nan=False) + "\n"
+    path.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _save_mat(path: Path, found: Document, linear: Linear) -> None:

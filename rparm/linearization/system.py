@@ -10,18 +10,7 @@ from rparm.errors import UserError, hint
 from rparm.files import UnreadableError
 from rparm.fmi.fmu_file import MODEL_EXCHANGE, Fmu
 from rparm.fmi.model import Value, Variable
-from rparm.linearization.linear import (
-    SAMPLED,
-    Linear,
-    cleared,
-    closure,
-    held_states,
-    is_sampled,
-    known_variable,
-    linear_model,
-    next_event,
-    require_derivatives,
-)
+from rparm.linearization import linear
 from rparm.systems.master import INPUT_MODES, ORDERS, Master
 from rparm.systems.ssp import Connection, Ssp
 
@@ -31,21 +20,9 @@ NEGLIGIBLE = 1e-14  # of the largest entries of row and column: rounding
 class SystemSubject(ExitStack):
     """A variant of a system to linearize; a context manager, which keeps its FMUs unpacked.
 
-    Names are "component.variable".
-
-    Parameters
-    ----------
-    ssp : Ssp
-        Unpacked as long as this.
-    variant : str
-        Of its parameter sets.
-    time : float, optional
-        s; default: the start of the system.
-    without : sequence of str
-        Components that are left out: what they feed is fed by outputs of the same names, of what
-        feeds them. So sensors become ideal.
-    cut : str
-        An input whose connection is left out.
+    The SSP stays unpacked as long. `time` in s is the system's start by default. Components
+    `without` are left out, as ideal sensors: what they feed is fed by outputs of the same names, of
+    what feeds them. `cut` is an input whose connection is left out.
     """
 
     def __init__(
@@ -75,12 +52,12 @@ class SystemSubject(ExitStack):
         with ExitStack() as stack:  # closes what is open if one of them is refused
             self.fmus = {name: stack.enter_context(ssp.unpacked_fmu(name)) for name in self.names}
             for fmu in self.fmus.values():
-                require_derivatives(fmu)
+                linear.require_derivatives(fmu)
             self.push(stack.pop_all())
 
     def _found(self, name: str) -> Connection:
         """Return the connection to an input."""
-        ends = {f"{c.end_component}.{c.end_connector}": c for c in self.connections}
+        ends = {c.end: c for c in self.connections}
         if name not in ends:
             raise UserError(f"--break: {name}: no connection ends there{hint(name, ends)}")
         return ends[name]
@@ -92,28 +69,22 @@ class SystemSubject(ExitStack):
             where = f"{self.ssp.path}: {name}: expected COMPONENT.VARIABLE"
             raise UserError(f"{where}{hint(component, self.names, 'components')}")
         where = f"{self.ssp.path}: component {component!r}"
-        return known_variable(self.ssp.models[component], variable, where)
+        return linear.known_variable(self.ssp.models[component], variable, where)
 
-    def parts(self, values: Mapping[str, Value]) -> dict[str, Linear]:
-        """Linearize each component, without held states, by its name.
-
-        UserError if one is sampled, or if the connections form an algebraic loop.
-        """
+    def parts(self, values: Mapping[str, Value]) -> dict[str, linear.Linear]:
+        """Linearize components, without held states; UserError if one is sampled, or a loop."""
         parameters = self.merged(values)
         found = {}
         with Master(self.fmus, self.connections) as master:
             master.initialize(self.time, None, parameters)
             for name, component in master.components.items():
-                part = linear_model(component.instance)
+                part = linear.linear_model(component.instance)
                 self._refuse_sampled(name, part, parameters.get(name, {}))
                 found[name] = part
         return found
 
-    def at(self, values: Mapping[str, Value]) -> Linear:
-        """Linearize where parameters and states have these values, held states included.
-
-        All loops are closed, also the one that is to be broken: the point is that of the system.
-        """
+    def at(self, values: Mapping[str, Value]) -> linear.Linear:
+        """Linearize at values of parameters and states, held ones too, with all loops closed."""
         return connected(self.parts(values), self.connections)
 
     @property
@@ -131,36 +102,35 @@ class SystemSubject(ExitStack):
             for c in self.connections
             if self._is_real(c.start_component, c.start_connector)
         )
-        return [
-            (order, inputs)
-            for inputs in (INPUT_MODES if can else INPUT_MODES[:1])
-            for order in ORDERS
-        ]
+        modes = INPUT_MODES if can else INPUT_MODES[:1]
+        return [(order, inputs) for inputs in modes for order in ORDERS]
 
-    def held(self, parts: Mapping[str, Linear]) -> dict[str, list[str]]:
+    def held(self, parts: Mapping[str, linear.Linear]) -> dict[str, list[str]]:
         """Return held states by component."""
-        return {name: held_states(part, self.ssp.models[name]) for name, part in parts.items()}
+        models = self.ssp.models
+        return {name: linear.held_states(part, models[name]) for name, part in parts.items()}
 
     def merged(self, values: Mapping[str, Value]) -> dict[str, dict[str, Value]]:
         """Join all that is set, by component."""
         merged = {name: dict(self._parameters.get(name, {})) for name in self.names}
         for name, value in values.items():
             component, _, variable = name.partition(".")
-            fed = {f"{c.end_component}.{c.end_connector}" for c in self.connections}
+            fed = {c.end for c in self.connections}
             if name in fed and self.variable(name).type == "Real":
                 raise UserError(f"{name}: is fed by a connection, which says its value")
             merged[component][variable] = value
         return merged
 
-    def _refuse_sampled(self, name: str, part: Linear, values: Mapping[str, Value]) -> None:
+    def _refuse_sampled(self, name: str, part: linear.Linear, values: Mapping[str, Value]) -> None:
         feeding = [c.start_connector for c in self.connections if c.start_component == name]
         outputs = [output for output in feeding if self._is_real(name, output)]
 
         def announced() -> float | None:
             return _next_event(self.ssp, name, values, self.time)
 
-        if is_sampled(part, self.ssp.models[name], outputs, announced):
-            raise UserError(f"{self.ssp.path}: component {name!r} {SAMPLED}{self._way_out(name)}")
+        if linear.is_sampled(part, self.ssp.models[name], outputs, announced):
+            wrong = f"{linear.SAMPLED}{self._way_out(name)}"
+            raise UserError(f"{self.ssp.path}: component {name!r} {wrong}")
 
     def _way_out(self, name: str) -> str:
         try:
@@ -181,9 +151,8 @@ def bypassed(ssp: Ssp, connections: Sequence[Connection], name: str) -> list[Con
         if c.start_component == name:
             found = [s for s in sources if c.end_connector in ssp.models[s].real_outputs]
             if len(found) != 1:
-                what = f"{c.end_component}.{c.end_connector}"
                 raise UserError(
-                    f"--without {name}: {what} has nothing to be fed by: expected one component "
+                    f"--without {name}: {c.end} has nothing to be fed by: expected one component "
                     f"that feeds {name} and has a Real output {c.end_connector!r}"
                 )
             result.append(replace(c, start_component=found[0], start_connector=c.end_connector))
@@ -204,17 +173,17 @@ def _next_event(ssp: Ssp, name: str, values: Mapping[str, Value], time: float) -
             instance.set(variable, value)
         instance.enter_initialization()
         instance.exit_initialization()
-        return next_event(instance)
+        return linear.next_event(instance)
 
 
 # ---- Connections ---------------------------------------------------------------------------------
-
-
-def connected(parts: Mapping[str, Linear], connections: Iterable[Connection]) -> Linear:
+def connected(
+    parts: Mapping[str, linear.Linear], connections: Iterable[Connection]
+) -> linear.Linear:
     """Join the linear models of components whose outputs feed inputs.
 
-    Its inputs are those of all components, each added to what its connection brings; names are
-    "component.variable". UserError if connections form an algebraic loop, with its path.
+    Inputs are all components' "component.variable", added to what connections bring. UserError with
+    the path of an algebraic loop.
     """
     inputs = [f"{name}.{u}" for name, part in parts.items() for u in part.inputs]
     outputs = [f"{name}.{y}" for name, part in parts.items() for y in part.outputs]
@@ -223,14 +192,14 @@ def connected(parts: Mapping[str, Linear], connections: Iterable[Connection]) ->
     _refuse_algebraic_loop(outputs, D @ fed)
     solved, terms = _solved(D @ fed), _solved(np.abs(D) @ fed)
     back, back_terms = B @ fed @ solved, np.abs(B) @ fed @ terms
-    return Linear(
+    return linear.Linear(
         states=tuple(f"{name}.{x}" for name, part in parts.items() for x in part.states),
         inputs=tuple(inputs),
         outputs=tuple(outputs),
-        A=cleared(A + back @ C, np.abs(A) + back_terms @ np.abs(C)),
-        B=cleared(B + back @ D, np.abs(B) + back_terms @ np.abs(D)),
-        C=cleared(solved @ C, terms @ np.abs(C)),
-        D=cleared(solved @ D, terms @ np.abs(D)),
+        A=linear.cleared(A + back @ C, np.abs(A) + back_terms @ np.abs(C)),
+        B=linear.cleared(B + back @ D, np.abs(B) + back_terms @ np.abs(D)),
+        C=linear.cleared(solved @ C, terms @ np.abs(C)),
+        D=linear.cleared(solved @ D, terms @ np.abs(D)),
         **{
             key: np.concatenate([getattr(part, key) for part in parts.values()])
             for key in ("x", "u", "y", "rates")
@@ -247,18 +216,13 @@ def _feeding(
     """Return 1 where an output feeds an input, (inputs, outputs); others are constant."""
     fed = np.zeros((len(inputs), len(outputs)))
     for c in connections:
-        start = f"{c.start_component}.{c.start_connector}"
-        end = f"{c.end_component}.{c.end_connector}"
-        if start in outputs and end in inputs:
-            fed[inputs.index(end), outputs.index(start)] = 1.0
+        if c.start in outputs and c.end in inputs:
+            fed[inputs.index(c.end), outputs.index(c.start)] = 1.0
     return fed
 
 
-def _clear(part: Linear) -> tuple[np.ndarray, ...]:
-    """Set A, B, C and D of a component to 0 where they are rounding.
-
-    An entry is compared with its row and its column, as units may make a whole row or column small.
-    """
+def _clear(part: linear.Linear) -> tuple[np.ndarray, ...]:
+    """Set entries of A, B, C and D to 0 that are rounding, compared with their row and column."""
     n = len(part.A)
     whole = np.block([[part.A, part.B], [part.C, part.D]])
     size = np.abs(whole)
@@ -309,16 +273,13 @@ def _refuse_algebraic_loop(outputs: Sequence[str], direct: np.ndarray) -> None:
 # ---- Loops ---------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Looped:
-    """Part of a system on loops through its connections: the rest cannot be unstable by them.
+    """Part of a system on loops through its connections, which alone may make it unstable."""
 
-    `parts` have only states, inputs and outputs on loops; components that have none are left out.
-    """
-
-    parts: Mapping[str, Linear]
+    parts: Mapping[str, linear.Linear]
     connections: Sequence[Connection]
 
 
-def looped(parts: Mapping[str, Linear], connections: Iterable[Connection]) -> Looped:
+def looped(parts: Mapping[str, linear.Linear], connections: Iterable[Connection]) -> Looped:
     """Return the part of a system that signals come back to through a connection."""
     nodes = [
         (name, kind, variable)
@@ -331,11 +292,9 @@ def looped(parts: Mapping[str, Linear], connections: Iterable[Connection]) -> Lo
     for name, part in parts.items():
         A, B, C, D = _clear(part)
         for cause, effect, matrix in (
-            ("states", "states", A),
-            ("inputs", "states", B),
-            ("states", "outputs", C),
-            ("inputs", "outputs", D),
-        ):
+            ("states", "states", A), ("inputs", "states", B),
+            ("states", "outputs", C), ("inputs", "outputs", D),
+        ):  # fmt: skip
             for i, j in np.argwhere(matrix).tolist():
                 start = index[name, cause, getattr(part, cause)[j]]
                 arrows[start, index[name, effect, getattr(part, effect)[i]]] = True
@@ -346,7 +305,7 @@ def looped(parts: Mapping[str, Linear], connections: Iterable[Connection]) -> Lo
         if start is not None and end is not None:
             arrows[start, end] = True
             kept.append((c, start, end))
-    reached = closure(arrows)
+    reached = linear.closure(arrows)
     on_loop = [(c, start) for c, start, end in kept if reached[end, start]]
     on_some = [start for _, start in on_loop]
     both = reached & reached.T

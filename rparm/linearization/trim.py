@@ -27,31 +27,18 @@ GUESS = "; --at NAME=VALUE begins elsewhere"
 
 @dataclass(frozen=True, eq=False)
 class Trimmed:
-    """An equilibrium.
+    """An equilibrium."""
 
-    Attributes
-    ----------
-    values : dict
-        Of all that is set, with those of the free variables.
-    intervals : dict of str to (float, float)
-        Free variables that may lie anywhere in between, the others staying as they are; their
-        values are the middle, if both ends are finite.
-    """
-
-    values: dict[str, Value]
+    values: dict[str, Value]  # of all that is set, with the free variables
+    # of free variables that may lie anywhere in between; their value is the middle, if the ends are
+    # finite
     intervals: dict[str, tuple[float, float]]
 
 
 def trim(
-    subject: Subject,
-    values: Mapping[str, Value],
-    free: Sequence[str],
-    targets: Mapping[str, float],
+    subject: Subject, values: Mapping[str, Value], free: Sequence[str], targets: Mapping[str, float]
 ) -> Trimmed:
-    """Find an equilibrium by moving the variables `free`, from `values` or else start values.
-
-    UserError if there is none, or the equations leave it open where it is.
-    """
+    """Move the variables `free`, from `values` or start values, to an equilibrium; UserError."""
     problem = _Problem(subject, values, free, targets)
     try:
         point = problem.solved()
@@ -156,21 +143,15 @@ class _Problem:
             left, responses, size = tried
         worst = int(np.argmax(np.abs(left) / size))
         name = self.equations[worst]
-        what = (
-            f"{name} stays {left[worst]:+.6g} off its value"
-            if name in self.targets
-            else f"the derivative of {name} stays at {left[worst]:.6g}"
-        )
+        what = f"the derivative of {name} stays at {left[worst]:.6g}"
+        if name in self.targets:
+            what = f"{name} stays {left[worst]:+.6g} off its value"
         few = f"; free at most {self.count} variables" if len(self.free) > self.count else ""
-        raise UserError(
-            f"--trim: no equilibrium found by {', '.join(self.free)}: {what}{few or GUESS}"
-        )
+        names = ", ".join(self.free)
+        raise UserError(f"--trim: no equilibrium found by {names}: {what}{few or GUESS}")
 
     def interval(self, point: np.ndarray, i: int) -> tuple[float, float] | None:
-        """Return values of a free variable that keep the equilibrium, if there is more than one.
-
-        UserError if it may have any value.
-        """
+        """Return where a free variable may be, if it is not one value; UserError if anywhere."""
         ends = tuple(self._end(point, i, side) for side in (-1.0, 1.0))
         if all(map(math.isinf, ends)):
             raise UserError(f"--trim: {self.free[i]} has no effect on the equilibrium")

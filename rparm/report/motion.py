@@ -55,19 +55,15 @@ def of_run(run: Run, rows: Rows = EVERY) -> dict | None:
 
 
 def of_result(
-    scenario: Scenario,
-    result: Result,
-    references: Mapping[str, np.ndarray],
-    rows: Rows = EVERY,
+    scenario: Scenario, result: Result, references: Mapping[str, np.ndarray], rows: Rows = EVERY
 ) -> dict | None:
     """Return data for a run that may have stopped early, and may have no references."""
     # a row holds the outputs at the end of a step, so the inputs are of this step, too
     steps = scenario.input_rows[: len(result.times)]
     inputs = {name: values[steps] for name, values in scenario.inputs.items()}
     outputs = dict(zip(result.names, result.values.T, strict=True))
-    recorded = Recorded(
-        result.times, inputs | outputs | result.integers, references, scenario.start_values
-    )
+    columns = inputs | outputs | result.integers
+    recorded = Recorded(result.times, columns, references, scenario.start_values)
     return of_recorded(scenario.model, recorded, rows)
 
 
@@ -117,9 +113,5 @@ def _animate(folder: str) -> Callable[[Recorded], Animation] | None:
 
 
 def _within(component: str, named: Mapping[str, Any]) -> dict[str, Any]:
-    prefix = f"{component}."
-    return {
-        name.removeprefix(prefix): content
-        for name, content in named.items()
-        if name.startswith(prefix)
-    }
+    start = f"{component}."
+    return {name.removeprefix(start): x for name, x in named.items() if name.startswith(start)}

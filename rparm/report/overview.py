@@ -56,11 +56,9 @@ def write_page(folder: Path, name: str, page: RunPage, group: str, **more: objec
     if page.data is not None:
         plot, x = page.data.plots[0], page.data.x
         curve = plot.curves[0]
+        scale = sparkline_scale(x, plot, page.data.axis.unit)
         fields |= {"line": sparkline(x, curve.values), "line_text": plot.text}
-        fields |= {
-            "line_of": curve.name,
-            "line_scale": sparkline_scale(x, plot, page.data.axis.unit),
-        }
+        fields |= {"line_of": curve.name, "line_scale": scale}
     return Entry(**fields | more)
 
 
@@ -111,16 +109,9 @@ def write(report: Path) -> Path:
             section = {"folder": folder, "title": title, "summary": _summary(entries)}
             sections.append(section | {"groups": groups})
     statuses = [entry.status for folder in SECTIONS for entry in read(report, folder)]
-    return pages.write_page(
-        report / pages.INDEX,
-        "overview.html",
-        root="",
-        sections=sections,
-        failed=statuses.count(FAILED),
-        count=len(statuses),
-        width=WIDTH,
-        height=HEIGHT,
-    )
+    shown = {"root": "", "sections": sections, "width": WIDTH, "height": HEIGHT}
+    shown |= {"failed": statuses.count(FAILED), "count": len(statuses)}
+    return pages.write_page(report / pages.INDEX, "overview.html", **shown)
 
 
 def _summary(entries: Sequence[Entry]) -> dict[str, object]:
@@ -164,9 +155,6 @@ def sparkline(x: np.ndarray, y: np.ndarray) -> str:
     across = (x[kept] - x[0]) / length if length > 0 else np.zeros(len(kept))
     height = np.ptp(y)
     up = (y[kept] - y.min()) / height if height > 0 else np.full(len(kept), 0.5)
-    points = zip(
-        MARGIN + across * (WIDTH - 2 * MARGIN),
-        HEIGHT - MARGIN - up * (HEIGHT - 2 * MARGIN),
-        strict=True,
-    )
+    x, y = across * (WIDTH - 2 * MARGIN), up * (HEIGHT - 2 * MARGIN)
+    points = zip(MARGIN + x, HEIGHT - MARGIN - y, strict=True)
     return "M" + "L".join(f"{a:.4g} {b:.4g}" for a, b in points)

@@ -61,15 +61,12 @@ STYLE = {
     "savefig.dpi": 130,
 }
 
-
 _templates.filters |= {
     "address": lambda path: quote(os.fsencode(path)),
     "minus": units.minus,
     "number": units.number,
     "short": units.short,
 }
-
-
 _templates.tests |= {
     "numeric": lambda cell: NUMERIC.fullmatch(str(cell)) is not None,
     "command": lambda cell: isinstance(cell, Command),
@@ -122,8 +119,6 @@ def write_page(path: Path, template: str, **values: object) -> Path:
 
 
 # ---- Assets --------------------------------------------------------------------------------------
-
-
 def write_assets(report: Path) -> None:
     """Write the assets that a report does not have yet: all of them, or none if that fails."""
     folder = report / ASSETS
@@ -157,16 +152,11 @@ def _plotly() -> bytes:
     assert version is not None
     packed = base64.b64encode(gzip.compress(bundle, mtime=0)).decode("ascii")
     script = (ASSET_SOURCES / UNPACK).read_text(encoding="utf-8")
-    return (
-        script.replace("@VERSION@", version[1].decode("ascii"))
-        .replace("@PACKED@", packed)
-        .encode("utf-8")
-    )
+    script = script.replace("@VERSION@", version[1].decode("ascii"))
+    return script.replace("@PACKED@", packed).encode("utf-8")
 
 
 # ---- Pictures ------------------------------------------------------------------------------------
-
-
 def save_figure(figure: "Figure", path: Path) -> None:
     """Write a picture in the style of all; complete or not at all."""
     import matplotlib as mpl  # takes long

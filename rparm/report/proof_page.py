@@ -31,8 +31,8 @@ def write(
 ) -> Path:
     """Write the page of a scenario; return its path. The command `again` proves it again.
 
-    `errors` are the proven ones of runs, (communication points, states), by method and tolerance;
-    `good` says how good the reference is, if there is one.
+    `errors` are proven, (communication points, states), by method and tolerance; `good` is about
+    the reference.
     """
     plots = [
         Plot(
@@ -108,11 +108,8 @@ def _write(report: Path, name: str, page: RunPage) -> Path:
 def _largest(model: Model, enclosure: Enclosure, errors: Mapping[str, np.ndarray]) -> Table:
     """Return the largest error of each state in each run, and its time."""
     heads = [f"{n} in {unit(model.variables[n].unit)}" for n in enclosure.names]
-    found = {
-        run: proof.largest_errors(course, enclosure).values() for run, course in errors.items()
-    }
-    rows = [
-        (run, *(f"{rounded_up(e.error, 2)} at {e.at:.4g} s" for e in largest))
-        for run, largest in found.items()
-    ]
+    rows = []
+    for run, course in errors.items():
+        largest = proof.largest_errors(course, enclosure).values()
+        rows.append((run, *(f"{rounded_up(e.error, 2)} at {e.at:.4g} s" for e in largest)))
     return Table("Largest proven errors", ("run", *heads), rows)

@@ -91,10 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def data_of(name: str) -> dict[str, Any]:
-    """Run a scenario, or a variant of a system: what its player gets.
-
-    UserError if there is none of this name, if it has nothing to animate, or if the run fails.
-    """
+    """Run a scenario or variant for its player; UserError if it fails or has no animation."""
     files = project.scenario_files()
     data = _of_scenario(files[name]) if name in files else _of_variant(name, list(files))
     if data is None:
@@ -116,9 +113,8 @@ def _of_variant(name: str, others: list[str]) -> dict[str, Any] | None:
             if name in opened.system.parameters:
                 experiment = comparison.load_study(folder).EXPERIMENT
                 expected = comparison.load_reference(opened, name, folder, experiment)
-                return motion.of_outcome(
-                    system, opened, comparison.simulate(opened, name, expected)
-                )
+                outcome = comparison.simulate(opened, name, expected)
+                return motion.of_outcome(system, opened, outcome)
             known = [*known, *opened.system.parameters]
     raise UserError(f"no scenario or variant {name!r}{did_you_mean(name, known)}")
 
@@ -171,15 +167,8 @@ def write(file: Path, drawn: "Sequence[Image]", duration: float) -> int:
     first, *others = _with_few_colours(drawn)
     times = [round(1000 * duration)] * len(others) + [round(1000 * REST)]
     buffer = io.BytesIO()
-    first.save(
-        buffer,
-        "PNG",
-        save_all=True,
-        append_images=others,
-        duration=times,
-        loop=PLAYS,
-        optimize=True,
-    )
+    more = {"append_images": others, "duration": times, "loop": PLAYS}
+    first.save(buffer, "PNG", save_all=True, optimize=True, **more)
     size = buffer.tell()
     if size > LARGEST:
         raise UserError(

@@ -141,12 +141,10 @@ def result_curve(
 
 
 def thinned(columns: Sequence[np.ndarray], most: int = MOST_ROWS) -> np.ndarray:
-    """Choose rows to show of columns (rows,).
+    """Choose rows to show of columns (rows,): at most `most`, or where the extremes are.
 
-    They are at most `most`, unless the columns have more extremes.
-
-    Rows at equal distances, half of `most` at least, and those where a column is smallest and
-    largest in each of many equal intervals: as many intervals as `most` permits, at least one.
+    Half of them at least are at equal distances; the others have the smallest and the largest value
+    of each column in each of many equal intervals.
     """
     table = np.nan_to_num(np.column_stack(columns).astype(float), posinf=1e300, neginf=-1e300)
     count = len(table)
@@ -193,12 +191,8 @@ def _plot(plot: Plot, packer: "_Packer") -> dict[str, Any]:
     content["levels"] = [{"name": name, "value": value} for name, value in plot.levels]
     content["curves"] = curves = []
     for curve in plot.curves:
-        item = {
-            "name": curve.name,
-            "values": packer.packed(narrow(curve.values)),
-            "steps": curve.steps,
-        }
-        item["limit"] = curve.limit
+        item = {"name": curve.name, "values": packer.packed(narrow(curve.values))}
+        item |= {"steps": curve.steps, "limit": curve.limit}
         if curve.reference is not None:
             item["reference"] = packer.packed(narrow(curve.reference))
         curves.append(item)

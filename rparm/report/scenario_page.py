@@ -29,8 +29,7 @@ def write(
 ) -> Entry:
     """Write page and values, called `name`, of a scenario to a section; its line in the overview.
 
-    The first of its runs is drawn; `failures` are others that did not end. The command `again` runs
-    it again.
+    The first run is drawn; `failures` did not end. The command `again` runs the scenario.
     """
     folder.mkdir(parents=True, exist_ok=True)
     first, scenario = runs[0], runs[0].scenario
@@ -114,10 +113,7 @@ def _write_values(
 
 
 def recorded(scenario: Scenario, model: Model, result: Result) -> dict[str, np.ndarray]:
-    """Return the columns (rows,) of Real outputs, Integers to draw, and given inputs.
-
-    A row holds what an importer reads after a step, so it holds the inputs of that step too.
-    """
+    """Return columns (rows,) of Real outputs, Integers to draw and inputs, read after each step."""
     rows = scenario.input_rows[: len(result.times)]
     drawn = {name for panel in scenario.panels for name in panel}
     inputs = [
@@ -257,9 +253,8 @@ def _csv_note(run: Run, shown: int) -> str:
     if run.compared:
         texts.append(f"Its values have {DIGITS} digits.")
     if shown < count:
-        texts.append(
-            f"This page shows {shown} of its {count} rows, with the extremes of all curves."
-        )
+        rows = f"{shown} of its {count} rows"
+        texts.append(f"This page shows {rows}, with the extremes of all curves.")
     return " ".join(texts)
 
 
@@ -276,18 +271,12 @@ def _start_tables(scenario: Scenario, model: Model) -> list[Table]:
     if given:
         tables.append(_values("Parameters and initial state of this run", model, given))
     if scenario.signals:
-        tables.append(
-            Table(
-                "Inputs",
-                ("input", "unit", "course", "meaning"),
-                [
-                    (name, unit(known.unit), describe_signal(signal), known.description)
-                    for name, signal in scenario.signals.items()
-                    if (known := model.variables[name])
-                ],
-                note="Sampled at communication points, each held over the step that begins there.",
-            )
-        )
+        rows = []
+        for name, signal in scenario.signals.items():
+            known = model.variables[name]
+            rows.append((name, unit(known.unit), describe_signal(signal), known.description))
+        note = "Sampled at communication points, each held over the step that begins there."
+        tables.append(Table("Inputs", ("input", "unit", "course", "meaning"), rows, note))
     rest = {
         name: value
         for name, value in scenario.defaults.items()
@@ -367,14 +356,9 @@ def measured_tables(comparisons: Sequence[Comparison], model: Model) -> list[Tab
         (c.name, unit(model.variables[c.name].unit), f"{c.rms:.4g}", f"{c.largest:.4g}", c.source)
         for c in comparisons
     ]
-    return [
-        Table(
-            "Difference from what was measured",
-            ("output", "unit", "RMS", "largest", "log"),
-            rows,
-            note="Simulated less measured, over the rows of the values that the log covers.",
-        )
-    ]
+    head = ("output", "unit", "RMS", "largest", "log")
+    note = "Simulated less measured, over the rows of the values that the log covers."
+    return [Table("Difference from what was measured", head, rows, note)]
 
 
 def describe_signal(signal: Signal) -> str:

@@ -69,7 +69,7 @@ def remove(report: Path, system: str, variants: Sequence[str]) -> None:
 
 def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
     """Write the page and the values of a run, complete or not at all; its line in the overview."""
-    run, folder = outcome.run, _folder(report, section)
+    run, ssp, folder = outcome.run, section.ssp, _folder(report, section)
     rows, data = _data(section, outcome)
     error = f"{outcome.error:.1e}"
     above = f"the error of {outcome.worst}, {error}, is above its bound {short(BOUND)}"
@@ -77,11 +77,7 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
         status=PASSED if outcome.passed else FAILED,
         facts=_facts(section, outcome),
         data=data,
-        tables=[
-            *_parameters(section.ssp, outcome.variant),
-            *_solvers(section.ssp, run),
-            _errors(section.ssp, outcome),
-        ],
+        tables=[*_parameters(ssp, outcome.variant), *_solvers(ssp, run), _errors(ssp, outcome)],
         notes=[
             *(f"{m.name.capitalize()}: {m.meaning}." for m in section.study.MEASURES),
             "These numbers are of all steps, also of those that the file leaves out.",
@@ -237,14 +233,8 @@ def _solvers(ssp: Ssp, run: ecos.Run) -> list[Table]:
 
 
 def _errors(ssp: Ssp, outcome: Outcome) -> Table:
-    rows = [
-        (name, unit(ssp.variable(name).unit), f"{error:.2e}")
-        for name, error in outcome.errors.items()
-    ]
-    note = (
-        "Largest difference from the reference of Ecos's order, relative to the variable's largest "
-        "value."
-    )
-    return Table(
-        "Errors of all variables", ("variable", "unit", "error"), rows, note=note, folded=True
-    )
+    found = outcome.errors.items()
+    rows = [(name, unit(ssp.variable(name).unit), f"{error:.2e}") for name, error in found]
+    note = "Largest difference from the reference of Ecos's order, relative to the variable's "
+    note += "largest value."
+    return Table("Errors of all variables", ("variable", "unit", "error"), rows, note, folded=True)

@@ -1,9 +1,10 @@
 """Writes the report of a command: pages of scenarios, studies over tolerances and steps."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +29,13 @@ UPDATE_NOTE = (
 )
 
 
+def _by(items: Iterable[Any], key: Callable[[Any], Any]) -> dict[Any, list[Any]]:
+    groups: dict[Any, list[Any]] = {}
+    for item in items:
+        groups.setdefault(key(item), []).append(item)
+    return groups
+
+
 class ReportWriter:
     """Writes pages of scenarios, of users' own files and of studies into a folder."""
 
@@ -47,10 +55,7 @@ class ReportWriter:
     @staticmethod
     def grouped(runs: Sequence[Run]) -> dict[Path, list[Run]]:
         """Return runs by scenario."""
-        groups: dict[Path, list[Run]] = {}
-        for run in runs:
-            groups.setdefault(run.scenario.path, []).append(run)
-        return groups
+        return _by(runs, lambda run: run.scenario.path)
 
     def write(
         self,
@@ -60,16 +65,10 @@ class ReportWriter:
         progress: Callable[[int], object] = lambda _: None,
         failures: Sequence[Failure] = (),
     ) -> Path:
-        """Write all pages; return the one to open: a single file's, or the overview.
-
-        Of the runs of each scenario, the first one is drawn. `progress` is called with 1 after
-        each.
-        """
-        failed: dict[Path, list[Failure]] = {}
-        for failure in failures:
-            failed.setdefault(failure.scenario.path, []).append(failure)
-        scenarios: list[overview.Entry] = []
-        files: list[overview.Entry] = []
+        """Write all pages; return the one to open: a single file's, or the overview."""
+        failed = _by(failures, lambda failure: failure.scenario.path)
+        scenarios: list[Entry] = []
+        files: list[Entry] = []
         for path in dict.fromkeys((*groups, *failed)):
             group, others = groups.get(path, ()), failed.get(path, ())
             scenario = (group or others)[0].scenario
@@ -99,10 +98,7 @@ class ReportWriter:
         return next(name for name in names if sources.get(name) in (None, str(file)))
 
     def _record(
-        self,
-        scenarios: Sequence[overview.Entry],
-        files: Sequence[overview.Entry],
-        studies: Sequence[overview.Entry],
+        self, scenarios: Sequence[Entry], files: Sequence[Entry], studies: Sequence[Entry]
     ) -> Path:
         """Put the entries into the overview; files of earlier runs stay there."""
         index = self.folder / "index.html"
@@ -117,14 +113,9 @@ class ReportWriter:
 def write_sweeps(folder: Path, sweeps: Sequence[Sweep]) -> Entry:
     """Write the page of errors over the tolerance; its line in the overview."""
     x = np.array(sweeps[0].tolerances)
-    models: dict[str, list[Sweep]] = {}
-    for sweep in sweeps:
-        models.setdefault(sweep.scenario.model, []).append(sweep)
-    limit = Curve(
-        f"{comparison.ERROR_PER_TOLERANCE:g} × tolerance",
-        comparison.ERROR_PER_TOLERANCE * x,
-        limit=True,
-    )
+    models = _by(sweeps, lambda sweep: sweep.scenario.model)
+    factor = comparison.ERROR_PER_TOLERANCE
+    limit = Curve(f"{factor:g} × tolerance", factor * x, limit=True)
     plots = [
         Plot(
             f"largest error, scenarios of {model}",
@@ -158,38 +149,27 @@ def write_convergence(folder: Path, study: Convergence) -> Entry:
     scenario, steps = study.scenario, np.asarray(study.problem.steps, float)
     model = project.model_folder(scenario.path).name
     curves = [Curve(row.name, np.asarray(row.errors)) for row in study.rows]
-    data = RunData(
-        scenario.name,
-        "",
-        1e3 * steps,
-        [Plot("error of the final state", "", curves, log=True)],
-        Axis("communication step", "ms", log=True),
-    )
+    plot = Plot("error of the final state", "", curves, log=True)
+    axis = Axis("communication step", "ms", log=True)
     rows = [
         [row.name, *(f"{e:.1e}" for e in row.errors), f"{row.slope:.2f}", verdict(row.holds)]
         for row in study.rows
     ]
+    head = ["known of the inputs", *map(milliseconds, steps), "slope", "result"]
     updated = any(row.name == UPDATE for row in study.rows)
     page = RunPage(
         title="Error against communication step",
         description=f"{scenario.title}: {scenario.description}",
         status=PASSED if study.passed else FAILED,
         facts=[("model", model), ("tolerance", short(scenario.tolerance))],
-        data=data,
-        tables=[
-            Table(
-                "Errors",
-                ["known of the inputs", *map(milliseconds, steps), "slope", "result"],
-                rows,
-            )
-        ],
+        data=RunData(scenario.name, "", 1e3 * steps, [plot], axis),
+        tables=[Table("Errors", head, rows)],
         notes=[UPDATE_NOTE] if updated else [],
         failures=study.violations,
     )
     worst = max(study.rows, key=lambda row: row.errors[-1])
-    return _write_study(
-        folder, page, worst.errors[-1], f"at {milliseconds(steps[-1])}, {worst.name}"
-    )
+    where = f"at {milliseconds(steps[-1])}, {worst.name}"
+    return _write_study(folder, page, worst.errors[-1], where)
 
 
 def _write_study(folder: Path, page: RunPage, error: float, detail: str) -> Entry:

@@ -31,8 +31,6 @@ SMALL_ENOUGH = 1e-10  # an error below it needs no gain
 
 
 # ---- References ----------------------------------------------------------------------------------
-
-
 class Compared:
     """A run that has been compared: which of its variables is farthest from the reference."""
 
@@ -76,8 +74,7 @@ class Reference:
 def load_reference(scenario: Scenario, model: Model) -> Reference:
     """Read and check the reference of `scenario`, which was checked against `model`.
 
-    UserError if the file is missing, damaged, or not of this scenario; names the line and the
-    command that makes references.
+    UserError if it is missing, damaged or another's; names line and command that makes it.
     """
     path = project.reference_file(scenario.path, model.name)
     folder = project.model_folder(scenario.path)
@@ -106,11 +103,7 @@ def read_summed(folder: Path) -> Summed:
 
 
 def error_scale(columns: Mapping[str, np.ndarray], name: str, summed: Summed) -> float:
-    """Return the divisor of a variable's error, in its unit: its largest value, or a sum's.
-
-    `columns` are the reference of all variables, (rows,) each; a sum of which a term is missing
-    does not count.
-    """
+    """Return the divisor of a variable's error: its largest value, or a complete sum's."""
     terms = summed.get(name, ())
     if not terms or not set(terms) <= set(columns):
         terms = (name,)
@@ -127,11 +120,7 @@ def errors_against(result: Result, reference: Reference) -> dict[str, float]:
 
 
 def error_bound(tolerance: float) -> float:
-    """Return the largest error allowed of a run at a relative tolerance.
-
-    1000 times the tolerance, and no more than 1e-6 from tolerance 1e-8 on and 1e-8 from tolerance
-    1e-11 on: of these the least that applies.
-    """
+    """Return 1000 tolerances, at most 1e-6 from tolerance 1e-8 on and 1e-8 from 1e-11 on."""
     applying = [error for loosest, error in BOUNDS.items() if tolerance <= loosest]
     return min([ERROR_PER_TOLERANCE * tolerance, *applying])
 
@@ -166,8 +155,6 @@ def _check_times(times: np.ndarray, scenario: Scenario, wrong: files.Failure) ->
 
 
 # ---- Runs ----------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Twin:
     """The same run on an FMU of another version of FMI."""
@@ -294,8 +281,8 @@ class Runs:
 def estimated_from(tolerance: float, smallest: float) -> float:
     """Choose the tolerance to compare a run at `tolerance` with if there is no reference.
 
-    A tighter one, unless it would be below the `smallest` that makes a difference. Then it is a
-    looser one, whose own error is what the runs differ by: more than that of the run.
+    A tighter one, or if it would be below the `smallest` that makes a difference, a looser one,
+    whose own error is then the difference: more than the run's.
     """
     tighter = min(ESTIMATE_TOLERANCE, tolerance / 10)
     return tighter if tighter >= smallest else 10 * tolerance
@@ -313,8 +300,6 @@ def differing(one: Result, other: Result) -> tuple[str, ...]:
 
 
 # ---- Logs ----------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """An output that was measured, at the times of a run's rows."""
@@ -352,8 +337,6 @@ def comparisons(scenario: Scenario, result: Result) -> Iterator[Comparison]:
 
 
 # ---- Tolerances ----------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Sweep:
     """Errors of one scenario over the tolerances."""
@@ -382,17 +365,15 @@ def sweep(
 def sweep_violations(tolerances: Sequence[float], errors: Sequence[float]) -> list[str]:
     """Return rules that errors over tolerances (loosest first) break, one sentence each.
 
-    An error stays within its bound; it never grows to more than 3 times that of the next looser
-    tolerance; at the tightest it is at most 1/1000 of that at the loosest, or below 1e-10. The
-    comparisons are such that NaN breaks them.
+    An error stays within its bound, grows to 3 times the next looser one's at most, and falls to
+    1/1000 of the loosest or below 1e-10. The comparisons are such that NaN breaks them.
     """
     texts = []
     for tolerance, error in zip(tolerances, errors, strict=True):
         largest = error_bound(tolerance)
         if not error <= largest:
-            texts.append(
-                f"error {error:.2e} at tolerance {tolerance:g} is above its bound {largest:.0e}"
-            )
+            found = f"error {error:.2e} at tolerance {tolerance:g}"
+            texts.append(f"{found} is above its bound {largest:.0e}")
     for i in range(1, len(errors)):
         if not errors[i] <= LARGEST_RISE * errors[i - 1]:
             texts.append(

@@ -31,13 +31,10 @@ from rparm.runs.scenario import Scenario
 FACTORS = (64, 32, 16, 8, 4, 2, 1)  # communication steps, in shortest steps of the problem
 ORDERS = (0, 1, 2, 3)  # of the highest input derivative that is set; 0: zero-order hold
 INTERMEDIATE_UPDATE = len(ORDERS)  # the case after the orders
+# of the cases
 NAMES = (
-    "inputs held",
-    "1st derivatives",
-    "2nd derivatives",
-    "3rd derivatives",
-    "intermediate update",
-)  # of the cases
+    "inputs held", "1st derivatives", "2nd derivatives", "3rd derivatives", "intermediate update",
+)  # fmt: skip
 POWERS = (1, 2, 3, 4, 4)  # of the step, which the error follows in each case
 LARGEST_DEVIATION = 0.2  # of a slope from the order expected
 CLEAR_OF_INTEGRATION = 100.0  # an error counts from this many times the integration's own
@@ -89,10 +86,9 @@ class Convergence:
     def integration_error(self) -> float:
         """Estimate of what the integrator itself leaves: the error with the best known inputs.
 
-        With the highest derivatives and the shortest step the inputs are all but exact, and the
-        integrator restarts most often: what is left there bounds its error in the other runs.
-        With intermediate update, the error of the inputs is as small as the integrator's there, and
-        the two may cancel: the second shortest step counts, too.
+        With the highest derivatives and the shortest step the inputs are all but exact, restarts
+        most frequent. With intermediate update, errors of inputs and integrator may cancel there:
+        the second shortest step counts, too.
         """
         shortest = 2 if len(self.errors) > INTERMEDIATE_UPDATE else 1
         return float(self.errors[-1, -shortest:].max())
@@ -144,10 +140,7 @@ def slope(steps: np.ndarray, errors: np.ndarray) -> float:
 
 
 def smooth_inputs(scenario: Scenario) -> dict[str, Sines]:
-    """Return the inputs of `scenario` as smooth functions.
-
-    UserError if one of them is no sum of sines.
-    """
+    """Return the inputs as smooth functions; UserError if one of them is no sum of sines."""
     for name, signal in scenario.signals.items():
         if not isinstance(signal, Sines):
             raise UserError(f"{scenario.path}: [inputs.{name}]: expected sines, which are smooth")
@@ -188,12 +181,10 @@ def study(
     progress: Callable[[int], object] = lambda _: None,
     updated: Fmu | None = None,
 ) -> Convergence:
-    """Run `problem` in every case and with every communication step.
+    """Run `problem` in every case and with every communication step; UserError if an FMU fails.
 
-    `fmu` takes all orders of input derivatives, `updated` intermediate update; without it, this
-    case is left out. `progress` is called with the number of steps that each run has made.
-
-    UserError if a function of an FMU fails.
+    `fmu` takes all orders of input derivatives, `updated` intermediate update, if its case is
+    wanted. `progress` is called with the number of steps that each run has made.
     """
     fmus = [fmu] * len(ORDERS) + ([] if updated is None else [updated])
     errors = np.empty((len(fmus), len(FACTORS)))
@@ -205,11 +196,7 @@ def study(
 
 
 def final_state(fmu: Fmu, problem: Problem, case: int, factor: int) -> dict[str, float]:
-    """Run a problem with steps of `factor` shortest ones; return the states at the end.
-
-    The case is the highest derivative of the inputs that is set, along with all lower ones, 0:
-    none; or INTERMEDIATE_UPDATE.
-    """
+    """Return the states after steps of `factor` shortest ones; case: order, or intermediate."""
     scenario = problem.scenario
     step_through = _with_updates if case == INTERMEDIATE_UPDATE else _with_derivatives
     with fmu.instance(scenario.name, list(problem.inputs) if case else ()) as instance:

@@ -37,8 +37,6 @@ BESIDE = {"offset": SINES} | dict.fromkeys(("column", "time", "begin", "scale", 
 
 
 # ---- Checked values of a file --------------------------------------------------------------------
-
-
 class Reader:
     """Takes checked values from one file; errors name the file and the key."""
 
@@ -90,8 +88,6 @@ class Reader:
 
 
 # ---- Functions of time ---------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Constant:
     """The same value at all times."""
@@ -118,10 +114,10 @@ class Sines:
         return total.astype(np.float64)
 
     def derivative(self, elapsed: np.ndarray, order: int) -> np.ndarray:
-        """Return the derivative of an order at `elapsed` seconds after the start, (n,).
+        """Return the derivative of an order (0: value) at `elapsed` seconds after the start, (n,).
 
-        Order 0 is the value. It is exact but for one rounding, unlike `values`, whose pi is a
-        double: the exact final states of the convergence problems are compared with it.
+        It is exact but for a rounding, unlike `values`, whose pi is a double: exact final states of
+        convergence problems are compared with it.
         """
         pi = np.arctan2(np.longdouble(0), np.longdouble(-1))
         t = np.asarray(elapsed, dtype=np.longdouble)
@@ -179,8 +175,6 @@ Signal = Constant | Sines | Table | Switches | Logged
 
 
 # ---- Logs ----------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Columns:
     """Columns of a log with their times, as exact as the file writes them."""
@@ -223,11 +217,7 @@ class Log:
     names: tuple[str, ...]  # of the columns
 
     def columns(self, time: str, names: Sequence[str], since: float | None = None) -> Columns:
-        """Read columns, with times since `since` (s), or since the first row.
-
-        UserError names the line of what is wrong. Times are subtracted as decimals: doubles of
-        clocks that count from 1970 are 0.2 microseconds apart.
-        """
+        """Read columns over times since `since` (s) or the first row; UserError names the line."""
         indices = [self._index(name) for name in (time, *names)]
         origin = None if since is None else Decimal(repr(since))
         found, lines, joined = array("d"), array("q"), list[tuple[int, int]]()
@@ -341,13 +331,8 @@ def _csv_reader(text: str, delimiter: str) -> "csv._reader":
 
 
 # ---- Sections of a scenario ----------------------------------------------------------------------
-
-
 class InputReader:
-    """Reads the sections [inputs] and [measured].
-
-    Communication points are `times` (n + 1,) in s, rounded, and `elapsed` since the start.
-    """
+    """Reads [inputs] and [measured] at `times` (n + 1,) s, rounded; `elapsed` since the start."""
 
     def __init__(
         self, reader: Reader, model: Model, times: np.ndarray, elapsed: np.ndarray
@@ -526,9 +511,8 @@ class InputReader:
             found = f"ends at {begin + float(log.times[-1])!r} s"
         else:
             return
-        self._reader.fail(
-            f"{where}: {found}, the run needs it from {begin!r} to {begin + last!r} s"
-        )
+        needed = f"from {begin!r} to {begin + last!r} s"
+        self._reader.fail(f"{where}: {found}, the run needs it {needed}")
 
     def _on_or_off(self, table: dict[str, Any], numbers: np.ndarray, where: str) -> np.ndarray:
         """Convert values of a Boolean input."""

@@ -63,8 +63,7 @@ INPUT_HELP = """\
 class Scenario:
     """A run of one model: parameters, initial state, communication points and inputs (SI units).
 
-    Only what the file gives is in `parameters`, `initial` and `inputs`; everything else has its
-    start value. Arrays are read-only; Boolean inputs' hold Booleans.
+    What the file does not give has its start value. Arrays are read-only, of Booleans for Booleans.
     """
 
     name: str
@@ -86,9 +85,7 @@ class Scenario:
     defaults: dict[str, Value]  # start values in the FMU
     panels: tuple[tuple[str, ...], ...] = ()  # variables to draw beside the states, by diagram
     measured: dict[str, Logged] = field(default_factory=dict)  # outputs to compare with logs
-    logs: dict[str, str] = field(
-        default_factory=dict
-    )  # SHA-256 of logs of inputs, by file as given
+    logs: dict[str, str] = field(default_factory=dict)  # SHA-256 of inputs' logs, by file as given
     # to ask the user: values that are hardly meant so, logs that look damaged
     questions: tuple[str, ...] = ()
     smallest_tolerance: float = 0.0  # relative; a smaller one makes no difference
@@ -133,8 +130,8 @@ def title(path: Path) -> str:
 def subject_of(path: Path) -> Path:
     """Return the FMU that the scenario's key `fmu` names, or the folder of its model.
 
-    The key `model` names the model, else it is the one whose folder the file lies in. UserError if
-    the file cannot be read, or names nothing that is there.
+    Without the key `model` it is the model in whose folder the file lies. UserError if the file
+    cannot be read, or names nothing that is there.
     """
     content, reader = read_toml(path), Reader(path)
     if FMU in content:
@@ -165,21 +162,13 @@ def name_of(subject: Path) -> str:
 
 
 def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> Scenario:
-    """Read and check the scenario at `path`, of the project or of a user.
-
-    Values of `times` replace section [time]'s. UserError if the file cannot be read, or if
-    anything in it is wrong.
-    """
+    """Read and check a scenario; `times` replace its own. UserError if anything is wrong."""
     path = Path(path)
     content = read_toml(path)
     subject = subject_of(path)
     reader = _Reader(path)
-    reader.keys(
-        content,
-        "",
-        required=("title", "description", "tolerance", "time"),
-        optional=(MODEL, FMU, "reference_every", "panels", PARAMETERS, INITIAL, INPUTS, MEASURED),
-    )
+    optional = (MODEL, FMU, "reference_every", "panels", PARAMETERS, INITIAL, INPUTS, MEASURED)
+    reader.keys(content, "", ("title", "description", "tolerance", "time"), optional)
     tolerance = reader.number(content["tolerance"], "tolerance")
     if not 0 < tolerance < 1:
         reader.fail(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")
@@ -311,10 +300,7 @@ class _Reader(Reader):
     def communication_points(
         self, start: float, stop: float, steps: tuple[float, ...]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return times from start to stop in s, and since the start.
-
-        Each is computed from its index: nothing accumulates.
-        """
+        """Return times (s) from start to stop, and since the start, from their numbers."""
         period = math.fsum(steps)
         cycles = math.ceil((stop - start) / period) + 1
         within = np.array([math.fsum(steps[:i]) for i in range(len(steps))])
@@ -333,14 +319,8 @@ class _Reader(Reader):
 
 
 # ---- A scenario to start from --------------------------------------------------------------------
-
-
 def template(name: str, key: str, subject: str, model: Model) -> str:
-    """Write the file, which runs as it is.
-
-    The `key` is `model`, with its folder below models/, or `fmu`, with the path of an FMU from the
-    file.
-    """
+    """Write the file, which runs as it is; `key` is `model`, or `fmu` with a path from the file."""
     outputs = model.real_outputs[:2]
     panels = "# Further plots, each of variables of one unit:\n"
     panels += f"# panels = {json.dumps([[output] for output in outputs])}\n"
@@ -395,15 +375,10 @@ def toml_text(content: str) -> str:
 
 def _template_section(section: str, title: str, model: Model) -> Iterator[str]:
     """Write a section with the start value of each variable in a comment."""
-    known = [
-        variable
-        for variable in model.variables.values()
-        if variable.is_a(section) and variable.start is not None and variable.type != "String"
-    ]
+    known = [v for v in model.variables.values() if v.is_a(section) and v.start is not None]
+    known = [variable for variable in known if variable.type != "String"]
     if known:
-        lines = [
-            f"{_template_comment(variable)}\n# {_template_line(variable)}" for variable in known
-        ]
+        lines = [f"{_template_comment(x)}\n# {_template_line(x)}" for x in known]
         yield f"# {title}\n[{section}]\n" + "\n".join(lines) + "\n"
 
 

@@ -60,23 +60,17 @@ def simulate(
 ) -> Result:
     """Run `scenario` on the FMU that it was checked against, and record its Real outputs.
 
-    The relative tolerance is the scenario's if none is given. `progress` is called now and
-    then with the number of steps done since the last call. `compiled` uses the compiled loop, where
-    numba is installed, even if it does not pay.
-
-    UserError if the FMU has no Real outputs, or if one of its functions fails; the text holds the
-    FMU's own message. In a step it is a `StoppedError`.
+    By default the relative tolerance is the scenario's. `progress` gets the number of steps since
+    its last call. `compiled` uses the compiled loop, where numba is installed, even if it does not
+    pay. UserError with the FMU's message if it fails, in a step a `StoppedError`.
     """
     tolerance = scenario.tolerance if tolerance is None else tolerance
     if not fmu.model.real_outputs:
         raise UserError(f"{fmu.path}: has no Real outputs, nothing can be recorded")
     with fmu.instance(scenario.name) as instance:
         initialize(instance, scenario, tolerance)
-        drawn = [
-            name
-            for name in dict.fromkeys(chain.from_iterable(scenario.panels))
-            if fmu.model.variables[name].type == "Integer"
-        ]
+        shown = dict.fromkeys(chain.from_iterable(scenario.panels))
+        drawn = [name for name in shown if fmu.model.variables[name].type == "Integer"]
         step_through = None if drawn else _compiled_loop(compiled, len(scenario.times) - 1)
         if step_through is None:
             made = _step_through(instance, scenario, drawn, progress)
@@ -188,15 +182,10 @@ def _switching(switches: dict[str, np.ndarray]) -> dict[int, list[str]]:
 
 
 # ---- Compiled steps ------------------------------------------------------------------------------
-
-
 def _step_compiled(
     instance: Instance, scenario: Scenario, progress: Callable[[int], object] | None
 ) -> tuple[np.ndarray, np.ndarray, float, UserError | None]:
-    """Make all steps of an initialized instance, or those before one that fails.
-
-    Recorded outputs (rows, outputs), no Integers (rows, 0), seconds of the loop, why it ended.
-    """
+    """Make all steps, or those before one that fails; Integers have the shape (rows, 0)."""
     made = _CompiledSteps(instance, scenario)
     begin = time.perf_counter()
     failure, count = made.begin(), FIRST_STEPS
@@ -261,14 +250,9 @@ class _CompiledSteps:
         last = min(first + count, self.count)
         here = slice(first, last + 1)
         rows = slice(*np.searchsorted(self._points, (first, last), side="right"))
-        made, failure = self._stepper.advance(
-            self._times[here],
-            self._held[here],
-            self._switches[here],
-            self._points[rows] - first,
-            self._watched,
-            self._values[rows],
-        )
+        given = self._times[here], self._held[here], self._switches[here]
+        where = self._points[rows] - first, self._watched, self._values[rows]
+        made, failure = self._stepper.advance(*given, *where)
         self.done += made
         self._recorded = int(np.searchsorted(self._points, self.done, side="right"))
         return failure
@@ -279,26 +263,19 @@ class _CompiledSteps:
 
 
 # ---- Values of programs --------------------------------------------------------------------------
-
-
 def is_finite_number(given: object) -> bool:
     """Return whether it is a real number, neither infinite nor nan; a Boolean is none."""
     return isinstance(given, Real) and not isinstance(given, bool) and bool(np.isfinite(given))
 
 
 def communication_points(start: float, stop: float, step: float) -> np.ndarray:
-    """Return communication points in s.
-
-    UserError if the stop time is no whole number of steps on.
-    """
+    """Return communication points in s; UserError if no whole number of steps leads to the stop."""
     for name, value in (("start_time", start), ("stop_time", stop), ("step", step)):
         if not is_finite_number(value):
             raise UserError(f"{name}: expected a finite number, got {value!r}")
     if start < 0 or stop <= start or step <= 0:
-        raise UserError(
-            "expected 0 <= start_time < stop_time and step > 0, "
-            f"got {start!r}, {stop!r} and {step!r}"
-        )
+        expected = "expected 0 <= start_time < stop_time and step > 0"
+        raise UserError(f"{expected}, got {start!r}, {stop!r} and {step!r}")
     exact = difference(stop, start) / step
     count = round(exact)
     if not 1 <= count <= MAX_STEPS:
@@ -323,11 +300,7 @@ def start_values(model: Model, given: Mapping[str, Any]) -> dict[str, Value]:
 
 
 def input_values(model: Model, name: str, given: Any, times: np.ndarray) -> np.ndarray:
-    """Sample an input at all communication points `times` (s).
-
-    `given` is a number, a value for each point, a pair (times, values) to interpolate, or a
-    function of the time. UserError if a value is not finite or not in the input's range.
-    """
+    """Sample a number, values, pair to interpolate or function at `times` (s); UserError."""
     with placed(f"inputs: {name}"):
         variable = model.find(name, INPUTS)
     boolean = variable.type == "Boolean"

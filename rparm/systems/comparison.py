@@ -99,8 +99,8 @@ def load_reference(
 ) -> Reference:
     """Read and check the reference of a variant of the system in a folder.
 
-    References are for `experiment`: start, stop and step in s. UserError if the file is missing,
-    damaged, or not of this system; names the line and the command that makes references.
+    `experiment` is its start, stop and step in s. UserError if it is missing, damaged or another's;
+    names the line and the command that makes it.
     """
     _check_experiment(ssp, experiment)
     path = project.variant_reference_file(system, variant)
@@ -146,8 +146,6 @@ def _check_experiment(ssp: Ssp, experiment: tuple[float, float, float]) -> None:
 
 
 # ---- study.py of a system ------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Measure:
     """A number that a run is measured by, for the tables."""
@@ -205,9 +203,8 @@ def load_study(folder: Path) -> Study:
     """Import the module of a system's folder; UserError if there is none."""
     file = folder / f"{project.STUDY}.py"
     if not is_file(file):
-        raise UserError(
-            f"{file}: no such file, rparm/systems/comparison.py says what belongs in it"
-        )
+        where = "rparm/systems/comparison.py"
+        raise UserError(f"{file}: no such file, {where} says what belongs in it")
     return cast(Study, import_module(f"rparm.models.{folder.name}.{project.STUDY}"))
 
 

@@ -74,11 +74,10 @@ def absent() -> str:
 
 
 def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
-    """Run a system from its start to its stop time with one of its parameter sets.
+    """Run a system from start to stop with a parameter set; read variables ``component.variable``.
 
-    Reads the Real, Integer or Boolean variables ``component.variable``. UserError if a component
-    fails or gives a value that is not finite (the text names component, variable and time), or if
-    Ecos itself fails. After the start it is a `StoppedError`.
+    UserError if a component fails or a value is not finite, with component, variable and time, or
+    if Ecos itself fails; after the start it is a `StoppedError`.
     """
     system = ssp.system
     if variant not in system.parameters:
@@ -106,14 +105,9 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     times = system.start + system.step * np.arange(len(values))
     messages = [match for match in map(MESSAGE.search, log.splitlines()) if match]
     warnings = [f"{_sender(ssp, m)}: {m['text']}" for m in messages if m["status"] not in BAD]
-    result = Run(
-        tuple(names),
-        times,
-        values,
-        done["wall_time"],
-        tuple(dict.fromkeys(warnings)),
-        dict(zip(statistics, done["statistics"], strict=True)),
-    )
+    said = dict(zip(statistics, done["statistics"], strict=True))
+    texts = tuple(dict.fromkeys(warnings))
+    result = Run(tuple(names), times, values, done["wall_time"], texts, said)
     try:
         _check_values(ssp, variant, names, times, values)
         _check_messages(ssp, variant, times, messages)
@@ -125,12 +119,8 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
 
 def said_at_end(ssp: "Ssp") -> list[str]:
     """Return the statistics that components have, as ``component.variable``."""
-    return [
-        f"{component}.{name}"
-        for component, model in ssp.models.items()
-        for name in STATISTICS
-        if name in model.variables
-    ]
+    models = ssp.models.items()
+    return [f"{c}.{name}" for c, model in models for name in STATISTICS if name in model.variables]
 
 
 def _check_messages(
@@ -157,10 +147,8 @@ def _check_parameters(ssp: "Ssp", variant: str) -> None:
         model = ssp.models[component]
         for name in values:
             if model.variables[name].type == "Enumeration":
-                raise UserError(
-                    f"{ssp.path}: parameter set {variant!r}: component {component!r}: {name!r} is "
-                    "an Enumeration, which Ecos does not set"
-                )
+                where = f"{ssp.path}: parameter set {variant!r}: component {component!r}"
+                raise UserError(f"{where}: {name!r} is an Enumeration, which Ecos does not set")
 
 
 def _as_ecos_opens(path: Path, folder: Path) -> Path:
@@ -179,13 +167,9 @@ def _start(folder: Path) -> int:
     if os.name == "posix" and shutil.which("unzip") is None:
         environment["PATH"] = f"{_unzip(folder)}:{environment.get('PATH', os.defpath)}"
     with (folder / LOG).open("wb") as log:
-        return run_group(
-            [sys.executable, "-P", "-m", "rparm.systems.ecos", str(folder)],
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=subprocess.STDOUT,
-            env=environment,
-        ).returncode
+        command = [sys.executable, "-P", "-m", "rparm.systems.ecos", str(folder)]
+        streams = {"stdin": subprocess.DEVNULL, "stdout": log, "stderr": subprocess.STDOUT}
+        return run_group(command, env=environment, **streams).returncode
 
 
 def _unzip(folder: Path) -> Path:
@@ -194,15 +178,14 @@ def _unzip(folder: Path) -> Path:
     command.parent.mkdir()
     python, extract = shlex.quote(sys.executable), "import sys, zipfile as z; "
     extract += "z.ZipFile(sys.argv[1]).extractall(sys.argv[2])"
-    command.write_text(
-        f'#!/bin/sh\nexec {python} -I -c "{extract}" "$2" "$4"\n', encoding="utf-8", newline="\n"
-    )
+    text = f'#!/bin/sh\nexec {python} -I -c "{extract}" "$2" "$4"\n'
+    command.write_text(text, encoding="utf-8", newline="\n")
     command.chmod(0o755)
     return command.parent
 
 
 def _sender(ssp: "Ssp", message: re.Match[str]) -> str:
-    """Name of the component that a message is of."""
+    """Return the name of the component that a message is of."""
     component = message["component"]
     return repr(component) if component is not None else _components(ssp, message["fmu"])
 
@@ -217,27 +200,19 @@ def _components(ssp: "Ssp", fmu: str) -> str:
 def _check_values(
     ssp: "Ssp", variant: str, names: Sequence[str], times: np.ndarray, values: np.ndarray
 ) -> None:
-    """Refuse values that are not finite, naming the component that the first of them is from.
-
-    `values` are (times, names); each name is component.variable.
-    """
+    """Refuse values (times, names) that are not finite, naming the first component that has one."""
     bad_rows = np.flatnonzero(~np.isfinite(values).all(axis=1))
     if not len(bad_rows):
         return
     row = bad_rows[0]
     bad = [name for name, value in zip(names, values[row], strict=True) if not np.isfinite(value)]
     # a component passes on a bad input in the same step
-    victims = {
-        connection.end_component
-        for connection in ssp.system.connections
-        if f"{connection.start_component}.{connection.start_connector}" in bad
-    }
+    victims = {c.end_component for c in ssp.system.connections if c.start in bad}
     sources = [name for name in bad if name.partition(".")[0] not in victims]
     component, _, variable = (sources or bad)[0].partition(".")
     value = values[row, list(names).index(f"{component}.{variable}")]
-    raise UserError(
-        f"{variant}: component {component!r}: {variable!r} is {value} at t = {times[row]:.6g} s"
-    )
+    where = f"{variant}: component {component!r}"
+    raise UserError(f"{where}: {variable!r} is {value} at t = {times[row]:.6g} s")
 
 
 # ---- the child

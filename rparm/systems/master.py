@@ -37,8 +37,6 @@ INPUT_MODES = ("held", "extrapolated")
 
 
 # ---- Components ----------------------------------------------------------------------------------
-
-
 class ConnectedInstance:
     """An instance, its place among the system's values, and the sources of its inputs.
 
@@ -116,10 +114,7 @@ def check_finite(component: str, outputs: Reals, when: str) -> None:
 
 
 def start_value(fmu: UnpackedFmu, component: str, name: str, value: Value) -> Value:
-    """Return the value to set before initialization, an item as its number.
-
-    UserError if it cannot be set.
-    """
+    """Return the value to set before initialization, an item as its number; else UserError."""
     variable = fmu.model.variables.get(name)
     if variable is None or not (variable.can_start or variable.is_a(INPUTS)):
         raise UserError(f"{component}: {fmu.path} has no parameter {name!r}")
@@ -131,8 +126,6 @@ def start_value(fmu: UnpackedFmu, component: str, name: str, value: Value) -> Va
 
 
 # ---- The master ----------------------------------------------------------------------------------
-
-
 class Snapshot(AbstractContextManager["Snapshot"]):
     """The state of a whole system at a communication point; a context manager that frees it."""
 
@@ -142,9 +135,7 @@ class Snapshot(AbstractContextManager["Snapshot"]):
             fmu = component.instance.fmu
             if not fmu.model.saves_states:
                 raise UserError(f"{component.name}: {fmu.path} has no FMU state to go back to")
-        self._states = [
-            component.instance.saved_state() for component in master.components.values()
-        ]
+        self._states = [c.instance.saved_state() for c in master.components.values()]
 
     def __exit__(self, *_: object) -> None:
         for state in self._states:
@@ -173,20 +164,18 @@ class Snapshot(AbstractContextManager["Snapshot"]):
 class Master(AbstractContextManager["Master"]):
     """A system of connected components; a context manager that frees their instances.
 
-    In Gauss-Seidel order the components step in the order of `fmus`. After each step all Real
-    outputs are read, and the Real variables `also`, pairs of component and variable. UserError if
-    names are unknown, an input has several connections, or an FMU cannot do what is asked.
+    In Gauss-Seidel order components step in the order of `fmus`. After each step all Real outputs
+    are read, and Real variables `also` (component, variable). UserError if names are unknown, an
+    input has several connections, or an FMU cannot do what is asked.
 
     Attributes
     ----------
     names : tuple of str
         "component.variable" of all that is read, by component, outputs first.
     values : ndarray, shape (len(names),)
-        As read right after the last step, before inputs are set for the next one; where a Boolean
-        has changed, after all that follows from it.
+        As read right after the last step, and all that follows from a Boolean that changed.
     slopes : ndarray, shape (len(names),)
-        Their derivatives with respect to time; only those that are connected, and only if
-        `inputs` is "extrapolated".
+        Derivatives by time of what is connected, if `inputs` is "extrapolated".
     time : float
         s.
     do_steps : int
@@ -276,9 +265,8 @@ class Master(AbstractContextManager["Master"]):
         parameters = parameters or {}
         for name in parameters:
             if name not in self.components:
-                raise UserError(
-                    f"{name}: no such component (there are: {', '.join(self.components)})"
-                )
+                known = ", ".join(self.components)
+                raise UserError(f"{name}: no such component (there are: {known})")
         self.time = start
         for component in self.components.values():
             component.begin(start, stop, parameters.get(component.name, {}))
@@ -314,7 +302,7 @@ class Master(AbstractContextManager["Master"]):
             value = source.boolean(c.start_connector)
             if value != target.boolean(c.end_connector):
                 target.set(c.end_connector, value)
-                changed.append(f"{c.end_component}.{c.end_connector}")
+                changed.append(c.end)
         return changed
 
     def _read_early(self, component: ConnectedInstance) -> None:
@@ -331,9 +319,8 @@ class Master(AbstractContextManager["Master"]):
                     component.read_slopes()
             for component in self.components.values():
                 with component.instance.explained(when):
-                    component.set_lines(
-                        self.values[component.sources], self.slopes[component.sources]
-                    )
+                    known = component.sources
+                    component.set_lines(self.values[known], self.slopes[known])
         for component in self.components.values():
             with component.instance.explained(when):
                 component.read_slopes()
@@ -439,15 +426,8 @@ def _is_switch(fmus: Mapping[str, Fmu], component: str, name: str, causality: st
 
 
 # ---- A variant -----------------------------------------------------------------------------------
-
-
 def run_in_master(ssp: Ssp, variant: str, names: Sequence[str]) -> Run:
-    """Run a system in Jacobi order with one of its parameter sets; read what Ecos would read.
-
-    That is the values of the Real, Integer or Boolean variables ``component.variable`` at a
-    communication point after the inputs of the next step have been set. UserError if a component
-    fails, or gives a value that is not finite.
-    """
+    """Run a variant in Jacobi order; read ``component.variable`` as Ecos would, all finite."""
     system = ssp.system
     times = system.times
     rows = np.empty((len(times), len(names)))
@@ -463,11 +443,8 @@ def run_in_master(ssp: Ssp, variant: str, names: Sequence[str]) -> Run:
                     reader.component.set_inputs(master.values[reader.component.sources])
                     reader.read(rows[row])
         wall_time = time.perf_counter() - begin
-        messages = [
-            f"{component.name!r}: {text}"
-            for component in master.components.values()
-            for text in component.instance.messages
-        ]
+        known = master.components.values()
+        messages = [f"{c.name!r}: {text}" for c in known for text in c.instance.messages]
         said = {name: _value_at_end(master, ssp, name) for name in said_at_end(ssp)}
     return Run(tuple(names), times, rows, wall_time, tuple(dict.fromkeys(messages)), said)
 
@@ -496,10 +473,9 @@ class _RowReader:
         self._real_columns = [own[name] for name in real]
         self._others: list[tuple[int, Callable[[str], int | None], str]] = []
         for name in own.keys() - set(real):
-            boolean = variables[name].type == "Boolean"
-            self._others.append(
-                (own[name], instance.boolean if boolean else instance.integer, name)
-            )
+            is_boolean = variables[name].type == "Boolean"
+            read = instance.boolean if is_boolean else instance.integer
+            self._others.append((own[name], read, name))
 
     def read(self, row: np.ndarray) -> None:
         self._reals.get()

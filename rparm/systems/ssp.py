@@ -58,8 +58,6 @@ PARAMETERS = ("parameter", "input", "output")  # causalities of variables with a
 
 
 # ---- Structure -----------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Connector:
     """A variable of a component that the system sees."""
@@ -88,11 +86,18 @@ class Connection:
     end_component: str
     end_connector: str
 
+    @property
+    def start(self) -> str:
+        """Name "component.variable" of the output."""
+        return f"{self.start_component}.{self.start_connector}"
+
+    @property
+    def end(self) -> str:
+        """Name "component.variable" of the input."""
+        return f"{self.end_component}.{self.end_connector}"
+
     def __str__(self) -> str:
-        return (
-            f"{self.start_component}.{self.start_connector} -> "
-            f"{self.end_component}.{self.end_connector}"
-        )
+        return f"{self.start} -> {self.end}"
 
 
 @dataclass(frozen=True)
@@ -150,8 +155,6 @@ class System:
 
 
 # ---- Archive -------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Ssp:
     """An SSP that is unpacked and can be run."""
@@ -178,7 +181,7 @@ class Ssp:
     @property
     def notes(self) -> list[str]:
         """Choices for all runs that the SSP does not make."""
-        fed = {f"{c.end_component}.{c.end_connector}" for c in self.system.connections}
+        fed = {c.end for c in self.system.connections}
         alone = [
             f"{component}.{variable.name}"
             for component, model in self.models.items()
@@ -206,8 +209,6 @@ def unpacked(path: Path) -> Iterator[Ssp]:
 
 
 # ---- Reader --------------------------------------------------------------------------------------
-
-
 @cache
 def _schema(name: str) -> etree.XMLSchema:
     return etree.XMLSchema(etree.parse(SCHEMAS / name))
@@ -315,10 +316,7 @@ class SspReader:
     def experiment(
         self, root: etree._Element, components: Iterable[Component]
     ) -> tuple[float, float, float]:
-        """Start, stop and communication step in s.
-
-        Where the SSP does not say them, the FMUs do: the largest stop and the smallest step.
-        """
+        """Start, stop and communication step in s; FMUs give the largest stop and smallest step."""
         node = root.find("ssd:DefaultExperiment", NAMESPACES)
         given = {} if node is None else node.attrib
         sizes = [] if node is None else node.xpath(STEP_SIZE, namespaces=NAMESPACES)
@@ -457,15 +455,11 @@ def _positive(text: object) -> float | None:
 
 
 # ---- Checks against the FMUs ---------------------------------------------------------------------
-
-
 def checked_models(path: Path, folder: Path, system: System) -> dict[str, Model]:
     """Read what the FMU of each component declares, and check the system against it.
 
-    Every component has its FMU, every connector is a variable of it with that causality, and with
-    that type and unit where it has them, connections go from an output to an input of the same type
-    and unit, no input has two, and parameters are variables that can be set. UserError if not; the
-    text names component and variable. The SSP is unpacked in `folder`.
+    Connectors are variables of the same causality, type and unit, connections lead from outputs to
+    inputs of the same type and unit, no input has two, parameters can be set; else UserError.
     """
     checker = _Checker(path, system)
     for component in system.components:

@@ -65,14 +65,11 @@ def run(
     control: Control,
     before: Callable[[float], object] = lambda _: None,
 ) -> Controlled:
-    """Step `master`, which is initialized, to end exactly at the time `stop`, s.
+    """Step the initialized `master` to end exactly at the time `stop`, s.
 
-    The order is 1 with zero-order hold of the inputs, with extrapolated ones 2. `before` is called
-    with the length of each accepted step while the system is back at the beginning of that step; it
-    may step the system.
-
-    UserError if a signal is unknown, a step would have to be shorter than the shortest, or an FMU
-    fails or has no state to go back to.
+    The order is 1 with zero-order hold of the inputs, with extrapolated ones 2. `before`, which may
+    step the system, is called with each accepted step's length, back at its beginning. UserError if
+    a step gets too short, or an FMU fails or has no state to go back to.
     """
     steps = _Steps(master, control)
     times, rows, estimates, limited = [master.time], [master.values.copy()], [], []

@@ -2,8 +2,7 @@
  * Communication points far from zero are coarse (1e-10 s apart at 1e6 s) and masters round them
  * again at every step; with the rounding carried along, the time that is integrated is exactly the
  * time that has passed. */
-#ifndef CLOCK_H
-#define CLOCK_H
+#pragma once
 
 #include <float.h>
 #include <math.h>
@@ -111,5 +110,3 @@ struct polynomial polynomial_through(const double values[POLYNOMIAL_NODES], doub
 
 /* Returns the same polynomial with its origin moved by t (s). */
 struct polynomial polynomial_shifted(const struct polynomial *polynomial, double t);
-
-#endif

@@ -1,6 +1,5 @@
 /* Integration from outside (Model Exchange): continuous time, and all states at once. */
-#ifndef CONTINUOUS_STATES_H
-#define CONTINUOUS_STATES_H
+#pragma once
 
 #include "variables.h"
 
@@ -37,5 +36,3 @@ MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_get_derivatives(struct instance *instance, double dx[], size_t count);
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_get_nominals(struct instance *instance, double nominals[], size_t count);
-
-#endif

@@ -1,7 +1,6 @@
 /* Derivatives of an instance's values with respect to time and to other variables. Discrete values,
  * which are constant between events, have the derivative 0. */
-#ifndef DERIVATIVES_H
-#define DERIVATIVES_H
+#pragma once
 
 #include "variables.h"
 
@@ -38,5 +37,3 @@ MUST_CHECK NONNULL_ARGUMENTS(1) enum status
                                     const unsigned unknowns[], size_t unknown_count,
                                     const unsigned knowns[], size_t known_count, const double v[],
                                     double result[]);
-
-#endif

@@ -1,8 +1,7 @@
 /* History of the integrator's internal steps: when it may continue, how a restored instance gets
  * its history back, and the initial value problem: the model with the parameters of the last
  * restart, and the inputs as polynomials since then. */
-#ifndef HISTORY_H
-#define HISTORY_H
+#pragma once
 
 #include "state.h"
 
@@ -69,5 +68,3 @@ ode_series instance_series;
 ode_indicators instance_indicators;
 ode_rounding instance_rounding;
 ode_reach instance_reach;
-
-#endif

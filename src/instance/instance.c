@@ -104,8 +104,8 @@ static void locate_reals(struct instance *instance) {
     for (size_t i = 0; i < instance->description->variable_count; i++) {
         const struct variable *variable = &instance->description->variables[i];
         struct instance_real *real = &instance->reals[variable->reference];
-        real->is_kept = variable->initial == INITIAL_CALCULATED &&
-                        is_kept_by_events(instance->model, variable);
+        real->is_kept =
+            variable->initial == INITIAL_CALCULATED && is_kept_by_events(instance->model, variable);
         real->is_calculated = variable->initial == INITIAL_CALCULATED &&
                               variable->owner == VARIABLE_OF_MODEL && !real->is_kept;
         if (variable->type != VARIABLE_FLOAT64) {

@@ -5,8 +5,7 @@
  * Every function that can fail reports its status to the sink given at creation, with one line of
  * text that says what was wrong and what was expected. Functions that set or get values are all or
  * nothing. An instance serves one thread at a time; instances share nothing. */
-#ifndef INSTANCE_H
-#define INSTANCE_H
+#pragma once
 
 #include "variables.h"
 
@@ -41,5 +40,3 @@ NONNULL void instance_allow_setting_states(struct instance *instance);
 
 /* Returns the time that the instance has reached, s. */
 NONNULL double instance_time(const struct instance *instance);
-
-#endif

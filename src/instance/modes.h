@@ -1,7 +1,6 @@
 /* Modes of the model and every event that changes them: within a step, at its end, and at points
  * where an integrator outside stops. */
-#ifndef MODES_H
-#define MODES_H
+#pragma once
 
 #include "state.h"
 
@@ -53,5 +52,3 @@ NONNULL void instance_forget_unhandled(struct instance *instance);
  * instance_update_modes. *states_changed: whether states have jumped. */
 MUST_CHECK NONNULL enum status instance_update_at_point(struct instance *instance,
                                                         bool *states_changed);
-
-#endif

@@ -215,10 +215,9 @@ static bool check_modes(const struct instance *instance, const struct instance_s
                    : !are_zeros(values, modes) || !are_at_start(instance, values)) {
         return refuse_modes(instance, "the modes");
     }
-    if (state->has_history &&
-        (!are_equal(values, restart_values, modes) ||
-         !are_equal(values, restart_values, events->discrete_states) ||
-         !events->modes_are_possible(restart_values, true))) {
+    if (state->has_history && (!are_equal(values, restart_values, modes) ||
+                               !are_equal(values, restart_values, events->discrete_states) ||
+                               !events->modes_are_possible(restart_values, true))) {
         return refuse_modes(instance, "the modes since the restart");
     }
     return true;

@@ -1,7 +1,6 @@
 /* Refuses a state read from bytes that no instance can be in: a hash that fits does not prove it.
  */
-#ifndef PLAUSIBILITY_H
-#define PLAUSIBILITY_H
+#pragma once
 
 #include "state.h"
 
@@ -10,5 +9,3 @@
 MUST_CHECK NONNULL enum status instance_check_plausible(const struct instance *instance,
                                                         const struct instance_state *state,
                                                         const char *block);
-
-#endif

@@ -7,8 +7,7 @@
  *     u32, bytes   length of the GUID, GUID
  *     8 bytes each fields, in the order of transfer_state() in serialization.c
  *     u64          FNV-1a hash of all bytes before it */
-#ifndef SERIALIZATION_H
-#define SERIALIZATION_H
+#pragma once
 
 #include "snapshot.h"
 
@@ -26,5 +25,3 @@ MUST_CHECK NONNULL enum status instance_serialize(struct instance *instance,
 MUST_CHECK NONNULL enum status instance_deserialize(struct instance *instance,
                                                     const unsigned char bytes[], size_t size,
                                                     struct instance_snapshot **snapshot);
-
-#endif

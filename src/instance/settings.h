@@ -1,7 +1,6 @@
 /* Settings of an instance: its experiment, its parameters, and the integrator's settings that
  * follow. */
-#ifndef SETTINGS_H
-#define SETTINGS_H
+#pragma once
 
 #include "state.h"
 
@@ -28,5 +27,3 @@ NONNULL bool instance_is_configured_otherwise(const struct instance *instance);
 
 /* Gives the integrator the method, tolerances and limits that the values ask for. */
 MUST_CHECK NONNULL enum status instance_configure_integrator(struct instance *instance);
-
-#endif

@@ -6,8 +6,7 @@
  *
  * A snapshot belongs to its instance, which frees it at its own end at the latest. Functions refuse
  * a snapshot of another instance with STATUS_INVALID_ARGUMENT and a message. */
-#ifndef SNAPSHOT_H
-#define SNAPSHOT_H
+#pragma once
 
 #include "variables.h"
 
@@ -43,5 +42,3 @@ NONNULL void instance_keep(struct instance *instance, struct instance_snapshot *
 /* Restores the instance as it was when instance_keep was called, at most one step ago. */
 MUST_CHECK NONNULL enum status instance_undo(struct instance *instance,
                                              const struct instance_snapshot *snapshot);
-
-#endif

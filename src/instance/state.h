@@ -1,7 +1,6 @@
 /* Structure of an instance: its parts, the places of its values, and the values of the integrator.
  * Private to this library. */
-#ifndef STATE_H
-#define STATE_H
+#pragma once
 
 #include "clock.h"
 #include "integrator.h"
@@ -284,5 +283,3 @@ static inline void instance_set_clock(struct instance *instance, struct clock_ti
 
 /* Returns STATUS_NOT_FINITE, with a message that `what` cannot be computed. */
 NONNULL enum status instance_not_finite(const struct instance *instance, const char *what);
-
-#endif

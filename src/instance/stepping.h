@@ -1,6 +1,5 @@
 /* Steps from one communication point to the next. */
-#ifndef STEPPING_H
-#define STEPPING_H
+#pragma once
 
 #include "snapshot.h"
 
@@ -50,5 +49,3 @@ MUST_CHECK NONNULL enum status instance_do_step_with(struct instance *instance,
 
 /* True if the last step passed an event, or left it. */
 NONNULL bool instance_met_event(const struct instance *instance);
-
-#endif

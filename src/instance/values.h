@@ -1,6 +1,5 @@
 /* Values of an instance by value reference, and its calculated values. */
-#ifndef VALUES_H
-#define VALUES_H
+#pragma once
 
 #include "variables.h"
 
@@ -39,5 +38,3 @@ VALUE_TYPE_LIST(INSTANCE_ACCESS)
 
 /* Brings the calculated values up to date; if that fails, a message says why. */
 MUST_CHECK NONNULL enum status instance_update_outputs(struct instance *instance);
-
-#endif

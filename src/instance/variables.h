@@ -1,7 +1,6 @@
 /* Table of variables that fmu/generate.py makes from variables.toml, functions of its rows, and the
  * values that belong to the instance. Terms as in section 2.2.7 of the FMI 2.0 specification. */
-#ifndef VARIABLES_H
-#define VARIABLES_H
+#pragma once
 
 #include "model.h"
 #include "ode.h" // enum integrator_method
@@ -107,8 +106,7 @@ static inline bool variable_is_settable(const struct variable *variable, enum ph
 
 /* True if only events write the variable once the initialization has ended. */
 static inline bool variable_is_discrete_state(const struct variable *variable) {
-    return variable->owner == VARIABLE_OF_MODEL &&
-           variable->variability == VARIABILITY_DISCRETE &&
+    return variable->owner == VARIABLE_OF_MODEL && variable->variability == VARIABILITY_DISCRETE &&
            variable->causality != CAUSALITY_INPUT;
 }
 
@@ -155,5 +153,3 @@ struct instance_experiment {
     bool tolerance_defined;
     double tolerance; /* relative, > 0 */
 };
-
-#endif

@@ -6,8 +6,7 @@
  * such a step. The Runge-Kutta method ends its steps at the requested times and has no history. The
  * Taylor method does so too, unless a restart continues the same solution. One handle serves one
  * thread at a time; handles share nothing. */
-#ifndef INTEGRATOR_H
-#define INTEGRATOR_H
+#pragma once
 
 #include "ode.h"
 #include "platform.h"
@@ -99,5 +98,3 @@ NONNULL void integrator_get_statistics(const struct integrator *integrator,
 /* Overwrites the totals, so that repeated work does not count. */
 NONNULL void integrator_set_statistics(struct integrator *integrator,
                                        const struct integrator_statistics *statistics);
-
-#endif

@@ -1,8 +1,7 @@
 /* Finds events: on each finished internal step, the states are polynomials of time, and the
  * indicators that follow from them are searched for falls to 0. So neither the requested times nor
  * the sign at the end of a step decide whether an event is found. */
-#ifndef LOCATION_H
-#define LOCATION_H
+#pragma once
 
 #include "ode.h"
 #include "platform.h"
@@ -118,5 +117,3 @@ struct fall {
  * p represents the indicator over the step, up to an error. A fall counts only once the indicator
  * is armed: rounding may leave it on either side of 0 at a restart. */
 MUST_CHECK NONNULL double fall_first(const struct roots_polynomial *p, const struct fall *fall);
-
-#endif

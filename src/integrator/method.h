@@ -1,8 +1,7 @@
 /* A method of integration: the functions that its file gives to integrator.c, and the initial value
  * problem that it gets. States are arrays here: the types of a solver library stay in the files
  * that use it. */
-#ifndef METHOD_H
-#define METHOD_H
+#pragma once
 
 #include "location.h"
 
@@ -145,5 +144,3 @@ struct method {
 #define METHOD_DECLARATION(code, symbol) extern const struct method symbol;
 INTEGRATOR_METHOD_LIST(METHOD_DECLARATION)
 #undef METHOD_DECLARATION
-
-#endif

@@ -1,7 +1,6 @@
 /* An initial value problem x' = f(t, x), with the settings of its integration: all that a method
  * and its caller share. */
-#ifndef ODE_H
-#define ODE_H
+#pragma once
 
 #include "model.h"
 #include "status.h"
@@ -100,5 +99,3 @@ struct integrator_start {
 /* Observes each internal step that ends before the t of an advance; x: the state at its end t (s
  * since the last restart). Returns true to end the advance there. */
 typedef bool integrator_observer(void *context, double t, const double x[]);
-
-#endif

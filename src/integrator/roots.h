@@ -18,8 +18,7 @@
  * allocated. The same polynomial has the same roots on every platform.
  *
  * An indicator that is no polynomial itself is interpolated at Chebyshev points of the step. */
-#ifndef ROOTS_H
-#define ROOTS_H
+#pragma once
 
 #include "platform.h"
 
@@ -146,5 +145,3 @@ MUST_CHECK NONNULL static inline double roots_first(const struct roots_polynomia
  * their own roots_first, or |p| is within the rounding of its value and of s. */
 MUST_CHECK NONNULL double roots_earliest(size_t count, const struct roots_polynomial p[],
                                          bool is_at_root[]);
-
-#endif

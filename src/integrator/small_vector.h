@@ -4,8 +4,7 @@
  *
  * It has the operations that every integrator of SUNDIALS needs and the fused ones of CVODE and
  * ARKODE; sums are formed in the same order as in N_Vector_Serial. Private to the integrator. */
-#ifndef SMALL_VECTOR_H
-#define SMALL_VECTOR_H
+#pragma once
 
 #include <sundials/sundials_nvector.h>
 
@@ -33,5 +32,3 @@ void small_vector_note_terms(N_Vector x, struct small_vector_terms *terms);
  * polynomial, beginning with the highest power. count > 0. */
 void small_vector_polynomial(const struct small_vector_terms *terms, double s, size_t length,
                              double x[]);
-
-#endif

@@ -1,6 +1,5 @@
 /* Context, vectors, texts and status that the methods of SUNDIALS share. */
-#ifndef SUNDIALS_H
-#define SUNDIALS_H
+#pragma once
 
 #include "method.h"
 #include "small_vector.h"
@@ -50,5 +49,3 @@ NONNULL void sundials_get_state(const struct sundials *sundials, double x[]);
 
 /* Integrates x' = 0 with the method of memory: solvers allocate memory at their first step. */
 MUST_CHECK NONNULL enum status sundials_warm_up(void *memory);
-
-#endif

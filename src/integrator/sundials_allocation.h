@@ -1,8 +1,7 @@
 /* Stands in front of every file of SUNDIALS, by an option of the compiler (cmake/Sundials.cmake):
  * SUNDIALS allocates from the workspace of the instance. Macros without arguments, because SUNDIALS
  * has members named free. The headers of the system come first: they declare the true functions. */
-#ifndef SUNDIALS_ALLOCATION_H
-#define SUNDIALS_ALLOCATION_H
+#pragma once
 
 #include "workspace.h"
 
@@ -16,5 +15,3 @@
 #define calloc  workspace_calloc
 #define realloc workspace_realloc
 #define free    workspace_free
-
-#endif

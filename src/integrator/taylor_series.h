@@ -3,8 +3,7 @@
  * by means of high-order Taylor methods, Experimental Mathematics 14, 2005).
  *
  * Steps are in time scales here: the series is one in s = (t - begin) / time_scale. */
-#ifndef TAYLOR_SERIES_H
-#define TAYLOR_SERIES_H
+#pragma once
 
 #include "method.h"
 
@@ -108,5 +107,3 @@ static inline void taylor_series_evaluate(const struct taylor_series *series, do
 MUST_CHECK NONNULL enum status taylor_series_measure_defect(struct taylor_series *series, double s,
                                                             double end_x[], double end_dx[],
                                                             double *defect);
-
-#endif

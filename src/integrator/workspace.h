@@ -4,8 +4,7 @@
  *
  * SUNDIALS is compiled with the four functions of the allocator below in place of the standard ones
  * (sundials_allocation.h); nothing else in the program is. */
-#ifndef WORKSPACE_H
-#define WORKSPACE_H
+#pragma once
 
 #include "platform.h"
 
@@ -44,5 +43,3 @@ MUST_CHECK void *workspace_realloc(void *memory, size_t size);
 
 /* Does nothing: memory comes back with the whole workspace. */
 void workspace_free(void *memory);
-
-#endif

@@ -4,8 +4,7 @@
  * of a step in which an event will be located, may be beyond the event. Values that are not finite
  * there are evaluated in the modes that follow from the states: sqrt(h) if h > 0 else 0 is 0 for h
  * < 0. */
-#ifndef DOMAINS_H
-#define DOMAINS_H
+#pragma once
 
 #include "model.h"
 #include "relations.h"
@@ -91,5 +90,3 @@ enum status domains_propagate(const struct domains *model, struct domains_room r
 enum status domains_extend(const struct domains *model, struct domains_room room,
                            const struct series_origin *origin, int first, int last,
                            double row[][SERIES_LENGTH]);
-
-#endif

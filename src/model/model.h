@@ -1,7 +1,6 @@
 /* Interface of a model for the instance that runs it. A model keeps all its values in one structure
  * made of doubles and ints; the instance reads and writes them through the generated table. */
-#ifndef MODEL_H
-#define MODEL_H
+#pragma once
 
 #include "status.h"
 
@@ -193,5 +192,3 @@ struct model {
     /* NULL if the model has no modes. */
     const struct model_events *events;
 };
-
-#endif

@@ -1,7 +1,6 @@
 /* Names that compilers and platforms spell differently: the only header that asks which one it is.
  * Attributes stand in front of the return type. */
-#ifndef PLATFORM_H
-#define PLATFORM_H
+#pragma once
 
 #if defined(__FAST_MATH__)
 #error "Without -ffast-math: the code relies on the order of its sums"
@@ -68,6 +67,4 @@ __declspec(dllimport) int __stdcall SwitchToThread(void);
 #else
 #include <sched.h>
 #define YIELD_THREAD() ((void)sched_yield())
-#endif
-
 #endif

@@ -33,7 +33,7 @@ static struct call call_of(const struct relations *model, struct relations_room 
     for (int i = 0; i < model->input_count; i++) {
         inputs_move |= du[i] != 0.0;
     }
-    return (struct call){model, room, values, modes, holds, holds + model->relation_count,
+    return (struct call){model, room, values, modes,      holds, holds + model->relation_count,
                          t,     t,    du,     inputs_move};
 }
 

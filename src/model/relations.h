@@ -4,8 +4,7 @@
  * A relation compares two values; its mode says whether it holds, and changes at events only. An
  * event of the model fires when its condition becomes true. A sampler ticks at the times start +
  * (offset + k every), k = 0, 1, ... */
-#ifndef RELATIONS_H
-#define RELATIONS_H
+#pragma once
 
 #include "model.h"
 
@@ -47,9 +46,9 @@ struct relations {
     int relation_count, event_count, sampler_count, state_count, input_count;
     bool has_inputs; /* true if some relation depends on inputs and parameters only */
     const struct relation *relation;
-    const double *nominal;              /* of each state */
+    const double *nominal; /* of each state */
     const char *const *sampler_names;
-    const char *const *discrete_names;  /* of the discrete variables */
+    const char *const *discrete_names; /* of the discrete variables */
 
     /* Writes the start values of modes, and of states and discrete variables that follow from
      * parameters. NULL if there are none. */
@@ -111,5 +110,3 @@ static inline struct indicator relations_state_indicator(size_t state, int holds
                               .offset = sign * offset,
                               .rises = sign * factor * rate > 0.0};
 }
-
-#endif

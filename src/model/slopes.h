@@ -1,8 +1,7 @@
 /* Derivatives for models that are made from their equations (fmu/equations), where the plain rules
  * give 0 infinity or 0 / 0 although the derivative is finite. Elsewhere they give the same bits as
  * the plain rules. */
-#ifndef SLOPES_H
-#define SLOPES_H
+#pragma once
 
 #include <math.h>
 
@@ -71,5 +70,3 @@ static inline double slopes_power(const double x[], double factor, double expone
     }
     return sum / (count * x_first);
 }
-
-#endif

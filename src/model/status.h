@@ -1,8 +1,7 @@
 /* Status of a call and the message that explains it. One list holds every status, what a caller can
  * do about it, and its text. Messages go to one function that the owner of the instance supplies.
  */
-#ifndef STATUS_H
-#define STATUS_H
+#pragma once
 
 #include "platform.h"
 
@@ -57,5 +56,3 @@ void message_format(char *text, size_t size, const char *format, va_list argumen
 
 PRINTF_FORMAT(3, 4)
 void message_write(const struct message_sink *sink, enum status status, const char *format, ...);
-
-#endif

@@ -208,7 +208,7 @@ def test_a_cluster_that_cannot_start_is_one_line(
     def refuse(**_: object) -> None:
         raise RuntimeError("Cluster failed to start:\nno loopback")  # as distributed says it
 
-    monkeypatch.setattr(engine, "SpecCluster", refuse)
+    monkeypatch.setattr(engine.distributed, "SpecCluster", refuse)
     expected = "cannot connect at 127.0.0.1: Cluster failed to start: no loopback$"
     with pytest.raises(UserError, match=expected), engine.opened_cluster(None, 1, tmp_path):
         pass

@@ -233,7 +233,7 @@ def test_results_of_an_edited_scenario_or_log_are_refused(
 ) -> None:
     known = project.scenario_file(folder.given.scenario)
     scenario = tmp_path / known.name
-    monkeypatch.setattr(project, "scenario_file", lambda _: scenario)
+    monkeypatch.setattr(project, "scenario_file", lambda *_: scenario)
     text = f'model = "rp_manipulator"\n{known.read_text(encoding="utf-8")}'
     assert "tau1" not in text
     scenario.write_text(f"{text}\n[inputs.tau1]\nfile = 'log.csv'\n", encoding="utf-8")

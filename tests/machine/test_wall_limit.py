@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rparm.models.machine import wall_limit
+from rparm.models.machine.systems import write_system
 from rparm.models.machine.wall_limit import (
     CASES,
     DEPTH,
@@ -18,6 +19,7 @@ from rparm.models.machine.wall_limit import (
     Measure,
     exact_least_damping,
     least_damping,
+    pressed,
 )
 
 from rparm.fmi.fmu_file import Fmu
@@ -49,7 +51,7 @@ def test_ecos(opened: Ssp, stiffness: float) -> None:
 def test_libcosim(opened: Ssp, tmp_path: Path) -> None:
     def measure(stiffness: float, damping: float) -> np.ndarray:
         path = tmp_path / "Pressed.ssp"
-        wall_limit.write_pressed(opened, path, stiffness, damping)
+        write_system(opened, path, pressed(stiffness, damping), STEPS * STEP, STEP)
         return libcosim(path, [DEPTH], STEPS, tmp_path)[DEPTH]
 
     check(measure, STIFFNESS, "jacobi", "held")

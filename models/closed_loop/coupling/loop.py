@@ -59,7 +59,7 @@ class Method:
         return 2 if self.inputs == "extrapolated" else 1
 
     def expects(self, slope: float) -> bool:
-        """Whether a slope of log error over log step is near the power."""
+        """Return whether a slope of log error over log step is near the power."""
         return abs(slope - self.power) <= LARGEST_DEVIATION
 
 
@@ -85,7 +85,7 @@ class ClosedLoop:
     def parameters(
         self, variant: str, changes: Mapping[str, Mapping[str, Value]] | None = None
     ) -> dict[str, dict[str, Value]]:
-        """Values of a variant by component and name, with `changes` to them."""
+        """Return values of a variant by component and name, with `changes` to them."""
         if variant not in self.variants:
             raise UserError(f"no variant {variant!r} (there are: {', '.join(self.variants)})")
         values = {name: dict(self.variants[variant].get(name, {})) for name in self.fmus}
@@ -111,7 +111,7 @@ class ClosedLoop:
         stop: float | None = None,
         changes: Mapping[str, Mapping[str, Value]] | None = None,
     ) -> tuple[Columns, int]:
-        """Values at all communication points by name, with "time", and calls of DoStep."""
+        """Return values at all communication points by name, with "time", and calls of DoStep."""
         stop = self.stop if stop is None else stop
         times = grid(stop, step)
         with self.master(method) as master:
@@ -127,11 +127,7 @@ def opened(path: Path) -> Iterator[ClosedLoop]:
     with ssp.unpacked(path) as unpacked, unpacked.unpacked_fmus() as fmus:
         system = unpacked.system
         # the master connects Reals; that the payload is attached never changes
-        real = [
-            c
-            for c in system.connections
-            if unpacked.variable(f"{c.start_component}.{c.start_connector}").type == "Real"
-        ]
+        real = [c for c in system.connections if unpacked.variable(c.start).type == "Real"]
         loop = ClosedLoop(fmus, real, system.parameter_sets, system.stop)
         _check(path, loop)
         yield loop
@@ -147,10 +143,8 @@ def _check(path: Path, loop: ClosedLoop) -> None:
             )
         for name in names:
             if name not in loop.fmus[component].model.variables:
-                raise UserError(
-                    f"{path}: component {component!r} has no variable {name!r}, "
-                    "which the study needs"
-                )
+                missing = f"component {component!r} has no variable {name!r}"
+                raise UserError(f"{path}: {missing}, which the study needs")
     for variant in VARIANTS:
         if variant not in loop.variants:
             raise UserError(f"{path}: has no variant {variant!r}, which the study needs")
@@ -159,7 +153,7 @@ def _check(path: Path, loop: ClosedLoop) -> None:
 
 
 def grid(stop: float, step: float) -> np.ndarray:
-    """Communication points from 0 to `stop`, s, each rounded once or twice."""
+    """Return communication points from 0 to `stop`, s, each rounded once or twice."""
     count = round(stop / step)
     per_second = round(1 / step)
     if abs(per_second * step - 1) < 1e-9:
@@ -168,7 +162,7 @@ def grid(stop: float, step: float) -> np.ndarray:
 
 
 def read_reference(path: Path) -> Columns:
-    """Columns of a reference by name, with "time"."""
+    """Return columns of a reference by name, with "time"."""
     wrong = files.csv_failure(path)
     names, table = files.read_trajectory(path, wrong)
     if not set(STATES) <= set(names):
@@ -177,7 +171,6 @@ def read_reference(path: Path) -> Columns:
 
 
 # ---- Delays --------------------------------------------------------------------------------------
-
 LARGEST_ERROR = 1e-3  # m, of the end effector on the circle at 1 ms in Jacobi order
 PREDICTED_WITHIN = 0.1  # of the measured error
 
@@ -215,14 +208,13 @@ def study_tracking(loop: ClosedLoop, step: float = 1e-3) -> list[Tracking]:
     for method in (METHODS[0], METHODS[1], REFERENCE_AHEAD):
         columns = loop.run(method, step)[0]
         error = path_error(columns)
-        found.append(
-            Tracking(method, step, columns["time"], error, predicted_error(loop, smooth, method))
-        )
+        predicted = predicted_error(loop, smooth, method)
+        found.append(Tracking(method, step, columns["time"], error, predicted))
     return found
 
 
 def tracking_passed(tracking: Sequence[Tracking]) -> bool:
-    """Whether the errors are small, ordered and predicted."""
+    """Return whether the errors are small, ordered and predicted."""
     jacobi, gauss_seidel, _ = tracking
     return (
         jacobi.largest < LARGEST_ERROR
@@ -232,7 +224,7 @@ def tracking_passed(tracking: Sequence[Tracking]) -> bool:
 
 
 def path_error(columns: Columns) -> np.ndarray:
-    """Distance of the end effector from its reference at the same time, m."""
+    """Return the distance of the end effector from its reference at the same time, m."""
     return np.hypot(
         columns["arm.ee_x"] - columns["trajectory.ee_x_ref"],
         columns["arm.ee_y"] - columns["trajectory.ee_y_ref"],
@@ -240,10 +232,10 @@ def path_error(columns: Columns) -> np.ndarray:
 
 
 def predicted_error(loop: ClosedLoop, smooth: Columns, method: Method) -> np.ndarray:
-    """First-order prediction of the end effector's error along a motion without coupling error.
+    """Predict the end effector's error along a motion without coupling error, to first order.
 
-    e'' + Kd e' + Kp e = D^-1 delta, where delta is what the efforts lack: those applied are the
-    law's of references and measurements of other times, on the average over a step.
+    e'' + Kd e' + Kp e = D^-1 delta, where the efforts lack delta, as they are the law's of
+    references and measurements of other times, on the average over a step.
     """
     step = smooth["time"][1] - smooth["time"][0]
     ages = {  # mean ages of references and measurements in steps
@@ -254,10 +246,8 @@ def predicted_error(loop: ClosedLoop, smooth: Columns, method: Method) -> np.nda
 
     # gains (2, 2) by Kp and Kd, mass matrix (rows, 2, 2)
     gains = np.array([[loop.gain(f"{kind}{i}") for i in (1, 2)] for kind in ("Kp", "Kd")])
-    mass = np.array(
-        [[smooth["arm.D11"], smooth["arm.D12"]], [smooth["arm.D12"], smooth["arm.D22"]]]
-    )
-    mass = np.moveaxis(mass, 2, 0)
+    D11, D12, D22 = (smooth[f"arm.{name}"] for _, name in MASSES)
+    mass = np.moveaxis(np.array([[D11, D12], [D12, D22]]), 2, 0)
 
     # rate of the efforts, and the part of it that the references cause, (rows, 2)
     efforts = np.array([smooth["controller.tau1"], smooth["controller.f2"]]).T

@@ -93,8 +93,6 @@ def _print(lines: list[str]) -> None:
 
 
 # ---- Tables --------------------------------------------------------------------------------------
-
-
 def step_error_lines(study: StepErrors) -> list[str]:
     steps = "".join(f"{1e3 * step:>5g} ms" for step in study.steps)
     width = max(len(method.name) for method in study.methods)
@@ -164,8 +162,6 @@ def doubling_lines(doubling: list[Doubling]) -> list[str]:
 
 
 # ---- Picture -------------------------------------------------------------------------------------
-
-
 def figure(study: StepErrors, tracking: Sequence[Tracking], doubling: Sequence[Doubling]) -> Figure:
     """Errors over step and calls, energy, the delays' prediction, and the controlled steps."""
     with mpl.rc_context(STYLE):
@@ -194,13 +190,8 @@ def _by_step(axes: Axes, study: StepErrors, values: np.ndarray, title: str) -> N
         label = method.name if title.startswith("Error") else None
         axes.loglog(study.steps, row, "o-", color=COLORS[i], markeredgecolor="white", label=label)
         slope = study.slopes(values)[i]
-        axes.annotate(
-            f"{slope:.2f}",
-            (study.steps[0], row[0]),
-            xytext=(6, -3),
-            textcoords="offset points",
-            color=COLORS[i],
-        )
+        style = {"xytext": (6, -3), "textcoords": "offset points", "color": COLORS[i]}
+        axes.annotate(f"{slope:.2f}", (study.steps[0], row[0]), **style)
     axes.xaxis.set_major_locator(FixedLocator(study.steps))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_formatter(FuncFormatter(lambda step, _: f"{1e3 * step:g}"))

@@ -21,7 +21,6 @@ from rparm.runs.convergence import slope
 from rparm.systems import step_control
 
 # ---- Error against step: how errors fall with the communication step -----------------------------
-
 STEPS = (8e-3, 4e-3, 2e-3, 1e-3, 5e-4)  # s
 COMMON = 0.04  # s, all steps and the reference's rows divide it
 
@@ -41,7 +40,7 @@ class StepErrors:
         return [slope(self.steps, np.abs(row)) for row in values]
 
     def holds(self, i: int) -> bool:
-        """Whether error and energy of a method fall as expected."""
+        """Return whether error and energy of a method fall as expected."""
         slopes = self.slopes(self.errors)[i], self.slopes(self.energies)[i]
         return all(map(self.methods[i].expects, slopes))
 
@@ -54,7 +53,7 @@ class StepErrors:
 def study_step_errors(
     loop: ClosedLoop, steps: Sequence[float] = STEPS, methods: Sequence[Method] = METHODS
 ) -> StepErrors:
-    """Error against step on the nominal motion, which does not saturate."""
+    """Return the error against step on the nominal motion, which does not saturate."""
     exact = read_reference(REFERENCES / "nominal" / "monolithic.csv")
     shape = len(methods), len(steps)
     errors, energies, calls = np.empty(shape), np.empty(shape), np.empty(shape, int)
@@ -79,10 +78,7 @@ def state_error(columns: Columns, exact: Columns) -> float:
 
 
 def created_energy(loop: ClosedLoop, columns: Columns) -> float:
-    """What the arm's energy gained beyond the work of the efforts that the control law asks for.
-
-    The law is evaluated at the arm's momentary motion; without coupling error nothing remains. J.
-    """
+    """Return the energy (J) that the arm gained beyond the efforts of the law at its motion."""
     efforts = law(loop, columns)
     power = efforts[0] * columns["arm.dq1"] + efforts[1] * columns["arm.dq2"]
     gained = columns["arm.total_energy"][-1] - columns["arm.total_energy"][0]
@@ -90,12 +86,9 @@ def created_energy(loop: ClosedLoop, columns: Columns) -> float:
 
 
 def law(loop: ClosedLoop, columns: Columns) -> np.ndarray:
-    """Efforts of the nominal controller for given references and measurements, (2, rows)."""
-    sources = {
-        c.end_connector: f"{c.start_component}.{c.start_connector}"
-        for c in loop.connections
-        if c.end_component == "controller"
-    }
+    """Return efforts of the nominal controller for given references and measurements, (2, rows)."""
+    fed = (c for c in loop.connections if c.end_component == "controller")
+    sources = {c.end_connector: c.start for c in fed}
     with loop.fmus["controller"].instance("controller") as controller:
         efforts, inputs = controller.reals(["tau1", "f2"]), controller.reals(list(sources))
         controller.set_up(0.0, None)
@@ -114,13 +107,12 @@ def law(loop: ClosedLoop, columns: Columns) -> np.ndarray:
 
 
 def simpson(values: np.ndarray, step: float) -> float:
-    """Integral over an even number of equal steps."""
+    """Return the integral over an even number of equal steps."""
     inner = 4 * values[1:-1:2].sum() + 2 * values[2:-1:2].sum()
     return float((values[0] + inner + values[-1]) * step / 3)
 
 
 # ---- An unknown payload --------------------------------------------------------------------------
-
 HOLD = 9.0  # s: the circle ends at 5.5 s, what is left of the motion has died out
 
 
@@ -149,9 +141,8 @@ def study_payload(loop: ClosedLoop, step: float = 1e-3) -> Payload:
     for variant in VARIANTS:
         columns = loop.run(METHODS[0], step, variant, stop=HOLD)[0]
         largest[variant] = float(path_error(columns).max())
-        held[variant] = np.array(
-            [columns[f"trajectory.q{i}_ref"][-1] - columns[f"arm.q{i}"][-1] for i in (1, 2)]
-        )
+        ends = [(columns[f"trajectory.q{i}_ref"][-1], columns[f"arm.q{i}"][-1]) for i in (1, 2)]
+        held[variant] = np.array([wanted - found for wanted, found in ends])
         if variant == "heavy_payload":
             theory = _held_error(loop, columns)
     return Payload(largest, held, theory)
@@ -170,7 +161,6 @@ def _held_error(loop: ClosedLoop, columns: Columns) -> np.ndarray:
 
 
 # ---- Step doubling on a motion with a fast and a slow part, against fixed steps ------------------
-
 FAST_AND_SLOW = REFERENCES / "fast_and_slow" / "monolithic.csv"
 RATES = ("arm.dq1", "arm.dq2", "arm.ddq1", "arm.ddq2")
 
@@ -221,13 +211,13 @@ class FastAndSlow:
         }
 
     def check(self) -> float:
-        """Error of this solution at the rows of the committed reference, in the norm."""
+        """Return the error of this solution at the rows of the committed reference, in the norm."""
         reference = read_reference(FAST_AND_SLOW)
         found = self.states(reference["time"])
         return float(max(np.abs(found[:, i] - reference[n]).max() for i, n in enumerate(STATES)))
 
     def states(self, times: np.ndarray) -> np.ndarray:
-        """States at any times, (times, 4), by cubic interpolation."""
+        """Return states at any times, (times, 4), by cubic interpolation."""
         h = self.step
         i = np.clip((times / h).astype(int), 0, len(self.exact[STATES[0]]) - 2)
         s = times / h - i
@@ -247,9 +237,8 @@ class FastAndSlow:
         self, tolerance: float, method: Method = FINEST
     ) -> tuple[step_control.Controlled, np.ndarray, tuple[str, ...]]:
         """A controlled run, with the local error of every accepted step, measured by redoing it."""
-        control = step_control.Control(
-            tolerance, dict.fromkeys(STATES, 1.0), FIRST, SHORTEST, LONGEST, CORNERS
-        )
+        norm, lengths = dict.fromkeys(STATES, 1.0), (FIRST, SHORTEST, LONGEST)
+        control = step_control.Control(tolerance, norm, *lengths, CORNERS)
         redone = []
         with self.loop.master(method) as master:
             places = [master.names.index(name) for name in STATES]

@@ -19,11 +19,7 @@ from rparm.fmi.fmu_file import read_model
 from rparm.fmi.model import Value, Variable
 
 MODELS = Path(__file__).resolve().parents[2]
-COMPONENTS = {
-    "trajectory": "rp_trajectory",
-    "controller": "rp_controller",
-    "arm": "rp_manipulator",
-}
+COMPONENTS = {"trajectory": "rp_trajectory", "controller": "rp_controller", "arm": "rp_manipulator"}
 ORDERS = ("jacobi", "gauss_seidel", "gauss_seidel_arm_first")
 READ = ("before", "after")
 ERRORS = ("q1_error", "q2_error", "dq1_error", "dq2_error")
@@ -45,10 +41,10 @@ def monolithic(
     state: Sequence[float] | None = None,
     real: type = np.longdouble,
 ) -> Columns:
-    """The closed loop in continuous time: every one of `COLUMNS`, (times,), in `real`.
+    """Return `COLUMNS` (times,) of the closed loop in continuous time, in `real`.
 
-    The motion begins at the first of `times` (s, ascending) with `state`: q1, q2, dq1, dq2,
-    integral1, integral2; without it, with the start values of the parameters.
+    The motion begins at the first of `times` (s) with the start values or `state`: q1, q2, dq1,
+    dq2, integral1, integral2.
     """
     loop, segments, start = prepare(parameters, real)
     times = _ascending(times, real)
@@ -83,17 +79,13 @@ def sampled(
     read: str = "before",
     real: type = np.longdouble,
 ) -> Columns:
-    """The closed loop stepped with held inputs, each component solved exactly; as `monolithic`.
+    """Step the closed loop with held inputs, each component solved exactly; as `monolithic`.
 
-    At the first point everything is consistent. Every step takes the components to the next of
-    `times` with the inputs that they were given; then inputs are set from the outputs of that
-    point.
-
-    Order ``jacobi``: all components step with the outputs of the point before; ``gauss_seidel``:
-    trajectory, controller and arm, each with the newest outputs of those before it;
-    ``gauss_seidel_arm_first``: the same for trajectory, arm and controller. The values of a point
-    are read ``before`` the inputs are set there, so that outputs still have the inputs of the step,
-    or ``after``.
+    At the first point everything is consistent. Every step leads to the next of `times` with the
+    inputs that were given; then inputs are set from that point's outputs. Order ``jacobi``: all
+    components step with the outputs of the point before; ``gauss_seidel``: trajectory, controller
+    and arm, each with the newest outputs; ``gauss_seidel_arm_first``: trajectory, arm, controller.
+    Values are read ``before`` the inputs are set, with the inputs of the step, or ``after``.
     """
     for what, value, items in (("order", order, ORDERS), ("read", read, READ)):
         if value not in items:
@@ -141,10 +133,7 @@ def reference_motion(
 
 
 def prepare(parameters: Parameters, real: type) -> tuple[Loop, np.ndarray, np.ndarray]:
-    """The equations with the parameters in them, the trajectory's segments and the start.
-
-    Segments are (segments, 8): time of the begin, coefficients of the progress from there.
-    """
+    """Return equations, segments (segments, 8: begin, the progress' coefficients) and start."""
     values = _complete(parameters)
     number = {name: real(v) for name, v in values.items() if not isinstance(v, str)}
     motion, mode = values["trajectory.motion"], values["controller.mode"]
@@ -174,7 +163,7 @@ _loop = cache(Loop)
 
 @cache
 def _declared() -> dict[str, Variable]:
-    """Parameters of the components, and the states, as the FMUs declare them."""
+    """Return parameters of the components, and the states, as the FMUs declare them."""
     return {
         f"{component}.{name}": variable
         for component, folder in COMPONENTS.items()
@@ -184,7 +173,7 @@ def _declared() -> dict[str, Variable]:
 
 
 def _complete(parameters: Parameters) -> dict[str, Value]:
-    """All parameters; items of enumerations, which may be given as numbers too, by name."""
+    """Return all parameters; items of enumerations, which may be given as numbers too, by name."""
     declared = _declared()
     unknown = [name for name in parameters if name not in declared]
     if unknown:
@@ -204,7 +193,7 @@ def _complete(parameters: Parameters) -> dict[str, Value]:
 
 
 def _segments(motion: str, number: Mapping[str, np.floating], real: type) -> np.ndarray:
-    """Segments of the trajectory: hold, move, hold; a circle is blended in and out."""
+    """Return segments of the trajectory: hold, move, hold; a circle is blended in and out."""
     begin = number["trajectory.start_time"]
     if motion != "circle":
         whole = number["trajectory.duration"]
@@ -227,7 +216,7 @@ def _segments(motion: str, number: Mapping[str, np.floating], real: type) -> np.
 
 
 def _at(times: np.ndarray, segments: np.ndarray) -> np.ndarray:
-    """Coefficients of the segment that every time is in, (times, 8)."""
+    """Return coefficients of the segment that every time is in, (times, 8)."""
     return segments[np.searchsorted(segments[1:, 0], times, side="right")]
 
 
@@ -241,7 +230,7 @@ def _ascending(times: Sequence[float], real: type) -> np.ndarray:
 def _held_controller(
     loop: Loop, signals: np.ndarray, integrals: np.ndarray, step: np.ndarray
 ) -> np.ndarray:
-    """Integral parts at the end of a step with held inputs."""
+    """Return the integral parts at the end of a step with held inputs."""
     if not loop.get("controller.Ki1", "controller.Ki2").any():
         return integrals
     loop.set({f"held.{n}": value for n, value in zip(SIGNALS, signals, strict=True)})
@@ -251,7 +240,7 @@ def _held_controller(
 
 
 def _held_arm(loop: Loop, efforts: np.ndarray, state: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """State of the arm at the end of a step with held efforts."""
+    """Return the state of the arm at the end of a step with held efforts."""
     loop.set({f"held.{n}": value for n, value in zip(INPUTS, efforts, strict=True)})
     loop.begin(loop.held_arm, step[0], state)
     return loop.advance(loop.held_arm, step[1])

@@ -42,7 +42,7 @@ def dynamics_terms() -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
 
 
 def law(mode: str) -> sp.Matrix:
-    """Efforts before the limits, (2, 1), of references, measurements and integral parts."""
+    """Return efforts before the limits, (2, 1), of references, measurements and integral parts."""
     reference = sp.Matrix(symbols("controller", REFERENCES))
     measured = sp.Matrix(symbols("controller", STATES))
     error, rate_error = (reference[:4, :] - measured)[:2, :], (reference[:4, :] - measured)[2:, :]
@@ -60,10 +60,10 @@ def law(mode: str) -> sp.Matrix:
 
 
 def reference(path: str) -> dict[str, sp.Expr]:
-    """Outputs of the trajectory on one segment, as functions of time.
+    """Return outputs of the trajectory on a segment, as functions of time.
 
-    The progress is a polynomial of the time since the segment's begin: a share of the way, or for a
-    circle the time for which the angle has moved at its full rate.
+    The progress is a polynomial of the time in the segment: a share of the way, or for a circle the
+    time for which the angle has moved at its full rate.
     """
     progress = sp.Symbol("progress")
     if path == "point_to_point":
@@ -96,10 +96,10 @@ def reference(path: str) -> dict[str, sp.Expr]:
 
 
 def _through_inverse_kinematics(path: str, progress: sp.Expr) -> tuple[sp.Matrix, sp.Matrix]:
-    """Position of the end effector and the joints that hold it there.
+    """Return the position of the end effector and the joints that hold it there.
 
-    The direction from the axis of joint 1 is counted from a heading, from which it never differs by
-    half a turn: the start of the line, the center of a circle aside, the radius of one around.
+    The direction from joint 1's axis is counted from a heading, at less than half a turn: the start
+    of the line, the center of a circle aside, the radius of one around.
     """
     if path == "line":
         start = sp.Matrix(symbols("trajectory", "ee_x_from ee_y_from"))
@@ -107,9 +107,8 @@ def _through_inverse_kinematics(path: str, progress: sp.Expr) -> tuple[sp.Matrix
         position = start + progress * (end - start)
         heading, heading_angle = start, sp.atan2(start[1], start[0])
     else:
-        x, y, radius, angle, frequency = symbols(
-            "trajectory", "x_center y_center radius start_angle frequency"
-        )
+        names = "x_center y_center radius start_angle frequency"
+        x, y, radius, angle, frequency = symbols("trajectory", names)
         center, phase = sp.Matrix([x, y]), angle + 2 * sp.pi * frequency * progress
         along_radius = sp.Matrix([sp.cos(phase), sp.sin(phase)])
         position = center + radius * along_radius

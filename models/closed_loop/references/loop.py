@@ -37,13 +37,10 @@ class Switch:
 class Loop:
     """Equations of one of `equations.PATHS` and one of `equations.MODES`.
 
-    All that changes from run to run or within one is a runtime value, named like the variable:
-
-    - the parameters of the components that are `numbers`;
-    - ``segment.*``, the trajectory between two of its corners;
-    - ``held.*``, what a component reads during a step;
-    - ``at_limit*``, 1 where an effort is at the limit ``level*``, else 0;
-    - ``back*`` in 1/(kg.m2.s) and 1/(kg.s), how fast the integral part gives way there.
+    Runtime values, named like variables, are the components' parameters that are `numbers`; of the
+    trajectory between corners ``segment.*``; inputs of a step ``held.*``; ``at_limit*``, 1 where an
+    effort is at ``level*``, else 0; and ``back*`` in 1/(kg.m2.s) and 1/(kg.s), how fast the
+    integral part gives way there.
     """
 
     def __init__(self, path: str, mode: str, numbers: Iterable[str], real: type) -> None:
@@ -97,7 +94,7 @@ class Loop:
     def _control(
         self, efforts: list[hy.expression], signals: dict[str, hy.expression]
     ) -> tuple[list, dict[str, hy.expression], list]:
-        """Integral parts with their rates, limited efforts, events at the limits."""
+        """Return the integral parts with their rates, limited efforts, events at the limits."""
         efforts = hy.subs(efforts, {f"controller.{n}": e for n, e in signals.items()})
         action, limited, events = [], {}, []
         for joint, effort in enumerate(efforts):
@@ -137,13 +134,13 @@ class Loop:
         return self._evaluate(self._law, np.concatenate((signals, integrals)))
 
     def limited(self, unlimited: np.ndarray) -> np.ndarray:
-        """Efforts after the limits, in the shape of those before."""
+        """Return efforts after the limits, in the shape of those before."""
         limits = self.get(*(f"controller.{name}" for name in LIMITS))
         limits = limits.reshape(2, *[1] * (unlimited.ndim - 1))
         return np.clip(unlimited, -limits, limits)
 
     def outputs(self, states: np.ndarray, efforts: np.ndarray) -> np.ndarray:
-        """Outputs of the arm, (outputs, n)."""
+        """Return outputs of the arm, (outputs, n)."""
         return self._evaluate(self._outputs, np.concatenate((states, efforts)))
 
     def _evaluate(self, function, inputs: np.ndarray) -> np.ndarray:
@@ -172,7 +169,7 @@ class Loop:
 
     @staticmethod
     def advance(integrator: hy.taylor_adaptive, until: np.floating) -> np.ndarray:
-        """State at the time `until`, with the efforts switched on the way."""
+        """Return the state at the time `until`, with the efforts switched on the way."""
         outcome = integrator.propagate_until(until)[0]
         if outcome != hy.taylor_outcome.time_limit:
             raise UserError(f"the motion blows up near {float(integrator.time)!r} s")

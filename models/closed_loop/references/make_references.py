@@ -12,12 +12,7 @@ import numpy as np
 from rparm.models.closed_loop.coupling.loop import STATES
 from rparm.models.closed_loop.coupling.study import FAST, FAST_AND_SLOW, FAST_STOP
 from rparm.models.closed_loop.experiment import STEPS_PER_SECOND, STOP
-from rparm.models.closed_loop.references.closed_loop import (
-    COMPONENTS,
-    Columns,
-    monolithic,
-    sampled,
-)
+from rparm.models.closed_loop.references.closed_loop import COMPONENTS, Columns, monolithic, sampled
 from rparm.models.reference_files import KEPT, Files, communication_points
 
 from rparm.fmi.model import Value
@@ -28,14 +23,14 @@ FAST_ROWS_PER_SECOND = 50
 
 
 def variants() -> dict[str, dict[str, Value]]:
-    """Parameters of every variant of the system, ``component.name``."""
+    """Return parameters of every variant of the system, ``component.name``."""
     return reference_files.variants(SYSTEM, COMPONENTS)
 
 
 def make(
     parameters: Mapping[str, Value], stop: float = STOP
 ) -> dict[str, tuple[np.ndarray, Columns]]:
-    """Times and columns of the files of a variant, by the name of the file."""
+    """Return times and columns of the files of a variant, by the name of the file."""
     times = communication_points(stop, STEPS_PER_SECOND)
     kept = times[::KEPT]
     stepped = {"sampled.csv": sampled(parameters, times)}

@@ -67,7 +67,7 @@ class Actuator:
             self.current[j] = target + (self.current[j] - target) * decay
 
     def outputs(self, inputs: Values) -> dict[str, real]:
-        """All Real outputs with these inputs."""
+        """Return all Real outputs with these inputs."""
         p, found = self._parameters, {}
         for j, (i, effort) in enumerate(zip(JOINTS, ("tau1", "f2"), strict=True)):
             found[effort] = self.force[j] * self.current[j]
@@ -124,7 +124,7 @@ class Sensor:
         return self._counts[max(place, 0)]
 
     def outputs(self, inputs: Values) -> dict[str, real]:
-        """All Real outputs, and the counts; between two ticks none depends on the inputs."""
+        """Return all Real outputs, and the counts; between two ticks none depends on the inputs."""
         del inputs
         p, found = self._parameters, {}
         now, before = self._shown(0), self._shown(1)
@@ -171,11 +171,7 @@ class Environment:
 
 
 class Controller:
-    """Computed torque with integral action, of the arm and the payload that it knows.
-
-    The inertia and the forces to be cancelled are those of the Lagrangian of the plant's
-    references, with the controller's parameters and without what it does not know.
-    """
+    """Computed torque, with integral action, by the plant's Lagrangian and its own parameters."""
 
     REFERENCES = ("q1_ref", "q2_ref", "dq1_ref", "dq2_ref", "ddq1_ref", "ddq2_ref")
     STATES = ("q1", "q2", "dq1", "dq2")
@@ -219,7 +215,7 @@ class Controller:
         return effort
 
     def _rates(self, inputs: Values) -> np.ndarray:
-        """Rates of the integral parts, (2,)."""
+        """Return rates of the integral parts, (2,)."""
         return self._gains[2] * np.array(
             [real(inputs[f"q{i}_ref"]) - real(inputs[f"q{i}"]) for i in JOINTS]
         )
@@ -230,7 +226,7 @@ class Controller:
         self._next, self._rate = self._law(inputs, self._integral), self._rates(inputs)
 
     def step(self, inputs: Values, begin: real, end: real) -> None:
-        """Integral parts, and efforts of the sampled form, at `end`."""
+        """Return the integral parts, and efforts of the sampled form, at `end`."""
         if not self._is_sampled:
             self._integral = self._integral + (end - begin) * self._rates(inputs)
             return
@@ -245,7 +241,7 @@ class Controller:
             self._effort, self._due = self._next, real(np.inf)
 
     def outputs(self, inputs: Values) -> dict[str, real]:
-        """All Real outputs and the integral parts with these inputs."""
+        """Return all Real outputs and the integral parts with these inputs."""
         effort = self._effort if self._is_sampled else self._law(inputs, self._integral)
         errors = {
             f"{name}_error": real(inputs[f"{name}_ref"]) - real(inputs[name])

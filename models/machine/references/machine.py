@@ -124,7 +124,7 @@ class Machine:
         self._show("controller", self.controller.outputs(self._inputs("controller")))
 
     def _reference(self, row: int) -> dict[str, real]:
-        """Outputs of the trajectory at a point."""
+        """Return outputs of the trajectory at a point."""
         return {name: column[row] for name, column in self._trajectory.items()}
 
     def _show(self, component: str, outputs: Mapping[str, real]) -> None:
@@ -134,7 +134,7 @@ class Machine:
         return {name: self._now[source] for name, source in WIRES[component].items()}
 
     def _read(self, inputs: Mapping[str, dict[str, real]], row: int) -> dict[str, real]:
-        """Outputs of all components at a point, with these inputs."""
+        """Return outputs of all components at a point, with these inputs."""
         self._show("trajectory", self._reference(row))
         for name in ("controller", "actuator", "sensor", "environment"):
             self._show(name, getattr(self, name).outputs(inputs[name]))
@@ -142,7 +142,7 @@ class Machine:
         return dict(self._now)
 
     def run(self) -> tuple[list[dict[str, real]], list[dict[str, real]]]:
-        """Values at all points: read before inputs are set there, and after it."""
+        """Return values at all points: read before inputs are set there, and after it."""
         inputs = {name: self._inputs(name) for name in WIRES}
         before, after = [], [self._read(inputs, 0)]
         before.append(after[0])
@@ -165,7 +165,7 @@ def declared() -> dict[str, Model]:
 
 
 def completed(parameters: Parameters) -> dict[str, dict[str, Value]]:
-    """Values of all variables that have a start value, by component."""
+    """Return values of all variables that have a start value, by component."""
     values = {component: dict(model.start_values) for component, model in declared().items()}
     for name, value in parameters.items():
         component, _, variable = name.partition(".")
@@ -176,7 +176,7 @@ def completed(parameters: Parameters) -> dict[str, dict[str, Value]]:
 
 
 def columns() -> list[str]:
-    """All Real outputs, then the states that are not outputs, as `system` compares them."""
+    """Return all Real outputs, then the states that are not outputs, as `system` compares them."""
     outputs, states = [], []
     for component, model in declared().items():
         outputs += [f"{component}.{name}" for name in model.real_outputs]

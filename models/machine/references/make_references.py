@@ -31,24 +31,21 @@ solver = cache(Solver)  # compiles the equations once
 
 
 def variants() -> dict[str, dict[str, Value]]:
-    """Parameters of every variant, ``component.name``."""
+    """Return parameters of every variant, ``component.name``."""
     return reference_files.variants(SYSTEM, COMPONENTS)
 
 
 def make(solver: Solver, parameters: Mapping[str, Value], stop: float = STOP) -> Files:
-    """Times and columns of the files of a machine in steps, by the name of the file."""
+    """Return times and columns of the files of a machine in steps, by the name of the file."""
     times = communication_points(stop, STEPS_PER_SECOND)
     names = [*columns(), *DISCRETE]
     machine = Machine(solver, parameters, times)
     runs = dict(zip(FILES, machine.run(), strict=True))
-    stepped = {
-        file: (
-            times[::KEPT],
-            {name: np.array([row[name] for row in rows[::KEPT]]) for name in names},
-        )
-        for file, rows in runs.items()
-    }
-    return stepped | {"tightest.csv": _tightest(machine.sensor.samples)}
+    found: dict[str, tuple[np.ndarray, dict[str, np.ndarray]]] = {}
+    for file, rows in runs.items():
+        kept = {name: np.array([row[name] for row in rows[::KEPT]]) for name in names}
+        found[file] = times[::KEPT], kept
+    return found | {"tightest.csv": _tightest(machine.sensor.samples)}
 
 
 def _tightest(samples: Sequence[Sample]) -> tuple[np.ndarray, dict[str, np.ndarray]]:

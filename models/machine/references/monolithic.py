@@ -88,7 +88,7 @@ class Monolith:
         return hy.par[self._place[name]]
 
     def _of(self, component: str) -> dict[sp.Symbol, hy.expression]:
-        """Parameters of the plant's equations as a component knows them."""
+        """Return parameters of the plant's equations as a component knows them."""
         known = {sp.Symbol(n): self._par(f"{component}.{n}") for n in plant.PARAMETERS}
         known |= {sp.Symbol(n): hy.expression(0.0) for n in (*INPUTS, *plant.SWITCHES)}
         return known | {sp.Symbol("attached"): self._par("attached")}
@@ -125,7 +125,7 @@ class Monolith:
         return {name: hy.from_sympy(x, known) for name, x in outputs.items()}
 
     def _motors(self, efforts: list, currents: list, speeds: list) -> tuple[list, list, list]:
-        """Efforts of the motors, their voltages, and the rates of their currents."""
+        """Return efforts of the motors, their voltages, and the rates of their currents."""
         moved, voltages, rates = [], [], []
         for j, i in enumerate((1, 2)):
             constant, gear, resistance, lag = (
@@ -139,9 +139,8 @@ class Monolith:
 
     def _path(self) -> str:
         """The circle of the reference motion contains the axis of joint 1, or leaves it aside."""
-        x, y, radius = (
-            self._numbers[f"trajectory.{n}"] for n in ("x_center", "y_center", "radius")
-        )
+        names = ("x_center", "y_center", "radius")
+        x, y, radius = (self._numbers[f"trajectory.{name}"] for name in names)
         return "circle_around" if np.hypot(x, y) < radius else "circle_aside"
 
     def _law(
@@ -167,13 +166,9 @@ class Monolith:
         known |= {sp.Symbol(name): effort for name, effort in zip(EFFORTS, moved, strict=True)}
         D, b = e.inertia, e.forces
         determinant = D[0, 0] * D[1, 1] - D[0, 1] ** 2
-        return [
-            hy.from_sympy(x, known)
-            for x in (
-                (D[1, 1] * b[0] - D[0, 1] * b[1]) / determinant,
-                (D[0, 0] * b[1] - D[0, 1] * b[0]) / determinant,
-            )
-        ]
+        first = (D[1, 1] * b[0] - D[0, 1] * b[1]) / determinant
+        second = (D[0, 0] * b[1] - D[0, 1] * b[0]) / determinant
+        return [hy.from_sympy(x, known) for x in (first, second)]
 
     # ---- The motion ------------------------------------------------------------------------------
 

@@ -35,10 +35,7 @@ mp.dps = 40
 
 @cache
 def equations_of_the_arm() -> Callable[..., tuple]:
-    """Function of parameters, q and dq that gives D, C(q, dq) dq and g(q), by Euler-Lagrange.
-
-    Of the plant's equations, with the payload, where its mass and inertia are above 0.
-    """
+    """Make a function of parameters, q, dq for D, C(q, dq) dq, g(q); a payload above 0 counts."""
     e = plant.derive()
     unknown = [f"{name}{joint}" for name in plant.PER_JOINT for joint in (1, 2)]
     alone = dict.fromkeys((*unknown, *plant.INPUTS), 0) | {"attached": 1}
@@ -56,12 +53,8 @@ class Law:
         self.limit = (value["tau1_max"], value["f2_max"])
         self.error = [value[f"q{i}_ref"] - value[f"q{i}"] for i in (1, 2)]
         self.derror = [value[f"dq{i}_ref"] - value[f"dq{i}"] for i in (1, 2)]
-        correction = mp.matrix(
-            [
-                value[f"Kp{i}"] * self.error[i - 1] + value[f"Kd{i}"] * self.derror[i - 1]
-                for i in (1, 2)
-            ]
-        )
+        both = zip((1, 2), self.error, self.derror, strict=True)
+        correction = mp.matrix([value[f"Kp{i}"] * e + value[f"Kd{i}"] * de for i, e, de in both])
         payload = [value[name] if value[ATTACHED] else mpf(0) for name in plant.PAYLOAD]
         known = (value[name] for name in plant.ARM)
         state = (value[name] for name in plant.STATES)
@@ -105,7 +98,7 @@ class Law:
         return [[row[i] for row in reversed(rows)] for i in (0, 1)]
 
     def advance(self, w: list[mpf], h: mpf) -> list[mpf]:
-        """Integral parts after a time h with these inputs."""
+        """Return the integral parts after a time h with these inputs."""
         sides = [self.side(i, u) for i, u in enumerate(self.unlimited(w))]
         while h > 0:
             series = self.series(w, sides)

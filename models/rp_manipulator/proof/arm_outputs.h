@@ -1,6 +1,5 @@
 /* The arm's outputs, in balls, from the balls of its states. */
-#ifndef ARM_OUTPUTS_H
-#define ARM_OUTPUTS_H
+#pragma once
 
 #include "step.h"
 
@@ -76,5 +75,3 @@ static void arm_outputs(const struct arm_problem *problem, const struct ball sta
         outputs[i] = ball_widened(outputs[i], outputs[i].radius * LOOSENED);
     }
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* Taylor coefficients in balls: of efforts and of the arm's motion, with its derivatives along the
  * variables at the origin. */
-#ifndef ARM_SERIES_H
-#define ARM_SERIES_H
+#pragma once
 
 #include "ball.h"
 
@@ -234,5 +233,3 @@ static struct ball series_end(const struct ball coefficients[ORDERS], int order)
     }
     return sum;
 }
-
-#endif

@@ -8,8 +8,7 @@
  *   - TINY, where products may underflow,
  * and is enlarged by OUTWARD for the roundings of that sum itself, fewer than 30 of 2^-53 each.
  * What overflows has an infinite radius or parts that are not numbers; `ball_largest` shows it. */
-#ifndef BALL_H
-#define BALL_H
+#pragma once
 
 #include <float.h>
 #include <math.h>
@@ -219,5 +218,3 @@ static inline void ball_sine_and_cosine(struct ball x, struct ball *sine, struct
     *sine = ball_widened(s, x.radius);
     *cosine = ball_widened(ball_difference(ball_exact(1.0), versine), x.radius);
 }
-
-#endif

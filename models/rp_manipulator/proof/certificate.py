@@ -26,30 +26,24 @@ class Ball:
         return arb(self.middle) + arb(0, 1) * arb(self.radius)
 
     def contains(self, x: arb) -> bool:
-        """Whether all of an interval is in it."""
+        """Return whether all of an interval is in it."""
         return bool((x - arb(self.middle)).abs_upper() <= arb(self.radius))
 
     def holds(self, middle: fmpq, radius: fmpq = NOTHING) -> bool:
-        """Whether another ball is in it."""
+        """Return whether another ball is in it."""
         return abs(middle - self.middle) + radius <= self.radius
 
 
 @dataclass
 class Problem:
-    """What `prove` was asked.
-
-    Attributes
-    ----------
-    sines : list of tuple
-        Effort (0 or 1), amplitude, frequency in Hz, phase in rad.
-    steps : list of tuple
-        End of each communication step in s; value and derivatives of each effort at its begin.
-    """
+    """A question to `prove`."""
 
     parameters: list[Ball] = field(default_factory=list)
     states: list[Ball] = field(default_factory=list)
+    # effort (0 or 1), amplitude, frequency in Hz, phase in rad
     sines: list[tuple[int, fmpq, fmpq, fmpq]] = field(default_factory=list)
     start: fmpq = NOTHING
+    # end of each communication step in s; value and derivatives of each effort at its begin
     steps: list[tuple[fmpq, tuple[list[fmpq], list[fmpq]]]] = field(default_factory=list)
 
 
@@ -97,7 +91,7 @@ def balls_of(words: Sequence[str]) -> list[Ball]:
 
 
 def of_states(words: Sequence[str]) -> list[Ball]:
-    """Balls of all states, no more and no fewer."""
+    """Return balls of all states, no more and no fewer."""
     found = balls_of(words)
     if len(found) != STATES:
         raise WrongClaim(f"{len(found)} balls for {STATES} states")
@@ -129,14 +123,10 @@ def read_problem(lines: Iterable[str]) -> Problem:
 
 
 def read_certificate(lines: Iterable[str], start_radii: list[fmpq]) -> Iterator[Step | fmpq]:
-    """The steps; after the last one of each communication step, the time of its end (s).
+    """Yield the steps, and after each communication step the time of its end (s).
 
-    WrongClaim if a line is missing or out of order, or a number is not finite.
-
-    Parameters
-    ----------
-    start_radii : list of fmpq
-        Radii of the sides after the frame, the same at the end of every step.
+    `start_radii` are of the sides after the frame, the same at the end of every step. WrongClaim if
+    a line is missing or out of order, or a number is not finite.
     """
     rows = map(str.split, lines)
 

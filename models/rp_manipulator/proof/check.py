@@ -34,8 +34,6 @@ BITS = 192
 
 
 # ---- What the problem says -----------------------------------------------------------------------
-
-
 class Start:
     """The set at the start: uncertain variables have sides of their own, forever the same ones."""
 
@@ -65,7 +63,7 @@ def effort_series(
     step: arb,
     last: int,
 ) -> list[arb]:
-    """Coefficients 0 to `last` of an effort at a time, or over an interval of times."""
+    """Return coefficients 0 to `last` of an effort at a time, or over an interval of times."""
     polynomial = [arb(u) / arb.fac_ui(k) for k, u in enumerate(derivatives)]
     found = []
     for k in range(last + 1):
@@ -83,8 +81,6 @@ def effort_series(
 
 
 # ---- Checks --------------------------------------------------------------------------------------
-
-
 class Checker:
     """Checks the steps of one certificate in their order."""
 
@@ -210,10 +206,7 @@ class Checker:
         return rest
 
     def point(self, words: Sequence[str], index: int, after: fmpq) -> None:
-        """The balls that were printed contain the set, and the outputs of all states in them.
-
-        The efforts are those `after` the begin of a communication step (s).
-        """
+        """Check that the printed balls contain set and outputs, by efforts `after` a begin (s)."""
         balls = balls_of(words)
         states, printed = balls[:STATES], balls[STATES:]
         if len(states) != STATES:
@@ -264,14 +257,10 @@ def check(
     certificate: Iterable[str],
     progress: Callable[[int], object] | None = None,
 ) -> int:
-    """Check all claims; how many steps there are. WrongClaim says what does not hold.
+    """Check all claims, and return how many steps there are; WrongClaim if one does not hold.
 
-    Parameters
-    ----------
-    problem_lines, point_lines, certificate : iterables of str
-        What `prove` was given, what it printed, and the file that it wrote.
-    progress : callable, optional
-        Called with 1 after each communication step.
+    `problem_lines` went to `prove`, which printed `point_lines` and wrote `certificate`. `progress`
+    is called with 1 after each communication step.
     """
     precision, flint.ctx.prec = flint.ctx.prec, BITS
     try:

@@ -41,8 +41,6 @@ TERMS = 40  # of the longest convolution
 
 
 # ---- Arithmetic ----------------------------------------------------------------------------------
-
-
 def sums(draw: random.Random) -> Question:
     x, y = operand(draw), operand(draw)
     if draw.random() < 0.3:  # cancels, wholly or but for the last digits
@@ -174,8 +172,6 @@ def between(draw: random.Random) -> Question:
 
 
 # ---- Functions -----------------------------------------------------------------------------------
-
-
 def encloses(answer: Parts, value: arb, width: float, rounding: float = 2.0**-96) -> None:
     """The answer contains a value, and its radius is at most `width` but for rounding."""
     if not is_finite(answer):
@@ -221,7 +217,6 @@ def versine(draw: random.Random) -> Question:
 
 
 # ---- All -----------------------------------------------------------------------------------------
-
 # how many of each, per round
 KINDS = {
     sums: 400, product: 400, quotient: 300, convolution: 120, one_sided_convolution: 2, bounds: 60,
@@ -241,14 +236,8 @@ def check(program: Path, rounds: int = 1, seed: int = 1) -> int:
     try:
         asked = questions(seed, rounds)
         lines = "".join(f"{question.line}\n" for question in asked)
-        run = subprocess.run(
-            [program, "--operations"],
-            input=lines,
-            capture_output=True,
-            text=True,
-            encoding="utf-8",
-            timeout=60,
-        )
+        text = {"input": lines, "capture_output": True, "text": True, "encoding": "utf-8"}
+        run = subprocess.run([program, "--operations"], timeout=60, **text)
         answers = run.stdout.splitlines()
         if run.returncode != 0 or len(answers) != len(asked):
             raise WrongAnswer(f"{len(answers)} answers to {len(asked)} questions: {run.stderr}")

@@ -24,16 +24,10 @@ def coefficients(
     last: int,
     along: Sequence[int] | None = None,
 ) -> list[list[Jet]]:
-    """Coefficients of q1, q2, dq1, dq2 of the orders 0 to `last`.
+    """Return coefficients of q1, q2, dq1, dq2 of the orders 0 to `last`.
 
-    Parameters
-    ----------
-    states, parameters : sequences of 4 and 8 arb
-        The origin; m1, m2, I1z, I2z, l1, lc1, a, g.
-    efforts : two sequences of arb
-        Coefficients of tau1 and f2.
-    along : sequence of int, optional
-        Derivatives are with respect to the states and to these parameters; None: there are none.
+    The `states` are the origin, `parameters` m1, m2, I1z, I2z, l1, lc1, a, g, `efforts` of tau1 and
+    f2. Derivatives are by the states and the parameters `along`; None: there are none.
     """
     directions = 0 if along is None else 4 + len(along)
     arithmetic = _Jets(directions)
@@ -50,10 +44,7 @@ def coefficients(
 
 
 def outputs(states: Sequence[arb], parameters: Sequence[arb], efforts: Sequence[arb]) -> list[arb]:
-    """Outputs besides the states, in the order of proof.toml.
-
-    The operations are the same as in arm_outputs.h: intervals are no wider than there.
-    """
+    """Return outputs besides the states, as proof.toml has them, no wider than in arm_outputs.h."""
     q1, q2, w, v = states
     m1, m2, I1z, I2z, l1, lc1, a, g = parameters
     tau1, f2 = efforts

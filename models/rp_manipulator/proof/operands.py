@@ -25,28 +25,17 @@ class WrongAnswer(Exception):
 
 @dataclass(frozen=True)
 class Question:
-    """A line for `prove --operations`, and what its answer has to satisfy.
+    """A line for `prove --operations`, and a check of its answer."""
 
-    Attributes
-    ----------
-    name : str
-        Of the operation.
-    line : str
-        How many operands there are, and they.
-    check : callable
-        Raises WrongAnswer; gets the numbers of two balls, from the operation's result on.
-    """
-
-    name: str
-    line: str
+    name: str  # of the operation
+    line: str  # number of operands, and operands
+    # raises WrongAnswer; gets the numbers of two balls, from the operation's result on
     check: Callable[[Sequence[float]], None]
 
 
 # ---- Operands ------------------------------------------------------------------------------------
-
-
 def number(draw: random.Random, exponents: int = 30) -> float:
-    """A double of any digits, or a round one."""
+    """Return a double of any digits, or a round one."""
     kind = draw.random()
     if kind < 0.2:
         return draw.choice((-1, 1)) * draw.choice((0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 10.0, 1024.0))
@@ -78,8 +67,6 @@ def ask(name: str, operands: Sequence[Parts], check: Callable[[Sequence[float]],
 
 
 # ---- What answers have to satisfy ----------------------------------------------------------------
-
-
 def balls(answer: Sequence[float]) -> list[Parts]:
     found = [tuple(answer[i : i + 3]) for i in range(0, len(answer), 3)]
     return [(hi, lo, radius) for hi, lo, radius in found]

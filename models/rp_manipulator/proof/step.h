@@ -1,7 +1,6 @@
 /* Sets that contain the arm's states, and steps from one to the next by Lohner's method with a box
  * of high order: README.md has the theorems. */
-#ifndef STEP_H
-#define STEP_H
+#pragma once
 
 #include "arm_series.h"
 
@@ -282,5 +281,3 @@ static bool arm_take_step(const struct arm_problem *problem, const struct states
     step->factor = !finite ? 0.5 : step->order < LAST_ORDER - 5 ? 1.25 : 1.0;
     return finite;
 }
-
-#endif

@@ -159,8 +159,6 @@ def outputs(scenario: Scenario) -> dict[str, np.ndarray]:
 
 
 # ---- Smooth inputs -------------------------------------------------------------------------------
-
-
 def signal(sines: Sines, real: type) -> hy.expression:
     """`sines` as a function of heyoka's time."""
     omega = 2 * np.arctan2(real(0), real(-1))
@@ -191,7 +189,7 @@ def integrator(
 def final_state(
     scenario: Scenario, real: type = np.longdouble
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """States at the end, and the largest absolute value of each on the way."""
+    """Return states at the end, and the largest absolute value of each on the way."""
     if real is np.longdouble and np.finfo(real).eps > 2e-19:
         raise UserError("long double is no wider than double here: make the references elsewhere")
     sines = convergence.smooth_inputs(scenario)

@@ -10,8 +10,7 @@
  *
  * The equations are in rp_plant_equations.h; the functions here call them and leave out what is 0.
  * All functions are pure and allocate nothing. */
-#ifndef RP_PLANT_H
-#define RP_PLANT_H
+#pragma once
 
 #include "rp_manipulator.h"
 
@@ -118,5 +117,3 @@ void rp_plant_reaction_rates(const struct rp_plant_parameters *p,
                              const struct rp_plant_modes *modes, const double q[2],
                              const double dq[2], const struct rp_plant_inputs *inputs,
                              const struct rp_plant_inputs *du, double rates[2]);
-
-#endif

@@ -3,8 +3,7 @@
  * The force is 0 where a contact begins or ends, but its slope jumps; the same holds where the
  * velocity out of a damped stop passes 1 / c, from where on the stop does not push. Both are
  * events, so that no internal step goes over a kink. */
-#ifndef RP_PLANT_CONTACT_H
-#define RP_PLANT_CONTACT_H
+#pragma once
 
 #include "rp_plant.h"
 
@@ -41,5 +40,3 @@ bool rp_plant_contact_fits(const struct rp_plant_parameters *p, int joint, doubl
  * velocity at which this happens. */
 void rp_plant_turn_contact(const struct rp_plant_parameters *p, int joint, double *dq,
                            int *contact);
-
-#endif

@@ -1,7 +1,6 @@
 /* The equations of the plant. rp_plant.h says what they mean. In given modes they are smooth: a
  * joint that slides forward keeps the sign of its friction also where its velocity passes 0. */
-#ifndef RP_PLANT_EQUATIONS_H
-#define RP_PLANT_EQUATIONS_H
+#pragma once
 
 #include "rp_payload.h"
 #include "rp_plant.h"
@@ -377,5 +376,3 @@ void plant_reaction_rates(const struct rp_plant_parameters *p, const struct rp_p
                           const struct rp_plant_inputs *inputs, const double q_first[2],
                           const double dq_first[2], const struct rp_plant_inputs *inputs_first,
                           double reaction_first[2]);
-
-#endif

@@ -9,8 +9,7 @@
  * D is positive definite: one of the four patterns fits. The impact takes
  * sum of P_i (1 - e_i) |q_i'-| / 2 >= 0 of the kinetic energy, also at two stops at once. Friction
  * is bounded and has no impulse: an impact at one joint can knock a stuck other one loose. */
-#ifndef RP_PLANT_IMPACT_H
-#define RP_PLANT_IMPACT_H
+#pragma once
 
 #include "rp_plant.h"
 
@@ -39,5 +38,3 @@ void rp_plant_catch(const struct rp_plant_inertia *inertia, const bool caught[2]
  * energy that this takes, (q'-^T D- q'- - q'+^T D+ q'+) / 2 >= 0 (J). */
 double rp_plant_grasp_at_rest(const struct rp_plant_parameters *p, const double q[2],
                               const double dq[2], double dq_after[2]);
-
-#endif

@@ -18,10 +18,7 @@ real = np.longdouble
 def descend(
     matrix: np.ndarray, vector: np.ndarray, cost: Sequence, low: Sequence, high: Sequence
 ) -> np.ndarray:
-    """argmin x' matrix x / 2 - vector' x + sum cost |x|, low <= x <= high; all of shape (2,).
-
-    `matrix` is positive definite, so that there is one minimum; 0 is within the bounds.
-    """
+    """Return x in low <= 0 <= high with the least x' M x / 2 - vector' x + sum cost |x|, (2,)."""
     x = np.zeros(2, real)
     for _ in range(MOST_SWEEPS):
         before = x.copy()
@@ -41,10 +38,10 @@ def accelerations(
     breakaway: np.ndarray,
     closed: Sequence[int],
 ) -> np.ndarray:
-    """Accelerations of both joints by Gauss' principle, (2,); joints that are not `at_rest` move.
+    """Return accelerations of both joints by Gauss' principle, (2,); joints not `at_rest` move.
 
-    `forces` are all but those of stops and of dry friction of joints at rest. `closed`: a joint
-    rests on its lower stop (+1), its upper one (-1), or none (0).
+    `forces` are without stops and dry friction at rest. `closed`: a joint rests on its lower stop
+    (+1), its upper one (-1), or none (0).
     """
     cost = [breakaway[i] if at_rest[i] else real(0) for i in (0, 1)]
     low = [real(0) if at_rest[i] and closed[i] > 0 else -np.inf for i in (0, 1)]
@@ -55,10 +52,10 @@ def accelerations(
 def impulses(
     inertia: np.ndarray, rates: np.ndarray, side: Sequence[int], restitution: Sequence[float]
 ) -> np.ndarray:
-    """Impulses of the stops, (2,): P >= 0, dq+ + e dq- >= 0, one of them 0, away from the stops.
+    """Return impulses P of the stops, (2,): P >= 0, dq+ + e dq- >= 0, away from them, one is 0.
 
-    A contact is a joint on a stop (`side` as `closed` above) that does not leave it. The conditions
-    are those of the minimum of P' D^-1 P / 2 + P' (1 + e) dq-.
+    A contact is a joint on a stop (`side` as `closed` above) that stays: conditions of the minimum
+    of P' D^-1 P / 2 + P' (1 + e) dq-.
     """
     determinant = inertia[0, 0] * inertia[1, 1] - inertia[0, 1] ** 2
     mobility = (

@@ -19,10 +19,7 @@ solver = cache(Solver)  # compiles the equations once
 
 
 def outputs(scenario: Scenario) -> dict[str, np.ndarray]:
-    """Return the columns of the Real outputs, (n + 1,) each.
-
-    Each row has the inputs of the step that ends there, row 0 the first.
-    """
+    """Return the Real outputs' columns (n + 1,), with the inputs of the step before each row."""
     inputs = {name: scenario.input(name) for name in INPUTS}
 
     def at(i: int) -> dict[str, float]:

@@ -159,7 +159,7 @@ class Motion(Plant):
         return min([stride / rates[i] for i, stride in strides if rates[i] > 0], default=np.inf)
 
     def _is_too_far(self, state: np.ndarray, after: np.ndarray) -> bool:
-        """Whether a velocity has changed by more than twice the stride."""
+        """Return whether a velocity has changed by more than twice the stride."""
         return any(abs(after[2 + i] - state[2 + i]) > 2 * x for i, x in self._strides(state))
 
     def _first_missed(

@@ -27,11 +27,7 @@ class Joints:
 
 
 class Plant:
-    """State, modes and sums from t = 0.
-
-    `values` are parameters, initial states and inputs by the FMU's names, `rates` those of the
-    inputs per s. Bouncing ends where the next bounce goes no higher than `rest_height` (rad, m).
-    """
+    """State, modes and sums; bouncing ends below `rest_height` (rad, m); `rates` of inputs."""
 
     def __init__(
         self,
@@ -222,7 +218,7 @@ class Plant:
         return tuple(0 if self.joints.held[i] else self.joints.direction[i] or FREE for i in (0, 1))
 
     def outputs(self) -> dict[str, real]:
-        """All Real outputs of the FMU at this time."""
+        """Return all Real outputs of the FMU at this time."""
         inertia, forces, friction, breakaway = self._blocks()
         held = self.joints.held
         ddq = self._moving(inertia, forces - friction)

@@ -110,10 +110,7 @@ class Solver:
                     sign = 1 if abs(contact[i]) == contacts.PUSHES else -1
                     add("push", i, sign * contacts.push(i + 1, contact[i]))
         numbers = self._numbers(True)
-        rates = [
-            *(sp.Integer(0) if held[i] else dq[i] for i in (0, 1)),
-            *ddq,
-        ]
+        rates = [*(sp.Integer(0) if held[i] else dq[i] for i in (0, 1)), *ddq]
         right = [hy.from_sympy(sp.sympify(x), numbers) for x in rates]
         converted = [hy.from_sympy(x, numbers) for x in indicators]
         events = [

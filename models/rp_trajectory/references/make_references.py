@@ -106,7 +106,7 @@ def _segments(motion: int, *values: float | mp.mpf) -> list[Segment]:
 def joint_rates(
     q1: mp.mpf, L: mp.mpf, a: mp.mpf, velocity: mp.mpc, acceleration: mp.mpc
 ) -> tuple[mp.mpc, mp.mpc]:
-    """Rates of the joints, q1 as the real part and q2 as the imaginary one, first and second.
+    """Return first and second rates of the joints, q1 as real part and q2 as imaginary one.
 
     p = exp(i q1) (L + i a) has p' = exp(i q1) (L' + i q1' (L + i a)) and
     p'' = exp(i q1) (L'' + i q1'' (L + i a) + 2 i q1' L' - q1'^2 (L + i a)).
