@@ -12,9 +12,8 @@ from scipy.io import loadmat
 
 import rparm
 from rparm import __main__ as cli
-from rparm.linearization.margins import frequency_response
 from rparm.linearization.page import steps_figure
-from rparm.linearization.responses import sampled_response
+from rparm.linearization.responses import frequency_response, sampled_response
 
 POSE = {"q1": "30 deg", "q2": "0.1 m"}
 H = 0.01
