@@ -30,7 +30,7 @@ def is_quiet() -> bool:
 
 @contextmanager
 def results_stream(as_json: bool, quiet: bool) -> Iterator[TextIO | None]:
-    """Lead a command's result to a stream, all else to standard error or nowhere (`quiet`)."""
+    """Yield the stream of a command's result; all else goes to standard error, or is dropped."""
     global _quiet
     real, before, _quiet = sys.stdout, _quiet, quiet
     try:

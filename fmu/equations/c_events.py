@@ -265,7 +265,7 @@ class Events:
 
 
 def _guards(graph: Graph, roots: Iterable[tuple[Value, Value | None]]) -> Guards:
-    """Return under which modes and parameters each mode is read; `roots` are values, conditions."""
+    """Return for each mode the condition under which it is read; roots: values and conditions."""
     found: Guards = {}
     modes: dict[Value, list[Value]] = {}  # by the distance that they follow from
     for relation in graph.relations.values():

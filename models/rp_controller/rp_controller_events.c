@@ -101,7 +101,8 @@ static enum status start(struct rp_controller_values *values, const struct event
     return status;
 }
 
-/* What is due at the next time: efforts, and then the sample that would replace them. */
+/* Shows the efforts and takes the sample that are due at the next time: the efforts first, as the
+ * sample would replace them. */
 static enum status pass_time(struct rp_controller_values *values) {
     const double t = next_time(values);
     enum status status = STATUS_OK;

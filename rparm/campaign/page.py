@@ -160,8 +160,7 @@ class Page:
         columns = list(columns)
         left = columns[DRAWN:]
         rest = "and what is below it in the table."
-        text = f"The picture leaves out {left[0]} {rest}" if left else ""
-        return columns[:DRAWN], text if left else ""
+        return columns[:DRAWN], f"The picture leaves out {left[0]} {rest}" if left else ""
 
     # ---- Distributions ---------------------------------------------------------------------------
 

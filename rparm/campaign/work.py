@@ -82,7 +82,7 @@ def opened(
     """Open the work of a campaign's file; UserError if anything in it is wrong.
 
     By default, the FMU or SSP is the built one, and the file or the project names the folder.
-    `ask` is called with questions to the user: values that are hardly meant so.
+    `ask` is called with questions to the user, about values that look like mistakes.
     """
     given = campaign_file.read(file)
     with bases.opened(given, fmu, file) as base:

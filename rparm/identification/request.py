@@ -43,7 +43,7 @@ class Parameter:
     scale: float = 0.0  # of one without limits; 0: its start
 
     def check(self, low: float) -> None:
-        """Check that the start is inside, above `low` from below; else WrongValueError."""
+        """Refuse a start that is not between `low` and the upper limit: WrongValueError."""
         unit = f" {self.unit}" if self.unit else ""
         for limit, is_in, word in (
             (low, self.start > low, "above"),

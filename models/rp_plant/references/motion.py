@@ -80,7 +80,7 @@ class Motion(Plant):
         return numbers
 
     def _held_until(self, end: real) -> tuple[str, int, real] | None:
-        """Nothing moves: the reactions are linear in time, as the inputs are."""
+        """Rest until `end` or the first breakaway: reactions are linear in time, as inputs are."""
         _, first, _, breakaway = self._blocks()
         begin, self.time = self.time, end
         last = self._blocks()[1]
