@@ -1,6 +1,6 @@
 """Scenarios: what to simulate, read from models/<model>/scenarios/<name>.toml.
 
-The README.md next to the scenarios documents the format. What a scenario says of its model is
+docs/scenarios.md documents the format. What a scenario says of its model is
 checked against the description of the model's FMU. `template` writes a scenario to start from.
 """
 
