@@ -17,7 +17,9 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
 
+import equations_tables
 from declaration.load import shown
+from equations_tables import Table
 
 from rparm.expressions.expression import (
     CONDITION,
@@ -28,6 +30,7 @@ from rparm.expressions.expression import (
     NUMBER,
     ExpressionError,
     Function,
+    Lookup,
     Node,
     check_kinds,
     derivative_of,
@@ -37,7 +40,16 @@ from rparm.expressions.expression import (
     names,
     parse,
 )
-from rparm.expressions.units import ANGLE, BASE, Unit, exponents, times, unit_of, unit_of_exponents
+from rparm.expressions.units import (
+    ANGLE,
+    BASE,
+    Unit,
+    exponents,
+    table_unit,
+    times,
+    unit_of,
+    unit_of_exponents,
+)
 from rparm.expressions.units import shown as unit_shown
 
 LARGEST = 10**6  # bytes
@@ -74,11 +86,12 @@ OWN_KEYS = {
     SWITCHES: (("type", "start", "description"), ""),
 }
 HEAD = (
-    *("name", "description", "experiment", "modes", "units", "functions"),
+    *("name", "description", "experiment", "modes", "units", "tables", "functions"),
     *("sampled", "events", "check"),
     *SECTIONS,
 )
 EXPERIMENT = {"stop": 10.0, "step": 0.01, "tolerance": 1e-8}
+TABLE = ("x", "y", "z", "file", "interpolation", "outside")
 EVENT = ("when", "while", "reinit", "set")
 SAMPLER = ("every", "offset", "while", "reinit", "set")
 # what other languages have, by what it looks like, and what to do instead
@@ -97,6 +110,7 @@ INSTEAD = {
 TABLES = (
     "experiment",
     "units",
+    "tables",
     "functions",
     "sampled",
     "events",
@@ -232,7 +246,9 @@ class ModelFile:
     text: str
     reserved: set[str]  # names that it must not give
     units: dict[str, dict[str, int]] = field(default_factory=dict)  # exponents, of [units]
-    functions: dict[str, Function] = field(default_factory=dict)
+    functions: dict[str, Function | Lookup] = field(default_factory=dict)
+    tables: dict[str, Table] = field(default_factory=dict)
+    table_units: dict[str, dict[str, int]] = field(default_factory=dict)  # by `table_unit`
     modes: dict[str, bool] = field(default_factory=dict)  # with their values at the start
     variables: dict[str, Variable] = field(default_factory=dict)
     sampled: list[Sampler] = field(default_factory=list)
@@ -411,6 +427,8 @@ def read_tables(
     for symbol, given in head.get("units", {}).items():
         with placed("[units]", shown(symbol)):
             file.units[symbol] = _entries(given, (*BASE, ANGLE), what="base unit")
+    for name, entry in head.get("tables", {}).items():
+        _read_table(file, name, entry)
     _read_functions(file, head.get("functions", {}))
     for section in SECTIONS:
         for name, entry in head.get(section, {}).items():
@@ -435,20 +453,47 @@ def read_tables(
     return file
 
 
+def _read_table(file: ModelFile, name: str, entry: object) -> None:
+    place = f"[tables.{name if NAME.fullmatch(name) else shown(name)}]"
+    with placed(place):
+        _check_function_name(name, file)
+        units = entry.get("unit", {}) if isinstance(entry, dict) else {}
+        bare = {k: v for k, v in entry.items() if k != "unit"} if units else entry
+        given = _entries(bare, (*TABLE, "unit"), "x")
+        arguments = ("x", "y") if "z" in given else ("x",)
+        file.tables[name] = equations_tables.read(name, given, file.path.parent)
+        file.functions[name] = Lookup(name, arguments)
+        keys = (*arguments, "z" if "z" in given else "y")
+        if not isinstance(units, dict) or not all(type(unit) is str for unit in units.values()):
+            raise ModelFileError(
+                f"unit: expected a table such as {{ x = 'm' }}, got {shown(units)}"
+            )
+        for key in units:
+            if key not in keys:
+                raise ModelFileError(f"unit: unknown key {shown(key)}, expected {', '.join(keys)}")
+            unit = units[key]
+            found = file.units[unit] if unit in file.units else exponents(unit)
+            file.table_units[table_unit(name, "" if key == keys[-1] else keys.index(key))] = found
+
+
+def _check_function_name(name: str, file: ModelFile) -> None:
+    if not NAME.fullmatch(name) or name in (*RESERVED, *FURTHER, *LATER, *file.functions):
+        raise ModelFileError("expected a name that is no function already")
+
+
 def _read_functions(file: ModelFile, entries: dict[str, object]) -> None:
     """Read the functions, each of which may call those before it."""
     for name, entry in entries.items():
         place = ("[functions]", name if NAME.fullmatch(name) else shown(name))
         with placed(*place):
-            if not NAME.fullmatch(name) or name in (*RESERVED, *FURTHER, *LATER):
-                raise ModelFileError("expected a name that is no function already")
+            _check_function_name(name, file)
             given = _entries(entry, ("arguments", "value"), "value")
             arguments = given.get("arguments", [])
             if not arguments or len({*arguments}) < len(arguments):
                 raise ModelFileError("arguments: expected names, each once")
             value = file.expression(("value",), given["value"])
             for node in in_order([value.tree]):
-                if node.name and node.name not in (*arguments, *CONSTANTS):
+                if node.op == "name" and node.name not in (*arguments, *CONSTANTS):
                     raise ExpressionError(node.column, f"{shown(node.name)} is no argument")
             check_kinds(value.tree)
         file.functions[name] = Function(tuple(arguments), value.tree)
@@ -644,7 +689,7 @@ def _check_names(file: ModelFile) -> None:
         for expression in expressions:
             with placed(*expression.place):
                 for node in in_order([expression.tree]):
-                    if node.name and node.name not in allowed:
+                    if node.op == "name" and node.name not in allowed:
                         meant = get_close_matches(node.name, allowed, n=1)
                         hint = f", did you mean {meant[0]!r}?" if meant else ""
                         raise ExpressionError(node.column, mistake.format(shown(node.name)) + hint)
@@ -696,12 +741,15 @@ def _number(expression: Expression, values: Mapping[str, float]) -> float:
         return evaluated(expression.tree, values)
     except (ArithmeticError, ValueError):
         return math.nan
+    except KeyError:  # tables are not looked up here: the start of a simulation checks their values
+        return 1.0
 
 
 def _check_units(file: ModelFile) -> None:
     """Check that units fit, and find the units of [where]."""
     declared = [v for v in file.variables.values() if v.section != "where"]
     units = {v.name: unit_of_exponents(v.exponents) for v in declared} | {"time": SECOND}
+    units |= {key: unit_of_exponents(found) for key, found in file.table_units.items()}
     for state in file.of("states"):
         units[derivative_of(state.name)] = times(units[state.name], SECOND, -1)
     for expression in file.order:

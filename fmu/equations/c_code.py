@@ -40,6 +40,11 @@ def formula(op: str, *given: str) -> str:
     return FORMULAS[op].format(*given) if op in FORMULAS else f"{op}({', '.join(given)})"
 
 
+def located(bounds: str, x: str) -> str:
+    """The segment of x in C."""
+    return f"relations_locate({bounds}, sizeof {bounds} / sizeof *{bounds}, {x})"
+
+
 class Code:
     """Statements, each value once; values that do not move are calculated in an `outer` code."""
 
@@ -63,8 +68,12 @@ class Code:
             return self.leaves[value.op, value.name]
         if self.outer and not value.moves:
             return self.outer.of(value)
-        c_type = "int" if value.op in CONDITIONS else "double"
+        c_type = "int" if value.op in (*CONDITIONS, "locate") else "double"
         given = [self.known[argument] for argument in value.arguments]
+        if value.op == "entry":
+            return self.constant(value.name + "".join(f"[{index}]" for index in given))
+        if value.op == "locate":
+            return self.constant(located(value.name, given[0]), c_type)
         return self.constant(formula(value.op, *given), c_type)
 
     def constant(self, of: str, c_type: str = "double") -> str:

@@ -5,11 +5,11 @@ mode, and 1 while no value that is needed reads it. An event of the file fires w
 comes to hold in its modes. What all models do with that is in src/model/relations.c.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from equations_file import SWITCHES, Change, ModelFile, Sampler
 
-from equations.c_code import Code, Leaves, filled, indented, text
+from equations.c_code import Code, Leaves, filled, indented, located, text
 from equations.errors import NONE, Errors
 from equations.graph import MOVING, Graph, Relation, Value, is_unknown
 from rparm.expressions.expression import in_order
@@ -34,6 +34,8 @@ def leaves(file: ModelFile) -> Leaves:
         for op, structure in ((v.leaf.op, "values"), ("first", "d"), ("second", "dd")):
             found[op, v.name] = f"{structure}->{FIELD.format(v.name)}"
     found |= {("mode", name): f"values->{MODE.format(name)}" for name in file.conditions}
+    segments = enumerate(file.graph.segments)
+    found |= {("integer", name): f"values->segments[{i}]" for i, name in segments}
     relations = enumerate(file.graph.relations)
     return found | {("mode", name): f"values->relations[{i}]" for i, name in relations}
 
@@ -57,7 +59,10 @@ class Events:
             read += [(event.when.value, during), *([(during, None)] if during else [])]
         used = _guards(graph, read)
         # condition under which each matters; None: always
-        self.used = {r.name: used.get(r.mode, graph.number(0.0)) for r in self.relations}
+        readers = {r.name: r.mode for r in self.relations}
+        for segment in graph.segments.values():
+            readers |= {segment.low.name: segment.leaf, segment.high.name: segment.leaf}
+        self.used = {name: used.get(reader, graph.number(0.0)) for name, reader in readers.items()}
         self.located = graph.located
 
     def __bool__(self) -> bool:
@@ -101,6 +106,7 @@ class Events:
             "int is_begun;",
             f"int relations[{len(self.relations) or 1}];",
             f"int active[{len(self.file.events) + 1}];",
+            *([f"int segments[{len(segments)}];"] if (segments := self.graph.segments) else []),
             *(f"int {MODE.format(mode)};" for mode in self.file.modes),
         ]
 
@@ -131,7 +137,12 @@ class Events:
             if states
             else "0",
             has_inputs=int(any(r.is_of_inputs for r in self.relations)),
-            modes=2 + (len(self.relations) or 1) + len(file.events) + len(file.modes),
+            modes=2
+            + (len(self.relations) or 1)
+            + len(file.events)
+            + len(file.graph.segments)
+            + len(file.modes),
+            **self._segments(places),
             samplers=len(file.sampled),
             sampler_names=", ".join([text(s.name) for s in file.sampled] or ["NULL"]),
             discrete=", ".join(
@@ -194,6 +205,15 @@ class Events:
             during = "" if event.during is None else f" && {code.of(event.during.value)}"
             code.lines.append(f"due[{i}] = {code.of(event.when.value)}{during};")
         return code.lines
+
+    def _segments(self, places: Mapping[str, int]) -> dict[str, object]:
+        segments, code = self.graph.segments.values(), Code(leaves(self.file))
+        table = []
+        for i, s in enumerate(segments):
+            code.lines.append(f"segment[{i}] = {located(s.bounds, code.of(s.argument))};")
+            row = (places[s.low.name], places[s.high.name], s.count, int(s.low.is_of_inputs))
+            table.append(f"{{{', '.join(map(str, row))}}},")
+        return {"segments": len(segments), "segment": table or ["{0},"], "locate": code.lines}
 
     def _switches(self) -> list[str]:
         fields = [MODE.format(v.name) for v in self.file.of(SWITCHES)]
@@ -270,6 +290,8 @@ def _guards(graph: Graph, roots: Iterable[tuple[Value, Value | None]]) -> Guards
     modes: dict[Value, list[Value]] = {}  # by the distance that they follow from
     for relation in graph.relations.values():
         modes.setdefault(relation.distance, []).append(relation.mode)
+    for segment in graph.segments.values():
+        modes.setdefault(segment.argument, []).append(segment.leaf)
     for value, guard in roots:
         _widen(graph, found, value, guard)
     for value in reversed(in_order([*modes, *found])):  # each before what it reads
@@ -290,7 +312,7 @@ def _guards(graph: Graph, roots: Iterable[tuple[Value, Value | None]]) -> Guards
             conditions[1] = _both(graph, found[value], open_)
         for argument, guard in zip(value.arguments, conditions, strict=True):
             _widen(graph, found, argument, guard)
-    return {value: guard for value, guard in found.items() if value.op == "mode"}
+    return {value: guard for value, guard in found.items() if value.op in ("mode", "integer")}
 
 
 def _both(graph: Graph, guard: Value | None, condition: Value) -> Value:

@@ -1,11 +1,12 @@
 """The model in C: equations.h with its value structure, equations.c with its struct model."""
 
+import re
 from collections.abc import Mapping
 from itertools import chain
 
 from equations_file import OPTIONS, ModelFile
 
-from equations.c_code import Code, filled, indented, text
+from equations.c_code import Code, filled, indented, number, text
 from equations.c_events import FIELD, MODE, Events, arrays, leaves
 from equations.c_series import Series
 from equations.graph import FALLIBLE, Value
@@ -14,6 +15,7 @@ from rparm.expressions.expression import in_order
 RATE = "d_{}"  # fields have prefixes, so that any name of a variable will do
 STRUCTURE = "struct equations_values"
 SYMBOL = "equations_model"
+HERE = "/* tables */"  # the line where they stand
 FOLLOWED = "relations_followed(&relations, ROOM, values, t, &copy)"
 
 
@@ -37,9 +39,10 @@ def source(file: ModelFile) -> str:
     events = Events(file)
     series = Series(file.graph, *_followed(file, events), leaves(file))
     has_domains = bool(events.located) and _may_end(file)
-    return filled(
+    text = filled(
         "equations.c.in",
         **_smooth(file),
+        tables=[HERE],
         **_series(series, has_domains),
         **_calculated(file, events),
         **_domains(file, events, series, has_domains),
@@ -52,6 +55,22 @@ def source(file: ModelFile) -> str:
         ],
         model_events=[".events = &events,"] if events else [],
     )
+    return text.replace(f"{HERE}\n", "".join(f"{line}\n" for line in _tables(file, text)))
+
+
+def _tables(file: ModelFile, text: str) -> list[str]:
+    """Constant arrays of tables that a text uses."""
+    lines, used = [], set(re.findall(r"\btable_\w+", text))
+    for table in file.tables.values():
+        for name, dimensions, values in table.arrays():
+            if name not in used:
+                continue
+            numbers = [number(value) for value in values]
+            width = len(table.axes[-1].origins) if dimensions.count("[") == 2 else len(numbers)
+            rows = [", ".join(numbers[i : i + width]) for i in range(0, len(numbers), width)]
+            content = ", ".join(f"{{{row}}}" for row in rows) if len(rows) > 1 else rows[0]
+            lines.append(f"static const double {name}{dimensions} = {{{content}}};")
+    return lines
 
 
 def _ranges(file: ModelFile) -> dict[str, list[str]]:

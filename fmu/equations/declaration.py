@@ -222,6 +222,8 @@ def _reached(leaves: Iterable[Leaf], file: ModelFile, changed: Collection[str]) 
         op, name = leaf
         if name in file.graph.relations:
             todo += file.graph.relations[name].distance.leaves
+        if name in file.graph.segments:
+            todo += file.graph.segments[name].argument.leaves
         if "state" in changed:
             todo += [
                 leaf for v in file.started if v.name == name for leaf in v.initial.value.leaves

@@ -5,6 +5,7 @@ one or two arguments; in derivatives also the functions of src/model/slopes.h. C
 mode, relations, and, or, not, isnan, isfinite. abs, min, max and squares have become others.
 From C come the leaf integer, the condition ==, and two operations that differ in derivatives only:
 value_of(x) rests, and moving_as(x, y) moves as y; and the functions ceil, floor, trunc, round.
+Of tables: entry, of an array by one or two segments, and locate, the segment of a number.
 """
 
 from __future__ import annotations
@@ -14,7 +15,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 
+from equations_tables import Table
+
 from rparm.expressions.expression import RELATIONS, Node, in_order, parse
+
+ENDS = ("bounds", "ends")  # arrays of a table: where segments begin and end
 
 # along a curve, "first" and "second" are the derivatives of the other leaves
 LEAVES = (
@@ -24,7 +29,7 @@ LEAVES = (
 MOVING = ("input", "state", "time")
 RUNTIME = ("first", "second")  # derivatives that may be 0 in one call and not in another
 CONDITIONS = ("mode", "and", "or", "not", "isnan", "isfinite", "==", *RELATIONS)
-STILL = (*CONDITIONS, "value_of")  # derivatives are 0
+STILL = (*CONDITIONS, "value_of", "entry", "locate")  # derivatives are 0
 PRODUCTS_UP_TO = 8  # whole exponents that are repeated multiplication
 WHOLE_UP_TO = 64  # whole exponents whose derivatives are defined at 0
 # derivatives of y = f(x) or f(x, z) by each argument
@@ -95,6 +100,18 @@ class Relation:
         return self.time is not None and self.distance.arguments[0].op == "time"
 
 
+@dataclass(frozen=True)
+class Segment:
+    """The segment of a table in which a value that moves is; it changes at events only."""
+
+    leaf: Value
+    argument: Value
+    bounds: str  # array of them
+    count: int  # of the table's segments
+    low: Relation  # holds above its begin
+    high: Relation  # holds from its end on
+
+
 @dataclass
 class Graph:
     """Makes values, and finds those that exist.
@@ -105,6 +122,8 @@ class Graph:
 
     known: dict[tuple, Value] = field(default_factory=dict)
     relations: dict[str, Relation] = field(default_factory=dict)
+    tables: Mapping[str, Table] = field(default_factory=dict)
+    segments: dict[str, Segment] = field(default_factory=dict)  # by the names of their leaves
     has_switches: bool = True  # else relations are evaluated with the values
     is_guarded: bool = True  # else an infinite slope makes derivatives infinite, as in C
 
@@ -153,10 +172,46 @@ class Graph:
                     value = self._choice(is_first, *given)
                 case "if":
                     value = self._choice(*given)
+                case "table":
+                    value = self._looked_up(self.tables[node.name], given, is_instant)
                 case op:
                     value = (compare if op in RELATIONS else self.value)(op, *given)
             found[node] = value
         return found[root]
+
+    def _looked_up(self, table: Table, given: list[Value], is_instant: bool) -> Value:
+        """The value of a table: a polynomial of the distance from its segment's origin."""
+        places = [self._segment(table, i, x, is_instant) for i, x in enumerate(given)]
+        distances = [
+            self.value("-", x, self.value("entry", k, name=table.array("origins", i)))
+            for i, (x, k) in enumerate(zip(given, places, strict=True))
+        ]
+        powers = range(len(table.coefficients))
+        found = [self.value("entry", *places, name=table.array("c", i)) for i in powers]
+        if len(given) == 1:
+            return reduce(
+                lambda sum_, c: self.value("+", c, self.value("*", sum_, distances[0])), found[::-1]
+            )
+        value, by_x, by_y, both = found
+        slope = self.value("+", by_x, self.value("*", both, distances[1]))
+        rest = self.value("+", value, self.value("*", by_y, distances[1]))
+        return self.value("+", rest, self.value("*", slope, distances[0]))
+
+    def _segment(self, table: Table, axis: int, x: Value, is_instant: bool) -> Value:
+        """The segment of a number: it stays between events if the number moves."""
+        bounds = table.array("bounds", axis)
+        if is_instant or not (self.has_switches and x.moves):
+            return self.value("locate", x, name=bounds)
+        for known in self.segments.values():
+            if known.argument is x and known.bounds == bounds:
+                return known.leaf
+        name = f"segment {len(self.segments) + 1}"
+        leaf = self.value("integer", name=name)
+        sides = [self.value("entry", leaf, name=table.array(end, axis)) for end in ENDS]
+        low, high = (self.relations[self.switch(">=", x, side).name] for side in sides)
+        count = len(table.axes[axis].origins)
+        self.segments[name] = Segment(leaf, x, bounds, count, low, high)
+        return leaf
 
     def _choice(self, condition: Value, first: Value, second: Value) -> Value:
         """The "if" of a text: not a number where a relation that decides is not defined."""

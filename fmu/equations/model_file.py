@@ -25,7 +25,8 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     """Read and check a file for values of its expressions; ModelFileError if something is wrong."""
     file = equations_file.read(path, solver_names)
     # without states nothing is integrated: outputs follow at once
-    graph = file.graph = Graph(has_switches=bool(file.of("states") or file.events))
+    has_switches = bool(file.of("states") or file.events)
+    graph = file.graph = Graph(tables=file.tables, has_switches=has_switches)
     for variable in file.of(*LEAVES):
         variable.leaf = graph.value(LEAVES[variable.section], name=variable.name)
     known = {variable.name: variable.leaf for variable in file.of(*LEAVES)}

@@ -72,9 +72,9 @@ class Node:
     """An operation, a number or a name.
 
     op is "number" (then `value` counts), "literal" (a condition: whether `value` is 1), "name"
-    (then `name`), an operator of `RELATIONS`, + - * / **, "negative", "and", "or", "not", "if"
-    (arguments: condition, value if true, otherwise), or a name of `FUNCTIONS`. min and max have two
-    arguments here.
+    (then `name`), "table" (a look-up in the table `name`), an operator of `RELATIONS`, + - * / **,
+    "negative", "and", "or", "not", "if" (arguments: condition, value if true, otherwise), or a name
+    of `FUNCTIONS`. min and max have two arguments here.
     """
 
     op: str
@@ -170,7 +170,19 @@ class Function:
         return found[self.body]
 
 
-def parse(text: str, functions: Mapping[str, Function] | None = None) -> Node:
+@dataclass(frozen=True)
+class Lookup:
+    """A table, which is called as a function."""
+
+    name: str
+    arguments: tuple[str, ...]
+
+    def of(self, given: Sequence[Node], column: int) -> Node:
+        """Return the look-up at these arguments."""
+        return Node("table", column, tuple(given), name=self.name)
+
+
+def parse(text: str, functions: Mapping[str, Function | Lookup] | None = None) -> Node:
     """Parse an expression; ExpressionError says what is wrong with it.
 
     functions: further ones, by name.
@@ -198,7 +210,7 @@ def _tokens(text: str) -> list[Token]:
 
 
 class _Parser:
-    def __init__(self, tokens: list[Token], functions: Mapping[str, Function]) -> None:
+    def __init__(self, tokens: list[Token], functions: Mapping[str, Function | Lookup]) -> None:
         self._tokens, self._functions = iter(tokens), functions
         self.token = next(self._tokens)
         self._depth = 0

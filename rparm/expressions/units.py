@@ -100,6 +100,8 @@ def _unit(node: Node, given: list[Unit | None], units: Mapping[str, Unit]) -> Un
         return times(given[0] or ONE, given[1] or ONE, power)
     if node.op in ("+", "-", "min", "max"):
         return _same(node, given)
+    if node.op == "table":
+        return _of_table(node, given, units)
     if node.op in RELATIONS:
         _same(node, given)
         return ONE
@@ -116,6 +118,20 @@ def _unit(node: Node, given: list[Unit | None], units: Mapping[str, Unit]) -> Un
             what = f"{node.op} takes a number of unit 1"
             raise ExpressionError(node.column, f"{what}, got {shown(unit)}")
     return ONE
+
+
+def table_unit(name: str, argument: int | str = "") -> str:
+    """Return the key that units have for an argument of a table, or for its value."""
+    return f"{name}({argument})"
+
+
+def _of_table(node: Node, given: list[Unit | None], units: Mapping[str, Unit]) -> Unit:
+    for i, unit in enumerate(given):
+        expected = units.get(table_unit(node.name, i), ONE)
+        if unit not in (None, expected):
+            what = f"{node.name} takes unit {shown(expected)}"
+            raise ExpressionError(node.column, f"{what}, got {shown(unit)}")
+    return units.get(table_unit(node.name), ONE)
 
 
 def _same(node: Node, given: list[Unit | None]) -> Unit | None:

@@ -14,10 +14,10 @@ struct call {
     const struct relations *model;
     struct relations_room room;
     void *values;
-    int *is_begun, *holds, *active; /* parts of its modes */
-    double t;                       /* s */
-    double passed;                  /* s: earlier time events, and those at this time, are past */
-    const double *du;               /* derivative of each input by the time */
+    int *is_begun, *holds, *active, *segments; /* parts of its modes */
+    double t;                                  /* s */
+    double passed;    /* s: earlier time events, and those at this time, are past */
+    const double *du; /* derivative of each input by the time */
     bool inputs_move;
 };
 
@@ -29,12 +29,14 @@ static struct call call_of(const struct relations *model, struct relations_room 
                            double t, const double du[]) {
     int *modes = (int *)(void *)((char *)values + model->modes.offset);
     int *holds = modes + 1;
+    int *active = holds + model->relation_count;
     bool inputs_move = false;
     for (int i = 0; i < model->input_count; i++) {
         inputs_move |= du[i] != 0.0;
     }
-    return (struct call){model, room, values, modes,      holds, holds + model->relation_count,
-                         t,     t,    du,     inputs_move};
+    return (struct call){
+        model, room, values, modes,      holds, active, active + model->event_count + 1,
+        t,     t,    du,     inputs_move};
 }
 
 /* Compares all relations. state_errors: how far from its limit each state may have been located, in
@@ -62,6 +64,41 @@ static bool is_sure(const struct compared *compared) {
     return compared->used ? size >= compared->noise : !(size < compared->noise);
 }
 
+/* Moves a segment whose value has left it: by one, or to where the value is if that is farther.
+ * Returns true if it has moved. */
+static bool update_segment(const struct call *call, int i, bool is_exact) {
+    const struct segment *segment = &call->model->segment[i];
+    int *number = &call->segments[i];
+    const bool is_above = call->holds[segment->high] != 0;
+    const bool is_below = call->holds[segment->low] == 0;
+    if (!is_above && !is_below) {
+        return false;
+    }
+    const int before = *number;
+    int found = call->room.segment[i];
+    if (!is_exact && is_above && found <= before) {
+        found = before + 1;
+    } else if (!is_exact && !is_above && found >= before) {
+        found = before - 1;
+    }
+    *number = found < 0 ? 0 : found < segment->count ? found : segment->count - 1;
+    call->holds[segment->low] = 1;
+    call->holds[segment->high] = 0;
+    return *number != before;
+}
+
+static bool update_segments(const struct call *call, bool is_exact) {
+    const struct relations *model = call->model;
+    bool changes = false;
+    if (model->segment_count > 0) {
+        model->locate(call->values, call->t, call->room.segment);
+    }
+    for (int i = 0; i < model->segment_count; i++) {
+        changes |= update_segment(call, i, is_exact);
+    }
+    return changes;
+}
+
 /* Updates the modes of relations by their distances. A relation at its limit keeps its mode, as
  * does a turned one. Returns true if some have changed. is_exact: distances are exact to the last
  * bit. */
@@ -78,7 +115,8 @@ static bool update_modes(const struct call *call, bool is_exact) {
             changes = true;
         }
     }
-    return changes;
+    const bool moves = update_segments(call, is_exact);
+    return changes || moves;
 }
 
 /* Repeats update_modes until no mode changes. Relations depend on each other in no circle, so that
@@ -93,6 +131,14 @@ static void update_modes_until_stable(const struct call *call, bool is_exact) {
 static void set_modes_from_values(const struct call *call, bool only_of_inputs) {
     const struct relations *model = call->model;
     const struct compared *compared = call->room.compared;
+    if (model->segment_count > 0) {
+        model->locate(call->values, call->t, call->room.segment);
+    }
+    for (int i = 0; i < model->segment_count; i++) {
+        if (model->segment[i].is_of_inputs || !only_of_inputs) {
+            call->segments[i] = call->room.segment[i];
+        }
+    }
     compare(call, call->room.zeros, call->room.compared);
     for (int k = 0; k < model->relation_count; k++) {
         if (model->relation[k].is_of_inputs || !only_of_inputs) {
@@ -376,10 +422,13 @@ static bool is_count(double ticks) {
 
 bool relations_are_plausible(const struct relations *model, const void *values) {
     const int *modes = modes_in(model, values);
-    const size_t count = model->modes.size / sizeof *modes;
+    const int count = (int)(model->modes.size / sizeof *modes);
+    const int first = 1 + model->relation_count + model->event_count + 1; // segment
     bool are_fine = modes[0] == 1;
-    for (size_t i = 0; i < count; i++) {
-        are_fine = are_fine && (modes[i] == 0 || modes[i] == 1);
+    for (int i = 0; i < count; i++) {
+        const bool is_segment = i >= first && i < first + model->segment_count;
+        const int end = is_segment ? model->segment[i - first].count : 2;
+        are_fine = are_fine && modes[i] >= 0 && modes[i] < end;
     }
     for (int i = 0; i < model->sampler_count; i++) {
         are_fine = are_fine && is_count(discrete_in(model, values)[1 + i]);

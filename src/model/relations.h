@@ -19,6 +19,15 @@ struct relation {
     size_t indicator;   /* of a relation that is not timed */
 };
 
+/* The segment of a table in which a value is, and the relations of the value with its ends. It
+ * changes at events only. */
+struct segment {
+    int low;           /* relation that holds from the segment's begin on */
+    int high;          /* relation that holds from its end on */
+    int count;         /* number of the table's segments */
+    bool is_of_inputs; /* true if the value depends on inputs and parameters only */
+};
+
 struct compared {
     double distance; /* above 0 where the relation holds */
     double slope;    /* 1/s: derivative of the distance by the time */
@@ -36,16 +45,17 @@ struct given {
 
 struct relations {
     size_t values_size;
-    /* int[]: 1 if initialization has ended; the mode of each relation; 1 per event that is due;
-     * further modes of the model */
+    /* int[]: 1 if initialization has ended; the mode of each relation; 1 per event that is due; 0;
+     * the number of each segment; further modes of the model */
     struct range modes;
     size_t states; /* offset of the states */
     /* double[], discrete states of the model: with samplers first the start time, s, and the number
      * of ticks of each sampler; then its discrete variables */
     struct range discrete;
-    int relation_count, event_count, sampler_count, state_count, input_count;
+    int relation_count, event_count, sampler_count, segment_count, state_count, input_count;
     bool has_inputs; /* true if some relation depends on inputs and parameters only */
     const struct relation *relation;
+    const struct segment *segment;
     const double *nominal; /* of each state */
     const char *const *sampler_names;
     const char *const *discrete_names; /* of the discrete variables */
@@ -59,6 +69,8 @@ struct relations {
     void (*write_times)(const void *values, double times[]);
     /* Writes every and offset of each sampler, s. */
     void (*write_periods)(const void *values, double every[], double offset[]);
+    /* Writes in which segment of its table each value is. */
+    void (*locate)(const void *values, double t, int segment[]);
     void (*find_due)(const void *values, double t, int due[]);
     /* Performs an event or, with event_count added to its number, a sampler: right sides use the
      * values before it; a state that jumps gets tolerance 0. */
@@ -70,6 +82,7 @@ struct relations_room {
     struct compared *compared, *before; /* one per relation each */
     double *times;                      /* one per relation */
     double *every, *offset;             /* one per sampler */
+    int *segment;                       /* one per segment */
     int *due;                           /* one per event */
     int *turned;                        /* one per relation; zeros */
     double *tolerance;                  /* one per state */
@@ -86,6 +99,18 @@ enum status relations_update(const struct relations *model, struct relations_roo
 /* errors of struct model_events. */
 void relations_errors(const struct relations *model, struct relations_room room, const void *values,
                       double t, const double state_errors[], double relative, double errors[]);
+
+/* Returns the last segment that begins at or below x, from the rising begins of all segments; the
+ * first one if none does. */
+static inline int relations_locate(const double begins[], size_t count, double x) {
+    size_t low = 0;
+    size_t high = count;
+    while (high - low > 1) {
+        const size_t middle = low + (high - low) / 2;
+        *(x >= begins[middle] ? &low : &high) = middle;
+    }
+    return (int)low;
+}
 
 /* Returns a bound of the error of y, a function of an argument with an error, from y's values at
  * both ends of the argument's range. A value that is not defined does not count. */

@@ -1,0 +1,256 @@
+"""Tables of a file with equations: their values, from lists or a CSV, and their segments.
+
+A table of one argument is a polynomial in each segment between two bounds. Every mistake is a
+ValueError, in one line.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from rparm.expressions.expression import finite_number
+
+LARGEST_FILE = 50_000_000  # bytes
+FAR = 1e300  # beyond every value: the bound where there is none
+INTERPOLATIONS = ("linear", "previous", "pchip")
+OUTSIDE = ("hold", "extend", "error")
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Bounds of segments: segment k begins at bounds[k] and ends before bounds[k + 1]."""
+
+    bounds: tuple[float, ...]
+    origins: tuple[float, ...]  # of each segment: from where its polynomial counts
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table as C needs it.
+
+    Attributes
+    ----------
+    axes : tuple of Axis
+        One for each argument.
+    coefficients : tuple of tuple of float
+        Of one argument: for each power of the distance from the origin, a number per segment. Of
+        two: value, slope by the first, by the second and by both, a number per pair of segments,
+        those of the second argument in a row.
+    """
+
+    name: str
+    axes: tuple[Axis, ...]
+    coefficients: tuple[tuple[float, ...], ...]
+
+    def array(self, kind: str, number: int) -> str:
+        """Return the name in C of an array: bounds, ends or origins of an axis, or coefficients."""
+        return f"table_{self.name}_{kind}{number}"
+
+    def arrays(self) -> Iterator[tuple[str, str, Sequence[float]]]:
+        """Yield name, dimensions and numbers of each array in C."""
+        for i, axis in enumerate(self.axes):
+            yield self.array("bounds", i), f"[{len(axis.origins)}]", axis.bounds[:-1]
+            yield self.array("ends", i), f"[{len(axis.origins)}]", axis.bounds[1:]
+            yield self.array("origins", i), f"[{len(axis.origins)}]", axis.origins
+        dimensions = "".join(f"[{len(axis.origins)}]" for axis in self.axes)
+        for i, numbers in enumerate(self.coefficients):
+            yield self.array("c", i), dimensions, numbers
+
+
+def read(name: str, given: dict[str, Any], folder: Path) -> Table:
+    """Read a table from its entry; a file's path counts from the folder."""
+    kind, outside = given.get("interpolation", "linear"), given.get("outside", "hold")
+    for key, value, known in (
+        ("interpolation", kind, INTERPOLATIONS),
+        ("outside", outside, OUTSIDE),
+    ):
+        if value not in known:
+            raise ValueError(f"{key}: expected one of {', '.join(known)}, got {value!r}")
+    if "z" in given:
+        if kind != "linear" or "file" in given:
+            raise ValueError("z: a table of two arguments is linear, and given by lists")
+        return _grid(name, given, outside)
+    columns = _columns(given, folder) if "file" in given else _lists(given)
+    x, y = _checked(columns["x"], "x"), columns["y"]
+    if len(x) != len(y):
+        raise ValueError(f"y: has {len(y)} values, expected {len(x)}, as x has")
+    coefficients = _polynomials(x, y, kind)
+    return Table(name, *_with_outside(x, y, coefficients, kind, outside))
+
+
+# ---- Values --------------------------------------------------------------------------------------
+def _lists(given: dict[str, Any]) -> dict[str, list[float]]:
+    return {key: [*_numbers(given.get(key), key)] for key in ("x", "y")}
+
+
+def _numbers(values: object, key: str) -> Iterator[float]:
+    if not isinstance(values, list):
+        raise ValueError(f"{key}: expected a list of numbers")
+    for row, value in enumerate(values, 1):
+        try:
+            yield finite_number(value)
+        except ValueError as error:
+            raise ValueError(f"{key}: row {row}: {error}") from None
+
+
+def _columns(given: dict[str, Any], folder: Path) -> dict[str, list[float]]:
+    """Read two columns of a CSV, which x and y name in its first line."""
+    path = folder / given["file"]
+    names = {key: given.get(key) for key in ("x", "y")}
+    for key, column in names.items():
+        if not isinstance(column, str):
+            raise ValueError(f"{key}: expected the name of a column of {path.name}")
+    try:
+        if not path.is_file():
+            raise ValueError(f"file: {path.name}: no such file")
+        if path.stat().st_size > LARGEST_FILE:
+            raise ValueError(f"file: {path.name}: has more than {LARGEST_FILE} bytes")
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = csv.reader(file, strict=True)
+            head = [column.strip() for column in next(rows, [])]
+            places = {}
+            for key, column in names.items():
+                if head.count(column) != 1:
+                    known = ", ".join(head[:10])
+                    raise ValueError(f"{key}: {path.name} has no column {column!r} (has: {known})")
+                places[key] = head.index(column)
+            found: dict[str, list[float]] = {"x": [], "y": []}
+            for row in rows:
+                for key, place in places.items() if row else ():
+                    where = f"{key}: {path.name}: line {rows.line_num}"
+                    found[key].append(_cell(row, place, where))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = getattr(error, "strerror", None) or "is no CSV in UTF-8"
+        raise ValueError(f"file: {path.name}: {reason}") from None
+    return found
+
+
+def _cell(row: Sequence[str], place: int, where: str) -> float:
+    text = row[place].strip() if place < len(row) else ""
+    try:
+        number = float(text.replace("_", "?"))
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise ValueError(f"{where}: expected a finite number, got {text[:30]!r}")
+    return number
+
+
+def _checked(x: list[float], key: str) -> list[float]:
+    """Check that there are two rows, and that they rise."""
+    if len(x) < 2:
+        raise ValueError(f"{key}: has {len(x)} rows, expected two at least")
+    for row, (low, high) in enumerate(pairwise(x), 2):
+        if not low < high:
+            raise ValueError(f"{key}: row {row}: expected more than {low!r}, got {high!r}")
+    if abs(x[0]) > FAR or abs(x[-1]) > FAR or not math.isfinite(x[-1] - x[0]):
+        raise ValueError(f"{key}: is beyond {FAR:g}")
+    return x
+
+
+# ---- Segments ------------------------------------------------------------------------------------
+def _polynomials(x: list[float], y: list[float], kind: str) -> list[tuple[float, ...]]:
+    """Return for each segment its coefficients, by powers of the distance from its begin."""
+    if kind == "previous":
+        return [(value,) for value in y[:-1]]
+    widths = [high - low for low, high in pairwise(x)]
+    slopes = [(after - before) / h for before, after, h in zip(y, y[1:], widths, strict=False)]
+    if kind == "linear":
+        return list(zip(y, slopes, strict=False))
+    at = _pchip_slopes(widths, slopes)
+    return [
+        (value, d, (3 * slope - 2 * d - d_next) / h, (d + d_next - 2 * slope) / (h * h))
+        for value, d, d_next, slope, h in zip(y, at, at[1:], slopes, widths, strict=False)
+    ]
+
+
+def _pchip_slopes(widths: list[float], slopes: list[float]) -> list[float]:
+    """Return slopes at all rows: of the cubics that keep the shape.
+
+    Fritsch and Butland, A Method for Constructing Local Monotone Piecewise Cubic Interpolants
+    (1984); at the ends of three points, limited so that the shape is kept.
+    """
+    if len(slopes) == 1:
+        return slopes * 2
+    inner = []
+    for (h0, h1), (s0, s1) in zip(pairwise(widths), pairwise(slopes), strict=True):
+        if s0 * s1 <= 0:
+            inner.append(0.0)
+        else:
+            w0, w1 = 2 * h1 + h0, h1 + 2 * h0
+            inner.append((w0 + w1) / (w0 / s0 + w1 / s1))
+    first = _end_slope(widths[0], widths[1], slopes[0], slopes[1])
+    last = _end_slope(widths[-1], widths[-2], slopes[-1], slopes[-2])
+    return [first, *inner, last]
+
+
+def _end_slope(h0: float, h1: float, s0: float, s1: float) -> float:
+    slope = ((2 * h0 + h1) * s0 - h0 * s1) / (h0 + h1)
+    if slope * s0 <= 0:
+        return 0.0
+    return 3 * s0 if s0 * s1 <= 0 and abs(slope) > abs(3 * s0) else slope
+
+
+def _with_outside(
+    x: list[float], y: list[float], inside: list[tuple[float, ...]], kind: str, outside: str
+) -> tuple[tuple[Axis, ...], tuple[tuple[float, ...], ...]]:
+    """Add the segments outside; return the axes and the coefficients by powers."""
+    powers = len(inside[0])
+    if outside == "extend" and kind != "previous":
+        bounds, origins, rows = [-FAR, *x[1:-1], FAR], x[:-1], inside
+    else:
+        ends = (math.nan, math.nan) if outside == "error" else (y[0], y[-1])
+        below, above = ([(end,) + (0.0,) * (powers - 1)] for end in ends)
+        # the last row itself is inside
+        last = math.nextafter(x[-1], math.inf) if outside == "error" else x[-1]
+        bounds, origins = [-FAR, *x[:-1], last, FAR], [x[0], *x[:-1], x[-1]]
+        rows = [*below, *inside, *above]
+        if kind == "previous" and outside == "error":
+            bounds, origins, rows = bounds[:-2] + [x[-1], last, FAR], [*origins, x[-1]], [
+                *below, *inside, (y[-1],), *above,
+            ]  # fmt: skip
+    return (Axis(tuple(bounds), tuple(origins)),), tuple(zip(*rows, strict=True))
+
+
+def _grid(name: str, given: dict[str, Any], outside: str) -> Table:
+    """Return a bilinear table; z has a row for each x."""
+    if outside == "error":
+        raise ValueError("outside: a table of two arguments holds or extends")
+    x, y = (_checked([*_numbers(given.get(key), key)], key) for key in ("x", "y"))
+    if not isinstance(given["z"], list) or len(given["z"]) != len(x):
+        raise ValueError(f"z: expected {len(x)} rows, one for each x")
+    z = []
+    for row, values in enumerate(given["z"], 1):
+        z.append([*_numbers(values, f"z: row {row}")])
+        if len(z[-1]) != len(y):
+            raise ValueError(f"z: row {row}: has {len(z[-1])} values, expected {len(y)}")
+    cells: list[tuple[float, float, float, float]] = []
+    axes = tuple(_held(axis) if outside == "hold" else _extended(axis) for axis in (x, y))
+    for i, wide in _spans(x, outside):
+        for j, high in _spans(y, outside):
+            a, b = i + (wide > 0), j + (high > 0)
+            by_x = (z[a][j] - z[i][j]) / wide if wide else 0.0
+            by_y = (z[i][b] - z[i][j]) / high if high else 0.0
+            both = (z[a][b] - z[a][j] - z[i][b] + z[i][j]) / (wide * high) if wide and high else 0.0
+            cells.append((z[i][j], by_x, by_y, both))
+    return Table(name, axes, tuple(zip(*cells, strict=True)))
+
+
+def _held(x: list[float]) -> Axis:
+    return Axis((-FAR, *x, FAR), (x[0], *x))
+
+
+def _extended(x: list[float]) -> Axis:
+    return Axis((-FAR, *x[1:-1], FAR), tuple(x[:-1]))
+
+
+def _spans(x: list[float], outside: str) -> list[tuple[int, float]]:
+    """Return for each segment the row where it begins, and its width; 0: the value is held."""
+    inside = [(i, high - low) for i, (low, high) in enumerate(pairwise(x))]
+    return [(0, 0.0), *inside, (len(x) - 1, 0.0)] if outside == "hold" else inside

@@ -1,0 +1,246 @@
+"""Tables of files with equations: interpolation, what lies outside, stops at the rows, files."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
+
+from tests.equations.compiled import Model, ModelFileError, read_text
+from tests.equations.examples import METHODS, build, simulated
+
+EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+X, Y = [0.0, 10.0, 20.0, 40.0], [3.0, 2.5, 1.0, 0.25]
+LISTS = f"x = {X}\ny = {Y}\n"
+MOTOR = """
+name = "Motor"
+[tables.T]
+x = [0, 10, 20, 40]
+y = [3.0, 2.5, 1.0, 0.25]
+outside = "OUTSIDE"
+unit = { x = "rad/s", y = "N.m" }
+[parameters]
+J = { start = 0.05, unit = "kg.m2" }
+d = { start = 0.02, unit = "N.m.s" }
+[inputs]
+load = { unit = "N.m" }
+[states]
+w = { start = -5, unit = "rad/s", derivative = "(T(w) - d * w - load) / J" }
+[outputs]
+torque = { value = "T(w)", unit = "N.m" }
+"""
+
+
+def built(folder: Path, text: str) -> Path:
+    """The FMU of a text."""
+    name = text.split('"')[1]
+    (folder / f"{name}.toml").write_text(text)
+    return build(folder / f"{name}.toml", folder)
+
+
+def segments(outside: str) -> list[tuple[float, float, float, float]]:
+    """Begin and end of each line of the table, and the line a + b w."""
+    slopes = np.diff(Y) / np.diff(X)
+    lines = [(X[i], X[i + 1], Y[i] - slopes[i] * X[i], slopes[i]) for i in range(3)]
+    if outside == "hold":
+        return [(-np.inf, 0.0, Y[0], 0.0), *lines, (40.0, np.inf, Y[-1], 0.0)]
+    return [(-np.inf, *lines[0][1:]), lines[1], (lines[2][0], np.inf, *lines[2][2:])]
+
+
+def speed(times: np.ndarray, outside: str, load: float) -> np.ndarray:
+    """w of J w' = a + b w - d w - load, from line to line; it is monotone."""
+    J, d, w, t, found = 0.05, 0.02, -5.0, 0.0, []
+    lines = segments(outside)
+    place = next(i for i, line in enumerate(lines) if line[0] <= w < line[1])
+    for goal in times:
+        while True:
+            low, high, a, b = lines[place]
+            rate, end = (b - d) / J, (a - load) / (d - b)
+            limit = high if end > w else low
+            left = np.inf
+            if (end - limit) * (limit - w) > 0:
+                left = np.log((limit - end) / (w - end)) / rate
+            if t + left > goal:
+                found.append(end + (w - end) * np.exp(rate * (goal - t)))
+                w, t = found[-1], goal
+                break
+            w, t, place = limit, t + left, place + (1 if limit == high else -1)
+    return np.array(found)
+
+
+@EACH_METHOD
+@pytest.mark.parametrize("outside", ["hold", "extend"])
+@pytest.mark.parametrize("load", [0.0, -4.0])
+def test_a_motor_runs_up_along_its_curve(
+    tmp_path: Path, method: int, outside: str, load: float
+) -> None:
+    fmu = built(tmp_path, MOTOR.replace("OUTSIDE", outside))
+    start = {"solver_method": method, "load": load}
+    run = simulated(fmu, 3.0, 0.01, start, relative_tolerance=1e-11, also=["event_count"])
+    exact = speed(run["time"], outside, load)
+    assert np.max(np.abs(run["w"] - exact)) < 1e-8
+    knots = np.array(X if outside == "hold" else X[1:-1])
+    assert run["event_count"][-1] == np.sum((exact.min() < knots) & (knots < exact.max()))
+
+
+SIGNALS = """
+name = "Signals"
+[tables.line]
+x = [0.5, 1.0, 1.7, 3.0]
+y = [1.0, -2.0, 0.5, 4.0]
+[tables.stair]
+x = [0.5, 1.0, 1.7, 3.0]
+y = [1.0, -2.0, 0.5, 4.0]
+interpolation = "previous"
+[tables.curve]
+x = [0.5, 1.0, 1.7, 3.0]
+y = [1.0, -2.0, 0.5, 4.0]
+interpolation = "pchip"
+outside = "extend"
+[inputs]
+u = {}
+[states]
+a = { derivative = "line(time)" }
+b = { derivative = "stair(time)" }
+c = { derivative = "curve(u) * 0 + curve(time)" }
+[outputs]
+now = { value = "line(u)" }
+"""
+ROWS = np.array([0.5, 1.0, 1.7, 3.0]), np.array([1.0, -2.0, 0.5, 4.0])
+
+
+@EACH_METHOD
+def test_integrals_over_tables_of_the_time_are_exact(tmp_path: Path, method: int) -> None:
+    run = simulated(
+        built(tmp_path, SIGNALS), 4.0, 0.1, {"solver_method": method}, relative_tolerance=1e-11
+    )
+    x, y = ROWS
+    grid = np.unique(np.concatenate([x, run["time"]]))
+    middle = (grid[1:] + grid[:-1]) / 2
+    width = np.diff(grid)
+    stairs = y[np.clip(np.searchsorted(x, middle, side="right") - 1, 0, 3)]
+    for name, rates in (("a", np.interp(middle, x, y)), ("b", stairs)):
+        whole = np.concatenate([[0.0], np.cumsum(rates * width)])
+        assert np.max(np.abs(run[name] - whole[np.searchsorted(grid, run["time"])])) < 1e-9, name
+    curve = PchipInterpolator(x, y)
+    primitive = curve.antiderivative()
+    assert np.max(np.abs(run["c"] - (primitive(run["time"]) - primitive(0.0)))) < 1e-8
+
+
+def test_a_table_of_an_input_follows_at_once(tmp_path: Path) -> None:
+    times = np.array([0.0, 0.4, 0.4, 1.0, 3.0])
+    u = np.array([0.0, 0.9, 2.9, 1.2, 5.0])
+    signal = np.array(list(zip(times, u, strict=True)), [("time", "f8"), ("u", "f8")])
+    run = simulated(built(tmp_path, SIGNALS), 3.0, 0.05, {}, input=signal)
+    # a step holds the input of its begin
+    exact = np.interp(np.interp(run["time"] - 0.05, times[2:], u[2:]), *ROWS)
+    rows = run["time"] > 0.46
+    assert np.max(np.abs(run["now"][rows] - exact[rows])) < 1e-12
+
+
+@pytest.mark.parametrize("kind", ["linear", "previous", "pchip"])
+@pytest.mark.parametrize("outside", ["hold", "extend", "error"])
+def test_values_without_states_are_scipys(tmp_path: Path, kind: str, outside: str) -> None:
+    text = f'name = "M"\n[tables.T]\n{LISTS}interpolation = "{kind}"\noutside = "{outside}"\n'
+    model = Model(tmp_path, text + '[inputs]\nu = {}\n[outputs]\ny = { value = "T(u)" }\n')
+    curve = PchipInterpolator(X, Y) if kind == "pchip" else None
+    for u in (-3.0, -0.0, 0.0, 4.0, 10.0, 13.3, 20.0, 39.999, 40.0, 47.0):
+        values = model.values(u=u)
+        model.outputs(values, 0.0)
+        found = values[model.names.index("y")]
+        held = float(np.clip(u, 0.0, 40.0))
+        where = u if outside == "extend" and kind != "previous" else held
+        if kind == "pchip":
+            exact = curve(where, extrapolate=True)
+        elif kind == "previous":
+            exact = Y[int(np.searchsorted(X, where, side="right")) - 1]
+        else:
+            i = int(np.clip(np.searchsorted(X, where, side="right") - 1, 0, 2))
+            exact = Y[i] + (Y[i + 1] - Y[i]) / (X[i + 1] - X[i]) * (where - X[i])
+        if outside == "error" and not 0.0 <= u <= 40.0:
+            exact = np.nan
+        assert found == pytest.approx(float(exact), rel=1e-14, abs=1e-14, nan_ok=True), u
+
+
+def test_a_table_of_two_arguments_is_bilinear(tmp_path: Path) -> None:
+    x, y = [0.0, 1.0, 3.0], [-1.0, 0.5, 2.0, 4.0]
+    z = np.random.default_rng(3).normal(size=(3, 4)).tolist()
+    text = f'name = "M"\n[tables.Z]\nx = {x}\ny = {y}\nz = {z}\n[inputs]\na = {{}}\nb = {{}}\n'
+    model = Model(tmp_path, text + '[outputs]\nv = { value = "Z(a, b)" }\n')
+    exact = RegularGridInterpolator((x, y), np.array(z))
+    for a, b in ((0.3, 0.7), (2.9, 3.9), (1.0, 0.5), (3.0, 4.0), (-5.0, 1.0), (2.0, 9.0)):
+        values = model.values(a=a, b=b)
+        model.outputs(values, 0.0)
+        held = exact((np.clip(a, 0.0, 3.0), np.clip(b, -1.0, 4.0)))
+        assert values[model.names.index("v")] == pytest.approx(float(held), rel=1e-13)
+
+
+LONG = """
+name = "Long"
+[tables.road]
+file = "road.csv"
+x = "way"
+y = "height"
+[states]
+s = { derivative = "20 + 10 * sin(time)" }
+h = { derivative = "road(s) - h" }
+[outputs]
+height = { value = "road(s)" }
+"""
+
+
+def test_a_hundred_thousand_rows_of_a_file(tmp_path: Path) -> None:
+    """A road of 1 mm rows, driven over at 30 m/s: a hundred rows in 3 ms."""
+    way = np.arange(100_000) * 0.001
+    height = np.sin(way) + 0.001 * np.random.default_rng(1).normal(size=len(way))
+    rows = "".join(f"{a!r}, {b!r}\n" for a, b in zip(way.tolist(), height.tolist(), strict=True))
+    (tmp_path / "road.csv").write_text("way, height\n" + rows)
+    run = simulated(built(tmp_path, LONG), 0.5, 0.1, {"max_events": 10**6}, also=["event_count"])
+    t = run["time"]
+    s = 20 * t + 10 * (1 - np.cos(t))
+    assert np.max(np.abs(run["height"] - np.interp(s, way, height))) < 1e-5
+    assert abs(run["event_count"][-1] - np.floor(s[-1] / 0.001)) <= 1
+
+
+MISTAKES = {
+    "one row": ("x = [1]\ny = [2]", "[tables.T]: x: has 1 rows, expected two at least"),
+    "order": ("x = [1, 3, 2]\ny = [0, 0, 0]", "x: row 3: expected more than 3.0, got 2.0"),
+    "twice": ("x = [1, 1]\ny = [0, 0]", "x: row 2: expected more than 1.0, got 1.0"),
+    "nan": ("x = [1, nan]\ny = [0, 0]", "x: row 2: expected a finite number"),
+    "text": ('x = [1, "2"]\ny = [0, 0]', "x: row 2: expected a number"),
+    "lengths": ("x = [1, 2]\ny = [0]", "y: has 1 values, expected 2, as x has"),
+    "no y": ("x = [1, 2]", "y: expected a list of numbers"),
+    "kind": ('x = [1, 2]\ny = [0, 0]\ninterpolation = "cubic"', "expected one of linear, previous"),
+    "outside": ('x = [1, 2]\ny = [0, 0]\noutside = "wrap"', "outside: expected one of hold, ext"),
+    "key": ("x = [1, 2]\ny = [0, 0]\nw = 1", "unknown key 'w', expected one of x, y, z, file"),
+    "rows of z": ("x = [1, 2]\ny = [0, 1]\nz = [[1, 2]]", "z: expected 2 rows, one for each x"),
+    "row of z": ("x = [1, 2]\ny = [0, 1]\nz = [[1, 2], [3]]", "z: row 2: has 1 values, expected 2"),
+    "no file": ('x = "a"\ny = "b"\nfile = "none.csv"', "file: none.csv: no such file"),
+    "folder": ('x = "a"\ny = "b"\nfile = "."', "no such file"),
+    "column": ('x = "c"\ny = "b"\nfile = "f.csv"', "x: f.csv has no column 'c' (has: a, b, b)"),
+    "columns": ('x = "a"\ny = "b"\nfile = "f.csv"', "y: f.csv has no column 'b'"),
+    "cell": ('x = "a"\ny = "d"\nfile = "g.csv"', "y: g.csv: line 3: expected a finite number, got"),
+    "bytes": ('x = "a"\ny = "d"\nfile = "h.csv"', "file: h.csv: is no CSV in UTF-8"),
+    "names": ('x = 1\ny = "d"\nfile = "g.csv"', "x: expected the name of a column of g.csv"),
+    "unit": ("x = [1, 2]\ny = [0, 0]\nunit = { x = 'm2/q' }", "'q' is no SI symbol"),
+    "unit key": ("x = [1, 2]\ny = [0, 0]\nunit = { z = 'm' }", "unit: unknown key 'z', expected x"),
+    "unit of x": (
+        "x = [1, 2]\ny = [0, 0]\nunit = { x = 'm' }\n[inputs]\nu = { unit = 's' }\n"
+        "[where]\na = 'T(u)'",
+        "[where]: a: column 1: T takes unit m, got s",
+    ),
+    "arguments": ("x = [1, 2]\ny = [0, 0]\n[where]\na = 'T(1, 2)'", "T: expected 1 argument, got"),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_in_a_table_is_one_line(name: str, tmp_path: Path) -> None:
+    (tmp_path / "f.csv").write_text("a,b,b\n1,2,3\n")
+    (tmp_path / "g.csv").write_text("a,d\n1,2\n2,inf\n")
+    (tmp_path / "h.csv").write_bytes(b"a,d\n\xff\xfe\n")
+    content, expected = MISTAKES[name]
+    text = f'name = "M"\n[tables.T]\n{content}\n'
+    with pytest.raises(ModelFileError) as refused:
+        read_text(tmp_path, text if "[where]" in content else text + "[inputs]\nv = {}\n")
+    message = str(refused.value)
+    assert expected in message and "\n" not in message and len(message) < 500
