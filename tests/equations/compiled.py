@@ -25,6 +25,11 @@ __all__ = [
 BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).parent
 LENGTH = 32  # SERIES_LENGTH
 WORDS = ["size"] + [f"{part}_{key}" for part in "puxd" for key in ("offset", "size")]
+# of struct model_events, up to this one
+WORDS_OF_EVENTS = ["indicator_count", "indicator_names"]
+WORDS_OF_EVENTS += [f"{part}_{key}" for part in ("modes", "discrete_states", "discrete_inputs")
+                    for key in ("offset", "size")]  # fmt: skip
+WORDS_OF_EVENTS += ["starts_follow", "next_time"]
 WORDS += ["right_hand_side", "jacobian", "series", "outputs", "propagate", "check", "events"]
 
 
@@ -84,6 +89,12 @@ class Model:
         ]
         function.argtypes = [type(a) for a in converted]
         assert function(*converted) == 0
+
+    def next_time(self, values: np.ndarray) -> float:
+        """The time of the next time event, s."""
+        words = ctypes.cast(self.words.events, ctypes.POINTER(ctypes.c_size_t))
+        function = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p)
+        return function(words[WORDS_OF_EVENTS.index("next_time")])(values.ctypes.data)
 
     def outputs(self, values: np.ndarray, t: float) -> None:
         """Write the calculated fields."""

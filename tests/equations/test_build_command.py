@@ -168,7 +168,7 @@ def test_the_pendulum_swings(tmp_path: Path) -> None:
 def test_it_names_all_sections_and_functions(tmp_path: Path) -> None:
     assert all(f"`[{section}]`" in PAGE for section in ("parameters", "inputs", "states", "where"))
     line = re.search(r"`(sin cos .*?)`", PAGE)[1]
-    calls = " + ".join(f"{f}(p, p)" if f in ("atan2", "min", "max") else f"{f}(p)"
+    calls = " + ".join(f"{f}(p, p)" if f in ("atan2", "hypot", "min", "max") else f"{f}(p)"
                        for f in line.split())  # fmt: skip
     Model(tmp_path, f'name = "M"\n[parameters]\np = {{ start = 1 }}\n[where]\na = "{calls}"\n')
     unit = re.search(r'`("dyn" = .*?)`', PAGE)[1]

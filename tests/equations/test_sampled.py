@@ -105,14 +105,11 @@ def test_samplers_of_one_instant_run_in_the_order_of_the_file(folder: Path) -> N
 def test_ticks_do_not_drift_in_a_thousand_million(tmp_path: Path) -> None:
     """Time of the next tick: start + (offset + k every), rounded three times."""
     model = Model(tmp_path, COUNTERS)
-    events = ctypes.cast(model.words.events, ctypes.POINTER(ctypes.c_size_t))
-    words = [events[i] for i in range(16)]
-    next_time = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p)(words[8])
     for start, every, k in ((0.0, 0.1, 10**9), (3.7, 1 / 3, 123456789), (1.7e9, 0.01, 10**6)):
         given = {"T": every, "start": start, "ticks_fast": k, "ticks_slow": 1e12}
         values = model.values(**given, ticks_late=1e12)
         values.view(np.int32)[2 * len(model.names)] = 1  # is_begun
-        assert next_time(values.ctypes.data) == start + (0.0 + k * every)
+        assert model.next_time(values) == start + (0.0 + k * every)
 
 
 def pid(stop: float, m: float = 1.3, period: float = 0.01) -> np.ndarray:
