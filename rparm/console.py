@@ -36,8 +36,11 @@ def results_stream(as_json: bool, quiet: bool) -> Iterator[TextIO | None]:
     try:
         with ExitStack() as stack:
             if real is not None and (as_json or quiet):
-                text = {"encoding": "utf-8", "errors": "backslashreplace", "newline": "\n"}
-                null = stack.enter_context(Path(os.devnull).open("w", **text))
+                null = stack.enter_context(
+                    Path(os.devnull).open(
+                        "w", encoding="utf-8", errors="backslashreplace", newline="\n"
+                    )
+                )
                 elsewhere = null if quiet or sys.stderr is None else sys.stderr
                 real = stack.enter_context(_apart(real, elsewhere))
                 stack.enter_context(redirect_stdout(elsewhere))

@@ -81,8 +81,9 @@ def run_group(command: Sequence[object], **options: Any) -> subprocess.Completed
     child = None
     try:
         with uninterrupted():
-            group = 0 if os.name == "posix" else None
-            child = subprocess.Popen(command, process_group=group, **options)
+            child = subprocess.Popen(
+                command, process_group=0 if os.name == "posix" else None, **options
+            )
         output, errors = child.communicate()
     except BaseException:
         if child is not None:
