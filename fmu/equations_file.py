@@ -489,8 +489,9 @@ def _read_functions(file: ModelFile, entries: dict[str, object]) -> None:
             _check_function_name(name, file)
             given = _entries(entry, ("arguments", "value"), "value")
             arguments = given.get("arguments", [])
-            if not arguments or len({*arguments}) < len(arguments):
-                raise ModelFileError("arguments: expected names, each once")
+            are_names = all(NAME.fullmatch(a) and a not in RESERVED for a in arguments)
+            if not arguments or not are_names or len({*arguments}) < len(arguments):
+                raise ModelFileError("arguments: expected names, each once and none reserved")
             value = file.expression(("value",), given["value"])
             for node in in_order([value.tree]):
                 if node.op == "name" and node.name not in (*arguments, *CONSTANTS):
@@ -555,6 +556,8 @@ def _texts_of(section: str, entry: object) -> tuple[str, object, dict[str, objec
     if section == "parameters" and "value" in entry:
         return FOLLOWS, entry, {}
     if entry.get("type") == BOOLEAN and section in ("parameters", "inputs"):
+        if type(entry.get("start", False)) is not bool:
+            raise ModelFileError(f"start: expected true or false, got {shown(entry['start'])}")
         return OPTIONS if section == "parameters" else SWITCHES, entry, {}
     if section in ("states", "discrete") and isinstance(entry.get("start"), str):
         return section, {k: v for k, v in entry.items() if k != "start"}, {"start": entry["start"]}
@@ -570,6 +573,8 @@ def _check_name(name: str, file: ModelFile) -> None:
         raise ModelFileError(f"this name is in {file.variables[name].place} already")
     if name in file.modes:
         raise ModelFileError("this name is in modes already")
+    if name in file.functions:
+        raise ModelFileError("this name is a function or table already")
     if len(file.variables) + len(file.modes) + len(file.changes) >= MOST_VARIABLES:
         raise ModelFileError(
             f"has more than {MOST_VARIABLES} variables, modes, samplers and events"
@@ -597,7 +602,7 @@ def _read_sampler(file: ModelFile, name: str, entry: object) -> None:
         file.expression((place, key), given.get(key, "0"), NUMBER, "time")
         for key in ("every", "offset")
     )
-    if not ("set" in given or "reinit" in given):
+    if not (given.get("set") or given.get("reinit")):
         raise ModelFileError(f"{place}: expected set or reinit: what it does")
     file.sampled.append(Sampler(name, *_given(file, place, given, "then"), every, offset))
 
@@ -719,19 +724,23 @@ def _in_order(file: ModelFile) -> list[Expression]:
 
 
 def _check_periods(file: ModelFile) -> None:
-    """Check that samplers tick with the start values of the parameters."""
+    """Check that samplers tick, and starts exist, with the start values of the parameters."""
     starts = {variable.name: variable.start for variable in file.of("parameters", OPTIONS)}
     follows = {variable.expression for variable in file.of(FOLLOWS)}
     for expression in file.order:
         if expression in follows:
             starts[expression.target] = _number(expression, starts)
+    for variable in file.started:
+        with placed(*variable.initial.place):
+            if not math.isfinite(_number(variable.initial, starts)):
+                raise ModelFileError("is not a finite number at the start values")
     for sampler in file.sampled:
         every, offset = (_number(expression, starts) for expression in sampler.periods)
         with placed(*sampler.every.place):
-            if not every > 0:
+            if not 0 < every < math.inf:
                 raise ModelFileError(f"is {every:g} s at the start values, expected more than 0")
         with placed(*sampler.offset.place):
-            if not offset >= 0:
+            if not 0 <= offset < math.inf:
                 raise ModelFileError(f"is {offset:g} s at the start values, expected 0 or more")
 
 

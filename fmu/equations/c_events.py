@@ -144,6 +144,7 @@ class Events:
             + len(file.modes),
             **self._segments(places),
             samplers=len(file.sampled),
+            state_names=", ".join([text(x.name) for x in states] or ["NULL"]),
             sampler_names=", ".join([text(s.name) for s in file.sampled] or ["NULL"]),
             discrete=", ".join(
                 [f"offsetof(struct equations_values, {self.discrete[0]})"]

@@ -27,6 +27,8 @@ Item = TypeVar("Item", bound=Any)  # hashable, with `arguments` of its own kind
 NUMBER, CONDITION = "a number", "a condition"
 LOGIC = ("and", "or", "not")
 DEEPEST = 100  # levels of brackets and other nesting
+ONE = "1"  # name of an operation whose value has this unit
+MOST_OPERATIONS = 10_000  # that functions make of an expression: they multiply
 DERIVATIVE = "der"  # of a state, in front of a bracket
 SPACE = re.compile(r"\s*")
 TOKEN = re.compile(
@@ -156,6 +158,7 @@ class Function:
 
     arguments: tuple[str, ...]
     body: Node
+    has_unit_one: bool = False  # its value takes no other unit, although it is made of numbers
 
     def of(self, given: Sequence[Node], column: int) -> Node:
         """Return its expression for these arguments; mistakes in it are at this column."""
@@ -167,7 +170,8 @@ class Function:
             else:
                 arguments = tuple(found[argument] for argument in node.arguments)
                 found[node] = replace(node, column=column, arguments=arguments)
-        return found[self.body]
+        found_body = found[self.body]
+        return replace(found_body, name=ONE) if self.has_unit_one else found_body
 
 
 @dataclass(frozen=True)
@@ -214,6 +218,7 @@ class _Parser:
         self._tokens, self._functions = iter(tokens), functions
         self.token = next(self._tokens)
         self._depth = 0
+        self._operations = 0  # that functions stand for
 
     def take(self) -> Token:
         """Return the current token, and go to the next one."""
@@ -308,10 +313,19 @@ class _Parser:
             text = f"{function.text}: expected {wanted}, got {len(arguments)}"
             raise ExpressionError(function.column, text)
         if further:
-            return further.of(arguments, function.column)
+            return self.expanded(further, arguments, function.column)
         if count:
             return Node(function.text, function.column, tuple(arguments))
         return reduce(lambda a, b: Node(function.text, function.column, (a, b)), arguments)
+
+    def expanded(self, function: Function | Lookup, arguments: list[Node], column: int) -> Node:
+        """Return the expression that a call stands for; those that multiply are refused."""
+        if isinstance(function, Function):
+            self._operations += len(in_order([function.body]))
+        if self._operations > MOST_OPERATIONS:
+            text = f"functions make more than {MOST_OPERATIONS} operations of this expression"
+            raise ExpressionError(column, text)
+        return function.of(arguments, column)
 
     def derivative(self, function: Token) -> Node:
         """Parse the state whose derivative is meant."""
@@ -337,6 +351,8 @@ for _name, _arguments, _body in (
     ("cbrt", "x", f"x**{1 / 3!r} if x >= 0 else -(-x)**{1 / 3!r}"),
 ):
     FURTHER[_name] = Function(tuple(_arguments.split()), parse(_body))
+_sign = FURTHER["sign"]
+FURTHER["sign"] = replace(_sign, has_unit_one=True)
 
 
 # ---- Values --------------------------------------------------------------------------------------

@@ -106,7 +106,8 @@ def _unit(node: Node, given: list[Unit | None], units: Mapping[str, Unit]) -> Un
         _same(node, given)
         return ONE
     if node.op == "if":
-        return _same(node, given[1:])
+        unit = _same(node, given[1:])
+        return ONE if node.name else unit
     if node.op == "**":
         return _power(node, given)
     if node.op == "sqrt":

@@ -8,6 +8,7 @@
 /* Relative distance of a state from its limit where its event may be located; and of the time. */
 static const double location_error = 1e-11;
 static const double time_error = 1e-12;
+static const double shortest_period = 1e-12; // s, of samplers
 
 /* Arguments of all functions during one event: a model, its values, and memory. */
 struct call {
@@ -312,8 +313,8 @@ static void pass(const struct call *call, const struct event *event) {
 /* Returns true if a sampler with this period and offset (s) can tick from the time t (s) on;
  * otherwise writes the reason. */
 static bool can_tick(const char *name, double every, double offset, const struct event *event) {
-    const double shortest = event_shortest_period(event->t);
-    if (every >= shortest && every > 0.0 && isfinite(every) && offset >= 0.0 && isfinite(offset)) {
+    const double shortest = fmax(event_shortest_period(event->t), shortest_period);
+    if (every >= shortest && isfinite(every) && offset >= 0.0 && isfinite(offset)) {
         return true;
     }
     if (event->reason != NULL && !(offset >= 0.0 && isfinite(offset))) {
@@ -321,9 +322,9 @@ static bool can_tick(const char *name, double every, double offset, const struct
                        "sampler %s: offset = %g s is refused: it must be 0 or more", name, offset);
     } else if (event->reason != NULL) {
         (void)snprintf(event->reason, event->reason_size,
-                       "sampler %s: every = %g s is refused: it must be above 0, and %g s or more "
-                       "at a start time of %g s",
-                       name, every, shortest, event->t);
+                       "sampler %s: every = %g s is refused: at a start time of %g s it must be "
+                       "%g s or more",
+                       name, every, event->t, shortest);
     }
     return false;
 }
@@ -343,6 +344,25 @@ static enum status start_samplers(const struct call *call, const struct event *e
         discrete[0] = event->t;
     }
     return STATUS_OK;
+}
+
+/* Writes start values that follow from parameters, and starts the samplers. */
+static enum status start(const struct call *call, const struct event *event) {
+    const struct relations *model = call->model;
+    if (model->start != NULL) {
+        model->start(call->values);
+    }
+    const double *x = (const double *)(const void *)((const char *)call->values + model->states);
+    for (int i = 0; i < model->state_count; i++) {
+        if (!isfinite(x[i])) {
+            if (event->reason != NULL) {
+                (void)snprintf(event->reason, event->reason_size,
+                               "the start value of %s is not finite", model->state_names[i]);
+            }
+            return STATUS_NOT_FINITE;
+        }
+    }
+    return start_samplers(call, event);
 }
 
 /* Returns STATUS_NOT_FINITE, with the reason, if a discrete variable is not finite. */
@@ -369,10 +389,7 @@ enum status relations_update(const struct relations *model, struct relations_roo
     double *tolerance = room.tolerance;
     const int was_begun = *call.is_begun;
     if (!was_begun) {
-        if (model->start != NULL) {
-            model->start(values);
-        }
-        const enum status status = start_samplers(&call, event);
+        const enum status status = start(&call, event);
         if (status != STATUS_OK) {
             return status;
         }

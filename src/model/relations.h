@@ -57,6 +57,7 @@ struct relations {
     const struct relation *relation;
     const struct segment *segment;
     const double *nominal; /* of each state */
+    const char *const *state_names;
     const char *const *sampler_names;
     const char *const *discrete_names; /* of the discrete variables */
 

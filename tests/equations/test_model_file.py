@@ -106,6 +106,38 @@ MISTAKES = {
     "function of a variable": (
         STATE + '[functions]\nf = { arguments = ["a"], value = "a * x" }', "'x' is no argument",
     ),
+    "functions that multiply": (
+        STATE + '[functions]\nf0 = { arguments = ["a"], value = "a * a" }\n' + "".join(
+            f'f{i} = {{ arguments = ["a"], value = "f{i - 1}(a) + f{i - 1}(a)" }}\n'
+            for i in range(1, 40)
+        ),
+        "functions make more than 10000 operations of this expression",
+    ),
+    "argument": (
+        STATE + '[functions]\nf = { arguments = ["a b"], value = "1" }', "arguments: expected na",
+    ),
+    "argument that is a function": (
+        STATE + '[functions]\nf = { arguments = ["sin"], value = "sin(sin)" }', "none reserved",
+    ),
+    "name of a function": (
+        STATE + '[functions]\nf = { arguments = ["a"], value = "a" }\n[inputs]\nf = {}',
+        "[inputs]: f: this name is a function or table already",
+    ),
+    "unit of a sign": (
+        HEAD + '[inputs]\nx = { unit = "m" }\n[where]\nq = "sign(x) + x"',
+        "q: column 9: '+': units 1 and m do not fit",
+    ),
+    "start without value": (
+        HEAD + '[states]\nx = { start = "log(-1)", derivative = "1" }',
+        "[states]: x: start: is not a finite number at the start values",
+    ),
+    "endless period": (
+        SAMPLED + 'every = "1e308 * 10"\nset = { u = "1" }', "every: is inf s at the start values",
+    ),
+    "sampler that sets nothing": (SAMPLED + 'every = "1"\nset = {}', "expected set or reinit"),
+    "Boolean in quotes": (
+        HEAD + '[inputs]\nu = { type = "Boolean", start = "true" }', "expected true or false, got",
+    ),
     "recursion": (
         STATE + '[functions]\nf = { arguments = ["a"], value = "f(a - 1)" }', "no function 'f'",
     ),
