@@ -10,7 +10,9 @@ from shutil import copy
 
 import fmpy
 import numpy as np
+from fmpy.fmi2 import FMU2Slave
 
+from tests.support.instances import Instance, LoadedFmu
 from tests.support.paths import ROOT
 
 FOLDER = ROOT / "examples" / "models"
@@ -55,3 +57,17 @@ def simulated(
         output=[*outputs, *options.pop("also", [])],
         **options,
     )
+
+
+@cache
+def loaded(fmu: Path) -> LoadedFmu:
+    """An FMU, unpacked once: its library stays where it was loaded from."""
+    return LoadedFmu(fmu, fmu.parent / "unpacked" / fmu.stem)
+
+
+def initializing(fmu: Path, kind: type = FMU2Slave) -> Instance:
+    """An instance of an FMU of FMI 2.0 at time 0, in initialization mode."""
+    instance = Instance(loaded(fmu), kind)
+    instance.fmi.setupExperiment(startTime=0.0, tolerance=1e-11)
+    instance.fmi.enterInitializationMode()
+    return instance

@@ -2,14 +2,12 @@
 
 from pathlib import Path
 
-import fmpy
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Model, FMU2Slave
 
 from rparm import api
-from tests.equations.examples import METHODS, build, simulated
+from tests.equations.examples import METHODS, build, initializing, simulated
 from tests.support.rparm_project import Console
 
 TEXT = """
@@ -59,18 +57,10 @@ def test_a_state_starts_where_its_parameters_say(fmu: Path, method: int, kind: s
     assert set(run["largest"]) == {4.0}
 
 
-def initializing(fmu: Path) -> tuple[FMU2Slave | FMU2Model, dict[str, int]]:
-    """An instance in initialization mode, and its value references."""
-    description = fmpy.read_model_description(fmu)
-    instance = fmpy.instantiate_fmu(fmpy.extract(fmu), description)
-    instance.setupExperiment(startTime=0.0)
-    instance.enterInitializationMode()
-    return instance, {v.name: v.valueReference for v in description.modelVariables}
-
-
 def test_values_follow_while_parameters_are_set(fmu: Path) -> None:
     """In initialization mode all values and their derivatives follow at once, later k does."""
-    instance, at = initializing(fmu)
+    begun = initializing(fmu)
+    instance, at = begun.fmi, begun.loaded.references
     for l0, phi0 in ((1.0, 0.5), (3.0, -0.2)):
         instance.setReal([at["l0"], at["phi0"]], [l0, phi0])
         x, largest, k = instance.getReal([at["x"], at["largest"], at["k"]])
@@ -92,19 +82,21 @@ def test_values_follow_while_parameters_are_set(fmu: Path) -> None:
 
 
 def test_an_importer_cannot_set_a_start_that_follows(fmu: Path) -> None:
-    instance, at = initializing(fmu)
+    begun = initializing(fmu)
+    instance, at = begun.fmi, begun.loaded.references
     with pytest.raises(FMICallException):
         instance.setReal([at["x"]], [1.0])
 
 
 def test_a_start_that_follows_survives_serialization(fmu: Path) -> None:
-    first, at = initializing(fmu)
+    begun = initializing(fmu), initializing(fmu)
+    first, second = (instance.fmi for instance in begun)
+    at = begun[0].loaded.references
     first.setReal([at["l0"]], [2.5])
     first.exitInitializationMode()
     for i in range(7):
         first.doStep(i * 0.1, 0.1)
     content = first.serializeFMUstate(first.getFMUstate())
-    second, _ = initializing(fmu)
     second.exitInitializationMode()
     second.setFMUstate(second.deSerializeFMUstate(content))
     for instance in (first, second):

@@ -11,7 +11,7 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave
 from scipy.linalg import expm
 
 from tests.equations.compiled import Model
-from tests.equations.examples import METHODS, build, simulated
+from tests.equations.examples import METHODS, build, initializing, simulated
 
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 COUNTERS = """
@@ -227,25 +227,11 @@ def test_a_digital_filter_has_no_states(folder: Path) -> None:
         )
 
 
-def names_of(fmu: Path) -> dict[str, int]:
-    variables = fmpy.read_model_description(fmu).modelVariables
-    return {variable.name: variable.valueReference for variable in variables}
-
-
-def begun(fmu: Path, kind: str) -> FMU2Slave | FMU2Model:
-    """An instance at time 0, initialized."""
-    description = fmpy.read_model_description(fmu)
-    instance = fmpy.instantiate_fmu(fmpy.extract(fmu), description, fmi_type=kind)
-    instance.setupExperiment(startTime=0.0, tolerance=1e-11)
-    instance.enterInitializationMode()
-    instance.exitInitializationMode()
-    return instance
-
-
 def test_an_importer_that_moves_the_mass_itself_gets_all_ticks(folder: Path) -> None:
     """Model Exchange: tick k is due at k Ts, and the force follows from the states set there."""
-    instance, rows = begun(made(folder, PID), "ModelExchange"), pid(1.0)
-    reference = names_of(made(folder, PID))["u"]
+    begun, rows = initializing(made(folder, PID), FMU2Model), pid(1.0)
+    instance, reference = begun.fmi, begun.loaded.references["u"]
+    instance.exitInitializationMode()
     for k, (_, _, force) in enumerate(rows[:-1]):
         needed, terminates, _, changed, is_defined, time = instance.newDiscreteStates()
         assert (needed, terminates, changed, is_defined) == (False, False, False, True)
@@ -262,8 +248,12 @@ def test_an_importer_that_moves_the_mass_itself_gets_all_ticks(folder: Path) -> 
 
 def test_ticks_survive_a_rollback_and_a_move_to_another_instance(folder: Path) -> None:
     fmu = made(folder, PID)
-    references = [names_of(fmu)[name] for name in ("x", "v", "u", "sum", "last")]
-    first, second = begun(fmu, "CoSimulation"), begun(fmu, "CoSimulation")
+    begun = initializing(fmu), initializing(fmu)
+    first, second = (instance.fmi for instance in begun)
+    names = begun[0].loaded.references
+    references = [names[name] for name in ("x", "v", "u", "sum", "last")]
+    for instance in (first, second):
+        instance.exitInitializationMode()
     at = [0.0]
 
     def advance(instance: FMU2Slave, steps: int) -> list[float]:
