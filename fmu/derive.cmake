@@ -16,7 +16,7 @@ function(derive target)
     list(APPEND modes --mode ${mode})
   endforeach()
   set(folders $<TARGET_PROPERTY:${target},INCLUDE_DIRECTORIES>)
-  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/plain_c/*.py ${FMU_SOURCE_DIR}/equations/*.py
+  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/plain_c/*.py ${FMU_SOURCE_DIR}/equations/*.py ${FMU_SOURCE_DIR}/equations_tables.py
        ${PROJECT_SOURCE_DIR}/rparm/expressions/*.py)
   add_custom_command(
     OUTPUT ${output}
