@@ -22,7 +22,7 @@ from declaration.load import Declaration, assemble, check
 from document import document
 from equations import declaration, lock
 from equations.model_file import ModelFile
-from equations_file import ModelFileError
+from equations_content import ModelFileError
 from fmi2.model_description import model_description as fmi2_description
 from fmi3.model_description import terminals_and_icons
 from generate import release_files

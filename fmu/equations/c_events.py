@@ -7,7 +7,7 @@ comes to hold in its modes. What all models do with that is in src/model/relatio
 
 from collections.abc import Iterable, Mapping
 
-from equations_file import SWITCHES, Change, ModelFile, Sampler
+from equations_content import SWITCHES, Change, ModelFile, Sampler
 
 from equations.c_code import Code, Leaves, filled, indented, located, text
 from equations.errors import NONE, Errors

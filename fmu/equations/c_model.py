@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from itertools import chain
 
-from equations_file import OPTIONS, ModelFile
+from equations_content import OPTIONS, ModelFile
 
 from equations.c_code import Code, filled, indented, number, text
 from equations.c_events import FIELD, MODE, Events, arrays, leaves

@@ -7,7 +7,8 @@ its value reference. It grows and never changes.
 import tomllib
 from pathlib import Path
 
-from equations_file import NAME, ModelFileError
+from equations_content import ModelFileError
+from equations_file import NAME
 
 from equations.declaration import Key
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import equations_file
-from equations_file import OPTIONS, SWITCHES, ModelFile, ModelFileError
+from equations_content import OPTIONS, SWITCHES, ModelFile, ModelFileError
 
 from equations.graph import Graph
 from rparm.expressions.expression import RELATIONS, derivative_of
