@@ -13,6 +13,7 @@ from declaration.load import shown
 from equations_tables import Table
 
 from rparm.expressions.expression import NUMBER, Function, Lookup, Node, parse
+from rparm.expressions.units import exponents
 
 FOLLOWS = "calculated"  # section of parameters that follow from others
 OPTIONS, SWITCHES = "options", "switches"  # of parameters and inputs that are Booleans
@@ -174,6 +175,10 @@ class ModelFile:
     def expression(self, *given: Any, **more: Any) -> Expression:
         """Read an expression that may call the file's functions."""
         return Expression(*given, **more, functions=self.functions)
+
+    def exponents_of(self, unit: str) -> dict[str, int]:
+        """Return the exponents of a unit, which the file or SI has; ValueError if none has it."""
+        return self.units[unit] if unit in self.units else exponents(unit)
 
     @property
     def has_units(self) -> bool:

@@ -53,7 +53,6 @@ from rparm.expressions.units import (
     ANGLE,
     BASE,
     Unit,
-    exponents,
     table_unit,
     times,
     unit_of,
@@ -109,6 +108,11 @@ TABLES = (
 )
 QUOTES = r"[\s\"']"
 SECOND = unit_of_exponents({"s": 1})
+
+
+def _named(name: str) -> str:
+    """Return a name as messages have it: in quotes if it is none."""
+    return name if NAME.fullmatch(name) else shown(name)
 
 
 def tables_of(path: Path) -> tuple[str, dict[str, Any]]:
@@ -247,7 +251,7 @@ def read_tables(
 
 
 def _read_table(file: ModelFile, name: str, entry: object) -> None:
-    place = f"[tables.{name if NAME.fullmatch(name) else shown(name)}]"
+    place = f"[tables.{_named(name)}]"
     with placed(place):
         _check_function_name(name, file)
         units = entry.get("unit", {}) if isinstance(entry, dict) else {}
@@ -265,7 +269,7 @@ def _read_table(file: ModelFile, name: str, entry: object) -> None:
             if key not in keys:
                 raise ModelFileError(f"unit: unknown key {shown(key)}, expected {', '.join(keys)}")
             unit = units[key]
-            found = file.units[unit] if unit in file.units else exponents(unit)
+            found = file.exponents_of(unit)
             file.table_units[table_unit(name, "" if key == keys[-1] else keys.index(key))] = found
 
 
@@ -277,7 +281,7 @@ def _check_function_name(name: str, file: ModelFile) -> None:
 def _read_functions(file: ModelFile, entries: dict[str, object]) -> None:
     """Read the functions, each of which may call those before it."""
     for name, entry in entries.items():
-        place = ("[functions]", name if NAME.fullmatch(name) else shown(name))
+        place = ("[functions]", _named(name))
         with placed(*place):
             _check_function_name(name, file)
             given = _entries(entry, ("arguments", "value"), "value")
@@ -305,7 +309,7 @@ def _experiment(given: dict[str, float]) -> dict[str, float]:
 
 
 def _read_variable(file: ModelFile, section: str, name: str, entry: object) -> None:
-    place = (f"[{section}]", name if NAME.fullmatch(name) else shown(name))
+    place = (f"[{section}]", _named(name))
     with placed(*place):
         _check_name(name, file)
         given = {"start": 0.0} if section in ("inputs", "states", "discrete") else {}
@@ -315,12 +319,13 @@ def _read_variable(file: ModelFile, section: str, name: str, entry: object) -> N
             section, entry, texts = _texts_of(section, entry)
             given = {} if "start" in texts else given
             given |= _entries(entry, *(OWN_KEYS | SECTIONS)[section])
-            _check_type(given, section)
+            if given.pop("type", None) is None and type(given.get("start")) is bool:
+                raise ModelFileError(f"start: expected a number, got {shown(given['start'])}")
             texts |= {key: given.pop(key) for key in ("derivative", "value") if key in given}
         variable = Variable(name, section, **given)
         with placed("unit"):
             unit = variable.unit or "1"
-            variable.exponents = file.units[unit] if unit in file.units else exponents(unit)
+            variable.exponents = file.exponents_of(unit)
         _check_range(variable)
     for key, text in texts.items():
         whole = (*place, key) if key else place
@@ -332,16 +337,6 @@ def _read_variable(file: ModelFile, section: str, name: str, entry: object) -> N
     file.variables[name] = variable
 
 
-def _check_type(given: dict[str, Any], section: str) -> None:
-    """Check that the start value is of the type, which is no key of a variable."""
-    is_boolean = given.pop("type", None) == BOOLEAN
-    if section == SWITCHES:
-        given["start"] = given["start"] or False
-    if "start" in given and is_boolean != (type(given["start"]) is bool):
-        what = "true or false" if is_boolean else "a number"
-        raise ModelFileError(f"start: expected {what}, got {shown(given['start'])}")
-
-
 def _texts_of(section: str, entry: object) -> tuple[str, object, dict[str, object]]:
     """Take a start value that is an expression from an entry; return its section and the rest."""
     if not isinstance(entry, dict):
@@ -351,7 +346,11 @@ def _texts_of(section: str, entry: object) -> tuple[str, object, dict[str, objec
     if entry.get("type") == BOOLEAN and section in ("parameters", "inputs"):
         if type(entry.get("start", False)) is not bool:
             raise ModelFileError(f"start: expected true or false, got {shown(entry['start'])}")
-        return OPTIONS if section == "parameters" else SWITCHES, entry, {}
+        return (
+            (OPTIONS, entry, {})
+            if section == "parameters"
+            else (SWITCHES, {"start": False} | entry, {})
+        )
     if section in ("states", "discrete") and isinstance(entry.get("start"), str):
         return section, {k: v for k, v in entry.items() if k != "start"}, {"start": entry["start"]}
     return section, entry, {}
@@ -404,7 +403,7 @@ def _change(
     file: ModelFile, section: str, name: str, entry: object, keys: tuple[str, ...]
 ) -> tuple[str, dict[str, Any]]:
     """Return the place of an event or sampler, and its entries; it needs the first of its keys."""
-    place = f"[{section}.{name if NAME.fullmatch(name) else shown(name)}]"
+    place = f"[{section}.{_named(name)}]"
     with placed(place):
         _check_name(name, file)
         return place, _entries(entry, keys, keys[0])

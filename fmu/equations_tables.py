@@ -203,19 +203,14 @@ def _with_outside(
     """Add the segments outside; return the axes and the coefficients by powers."""
     powers = len(inside[0])
     if outside == "extend" and kind != "previous":
-        bounds, origins, rows = [-FAR, *x[1:-1], FAR], x[:-1], inside
-    else:
-        ends = (math.nan, math.nan) if outside == "error" else (y[0], y[-1])
-        below, above = ([(end,) + (0.0,) * (powers - 1)] for end in ends)
-        # the last row itself is inside
-        last = math.nextafter(x[-1], math.inf) if outside == "error" else x[-1]
-        bounds, origins = [-FAR, *x[:-1], last, FAR], [x[0], *x[:-1], x[-1]]
-        rows = [*below, *inside, *above]
-        if kind == "previous" and outside == "error":
-            bounds, origins, rows = bounds[:-2] + [x[-1], last, FAR], [*origins, x[-1]], [
-                *below, *inside, (y[-1],), *above,
-            ]  # fmt: skip
-    return (Axis(tuple(bounds), tuple(origins)),), tuple(zip(*rows, strict=True))
+        return (_extended(x),), tuple(zip(*inside, strict=True))
+    ends = (math.nan, math.nan) if outside == "error" else (y[0], y[-1])
+    below, above = ((end,) + (0.0,) * (powers - 1) for end in ends)
+    if outside == "error":  # the last row itself is inside
+        last = math.nextafter(x[-1], math.inf)
+        inside = [*inside, (y[-1],)] if kind == "previous" else inside
+        x = [*x, last] if kind == "previous" else [*x[:-1], last]
+    return (_held(x),), tuple(zip(below, *inside, above, strict=True))
 
 
 def _grid(name: str, given: dict[str, Any], outside: str) -> Table:

@@ -47,6 +47,16 @@ def arrays(file: ModelFile) -> Leaves:
     return {**leaves(file), **own}
 
 
+def has_events(file: ModelFile) -> bool:
+    """Return whether a file has anything that only events, or the initialization, may write."""
+    written = file.sampled or file.of("discrete", SWITCHES)
+    return bool(file.graph.relations or written or _has_starts(file))
+
+
+def _has_starts(file: ModelFile) -> bool:
+    return bool(file.started or any(file.modes.values()))
+
+
 class Events:
     """All relations of a file with their indicators, and the functions of struct model_events."""
 
@@ -66,12 +76,7 @@ class Events:
         self.located = graph.located
 
     def __bool__(self) -> bool:
-        switches = self.file.of(SWITCHES)
-        return bool(self.relations or self.discrete or self._has_starts or switches)
-
-    @property
-    def _has_starts(self) -> bool:
-        return bool(self.file.started or any(self.file.modes.values()))
+        return has_events(self.file)
 
     @property
     def discrete(self) -> list[str]:
@@ -154,8 +159,8 @@ class Events:
             else "0, 0",
             discrete_names=", ".join([text(v.name) for v in file.of("discrete")] or ["NULL"]),
             periods=self._periods(),
-            write_start=self._starts() if self._has_starts else [],
-            starts=[".start = start,"] if self._has_starts else [],
+            write_start=self._starts() if _has_starts(file) else [],
+            starts=[".start = start,"] if _has_starts(file) else [],
             switches=self._switches(),
             starts_follow=[".starts_follow = true,"] if file.started else [],
             located=len(self.located),

@@ -86,7 +86,7 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
             **_dependencies(state.value, file),
             "description": f"Derivative of {state.name} by the time",
         }
-    for mode in file.modes if c_events.Events(file) else ():
+    for mode in file.modes if c_events.has_events(file) else ():
         own = {"type": "boolean", "variability": "discrete", "description": f"Mode {mode}"}
         tables[mode] = _local(MODE.format(mode)) | own
     for name, relation in indicators.items():
@@ -161,7 +161,8 @@ def _entries_of(
         entries["reinit"] = any(variable.name in change.reinit for change in file.changes)
     if variable.section == "discrete":
         entries |= {"variability": "discrete", "initial": "exact"}
-        entries |= _known_of({("discrete", variable.name)}, file)
+        leaves = _reached({("discrete", variable.name)}, file, ["discrete"])
+        entries |= _known_of(leaves, file)
     if variable.initial is not None:
         op = variable.leaf.op
         entries |= {"initial": "calculated", **_initially({(op, variable.name)}, {}, file)}
@@ -199,7 +200,6 @@ def _dependencies(value: Value, file: ModelFile) -> dict[str, list[str]]:
 
 def _known_of(leaves: set[Leaf], file: ModelFile) -> dict[str, list[str]]:
     """Dependencies and parameters among what these leaves follow from."""
-    leaves = _reached(leaves, file, ["discrete"])
     moving = {name for op, name in leaves if op in MOVING or _is_in(file, name, SWITCHES)}
     parameters = {name for op, name in leaves if op == "parameter" or _is_in(file, name, OPTIONS)}
     return {

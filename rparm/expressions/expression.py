@@ -27,7 +27,7 @@ Item = TypeVar("Item", bound=Any)  # hashable, with `arguments` of its own kind
 NUMBER, CONDITION = "a number", "a condition"
 LOGIC = ("and", "or", "not")
 DEEPEST = 100  # levels of brackets and other nesting
-ONE = "1"  # name of an operation whose value has this unit
+UNIT_ONE = "1"  # name of an operation whose value has this unit
 MOST_OPERATIONS = 10_000  # that functions make of an expression: they multiply
 DERIVATIVE = "der"  # of a state, in front of a bracket
 SPACE = re.compile(r"\s*")
@@ -170,8 +170,7 @@ class Function:
             else:
                 arguments = tuple(found[argument] for argument in node.arguments)
                 found[node] = replace(node, column=column, arguments=arguments)
-        found_body = found[self.body]
-        return replace(found_body, name=ONE) if self.has_unit_one else found_body
+        return replace(found[self.body], name=UNIT_ONE) if self.has_unit_one else found[self.body]
 
 
 @dataclass(frozen=True)
@@ -350,9 +349,7 @@ for _name, _arguments, _body in (
     ("log10", "x", f"log(x) / {math.log(10)!r}"),
     ("cbrt", "x", f"x**{1 / 3!r} if x >= 0 else -(-x)**{1 / 3!r}"),
 ):
-    FURTHER[_name] = Function(tuple(_arguments.split()), parse(_body))
-_sign = FURTHER["sign"]
-FURTHER["sign"] = replace(_sign, has_unit_one=True)
+    FURTHER[_name] = Function(tuple(_arguments.split()), parse(_body), _name == "sign")
 
 
 # ---- Values --------------------------------------------------------------------------------------

@@ -185,9 +185,9 @@ static bool are_equal(const char *values, const char *others, struct range range
 /* True if no event has written a discrete state: all are 0, except those with start values. */
 static bool are_at_start(const struct instance *instance, const char *values) {
     const struct range kept = events_of(instance->model).discrete_states;
-    size_t zeros = 0;
+    size_t others = 0; // than 0
     for (size_t i = 0; i < count_of(kept); i++) {
-        zeros += ((const double *)(const void *)(values + kept.offset))[i] == 0.0 ? 1 : 0;
+        others += ((const double *)(const void *)(values + kept.offset))[i] == 0.0 ? 0 : 1;
     }
     size_t started = 0; // and not 0
     for (size_t i = 0; i < instance->description->variable_count; i++) {
@@ -197,7 +197,7 @@ static bool are_at_start(const struct instance *instance, const char *values) {
             started += value == 0.0 ? 0 : 1;
         }
     }
-    return zeros + started == count_of(kept);
+    return others == started;
 }
 
 /* Checks the modes of values, which may have been set since the last event, and the integrator's

@@ -88,12 +88,17 @@ static bool update_segment(const struct call *call, int i, bool is_exact) {
     return *number != before;
 }
 
+/* Writes to call->room.segment where the values of all segments are. */
+static void locate_segments(const struct call *call) {
+    if (call->model->segment_count > 0) {
+        call->model->locate(call->values, call->t, call->room.segment);
+    }
+}
+
 static bool update_segments(const struct call *call, bool is_exact) {
     const struct relations *model = call->model;
     bool changes = false;
-    if (model->segment_count > 0) {
-        model->locate(call->values, call->t, call->room.segment);
-    }
+    locate_segments(call);
     for (int i = 0; i < model->segment_count; i++) {
         changes |= update_segment(call, i, is_exact);
     }
@@ -132,9 +137,7 @@ static void update_modes_until_stable(const struct call *call, bool is_exact) {
 static void set_modes_from_values(const struct call *call, bool only_of_inputs) {
     const struct relations *model = call->model;
     const struct compared *compared = call->room.compared;
-    if (model->segment_count > 0) {
-        model->locate(call->values, call->t, call->room.segment);
-    }
+    locate_segments(call);
     for (int i = 0; i < model->segment_count; i++) {
         if (model->segment[i].is_of_inputs || !only_of_inputs) {
             call->segments[i] = call->room.segment[i];
@@ -168,6 +171,10 @@ const void *relations_followed(const struct relations *model, struct relations_r
 
 static const double *discrete_in(const struct relations *model, const void *values) {
     return (const double *)(const void *)((const char *)values + model->discrete.offset);
+}
+
+static double *discrete_of(const struct call *call) {
+    return (double *)(void *)((char *)call->values + call->model->discrete.offset);
 }
 
 /* Returns the time of a sampler's next tick, s: never a sum of periods, which would drift. */
@@ -255,7 +262,7 @@ static void perform(const struct call *call, int event) {
  * such as 3 0.1 and 1 0.3, are at one instant. */
 static void run_samplers(const struct call *call) {
     const struct relations *model = call->model;
-    double *ticks = (double *)(void *)((char *)call->values + model->discrete.offset) + 1;
+    double *ticks = discrete_of(call) + 1;
     const double rounding = 4.0 * DBL_EPSILON * fabs(call->passed);
     model->write_periods(call->values, call->room.every, call->room.offset);
     for (int i = 0; i < model->sampler_count; i++) {
@@ -340,8 +347,7 @@ static enum status start_samplers(const struct call *call, const struct event *e
         }
     }
     if (model->sampler_count > 0) {
-        double *discrete = (double *)(void *)((char *)call->values + model->discrete.offset);
-        discrete[0] = event->t;
+        discrete_of(call)[0] = event->t;
     }
     return STATUS_OK;
 }

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import zlib
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -57,6 +58,18 @@ def simulated(
         output=[*outputs, *options.pop("also", [])],
         **options,
     )
+
+
+def made(folder: Path, text: str) -> Path:
+    """The FMU of a text, in a folder where each is built once."""
+    name = text.split('"')[1]
+    own = folder / f"{zlib.crc32(text.encode()):08x}"
+    path = own / f"{name}.toml"
+    if not path.with_suffix(".fmu").exists():
+        own.mkdir(exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+        build(path, own)
+    return path.with_suffix(".fmu")
 
 
 @cache

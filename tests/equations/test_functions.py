@@ -7,9 +7,16 @@ import numpy as np
 import pytest
 
 from tests.equations.compiled import Model
-from tests.equations.examples import METHODS, build, simulated
+from tests.equations.examples import METHODS, made, simulated
 
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("functions")
+
+
 VALUES = """
 name = "Values"
 [functions]
@@ -72,10 +79,9 @@ power = { value = "m * der(v) * der(x)", unit = "W" }
 
 
 @EACH_METHOD
-def test_sign_of_a_velocity_switches_where_it_turns(tmp_path: Path, method: int) -> None:
+def test_sign_of_a_velocity_switches_where_it_turns(folder: Path, method: int) -> None:
     """Half a swing about k x = F after the other, each shorter by 4 F / k in its range."""
-    (tmp_path / "Friction.toml").write_text(FRICTION.replace("start = 2.0", "start = 0.3"))
-    fmu = build(tmp_path / "Friction.toml", tmp_path)
+    fmu = made(folder, FRICTION.replace("start = 2.0", "start = 0.3"))
     run = simulated(fmu, 6.0, 0.01, {"solver_method": method}, relative_tolerance=1e-11)
     w, center, half = np.sqrt(3.0 / 0.5), 0.1, np.pi / np.sqrt(3.0 / 0.5)
     n = np.floor(run["time"] / half)
@@ -104,11 +110,10 @@ set = { armed = "false", passed = "passed + 1" }
 
 @EACH_METHOD
 def test_an_event_of_several_relations_happens_when_the_whole_comes_true(
-    tmp_path: Path, method: int
+    folder: Path, method: int
 ) -> None:
     """x = sin t: armed above 0.5, left above 0.95; armed again below 0.9, left below -0.5."""
-    (tmp_path / "Gate.toml").write_text(GATE)
-    fmu = build(tmp_path / "Gate.toml", tmp_path)
+    fmu = made(folder, GATE)
     run = simulated(fmu, 12.0, 0.01, {"solver_method": method}, also=["armed", "open"])
     assert np.all(run["open"])
     t = run["time"]
@@ -171,9 +176,8 @@ def room(stop: float, is_enabled: bool) -> np.ndarray:
 
 @EACH_METHOD
 @pytest.mark.parametrize("is_enabled", [True, False])
-def test_a_thermostat_sees_an_open_window(tmp_path: Path, method: int, is_enabled: bool) -> None:
-    (tmp_path / "Room.toml").write_text(ROOM)
-    fmu = build(tmp_path / "Room.toml", tmp_path)
+def test_a_thermostat_sees_an_open_window(folder: Path, method: int, is_enabled: bool) -> None:
+    fmu = made(folder, ROOM)
     times = [(0.0, 0), (30.0, 0), (30.0, 1), (40.0, 1), (40.0, 0), (100.0, 0)]
     run = simulated(
         fmu, 100.0, 1.0, {"solver_method": method, "enabled": is_enabled},

@@ -11,7 +11,7 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave
 from scipy.linalg import expm
 
 from tests.equations.compiled import Model
-from tests.equations.examples import METHODS, build, initializing, simulated
+from tests.equations.examples import METHODS, initializing, made, simulated
 
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 COUNTERS = """
@@ -80,17 +80,6 @@ set = { on = "false" }
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("sampled")
-
-
-def made(folder: Path, text: str) -> Path:
-    """The FMU of a text, built once."""
-    name = text.split('"')[1]
-    path = folder / name / f"{name}.toml"
-    if not path.parent.exists():
-        path.parent.mkdir()
-        path.write_text(text)
-        build(path, path.parent)
-    return path.with_suffix(".fmu")
 
 
 def test_samplers_of_one_instant_run_in_the_order_of_the_file(folder: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
 
 from tests.equations.compiled import Model, ModelFileError, read_text
-from tests.equations.examples import METHODS, build, simulated
+from tests.equations.examples import METHODS, build, made, simulated
 
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 X, Y = [0.0, 10.0, 20.0, 40.0], [3.0, 2.5, 1.0, 0.25]
@@ -31,11 +31,9 @@ torque = { value = "T(w)", unit = "N.m" }
 """
 
 
-def built(folder: Path, text: str) -> Path:
-    """The FMU of a text."""
-    name = text.split('"')[1]
-    (folder / f"{name}.toml").write_text(text)
-    return build(folder / f"{name}.toml", folder)
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("tables")
 
 
 def segments(outside: str) -> list[tuple[float, float, float, float]]:
@@ -72,9 +70,9 @@ def speed(times: np.ndarray, outside: str, load: float) -> np.ndarray:
 @pytest.mark.parametrize("outside", ["hold", "extend"])
 @pytest.mark.parametrize("load", [0.0, -4.0])
 def test_a_motor_runs_up_along_its_curve(
-    tmp_path: Path, method: int, outside: str, load: float
+    folder: Path, method: int, outside: str, load: float
 ) -> None:
-    fmu = built(tmp_path, MOTOR.replace("OUTSIDE", outside))
+    fmu = made(folder, MOTOR.replace("OUTSIDE", outside))
     start = {"solver_method": method, "load": load}
     run = simulated(fmu, 3.0, 0.01, start, relative_tolerance=1e-11, also=["event_count"])
     exact = speed(run["time"], outside, load)
@@ -110,9 +108,9 @@ ROWS = np.array([0.5, 1.0, 1.7, 3.0]), np.array([1.0, -2.0, 0.5, 4.0])
 
 
 @EACH_METHOD
-def test_integrals_over_tables_of_the_time_are_exact(tmp_path: Path, method: int) -> None:
+def test_integrals_over_tables_of_the_time_are_exact(folder: Path, method: int) -> None:
     run = simulated(
-        built(tmp_path, SIGNALS), 4.0, 0.1, {"solver_method": method}, relative_tolerance=1e-11
+        made(folder, SIGNALS), 4.0, 0.1, {"solver_method": method}, relative_tolerance=1e-11
     )
     x, y = ROWS
     grid = np.unique(np.concatenate([x, run["time"]]))
@@ -127,11 +125,11 @@ def test_integrals_over_tables_of_the_time_are_exact(tmp_path: Path, method: int
     assert np.max(np.abs(run["c"] - (primitive(run["time"]) - primitive(0.0)))) < 1e-8
 
 
-def test_a_table_of_an_input_follows_at_once(tmp_path: Path) -> None:
+def test_a_table_of_an_input_follows_at_once(folder: Path) -> None:
     times = np.array([0.0, 0.4, 0.4, 1.0, 3.0])
     u = np.array([0.0, 0.9, 2.9, 1.2, 5.0])
     signal = np.array(list(zip(times, u, strict=True)), [("time", "f8"), ("u", "f8")])
-    run = simulated(built(tmp_path, SIGNALS), 3.0, 0.05, {}, input=signal)
+    run = simulated(made(folder, SIGNALS), 3.0, 0.05, {}, input=signal)
     # a step holds the input of its begin
     exact = np.interp(np.interp(run["time"] - 0.05, times[2:], u[2:]), *ROWS)
     rows = run["time"] > 0.46
@@ -195,7 +193,9 @@ def test_a_hundred_thousand_rows_of_a_file(tmp_path: Path) -> None:
     height = np.sin(way) + 0.001 * np.random.default_rng(1).normal(size=len(way))
     rows = "".join(f"{a!r}, {b!r}\n" for a, b in zip(way.tolist(), height.tolist(), strict=True))
     (tmp_path / "road.csv").write_text("way, height\n" + rows)
-    run = simulated(built(tmp_path, LONG), 0.5, 0.1, {"max_events": 10**6}, also=["event_count"])
+    (tmp_path / "Long.toml").write_text(LONG)
+    fmu = build(tmp_path / "Long.toml", tmp_path)
+    run = simulated(fmu, 0.5, 0.1, {"max_events": 10**6}, also=["event_count"])
     t = run["time"]
     s = 20 * t + 10 * (1 - np.cos(t))
     assert np.max(np.abs(run["height"] - np.interp(s, way, height))) < 1e-5
