@@ -311,12 +311,12 @@ static double length_of(int i) {
  * end. */
 static double step(struct run *run, fmi2Component c, int i, double time, int shift) {
     const struct references *inputs = &run->model->inputs;
-    fmi2Integer orders[MOST_VALUES];
-    double slopes[MOST_VALUES];
     if (i % 4 != 3) {
         set_inputs(run, c, i, shift);
     }
     if (i % 5 == 0 && inputs->count > 0) {
+        fmi2Integer orders[MOST_VALUES];
+        double slopes[MOST_VALUES];
         for (int j = 0; j < (int)inputs->count; j++) {
             orders[j] = 1 + (i / 5 + j) % 3;
             slopes[j] = (i % 13 - 6) / 4.0;
