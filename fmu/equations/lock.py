@@ -4,6 +4,7 @@ NAME.lock.toml beside the file has a line for each variable that ever was: its n
 its value reference. It grows and never changes.
 """
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -13,7 +14,8 @@ from equations_file import NAME
 from equations.declaration import Key
 
 RESERVED = (0, *range(80, 100))  # the time, the variables of the integrator
-LARGEST = 9999
+LARGEST = 99_999
+ELEMENT = re.compile(rf"{NAME.pattern}(\[[0-9]+(,[0-9]+)*\])?", re.ASCII)
 HEAD = "# Value references of {name}: written by the build. Keep it with the model.\n"
 
 
@@ -70,7 +72,7 @@ def _read(path: Path) -> dict[Key, int]:
 def _entry(entry: object) -> tuple[Key, int]:
     match entry:
         case {"name": str(name), "kind": str(kind), "reference": int(reference)}:
-            fine = len(entry) == 3 and NAME.fullmatch(name) and kind.isalpha()
+            fine = len(entry) == 3 and ELEMENT.fullmatch(name) and kind.isalpha()
             if fine and reference not in RESERVED and 0 < reference <= LARGEST:
                 return (name, kind), reference
     raise ValueError(f"{str(entry)[:100]} has no name, kind and free reference")
