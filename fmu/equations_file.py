@@ -433,7 +433,8 @@ def _set_start(section: str, given: dict[str, Any], texts: dict[str, Any]) -> No
     for key in ("start", "min", "max"):
         if kind == WHOLE and key in given:
             if not given[key].is_integer() or abs(given[key]) > LARGEST_INTEGER:
-                raise ModelFileError(f"{key}: expected a whole number, got {given[key]:g}")
+                wanted = f"a whole number within +-{LARGEST_INTEGER}"
+                raise ModelFileError(f"{key}: expected {wanted}, got {given[key]:g}")
             given[key] = int(given[key])
 
 

@@ -53,11 +53,10 @@ class Fields:
 
 def declared(c_type: str, fields: Iterable[str]) -> list[str]:
     """Return the declarations of fields, in arrays where they are elements."""
-    sizes = Counter(field.partition("[")[0] for field in fields)
-    arrays = {field.partition("[")[0] for field in fields if "[" in field}
+    sizes = Counter(field.partition("[")[:2] for field in fields)
     return [
-        f"{c_type} {name}[{size}];" if name in arrays else f"{c_type} {name};"
-        for name, size in sizes.items()
+        f"{c_type} {name}[{size}];" if bracket else f"{c_type} {name};"
+        for (name, bracket), size in sizes.items()
     ]
 
 

@@ -21,6 +21,7 @@ from equations.c_code import (
 )
 from equations.errors import NONE, Errors
 from equations.graph import MOVING, Graph, Relation, Value, is_unknown
+from equations.rolled import rolled
 from rparm.expressions.expression import CONDITION, Kind, in_order
 
 Guards = dict[Value, Value | None]  # conditions; None: always
@@ -41,8 +42,11 @@ def leaves(file: ModelFile) -> Leaves:
         for op, structure in ((v.leaf.op, "values"), ("first", "d"), ("second", "dd")):
             found[op, v.name] = f"{structure}->{file.fields.value(v.name)}"
     for name, kind in file.kinds.items():
-        found["mode" if kind == CONDITION else "integer", name] = (
-            f"values->{file.fields.count(name)}"
+        place = f"values->{file.fields.count(name)}"
+        found |= (
+            {("mode", name): place}
+            if kind == CONDITION
+            else {("integer", name): f"(double){place}"}
         )
     segments = enumerate(file.graph.segments)
     found |= {("integer", name): f"values->segments[{i}]" for i, name in segments}
@@ -126,7 +130,7 @@ class Events:
             *declared("int", [self.file.fields.count(v.name) for v in self.file.of(SWITCHES)]),
             "/* modes; C has no empty arrays */",
             "int is_begun;",
-            f"int relations[{len(self.relations) or 1}];",
+            *([f"int relations[{len(self.relations)}];"] if self.relations else []),
             f"int active[{len(self.file.events) + 1}];",
             *([f"int segments[{len(segments)}];"] if (segments := self.graph.segments) else []),
             *declared("int", map(self.file.fields.count, _counted(self.file))),
@@ -160,7 +164,7 @@ class Events:
             else "0",
             has_inputs=int(any(r.is_of_inputs for r in self.relations)),
             modes=2
-            + (len(self.relations) or 1)
+            + len(self.relations)
             + len(file.events)
             + len(file.graph.segments)
             + len(_counted(file)),
@@ -187,7 +191,7 @@ class Events:
             timed=[".next_time = next_time,"] if timed or file.sampled else [],
             table=table or ["{0},"],
             nominal=", ".join(str(float(v.nominal or 1.0)) for v in states) or "1.0",
-            indicators=Code(arrays(file)).assign(indicators).lines,
+            indicators=rolled(Code(arrays(file)).assign(indicators).lines)[0],
             compare=self._compare(),
             times=Code(leaves(file)).assign(times).lines,
             due=self._due(),
@@ -221,7 +225,7 @@ class Events:
                 f"compared[{k}].noise = {error};",
                 f"compared[{k}].used = {'1' if used is None else code.of(used) + ' != 0'};",
             ]
-        return code.lines + lines
+        return rolled(code.lines + lines)[0]
 
     def _due(self) -> list[str]:
         """Return whether each event of the file is due."""
@@ -229,7 +233,7 @@ class Events:
         for i, event in enumerate(self.file.events):
             during = "" if event.during is None else f" && {code.of(event.during.value)}"
             code.lines.append(f"due[{i}] = {code.of(event.when.value)}{during};")
-        return code.lines
+        return rolled(code.lines)[0]
 
     def _segments(self, places: Mapping[str, int]) -> dict[str, object]:
         segments, code = self.graph.segments.values(), Code(leaves(self.file))
@@ -258,7 +262,7 @@ class Events:
                 f"    values->{self.file.fields.count(name)} = {start};"
                 for name, (_, start) in counted
             ),
-            *indented(self._assigned(Code(leaves(self.file)), new)),
+            *indented(rolled(self._assigned(Code(leaves(self.file)), new))[0]),
             "}",
             "",
         ]

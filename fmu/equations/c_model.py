@@ -227,8 +227,9 @@ def _checks(file: ModelFile) -> list[str]:
     """Refuses parameters that are not finite or break a condition, or leave it undefined."""
     graph, code = file.graph, Code(leaves(file))
     conditions = [
-        (f"isfinite(values->{file.fields.value(v.name)})", f"{v.name} is not finite")
+        (f"isfinite(values->{file.fields.value(v.name)})", f"{base} is not finite")
         for v in file.of("parameters")
+        for base in v.name.split("[")[:1]
     ]
     for message, check in file.checks:
         holds, unknown = check.value, graph.unknown(check.value)
@@ -237,10 +238,7 @@ def _checks(file: ModelFile) -> list[str]:
         conditions.append((code.of(holds), message))
     lines = []
     for condition, message in conditions:
-        lines += [
-            f"if (!{condition}) {{",
-            f'    (void)snprintf(text, size, "%s", {text(message)});',
-            "    return STATUS_INVALID_PARAMETERS;",
-            "}",
-        ]
-    return code.lines + lines
+        why = f'    (void)snprintf(text, size, "%s", {text(message)});'
+        refused = [f"if (!{condition}) {{", why, "    return STATUS_INVALID_PARAMETERS;", "}"]
+        lines.append("\n".join(refused))
+    return rolled(code.lines + lines)[0]

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 SHORTEST = 400  # lines of a function that gains by loops
 FEWEST_TURNS = 4
 MOST_TRIED = 40  # lengths of a turn
-NUMBER = re.compile(r"\b([nvzc])(\d+)\b|\[(\d+)")
+STRING = r'"(?:\\.|[^"\\])*"'
+NUMBER = re.compile(rf"{STRING}|\b([nvzc])(\d+)\b|\[(\d+)")  # strings have none
 LITERAL = re.compile(r"(?<![\w.])(?:\d+\.\d+(?:e[-+]?\d+)?|\d+e[-+]?\d+)(?![\w.])")
 RARE, FEWEST_LITERALS = 16, 20  # occurrences of a number, and such numbers, for a table of them
 TABLE = "numbers"
@@ -32,21 +33,29 @@ class Line:
     @classmethod
     def of(cls, text: str) -> Line:
         """Take a statement apart."""
-        found = NUMBER.findall(text)
-        form = NUMBER.sub(lambda number: f"{number[1] or '['}#", text)
-        return cls(form, tuple(int(name or bracket) for _, name, bracket in found))
+        numbers: list[int] = []
+
+        def hole(number: re.Match[str]) -> str:
+            if not number.lastindex:
+                return number[0]
+            numbers.append(int(number[number.lastindex]))
+            return f"{number[1] or '['}#"
+
+        return cls(NUMBER.sub(hole, text), tuple(numbers))
 
     def text(self, terms: Sequence[str], depth: int) -> Iterator[str]:
         """Yield the lines of C; terms: added to the numbers."""
         given = iter(zip(self.numbers, terms, strict=True))
 
         def number(found: re.Match[str]) -> str:
+            if found[0].startswith('"'):
+                return found[0]
             value, term = next(given)
             if found[0] == "[#":
                 return f"[{value}{term}" if value or not term else f"[{term.removeprefix(' + ')}"
             return f"{found[0][:-1]}{value}"
 
-        yield re.sub(r"(?:\b[nvzc]|\[)#", number, self.form)
+        yield re.sub(rf"{STRING}|(?:\b[nvzc]|\[)#", number, self.form)
 
 
 @dataclass(frozen=True)
@@ -82,9 +91,12 @@ class Loop:
 
 
 def rolled(*sections: list[str]) -> list[list[str]]:
-    """Return the sections of one function with loops; the first one begins with declarations."""
+    """Return the sections of one function with loops; the first one begins with declarations.
+
+    A statement of several lines is one text.
+    """
     if sum(map(len, sections)) < SHORTEST:
-        return [*sections]
+        return [_split(section) for section in sections]
     literals = Counter(t for section in sections for line in section for t in LITERAL.findall(line))
     rare = {text for text, count in literals.items() if count <= RARE}
     table: list[str] = []  # numbers that are other ones in each turn
@@ -106,7 +118,7 @@ def rolled(*sections: list[str]) -> list[list[str]]:
             kept[name] = f"{arrays[name]}[{sizes[arrays[name]]}]"
             sizes[arrays[name]] += 1
     lines = [
-        [text for item in items for text in item.text([""] * len(item.numbers), 0)]
+        _split(text for item in items for text in item.text([""] * len(item.numbers), 0))
         for items in found
     ]
     declared = [f"{array.split('_')[1][:-1]} {array}[{n}];" for array, n in sizes.items() if kept]
@@ -114,6 +126,10 @@ def rolled(*sections: list[str]) -> list[list[str]]:
         declared.append(f"static const double {TABLE}[] = {{{', '.join(table)}}};")
     lines[0] = declared + lines[0]
     return lines
+
+
+def _split(statements: Iterable[str]) -> list[str]:
+    return [line for statement in statements for line in statement.split("\n")]
 
 
 def _with_table(line: str, rare: set[str], table: list[str]) -> str:
@@ -201,7 +217,8 @@ def _read_by_others(texts: list[list[str]], found: list[list[Line | Loop]]) -> s
         places = [place for item in items for place in _places(item, (), (), count)]
         for text, (turns, steps) in zip(section, places, strict=True):
             is_definition = DEFINITION.match(text) is not None
-            for i, number in enumerate(NUMBER.finditer(text)):
+            numbers = (number for number in NUMBER.finditer(text) if number.lastindex)
+            for i, number in enumerate(numbers):
                 if is_definition and i == 0:
                     where[number[0]] = turns
                 elif number[1]:

@@ -149,7 +149,7 @@ def with_kinds(
         of_arguments = [*zip(node.arguments, _needed(node, needed[node], found), strict=True)]
         pairs += of_arguments[::-1]
         needed |= of_arguments
-        if node.op == "text" and not isinstance(needed[node], str):
+        if node.op == "text" and node.name in needed[node]:
             items[node] = _constant(node, needed[node].index(node.name) + 1)
     for node, kind in reversed(pairs):
         _check(node, found[node], kind)
@@ -569,12 +569,16 @@ def _decided(node: Node, decided: Collection[Node]) -> Node:
 
 def _index(node: Node) -> int:
     """Return the value of an index; ExpressionError if it is not known or not whole."""
+    unknown = names(node)
+    if unknown:
+        text = f"{min(unknown)!r} is no size and no index of for or sum"
+        raise ExpressionError(node.column, text)
     try:
         value = evaluated(node, {})
     except (KeyError, ArithmeticError, ValueError):
         value = math.nan
     if not math.isfinite(value) or value != int(value):
-        raise ExpressionError(node.column, "expected an index: of whole numbers, sizes and indexes")
+        raise ExpressionError(node.column, "expected a whole number as index")
     return int(value)
 
 
