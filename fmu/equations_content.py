@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from declaration.load import shown
+from equations_code import CodeFile
 from equations_tables import Table
 
 from rparm.expressions.expression import NUMBER, Function, Lookup, Node, parse
@@ -163,6 +164,7 @@ class ModelFile:
     units: dict[str, dict[str, int]] = field(default_factory=dict)  # exponents, of [units]
     functions: dict[str, Function | Lookup] = field(default_factory=dict)
     tables: dict[str, Table] = field(default_factory=dict)
+    code: CodeFile | None = None
     table_units: dict[str, dict[str, int]] = field(default_factory=dict)  # by `table_unit`
     modes: dict[str, bool] = field(default_factory=dict)  # with their values at the start
     variables: dict[str, Variable] = field(default_factory=dict)

@@ -9,12 +9,14 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from difflib import get_close_matches
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
 
+import equations_code
 import equations_tables
 from declaration.load import shown
 from equations_content import (
@@ -66,6 +68,7 @@ LONGEST_TEXT = 1000  # characters of a description
 LONGEST_MESSAGE = 500  # bytes: src/instance/settings.c has no room for more
 NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,99}", re.ASCII)
 # files that Windows cannot have, with any suffix
+CODE = re.compile(r'[^\x00-\x1f\\"]+\.c')
 DEVICE = re.compile("(?i:con|prn|aux|nul|com[1-9]|lpt[1-9])")
 CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 LATER = ("sum", "der", "floor", "ceil", "round", "mod")
@@ -86,7 +89,7 @@ OWN_KEYS = {
     SWITCHES: (("type", "start", "description"), ""),
 }
 HEAD = (
-    *("name", "description", "experiment", "modes", "units", "tables", "functions"),
+    *("name", "description", "experiment", "modes", "code", "units", "tables", "functions"),
     *("sampled", "events", "check"),
     *SECTIONS,
 )
@@ -171,6 +174,17 @@ def _modes(value: Any) -> list[tuple[str, bool]]:
         raise ValueError("expected a list of names, or a table of true and false") from None
 
 
+def _arguments(value: Any) -> dict[str, str]:
+    """Return the arguments of a function with their units; of a list, these are empty."""
+    if isinstance(value, dict) and all(type(unit) is str and unit for unit in value.values()):
+        return value
+    if isinstance(value, list) and all(type(name) is str for name in value):
+        found = dict.fromkeys(value, "")
+        if len(found) == len(value):
+            return found
+    raise ValueError("expected a list of names, each once, or a table of their units")
+
+
 READ = {
     **dict.fromkeys((*NUMBERS, *EXPERIMENT), finite_number),
     "start": lambda given: given if type(given) is bool else finite_number(given),
@@ -180,7 +194,8 @@ READ = {
     **dict.fromkeys((*BASE, ANGLE), _expect("a whole exponent", int, lambda e: abs(e) < 100)),
     "name": _expect("a letter, then letters, digits, _", str, NAME.fullmatch),
     "modes": _modes,
-    "arguments": LIST,
+    "arguments": _arguments,
+    "code": _expect("a C file such as crane.c", str, CODE.fullmatch),
 }  # how values of keys are read; others are expressions
 
 
@@ -226,6 +241,13 @@ def read_tables(
             file.units[symbol] = _entries(given, (*BASE, ANGLE), what="base unit")
     for name, entry in head.get("tables", {}).items():
         _read_table(file, name, entry)
+    if "code" in head:
+        with placed("code"):
+            file.code = equations_code.read(path.parent / head["code"])
+            for name, function in file.code.functions.items():
+                with placed(f"{function.place}: {name}"):
+                    _check_function_name(name, file)
+                file.functions[name] = function
     _read_functions(file, head.get("functions", {}))
     for section in SECTIONS:
         for name, entry in head.get(section, {}).items():
@@ -279,22 +301,46 @@ def _check_function_name(name: str, file: ModelFile) -> None:
 
 
 def _read_functions(file: ModelFile, entries: dict[str, object]) -> None:
-    """Read the functions, each of which may call those before it."""
-    for name, entry in entries.items():
-        place = ("[functions]", _named(name))
-        with placed(*place):
-            _check_function_name(name, file)
-            given = _entries(entry, ("arguments", "value"), "value")
-            arguments = given.get("arguments", [])
-            are_names = all(NAME.fullmatch(a) and a not in RESERVED for a in arguments)
-            if not arguments or not are_names or len({*arguments}) < len(arguments):
-                raise ModelFileError("arguments: expected names, each once and none reserved")
-            value = file.expression(("value",), given["value"])
-            for node in in_order([value.tree]):
-                if node.op == "name" and node.name not in (*arguments, *CONSTANTS):
-                    raise ExpressionError(node.column, f"{shown(node.name)} is no argument")
-            check_kinds(value.tree)
-        file.functions[name] = Function(tuple(arguments), value.tree)
+    """Read units of functions of the C file, then functions, which may call those before them."""
+    in_c = file.code.functions if file.code else {}
+    of_c = {name: entry for name, entry in entries.items() if name in in_c}
+    for name, entry in (of_c | entries).items():
+        with placed("[functions]", _named(name)):
+            needed = "" if name in in_c else "value"
+            given = _entries(entry, ("arguments", "value", "unit"), needed)
+            arguments, units = given.get("arguments", {}), {}
+            order = (*arguments,) if "value" in given else in_c[name].arguments
+            if {*order} != {*arguments}:
+                raise ModelFileError(f"arguments: expected all of the C file: {', '.join(order)}")
+            if "unit" in given or any(arguments.values()):
+                if "" in arguments.values():
+                    raise ModelFileError("unit: expected units of arguments, too: { x = 'm' }")
+                units = {table_unit(name, order.index(a)): u for a, u in arguments.items()}
+                units |= {table_unit(name): given.get("unit", "1")}
+                file.table_units |= {key: file.exponents_of(unit) for key, unit in units.items()}
+            if "value" in given:
+                own = _function(file, name, arguments, given["value"], bool(units))
+                file.functions[name] = own
+
+
+def _function(
+    file: ModelFile, name: str, arguments: dict[str, str], text: object, has_units: bool
+) -> Function:
+    """Return a function, whose arguments and value have units in the file, or take any."""
+    _check_function_name(name, file)
+    if not arguments or not all(NAME.fullmatch(a) and a not in RESERVED for a in arguments):
+        raise ModelFileError("arguments: expected names, each once and none reserved")
+    value = file.expression(("value",), text)
+    for node in in_order([value.tree]):
+        if node.op == "name" and node.name not in (*arguments, *CONSTANTS):
+            raise ExpressionError(node.column, f"{shown(node.name)} is no argument")
+    check_kinds(value.tree)
+    if has_units:
+        units = {key: unit_of_exponents(found) for key, found in file.table_units.items()}
+        units |= {a: units[table_unit(name, i)] for i, a in enumerate(arguments)}
+        with placed("value"):
+            unit_of(value.tree, units, units[table_unit(name)])
+    return Function((*arguments,), value.tree, name=name if has_units else "")
 
 
 def _experiment(given: dict[str, float]) -> dict[str, float]:
@@ -438,16 +484,23 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     """Read and check a file for a model that has `solver_names`, too; ModelFileError."""
     with placed(path):
         text, tables = tables_of(path)
-        try:
-            file = read_tables(path, text, tables, solver_names)
-            _check_names(file)
-            file.order = _in_order(file)
-            _check_periods(file)
-            if file.has_units:
-                _check_units(file)
-        except ModelFileError as error:
-            raise ModelFileError(f"{_line(text, str(error))}{error}") from None
+    with located(path, text):
+        file = read_tables(path, text, tables, solver_names)
+        _check_names(file)
+        file.order = _in_order(file)
+        _check_periods(file)
+        if file.has_units:
+            _check_units(file)
     return file
+
+
+@contextmanager
+def located(path: Path, text: str) -> Iterator[None]:
+    """Put the path and the line in front of what is wrong inside."""
+    try:
+        yield
+    except ModelFileError as error:
+        raise ModelFileError(f"{path}: {_line(text, str(error))}{error}") from None
 
 
 def _line(text: str, message: str) -> str:

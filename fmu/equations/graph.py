@@ -11,7 +11,7 @@ Of tables: entry, of an array by one or two segments, and locate, the segment of
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 
@@ -117,12 +117,14 @@ class Graph:
     """Makes values, and finds those that exist.
 
     A relation of values that move is a switch: its result is a mode, which changes at events only;
-    `relations` has them by mode.
+    `relations` has them by mode. `functions` are called with values, and whether this is an instant.
     """
 
     known: dict[tuple, Value] = field(default_factory=dict)
     relations: dict[str, Relation] = field(default_factory=dict)
     tables: Mapping[str, Table] = field(default_factory=dict)
+    functions: Mapping[str, Callable[[list[Value], bool], Value]] = field(default_factory=dict)
+    unknowns: dict[Value, Value | None] = field(default_factory=dict)  # by condition
     segments: dict[str, Segment] = field(default_factory=dict)  # by the names of their leaves
     has_switches: bool = True  # else relations are evaluated with the values
     is_guarded: bool = True  # else an infinite slope makes derivatives infinite, as in C
@@ -169,11 +171,15 @@ class Graph:
                     value = self.value("if", is_negative, self.negative(given[0]), given[0])
                 case "min" | "max":
                     is_first = compare("<" if node.op == "min" else ">", *given)
-                    value = self._choice(is_first, *given)
+                    value = self.choice(is_first, *given)
                 case "if":
-                    value = self._choice(*given)
+                    value = self.choice(*given)
                 case "table":
                     value = self._looked_up(self.tables[node.name], given, is_instant)
+                case "call":
+                    value = self.functions[node.name](given, is_instant)
+                case "unit":
+                    value = given[0]
                 case op:
                     value = (compare if op in RELATIONS else self.value)(op, *given)
             found[node] = value
@@ -213,7 +219,7 @@ class Graph:
         self.segments[name] = Segment(leaf, x, bounds, count, low, high)
         return leaf
 
-    def _choice(self, condition: Value, first: Value, second: Value) -> Value:
+    def choice(self, condition: Value, first: Value, second: Value) -> Value:
         """The "if" of a text: not a number where a relation that decides is not defined."""
         chosen, unknown = self.value("if", condition, first, second), self.unknown(condition)
         return (
@@ -222,9 +228,14 @@ class Graph:
 
     def unknown(self, condition: Value) -> Value | None:
         """Whether a relation that decides on a condition has no value; None: all have one."""
+        if condition not in self.unknowns:
+            self.unknowns[condition] = self._unknown(condition)
+        return self.unknowns[condition]
+
+    def _unknown(self, condition: Value) -> Value | None:
         if condition.name in self.relations:
             sides = self.relations[condition.name].distance.arguments
-        elif condition.op in RELATIONS:
+        elif condition.op in (*RELATIONS, "=="):
             sides = condition.arguments
         else:
             unknown = [self.unknown(argument) for argument in condition.arguments]

@@ -14,6 +14,7 @@ from plain_c.values import Choice, Conditions, Known, Table
 
 REAL, DOUBLE, INT, BOOL, VOID = "real", "double", "int", "bool", "void"
 NAMES = {"double": DOUBLE, "int": INT, "_Bool": BOOL, "void": VOID}
+LONGEST_ARRAY = 10_000
 UNSET = object()  # what a variable has before it gets a value
 # leaf of an argument's part: its path from the name of the argument, and its type
 LeafOf = Callable[[tuple[str | int, ...], Any], Any]
@@ -71,6 +72,8 @@ class Types:
             return Pointer(self.of(node.type))
         if isinstance(node, c_ast.ArrayDecl):
             length = None if node.dim is None else self.size(node.dim)
+            if length is not None and not 0 < length <= LONGEST_ARRAY:
+                raise refused(node, f"an array has 1 to {LONGEST_ARRAY} elements, not {length}")
             return Array(self.of(node.type), length)
         if isinstance(node, c_ast.Struct):
             return Structure(node.name or f"at {node.coord}")

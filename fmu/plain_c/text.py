@@ -16,7 +16,9 @@ from pycparser.c_parser import CParser, ParseError
 SYSTEM_HEADERS = ("math.h", "stdbool.h", "stddef.h", "stdlib.h")
 PRELUDE = "typedef _Bool bool;\ntypedef unsigned long size_t;\n"
 DIRECTIVE = re.compile(r"\s*#\s*(\w*)\s*(.*?)\s*$")
-COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/|\"(?:\\.|[^\"\\\n])*\"", re.DOTALL)
+# a comment or a string, perhaps without an end: nothing is looked at twice
+COMMENT = re.compile(r"//[^\n]*|/\*.*?(?:\*/|\Z)|\"(?:\\.|[^\"\\\n])*\"?", re.DOTALL)
+CONTINUED = re.compile(r"^((?:[^\n]*\\\n)+)([^\n]*)", re.MULTILINE)
 PLACE = re.compile(r"(?P<file>.*?):(?P<line>\d+)(?::\d+)?: (?P<text>.*)", re.DOTALL)
 # what to write instead of a statement or an expression that is no part of the equations' C
 INSTEAD = {
@@ -86,7 +88,7 @@ class Preprocessor:
         self.files.append(path)
         self.lines.append(f'# 1 "{shown}"')
         skipping: list[bool] = []  # of each #ifndef that is open
-        for number, line in enumerate(without_comments(text).split("\n"), 1):
+        for number, line in enumerate(without_comments(text, shown).split("\n"), 1):
             found = DIRECTIVE.match(line)
             if found is None:
                 self.lines.append("" if any(skipping) else line)
@@ -132,14 +134,16 @@ class Preprocessor:
         raise CTextError(f"{place}: <{name}> is not read: <math.h> and <stdbool.h> are enough")
 
 
-def without_comments(text: str) -> str:
+def without_comments(text: str, shown: str) -> str:
     """Replace comments by spaces, and join lines that end in a backslash."""
 
     def blank(found: re.Match[str]) -> str:
+        if found[0].startswith("/*") and not (found[0].endswith("*/") and len(found[0]) > 3):
+            line = found.string.count("\n", 0, found.start()) + 1
+            raise CTextError(f"{shown}:{line}: this comment has no end")
         return found[0] if found[0].startswith('"') else re.sub(r"[^\n]", " ", found[0])
 
-    joined = re.sub(r"((?:[^\n]*\\\n)+)([^\n]*)", _joined, text)
-    return COMMENT.sub(blank, joined)
+    return COMMENT.sub(blank, CONTINUED.sub(_joined, text))
 
 
 def _joined(found: re.Match[str]) -> str:
@@ -152,14 +156,19 @@ def read(path: Path, folders: Iterable[Path] = (), ignored: Iterable[str] = ()) 
     """Read the declarations of a file, with includes from `folders` but for `ignored` headers."""
     preprocessor = Preprocessor(folders, ignored)
     preprocessor.add(path)
-    text = '# 1 "prelude"\n' + PRELUDE + "\n".join(preprocessor.lines)
+    return parsed("\n".join(preprocessor.lines), preprocessor.files)
+
+
+def parsed(text: str, files: list[Path]) -> Program:
+    """Read the declarations of a text without comments and directives; its first file names it."""
+    text, name = f'# 1 "prelude"\n{PRELUDE}{text}', files[0].name
     try:
-        tree = CParser().parse(text, path.name)
+        tree = CParser().parse(text, name)
     except ParseError as error:
-        raise CTextError(_rephrased(str(error), text, path.name)) from None
+        raise CTextError(_rephrased(str(error), text, name)) from None
     except RecursionError:
-        raise CTextError(f"{path.name}: is nested too deeply") from None
-    program = Program(files=preprocessor.files)
+        raise CTextError(f"{name}: is nested too deeply") from None
+    program = Program(files=files)
     for node in tree.ext:
         _add(program, node)
     return program

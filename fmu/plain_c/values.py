@@ -335,4 +335,8 @@ class Conditions:
             first = first.arguments[1]
         if second.op == "if" and second.arguments[0] is condition:
             second = second.arguments[2]
-        return first if first is second else self.graph.value("if", condition, first, second)
+        return first if first is second else self.decided(condition, first, second)
+
+    def decided(self, condition: Value, first: Value, second: Value) -> Value:
+        """Return the choice of a condition that is not known."""
+        return self.graph.value("if", condition, first, second)

@@ -56,6 +56,7 @@ OPERATIONS: dict[str, Callable[..., float]] = {
     "and": lambda a, b: a and b,
     "or": lambda a, b: a or b,
     "not": operator.not_,
+    "unit": lambda a: a,
 }
 BUILT_IN = {"abs": abs, "min": min, "max": max}
 OPERATIONS |= {name: BUILT_IN.get(name) or getattr(math, name) for name in FUNCTIONS}
@@ -74,9 +75,10 @@ class Node:
     """An operation, a number or a name.
 
     op is "number" (then `value` counts), "literal" (a condition: whether `value` is 1), "name"
-    (then `name`), "table" (a look-up in the table `name`), an operator of `RELATIONS`, + - * / **,
-    "negative", "and", "or", "not", "if" (arguments: condition, value if true, otherwise), or a name
-    of `FUNCTIONS`. min and max have two arguments here.
+    (then `name`), "table" (a look-up in the table `name`), "call" (of the function `name`), "unit"
+    (its argument, in the unit `name`), an operator of `RELATIONS`, + - * / **, "negative", "and",
+    "or", "not", "if" (arguments: condition, value if true, otherwise), or a name of `FUNCTIONS`.
+    min and max have two arguments here.
     """
 
     op: str
@@ -159,9 +161,15 @@ class Function:
     arguments: tuple[str, ...]
     body: Node
     has_unit_one: bool = False  # its value takes no other unit, although it is made of numbers
+    name: str = ""  # by which `table_unit` has units of its arguments and its value
 
     def of(self, given: Sequence[Node], column: int) -> Node:
         """Return its expression for these arguments; mistakes in it are at this column."""
+        if self.name:
+            units = (table_unit(self.name, i) for i in range(len(given)))
+            given = [Node("unit", a.column, (a,), 0.0, u) for a, u in zip(given, units, strict=True)]
+            body = replace(self, name="").of(given, column)
+            return Node("unit", column, (body,), name=table_unit(self.name))
         known = dict(zip(self.arguments, given, strict=True))
         found: dict[Node, Node] = {}
         for node in in_order([self.body]):
@@ -173,16 +181,22 @@ class Function:
         return replace(found[self.body], name=UNIT_ONE) if self.has_unit_one else found[self.body]
 
 
+def table_unit(name: str, argument: int | str = "") -> str:
+    """Return the key that units have for an argument of a table or function, or for its value."""
+    return f"{name}({argument})"
+
+
 @dataclass(frozen=True)
 class Lookup:
-    """A table, which is called as a function."""
+    """A table or a function of a C file: an operation of its own."""
 
     name: str
     arguments: tuple[str, ...]
+    op: str = "table"
 
     def of(self, given: Sequence[Node], column: int) -> Node:
-        """Return the look-up at these arguments."""
-        return Node("table", column, tuple(given), name=self.name)
+        """Return the operation on these arguments."""
+        return Node(self.op, column, tuple(given), name=self.name)
 
 
 def parse(text: str, functions: Mapping[str, Function | Lookup] | None = None) -> Node:
@@ -303,12 +317,14 @@ class _Parser:
         separator = "("
         while self.token.text == separator:
             self.take()
+            if self.token.text == ")" and separator == "(":
+                break
             arguments.append(self.expression(CONDITIONAL))
             separator = ","
         self.expect(")")
         count = len(further.arguments) if further else FUNCTIONS[function.text]
-        if len(arguments) != (count or max(2, len(arguments))):
-            wanted = f"{count or '2 or more'} argument{'s' * (count != 1)}"
+        if len(arguments) != (max(2, len(arguments)) if count is None else count):
+            wanted = f"{'2 or more' if count is None else count} argument{'s' * (count != 1)}"
             text = f"{function.text}: expected {wanted}, got {len(arguments)}"
             raise ExpressionError(function.column, text)
         if further:

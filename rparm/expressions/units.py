@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from fractions import Fraction
 
-from rparm.expressions.expression import RELATIONS, ExpressionError, Node, in_order
+from rparm.expressions.expression import RELATIONS, ExpressionError, Node, in_order, table_unit
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd")
 ANGLE = "rad"
@@ -100,8 +100,10 @@ def _unit(node: Node, given: list[Unit | None], units: Mapping[str, Unit]) -> Un
         return times(given[0] or ONE, given[1] or ONE, power)
     if node.op in ("+", "-", "min", "max"):
         return _same(node, given)
-    if node.op == "table":
+    if node.op in ("table", "call"):
         return _of_table(node, given, units)
+    if node.op == "unit":
+        return _checked(node, given[0], units.get(node.name, ONE))
     if node.op in RELATIONS:
         _same(node, given)
         return ONE
@@ -121,18 +123,18 @@ def _unit(node: Node, given: list[Unit | None], units: Mapping[str, Unit]) -> Un
     return ONE
 
 
-def table_unit(name: str, argument: int | str = "") -> str:
-    """Return the key that units have for an argument of a table, or for its value."""
-    return f"{name}({argument})"
-
-
 def _of_table(node: Node, given: list[Unit | None], units: Mapping[str, Unit]) -> Unit:
     for i, unit in enumerate(given):
-        expected = units.get(table_unit(node.name, i), ONE)
-        if unit not in (None, expected):
-            what = f"{node.name} takes unit {shown(expected)}"
-            raise ExpressionError(node.column, f"{what}, got {shown(unit)}")
+        _checked(node, unit, units.get(table_unit(node.name, i), ONE))
     return units.get(table_unit(node.name), ONE)
+
+
+def _checked(node: Node, unit: Unit | None, expected: Unit) -> Unit:
+    """Return the unit that is expected, for a table or function that the node names."""
+    if unit not in (None, expected):
+        what = f"{node.name.partition('(')[0]} takes unit {shown(expected)}"
+        raise ExpressionError(node.column, f"{what}, got {shown(unit)}")
+    return expected
 
 
 def _same(node: Node, given: list[Unit | None]) -> Unit | None:
