@@ -21,18 +21,19 @@ from plain_c.text import CTextError, Program, check_function, parsed, refused, w
 from plain_c.values import Conditions, Known
 from pycparser import c_ast
 
-from rparm.expressions.expression import ExpressionError, Lookup, Node, in_order, parse
+from rparm.expressions.expression import RELATIONS, ExpressionError, Lookup, Node, in_order, parse
 
 LARGEST_FILE = 200_000  # bytes
 MOST_OPERATIONS = 10_000  # that a call stands for
 MOST_STEPS = 100_000  # of the interpreter in a call
-MOST_STEPS_IN_ALL = 2_000_000
+MOST_STEPS_IN_ALL = 500_000
+MOST_RELATIONS = 1000  # of values that move, in the whole model
 CELLS = 16  # variables that are copied in a step
 NO_LINES = {  # of C, and what to write instead
     r"#\s*include\s*<math\.h>\s*": "",
     r"#\s*include\b.*": "only #include <math.h> is read: put all functions into this file",
     r"#\s*define\b.*": "macros are not read: write static const double NAME = ... or a function",
-    r"(%:|\?\?=|#).*": "of directives, only #include <math.h> is read",
+    r"(%:|\?\?=|#|(.*\W)?_Pragma\b).*": "of directives, only #include <math.h> is read",
     r"(.*\W)?(__)?asm(__)?\b.*": "assembly is not read: write the equation in C",
 }
 # functions of math.h that are no operations of the graph, as expressions of x and y
@@ -154,7 +155,7 @@ class Calls(Interpreter):
         """Call a function; is_instant: at an event, where nothing moves."""
         key = (function.name, is_instant, *map(id, given))
         if key not in self.results:
-            self.is_instant, self.steps, self.here = is_instant, 0, None
+            self.is_instant, self.steps, self.rounds, self.here = is_instant, 0, 0, None
             arguments = dict(zip(function.arguments, given, strict=True))
             (found,), _ = self.run(function.name, lambda place, _: arguments[place[0]])
             if len(in_order([found], {*given})) > MOST_OPERATIONS:
@@ -207,9 +208,11 @@ class Calls(Interpreter):
 
     def relation(self, op: str, a: Value, b: Value, node: c_ast.Node) -> Value:
         """Compare real numbers: at an instant there are no switches."""
-        is_switch = op not in ("==", "!=") and not (a.op == b.op == "number")
-        if self.is_instant and is_switch:
+        is_open = op in RELATIONS and not (a.op == b.op == "number")
+        if self.is_instant and is_open:
             return self.graph.value(op, a, b)
+        if len(self.graph.relations) > MOST_RELATIONS:
+            raise refused(node, f"the model has more than {MOST_RELATIONS} conditions that move")
         return super().relation(op, a, b, node)
 
     def built_in(

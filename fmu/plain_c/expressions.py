@@ -163,7 +163,7 @@ class Expressions(Memory):
             case c_ast.FuncCall():
                 return self.function_call(node, scope, state)
             case c_ast.CompoundLiteral():
-                kind = self.types.of(node.type)
+                kind = self.declared_kind(node)
                 return kind, self.initialized(node.init, kind, scope, state)
             case c_ast.ExprList():
                 results = [self.value(item, scope, state) for item in node.exprs]
@@ -201,12 +201,21 @@ class Expressions(Memory):
                     return at
         raise CTextError(f"{name} is not defined")
 
+    def declared_kind(self, node: c_ast.Decl | c_ast.CompoundLiteral) -> Any:
+        """Return the type of a variable; its initializer may give it its length."""
+        kind = self.types.of(node.type)
+        if isinstance(kind, Array) and kind.length is None:
+            if not isinstance(node.init, c_ast.InitList):
+                raise refused(node, "this array has no size")
+            kind = Array(kind.of, len(node.init.exprs))
+        return kind
+
     def constant(self, node: c_ast.ID) -> tuple[Address, Any]:
         """Evaluate a constant at the top of a file."""
         declared = self.program.constants.get(node.name)
         if declared is None:
             raise refused(node, f"{node.name} is not declared")
-        kind = self.types.of(declared)
+        kind = self.declared_kind(declared)
         address = self.new_object(kind)
         value = self.initialized(declared.init, kind, self.globals, State())
 
@@ -353,6 +362,8 @@ class Expressions(Memory):
             a = a if is_real(kind) else self.conditions.real(a, known_a)
             b = b if is_real(other) else self.conditions.real(b, known_b)
             kind = DOUBLE if is_whole(kind) else kind
+        elif kind != other and not (is_real(kind) and is_real(other)) and not is_whole(kind):
+            raise refused(node, "the types of both branches do not fit")
         kind = REAL if REAL in (kind, other) else kind
         return kind, self.chosen(condition, a, b)
 
@@ -441,7 +452,8 @@ class Expressions(Memory):
                 if designator is None:
                     raise refused(item, "write nested braces instead of .a.b = ...")
                 is_name = isinstance(designator, c_ast.ID)
-                name = designator.name if is_name else self.size(designator)
+                at_index = getattr(designator, "expr", designator)  # pycparser 3.1 has a node for it
+                name = designator.name if is_name else self.size(at_index)
                 if name not in names:
                     raise refused(item, f"there is no {name} to initialize")
                 at, item = names.index(name), item.expr

@@ -47,7 +47,8 @@ class Interpreter(Expressions):
         try:
             return self._run(name, leaf_of)
         except RecursionError:
-            raise CTextError(f"{name}: is nested too deeply") from None
+            place, reason = self.program.functions[name].decl, f"{name} is nested too deeply"
+            raise refused(place, f"{reason}: use variables for parts of it") from None
 
     def _run(self, name: str, leaf_of: LeafOf) -> tuple[Any, dict[tuple[str | int, ...], Any]]:
         function = self.program.functions.get(name)
@@ -158,10 +159,12 @@ class Interpreter(Expressions):
         return state, None
 
     def returned(self, node: c_ast.Return, scope: Scope, state: State) -> Any:
-        if node.expr is None:
-            return None
         function = self.program.functions[self.calls[-1]]
         kind = self.types.of(function.decl.type.type)
+        if node.expr is None:
+            if kind != VOID:
+                raise refused(node, f"{function.decl.name} does not return a value here")
+            return None
         return self.scalar(*self.value(node.expr, scope, state), kind, state, node.expr)
 
     def branch(
@@ -249,12 +252,7 @@ class Interpreter(Expressions):
     def declaration(self, node: c_ast.Decl, scope: Scope, state: State) -> None:
         if node.name is None or isinstance(node.type, c_ast.FuncDecl):
             return
-        kind = self.types.of(node)
-        if isinstance(kind, Array) and kind.length is None:
-            if not isinstance(node.init, c_ast.InitList):
-                raise refused(node, f"the array {node.name} has no size")
-            kind = Array(kind.of, len(node.init.exprs))
-        value = UNSET
+        kind, value = self.declared_kind(node), UNSET
         if isinstance(node.init, c_ast.InitList):
             value = self.initialized(node.init, kind, scope, state)
         elif node.init is not None:

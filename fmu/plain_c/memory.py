@@ -74,7 +74,7 @@ class Types:
             length = None if node.dim is None else self.size(node.dim)
             if length is not None and not 0 < length <= LONGEST_ARRAY:
                 raise refused(node, f"an array has 1 to {LONGEST_ARRAY} elements, not {length}")
-            return Array(self.of(node.type), length)
+            return Array(self.sized(node.type), length)
         if isinstance(node, c_ast.Struct):
             return Structure(node.name or f"at {node.coord}")
         if isinstance(node, c_ast.Enum):
@@ -82,6 +82,13 @@ class Types:
         if isinstance(node, c_ast.IdentifierType):
             return self._named(node)
         raise refused(node, f"{type(node).__name__} is no type of the equations' C")
+
+    def sized(self, node: c_ast.Node) -> Any:
+        """Return the type of a part, whose length has to be known."""
+        kind = self.of(node)
+        if isinstance(kind, Array) and kind.length is None:
+            raise refused(node, "this array has no size")
+        return kind
 
     def _named(self, node: c_ast.IdentifierType) -> Any:
         name = " ".join(node.names)
@@ -102,9 +109,11 @@ class Types:
         if name not in self.structures:
             if name not in self.program.structs:
                 raise refused(node, f"struct {name} is not defined")
-            self.structures[name] = {
-                field.name: self.of(field) for field in self.program.structs[name].decls
-            }
+            found = self.structures[name] = {}
+            for field in self.program.structs[name].decls:
+                if not isinstance(field, c_ast.Decl) or field.name is None:
+                    raise refused(field, "each field of a struct needs a type and a name")
+                found[field.name] = self.sized(field)
         return self.structures[name]
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pycparser import c_ast
+from pycparser.c_lexer import CLexer, Token
 from pycparser.c_parser import CParser, ParseError
 
 # nothing of them is read: sin, bool and others are known
@@ -161,11 +162,11 @@ def read(path: Path, folders: Iterable[Path] = (), ignored: Iterable[str] = ()) 
 
 def parsed(text: str, files: list[Path]) -> Program:
     """Read the declarations of a text without comments and directives; its first file names it."""
-    text, name = f'# 1 "prelude"\n{PRELUDE}{text}', files[0].name
+    name, parser = files[0].name, CParser(lexer=_Lexer)
     try:
-        tree = CParser().parse(text, name)
+        tree = parser.parse(f'# 1 "prelude"\n{PRELUDE}{text}', name)
     except ParseError as error:
-        raise CTextError(_rephrased(str(error), text, name)) from None
+        raise CTextError(_rephrased(str(error), parser.clex.last)) from None
     except RecursionError:
         raise CTextError(f"{name}: is nested too deeply") from None
     program = Program(files=files)
@@ -174,12 +175,25 @@ def parsed(text: str, files: list[Path]) -> Program:
     return program
 
 
-def _rephrased(message: str, text: str, name: str) -> str:
+class _Lexer(CLexer):
+    """Keeps the last token, for messages without a line."""
+
+    last: Token
+
+    def token(self) -> Token | None:
+        """Return the next token."""
+        found = super().token()
+        self.last = found or self.last
+        return found
+
+
+def _rephrased(message: str, last: Token) -> str:
     """Rephrase a message of pycparser for a reader who does not know parsers."""
-    found = PLACE.fullmatch(message)
-    if found is None:  # "name: At end of input"
-        line = _lines(text, name)
-        return f"{name}:{line}: the file ends too early: a }} or ; is missing"
+    found, place = PLACE.fullmatch(message), f"{last.filename}:{last.lineno}"
+    if message.endswith(": At end of input"):
+        return f"{place}: the file ends too early: a }} or ; is missing"
+    if found is None:
+        return f"{place}: {message.rpartition(': ')[2].lower()} near {last.value}"
     reason = found["text"]
     place = f"{found['file']}:{found['line']}"
     if reason.startswith("before: "):
@@ -190,24 +204,12 @@ def _rephrased(message: str, text: str, name: str) -> str:
     return f"{place}: {reason[:1].lower()}{reason[1:]}"
 
 
-def _lines(text: str, name: str) -> int:
-    """Return the number of the last line that is not empty, of the file with this name."""
-    current, number, last = "", 0, 1
-    for line in text.split("\n"):
-        found = re.fullmatch(r'# (\d+) "(.*)"', line)
-        if found:
-            number, current = int(found[1]), found[2]
-            continue
-        if current == name and line.strip():
-            last = number
-        number += 1
-    return last
-
-
 def _add(program: Program, node: c_ast.Node) -> None:
     """Put a declaration at the top of a file into the program."""
     if isinstance(node, c_ast.FuncDef):
         name = node.decl.name
+        if not isinstance(node.decl.type, c_ast.FuncDecl) or node.param_decls:
+            raise refused(node.decl, f"{name} has no list of arguments: write double {name}(...)")
         if name in program.functions:
             raise refused(node.decl, f"{name} is defined twice")
         program.functions[name] = node

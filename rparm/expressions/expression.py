@@ -317,7 +317,7 @@ class _Parser:
         separator = "("
         while self.token.text == separator:
             self.take()
-            if self.token.text == ")" and separator == "(":
+            if self.token.text == ")" and further and not further.arguments:
                 break
             arguments.append(self.expression(CONDITIONAL))
             separator = ","
