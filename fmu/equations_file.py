@@ -73,6 +73,7 @@ DEVICE = re.compile("(?i:con|prn|aux|nul|com[1-9]|lpt[1-9])")
 CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 LATER = ("sum", "der", "floor", "ceil", "round", "mod")
 RESERVED = {*FUNCTIONS, *NO_NAMES, "pi", "time", "GUID", "NAME", "TOKEN_FMI3"}
+TAKEN = {*RESERVED, *FURTHER, *LATER}  # no names of functions
 NUMBERS = ("start", "min", "max", "nominal")
 OF_ALL = ("start", "unit", "min", "max", "description")
 SECTIONS = {  # keys of their entries, and the one that each needs
@@ -245,6 +246,8 @@ def read_tables(
         with placed("code"):
             file.code = equations_code.read(path.parent / head["code"])
             for name, function in file.code.functions.items():
+                if function.is_helper and name in TAKEN:
+                    continue
                 with placed(f"{function.place}: {name}"):
                     _check_function_name(name, file)
                 file.functions[name] = function
@@ -296,7 +299,7 @@ def _read_table(file: ModelFile, name: str, entry: object) -> None:
 
 
 def _check_function_name(name: str, file: ModelFile) -> None:
-    if not NAME.fullmatch(name) or name in (*RESERVED, *FURTHER, *LATER, *file.functions):
+    if not NAME.fullmatch(name) or name in (*TAKEN, *file.functions):
         raise ModelFileError("expected a name that is no function already")
 
 

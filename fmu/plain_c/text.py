@@ -8,9 +8,10 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from pycparser import c_ast
-from pycparser.c_lexer import CLexer, Token
+from pycparser.c_lexer import CLexer
 from pycparser.c_parser import CParser, ParseError
 
 # nothing of them is read: sin, bool and others are known
@@ -19,6 +20,7 @@ PRELUDE = "typedef _Bool bool;\ntypedef unsigned long size_t;\n"
 DIRECTIVE = re.compile(r"\s*#\s*(\w*)\s*(.*?)\s*$")
 # a comment or a string, perhaps without an end: nothing is looked at twice
 COMMENT = re.compile(r"//[^\n]*|/\*.*?(?:\*/|\Z)|\"(?:\\.|[^\"\\\n])*\"?", re.DOTALL)
+LONGEST_WORD = 30  # characters in a message
 CONTINUED = re.compile(r"^((?:[^\n]*\\\n)+)([^\n]*)", re.MULTILINE)
 PLACE = re.compile(r"(?P<file>.*?):(?P<line>\d+)(?::\d+)?: (?P<text>.*)", re.DOTALL)
 # what to write instead of a statement or an expression that is no part of the equations' C
@@ -166,7 +168,7 @@ def parsed(text: str, files: list[Path]) -> Program:
     try:
         tree = parser.parse(f'# 1 "prelude"\n{PRELUDE}{text}', name)
     except ParseError as error:
-        raise CTextError(_rephrased(str(error), parser.clex.last)) from None
+        raise CTextError(_rephrased(str(error), *parser.clex.last)) from None
     except RecursionError:
         raise CTextError(f"{name}: is nested too deeply") from None
     program = Program(files=files)
@@ -176,28 +178,29 @@ def parsed(text: str, files: list[Path]) -> Program:
 
 
 class _Lexer(CLexer):
-    """Keeps the last token, for messages without a line."""
+    """Keeps place and text of the last token, for messages without a line."""
 
-    last: Token
+    last = ("", "")
 
-    def token(self) -> Token | None:
+    def token(self) -> Any:
         """Return the next token."""
         found = super().token()
-        self.last = found or self.last
+        if found is not None:
+            self.last = f"{self.filename}:{found.lineno}", found.value[:LONGEST_WORD]
         return found
 
 
-def _rephrased(message: str, last: Token) -> str:
+def _rephrased(message: str, place: str, word: str) -> str:
     """Rephrase a message of pycparser for a reader who does not know parsers."""
-    found, place = PLACE.fullmatch(message), f"{last.filename}:{last.lineno}"
+    found = PLACE.fullmatch(message)
     if message.endswith(": At end of input"):
         return f"{place}: the file ends too early: a }} or ; is missing"
     if found is None:
-        return f"{place}: {message.rpartition(': ')[2].lower()} near {last.value}"
+        return f"{place}: {message.rpartition(': ')[2].lower()} near {word}"
     reason = found["text"]
     place = f"{found['file']}:{found['line']}"
     if reason.startswith("before: "):
-        token = reason.removeprefix("before: ")
+        token = reason.removeprefix("before: ")[:LONGEST_WORD]
         return f"{place}: {token} does not fit here: often a ; is missing before it"
     if reason == "Invalid function definition":
         return f"{place}: this is no declaration: a type or a ; may be missing before it"

@@ -124,16 +124,18 @@ def _unit(node: Node, given: list[Unit | None], units: Mapping[str, Unit]) -> Un
 
 
 def _of_table(node: Node, given: list[Unit | None], units: Mapping[str, Unit]) -> Unit:
+    has_none = node.op == "call" and table_unit(node.name) not in units
+    hint = ": write its units into [functions]" if has_none else ""
     for i, unit in enumerate(given):
-        _checked(node, unit, units.get(table_unit(node.name, i), ONE))
+        _checked(node, unit, units.get(table_unit(node.name, i), ONE), hint)
     return units.get(table_unit(node.name), ONE)
 
 
-def _checked(node: Node, unit: Unit | None, expected: Unit) -> Unit:
+def _checked(node: Node, unit: Unit | None, expected: Unit, hint: str = "") -> Unit:
     """Return the unit that is expected, for a table or function that the node names."""
     if unit not in (None, expected):
-        what = f"{node.name.partition('(')[0]} takes unit {shown(expected)}"
-        raise ExpressionError(node.column, f"{what}, got {shown(unit)}")
+        what = f"{node.name.partition('(')[0]} takes unit {shown(expected)}, got {shown(unit)}"
+        raise ExpressionError(node.column, what + hint)
     return expected
 
 
