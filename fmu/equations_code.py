@@ -15,20 +15,17 @@ from typing import Any
 
 from equations.graph import DERIVATIVES, Graph, Value
 from plain_c.expressions import ROUNDING
-from plain_c.interpreter import Interpreter, Todo
-from plain_c.memory import Address, is_real
+from plain_c.interpreter import Interpreter
+from plain_c.memory import DOUBLE, is_real
 from plain_c.text import CTextError, Program, check_function, parsed, refused, without_comments
-from plain_c.values import Conditions, Known
 from pycparser import c_ast
 
 from rparm.expressions.expression import RELATIONS, ExpressionError, Lookup, Node, in_order, parse
 
 LARGEST_FILE = 200_000  # bytes
 MOST_OPERATIONS = 10_000  # that a call stands for
-MOST_STEPS = 100_000  # of the interpreter in a call
-MOST_STEPS_IN_ALL = 500_000
+MOST_STEPS, MOST_STEPS_IN_ALL = 100_000, 500_000  # of the interpreter in a call, and in all
 MOST_RELATIONS = 1000  # of values that move, in the whole model
-CELLS = 16  # variables that are copied in a step
 NO_LINES = {  # of C, and what to write instead
     r"#\s*include\s*<math\.h>\s*": "",
     r"#\s*include\b.*": "only #include <math.h> is read: put all functions into this file",
@@ -74,6 +71,7 @@ class CodeFile:
 
     program: Program
     functions: dict[str, Called]
+    warnings: list[str]
 
     def called_by(self, graph: Graph) -> Mapping[str, Callable[[list[Value], bool], Value]]:
         """Return the functions of arguments in a graph, and of whether this is an instant."""
@@ -96,7 +94,8 @@ def read(path: Path) -> CodeFile:
         if not function.is_helper:
             given = [graph.value("parameter", name=a) for a in function.arguments]
             calls.result(function, given, False)
-    return CodeFile(program, found)
+    warnings = [warning.replace(" warning:", "") for warning in dict.fromkeys(calls.warnings)]
+    return CodeFile(program, found, warnings)
 
 
 def _lines(path: Path) -> str:
@@ -128,15 +127,14 @@ def _lines(path: Path) -> str:
 class Calls(Interpreter):
     """Calls of functions of a program, as values of a graph."""
 
-    known = ARGUMENTS
+    known, most_steps = ARGUMENTS, MOST_STEPS
 
     def __init__(self, program: Program, graph: Graph) -> None:
-        super().__init__(program, graph, warn=lambda _: None)
-        self.conditions = Counted(graph, self.spend)
+        self.warnings: list[str] = []
+        super().__init__(program, graph, warn=self.warnings.append)
+        self.conditions.decided = graph.choice
         self.results: dict[tuple[object, ...], Value] = {}
-        self.is_instant = False
-        self.steps = self.steps_in_all = 0
-        self.here: c_ast.Node | None = None  # what is read
+        self.is_instant, self.steps_in_all = False, 0
 
     def called(self, name: str, function: c_ast.FuncDef) -> Called:
         """Return how expressions call a function."""
@@ -153,58 +151,20 @@ class Calls(Interpreter):
 
     def result(self, function: Called, given: Sequence[Value], is_instant: bool) -> Value:
         """Call a function; is_instant: at an event, where nothing moves."""
-        key = (function.name, is_instant, *map(id, given))
+        key = (function.name, is_instant, *given)
         if key not in self.results:
-            self.is_instant, self.steps, self.rounds, self.here = is_instant, 0, 0, None
+            self.is_instant = is_instant
             arguments = dict(zip(function.arguments, given, strict=True))
             (found,), _ = self.run(function.name, lambda place, _: arguments[place[0]])
+            self.results[key], self.steps_in_all = found, self.steps_in_all + self.steps
             if len(in_order([found], {*given})) > MOST_OPERATIONS:
-                place = self.program.functions[function.name].decl
-                reason = f"{function.name} makes more than {MOST_OPERATIONS} operations"
-                raise refused(place, reason)
-            self.results[key] = found
+                reason = f"a call makes more than {MOST_OPERATIONS} operations"
+                raise CTextError(f"{function.place}: {reason}")
+            if self.steps_in_all > MOST_STEPS_IN_ALL:
+                raise CTextError(
+                    f"{function.place}: calls take more than {MOST_STEPS_IN_ALL} steps"
+                )
         return self.results[key]
-
-    # ---- Limits ----------------------------------------------------------------------------------
-
-    def spend(self, steps: int = 1) -> None:
-        """Count steps; a text that takes too many is refused where it does."""
-        self.steps += steps
-        self.steps_in_all += steps
-        if self.steps > MOST_STEPS or self.steps_in_all > MOST_STEPS_IN_ALL:
-            most, of = (
-                (MOST_STEPS, "a call") if self.steps > MOST_STEPS else (MOST_STEPS_IN_ALL, "all")
-            )
-            reason = f"more than {most} steps of {of}: use shorter loops or fewer calls"
-            raise refused(self.here, reason)
-
-    def value(self, node: c_ast.Node, *rest: Any) -> tuple[Any, Any]:
-        """Return type and value of an expression."""
-        self.here = node
-        self.spend()
-        return super().value(node, *rest)
-
-    def execute(self, todo: Todo | None, state: Any) -> tuple[Any, Any]:
-        """Run statements; branches and calls copy the variables."""
-        self.spend(1 + len(state.memory) // CELLS)
-        return super().execute(todo, state)
-
-    def get(self, *arguments: Any) -> Any:
-        """Read a value, part by part."""
-        self.spend()
-        return super().get(*arguments)
-
-    def set_all(self, address: Address, value: Any, state: Any) -> None:
-        """Store a value, part by part."""
-        self.spend()
-        super().set_all(address, value, state)
-
-    def zero(self, *arguments: Any) -> Any:
-        """Return the value of parts that an initializer leaves out."""
-        self.spend()
-        return super().zero(*arguments)
-
-    # ---- Operations ------------------------------------------------------------------------------
 
     def relation(self, op: str, a: Value, b: Value, node: c_ast.Node) -> Value:
         """Compare real numbers: at an instant there are no switches."""
@@ -223,37 +183,6 @@ class Calls(Interpreter):
             return super().built_in(name, given, state, node)
         reals = []
         for (kind, value), at in zip(given, node.args.exprs, strict=True):
-            reals.append(self.scalar(kind, value, "double", state, at))
+            reals.append(self.scalar(kind, value, DOUBLE, state, at))
         names = dict(zip("xy", reals, strict=False))
-        return "real", self.graph.of_tree(EXPRESSIONS[name], names, self.is_instant)
-
-
-class Counted(Conditions):
-    """Conditions that count their steps; where a choice has no value is as in expressions."""
-
-    def __init__(self, graph: Graph, spend: Callable[[], None]) -> None:
-        super().__init__(graph)
-        self.spend = spend
-
-    def decided(self, condition: Value, first: Value, second: Value) -> Value:
-        """Return the choice of a condition that is not known."""
-        return self.graph.choice(condition, first, second)
-
-    def _truth(self, condition: Value, known: Known) -> bool | None:
-        self.spend()
-        return super()._truth(condition, known)
-
-    def each(self, function: Callable[[Any, Known], Any], value: Any, known: Known) -> Any:
-        """Apply a function to each number or pointer that a value may be."""
-        self.spend()
-        return super().each(function, value, known)
-
-    def real(self, value: Any, known: Known) -> Value:
-        """Convert a whole number to a real one."""
-        self.spend()
-        return super().real(value, known)
-
-    def truth(self, value: Any, known: Known) -> Value:
-        """Return the condition that a whole number is not 0."""
-        self.spend()
-        return super().truth(value, known)
+        return DOUBLE, self.graph.of_tree(EXPRESSIONS[name], names, self.is_instant)

@@ -117,7 +117,7 @@ class Graph:
     """Makes values, and finds those that exist.
 
     A relation of values that move is a switch: its result is a mode, which changes at events only;
-    `relations` has them by mode. `functions` are called with values, and whether this is an instant.
+    `relations` has them by mode. `functions` take values, and whether this is an instant.
     """
 
     known: dict[tuple, Value] = field(default_factory=dict)

@@ -37,12 +37,13 @@ ARGUMENTS |= dict.fromkeys(ROUNDING, 1)
 
 
 class Expressions(Memory):
-    known: Mapping[str, int] = ARGUMENTS
     """Calculates expressions; `known` are functions of libm and real.h with their arguments.
 
     doubles_move: double has derivatives, as real. is_exact: operations with 0 and 1 stay, which
     keeps signs of zeros. warn: gets warnings.
     """
+
+    known: Mapping[str, int] = ARGUMENTS
 
     def __init__(
         self,
@@ -137,6 +138,8 @@ class Expressions(Memory):
 
     def value(self, node: c_ast.Node, scope: Scope, state: State) -> tuple[Any, Any]:
         """Return type and value of an expression."""
+        self.here = node
+        self.spend()
         kind, value = self._value(node, scope, state)
         if value is UNSET:
             raise refused(node, f"{_shown(node)} has no value here on every path")
@@ -362,7 +365,7 @@ class Expressions(Memory):
             a = a if is_real(kind) else self.conditions.real(a, known_a)
             b = b if is_real(other) else self.conditions.real(b, known_b)
             kind = DOUBLE if is_whole(kind) else kind
-        elif kind != other and not (is_real(kind) and is_real(other)) and not is_whole(kind):
+        elif kind != other and not all(is_real(k) or is_whole(k) for k in (kind, other)):
             raise refused(node, "the types of both branches do not fit")
         kind = REAL if REAL in (kind, other) else kind
         return kind, self.chosen(condition, a, b)
@@ -452,8 +455,8 @@ class Expressions(Memory):
                 if designator is None:
                     raise refused(item, "write nested braces instead of .a.b = ...")
                 is_name = isinstance(designator, c_ast.ID)
-                at_index = getattr(designator, "expr", designator)  # pycparser 3.1 has a node for it
-                name = designator.name if is_name else self.size(at_index)
+                inner = getattr(designator, "expr", designator)  # pycparser has a node for it
+                name = designator.name if is_name else self.size(inner)
                 if name not in names:
                     raise refused(item, f"there is no {name} to initialize")
                 at, item = names.index(name), item.expr
@@ -465,6 +468,7 @@ class Expressions(Memory):
 
     def zero(self, kind: Any, node: c_ast.Node) -> Any:
         """Return the value of parts that an initializer leaves out."""
+        self.spend()
         if isinstance(kind, Structure):
             fields = self.types.fields(kind, node)
             return {name: self.zero(of, node) for name, of in fields.items()}

@@ -18,7 +18,7 @@ from plain_c.expressions import Expressions
 from plain_c.memory import UNSET, VOID, Array, LeafOf, Pointer, Scope, State, Structure
 from plain_c.text import CTextError, check_function, refused, walk
 
-MOST_ROUNDS = 100_000  # of loops, before a text is refused
+CELLS = 16  # variables that are copied in a step
 
 
 @dataclass(frozen=True)
@@ -38,12 +38,12 @@ class Interpreter(Expressions):
         super().__init__(*arguments, **options)
         self.checked: set[str] = set()
         self.calls: list[str] = []
-        self.rounds = 0
 
     # ---- Functions -------------------------------------------------------------------------------
 
     def run(self, name: str, leaf_of: LeafOf) -> tuple[Any, dict[tuple[str | int, ...], Any]]:
         """Run a function; return result and writes, by paths. `leaf_of` gives what it reads."""
+        self.steps, self.here = 0, None
         try:
             return self._run(name, leaf_of)
         except RecursionError:
@@ -127,6 +127,7 @@ class Interpreter(Expressions):
 
     def execute(self, todo: Todo | None, state: State) -> tuple[State, Any]:
         """Run statements; return the state at the end, None if they all return, and the result."""
+        self.spend(4 + len(state.memory) // CELLS)  # calls and branches copy the variables
         while todo is not None:
             node, scope, after = todo.statement, todo.scope, todo.after
             match node:
@@ -242,9 +243,6 @@ class Interpreter(Expressions):
             raise refused(
                 node, "the number of rounds is not fixed: compare an int counter with a constant"
             )
-        self.rounds += 1
-        if self.rounds > MOST_ROUNDS:
-            raise refused(node, f"loops have more than {MOST_ROUNDS} rounds in all")
         if not condition.number:
             return todo.after
         return Todo(node.stmt, Scope(scope), replace(todo, scope=scope, is_round=True))

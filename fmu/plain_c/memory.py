@@ -144,19 +144,30 @@ class Scope:
 class Memory:
     """Objects of a program with their parts, and how these are read and written."""
 
+    most_steps = 10**6  # of a run, before its text is refused
+
     def __init__(self, program: Program, graph: Graph) -> None:
         self.program, self.graph = program, graph
         self.types = Types(program, self.size)
-        self.conditions = Conditions(graph)
+        self.conditions = Conditions(graph, self.spend)
         self.names: dict[Value, str] = {}  # of values, by the variables that got them
         self.inputs: dict[int, tuple[str, LeafOf]] = {}
         self.objects: dict[int, Any] = {}  # types
         self.titles: dict[int, str] = {}  # names of variables
         self.read: set[Address] = set()  # parts of arguments that were read before they were set
+        self.steps = 0  # of this run
+        self.here: c_ast.Node | None = None  # the expression that is read
 
     def size(self, node: c_ast.Node) -> int:
         """Evaluate a whole number that is known: length of an array, value of an enumerator."""
         raise NotImplementedError
+
+    def spend(self, steps: int = 1) -> None:
+        """Count steps; a text that takes too many is refused where it does."""
+        self.steps += steps
+        if self.steps > self.most_steps:
+            what = f"more than {self.most_steps} steps"
+            raise refused(self.here, f"{what}: use fewer rounds of loops, or fewer calls")
 
     def new_object(self, kind: Any) -> Address:
         self.objects[len(self.objects)] = kind
@@ -194,6 +205,7 @@ class Memory:
 
     def get(self, address: Address, kind: Any, state: State, node: c_ast.Node) -> Any:
         """Read the value at an address."""
+        self.spend()
         if isinstance(kind, Structure):
             fields = self.types.fields(kind, node)
             return {name: self.get(address + name, of, state, node) for name, of in fields.items()}
@@ -208,7 +220,8 @@ class Memory:
         return value
 
     def set_all(self, address: Address, value: Any, state: State) -> None:
-        """Return the store a value with all of its parts."""
+        """Store a value with all of its parts."""
+        self.spend()
         if isinstance(value, dict):
             for name, part in value.items():
                 self.set_all(address + name, part, state)

@@ -167,7 +167,9 @@ class Function:
         """Return its expression for these arguments; mistakes in it are at this column."""
         if self.name:
             units = (table_unit(self.name, i) for i in range(len(given)))
-            given = [Node("unit", a.column, (a,), 0.0, u) for a, u in zip(given, units, strict=True)]
+            given = [
+                Node("unit", a.column, (a,), 0.0, u) for a, u in zip(given, units, strict=True)
+            ]
             body = replace(self, name="").of(given, column)
             return Node("unit", column, (body,), name=table_unit(self.name))
         known = dict(zip(self.arguments, given, strict=True))
