@@ -110,7 +110,7 @@ code = "functions.c"
 modes = ["resting"]
 [parameters]
 k = { start = 5 }
-follows = { value = "spring(k, k) + 1" }
+follows = { value = "spring(k, k) + 2" }
 [inputs]
 u = {}
 [states]
@@ -119,7 +119,7 @@ v = { derivative = "spring(x, k) - drag(v, 0.1) - load(x, time) + u" }
 [discrete]
 held = {}
 [sampled.s]
-every = "0.1"
+every = "follows - 1.9"
 set = { held = "load(x, time)" }
 [events.floor]
 when = "spring(x - 1, k) > 2"
