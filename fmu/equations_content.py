@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from declaration.load import shown
+from equations_code import CodeFile
 from equations_tables import Table
 
 from rparm.expressions.expression import (
@@ -179,6 +180,7 @@ class ModelFile:
     units: dict[str, Measure] = field(default_factory=dict)  # of [units]
     functions: dict[str, Function | Lookup] = field(default_factory=dict)
     tables: dict[str, Table] = field(default_factory=dict)
+    code: CodeFile | None = None
     table_units: dict[str, dict[str, int]] = field(default_factory=dict)  # by `table_unit`
     dimensions: dict[str, int] = field(default_factory=dict)  # numbers of indexes, by name
     indexes: set[str] = field(default_factory=set)  # all that `for` gives

@@ -10,9 +10,11 @@ import math
 import re
 import tomllib
 from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import equations_code
 import equations_tables
 from declaration.load import shown
 from equations_arrays import FOR, elements, every, target
@@ -56,6 +58,7 @@ from rparm.expressions.units import (
     BASE,
     Measure,
     table_unit,
+    unit_of,
     unit_of_exponents,
 )
 
@@ -67,10 +70,12 @@ LONGEST_TEXT = 1000  # characters of a description
 LONGEST_MESSAGE = 500  # bytes: src/instance/settings.c has no room for more
 NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,99}", re.ASCII)
 # files that Windows cannot have, with any suffix
+CODE = re.compile(r'[^\x00-\x1f\\"]+\.c')
 DEVICE = re.compile("(?i:con|prn|aux|nul|com[1-9]|lpt[1-9])")
 CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 LATER = ("sum", "der")
 RESERVED = {*FUNCTIONS, *NO_NAMES, "pi", "time", "GUID", "NAME", "TOKEN_FMI3"}
+TAKEN = {*RESERVED, *FURTHER, *LATER}  # no names of functions
 NUMBERS = ("start", "min", "max", "nominal")
 OF_ALL = ("start", "unit", "min", "max", "description")
 SECTIONS = {  # keys of their entries, and the one that each needs
@@ -89,8 +94,8 @@ OWN_KEYS = {
 }
 NOT_REAL = {"parameters": OPTIONS, "inputs": SWITCHES, "discrete": COUNTS}
 HEAD = (
-    *("name", "description", "experiment", "modes", "sizes", "units", "tables", "functions"),
-    *("sampled", "events", "check"),
+    *("name", "description", "experiment", "modes", "code", "sizes", "units", "tables"),
+    *("functions", "sampled", "events", "check"),
     *SECTIONS,
 )
 EXPERIMENT = {"stop": 10.0, "step": 0.01, "tolerance": 1e-8}
@@ -186,6 +191,17 @@ def _type(value: Any) -> Kind:
     raise ValueError(f'expected "{BOOLEAN}", "{INTEGER}" or a list of different names')
 
 
+def _arguments(value: Any) -> dict[str, str]:
+    """Return the arguments of a function with their units; of a list, these are empty."""
+    if isinstance(value, dict) and all(type(unit) is str and unit for unit in value.values()):
+        return value
+    if isinstance(value, list) and all(type(name) is str for name in value):
+        found = dict.fromkeys(value, "")
+        if len(found) == len(value):
+            return found
+    raise ValueError("expected a list of names, each once, or a table of their units")
+
+
 READ = {
     **dict.fromkeys((*NUMBERS, *EXPERIMENT), finite_number),
     "start": lambda given: given if type(given) in (bool, str) else finite_number(given),
@@ -195,7 +211,8 @@ READ = {
     **dict.fromkeys((*BASE, ANGLE), _expect("a whole exponent", int, lambda e: abs(e) < 100)),
     "name": _expect("a letter, then letters, digits, _", str, NAME.fullmatch),
     "modes": _modes,
-    "arguments": LIST,
+    "arguments": _arguments,
+    "code": _expect("a C file such as crane.c", str, CODE.fullmatch),
 }  # how values of keys are read; others are expressions
 
 
@@ -249,6 +266,15 @@ def read_tables(
             file.units[symbol] = Measure(known, base=symbol)
     for name, entry in head.get("tables", {}).items():
         _read_table(file, name, entry)
+    if "code" in head:
+        with placed("code"):
+            file.code = equations_code.read(path.parent / head["code"])
+            for name, function in file.code.functions.items():
+                if function.is_helper and name in TAKEN:
+                    continue
+                with placed(f"{function.place}: {name}"):
+                    _check_function_name(name, file)
+                file.functions[name] = function
     _read_functions(file, head.get("functions", {}))
     modes = head.get("modes", [])
     entries = [*SECTIONS, "sampled", "events"]
@@ -325,29 +351,52 @@ def _read_table(file: ModelFile, name: str, entry: object) -> None:
 
 
 def _check_function_name(name: str, file: ModelFile) -> None:
-    if not NAME.fullmatch(name) or name in (*RESERVED, *FURTHER, *LATER, *file.functions):
+    if not NAME.fullmatch(name) or name in (*TAKEN, *file.functions):
         raise ModelFileError("expected a name that is no function already")
 
 
 def _read_functions(file: ModelFile, entries: dict[str, object]) -> None:
-    """Read the functions, each of which may call those before it."""
-    for name, entry in entries.items():
-        place = ("[functions]", _named(name))
-        with placed(*place):
-            _check_function_name(name, file)
-            given = _entries(entry, ("arguments", "value"), "value")
-            arguments = given.get("arguments", [])
-            taken = (*RESERVED, *file.sizes)
-            are_names = all(NAME.fullmatch(a) and a not in taken for a in arguments)
-            if not arguments or not are_names or len({*arguments}) < len(arguments):
-                raise ModelFileError("arguments: expected names, each once and none reserved")
-            element = Element(name, name, given["value"])
-            value = file.expression(element, ("value",), element.entry)
-            for node in in_order([value.tree]):
-                if node.op == "name" and node.name not in (*arguments, *CONSTANTS):
-                    raise ExpressionError(node.column, f"{shown(node.name)} is no argument")
-            body = with_kinds(value.tree)
-        file.functions[name] = Function(tuple(arguments), body)
+    """Read units of functions of the C file, then functions, which may call those before them."""
+    in_c = file.code.functions if file.code else {}
+    of_c = {name: entry for name, entry in entries.items() if name in in_c}
+    for name, entry in (of_c | entries).items():
+        with placed("[functions]", _named(name)):
+            needed = "" if name in in_c else "value"
+            given = _entries(entry, ("arguments", "value", "unit"), needed)
+            arguments, units = given.get("arguments", {}), {}
+            order = (*arguments,) if "value" in given else in_c[name].arguments
+            if {*order} != {*arguments}:
+                raise ModelFileError(f"arguments: expected all of the C file: {', '.join(order)}")
+            if "unit" in given or any(arguments.values()):
+                if "" in arguments.values():
+                    raise ModelFileError("unit: expected units of arguments, too: { x = 'm' }")
+                units = {table_unit(name, order.index(a)): u for a, u in arguments.items()}
+                units |= {table_unit(name): given.get("unit", "1")}
+                file.table_units |= {k: file.measured(u).exponents for k, u in units.items()}
+            if "value" in given:
+                own = _function(file, name, arguments, given["value"], bool(units))
+                file.functions[name] = own
+
+
+def _function(
+    file: ModelFile, name: str, arguments: dict[str, str], text: object, has_units: bool
+) -> Function:
+    """Return a function, whose arguments and value have units in the file, or take any."""
+    _check_function_name(name, file)
+    taken = (*RESERVED, *file.sizes)
+    if not arguments or not all(NAME.fullmatch(a) and a not in taken for a in arguments):
+        raise ModelFileError("arguments: expected names, each once and none reserved")
+    value = file.expression(Element(name, name, text), ("value",), text)
+    for node in in_order([value.tree]):
+        if node.op == "name" and node.name not in (*arguments, *CONSTANTS):
+            raise ExpressionError(node.column, f"{shown(node.name)} is no argument")
+    body = with_kinds(value.tree)
+    if has_units:
+        units = {key: unit_of_exponents(found) for key, found in file.table_units.items()}
+        units |= {a: units[table_unit(name, i)] for i, a in enumerate(arguments)}
+        with placed("value"):
+            unit_of(body, units, units[table_unit(name)])
+    return Function((*arguments,), body, name=name if has_units else "")
 
 
 def _experiment(given: dict[str, float]) -> dict[str, float]:
@@ -556,12 +605,19 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     """Read and check a file for a model that has `solver_names`, too; ModelFileError."""
     with placed(path):
         text, tables = tables_of(path)
-        try:
-            file = read_tables(path, text, tables, solver_names)
-            check(file)
-        except ModelFileError as error:
-            raise ModelFileError(f"{_line(text, str(error))}{error}") from None
+    with located(path, text):
+        file = read_tables(path, text, tables, solver_names)
+        check(file)
     return file
+
+
+@contextmanager
+def located(path: Path, text: str) -> Iterator[None]:
+    """Put the path and the line in front of what is wrong inside."""
+    try:
+        yield
+    except ModelFileError as error:
+        raise ModelFileError(f"{path}: {_line(text, str(error))}{error}") from None
 
 
 def _line(text: str, message: str) -> str:

@@ -97,8 +97,8 @@ def _check_periods(file: ModelFile) -> None:
     starts = {variable.name: variable.start for variable in file.of("parameters", OPTIONS)}
     follows = {variable.expression for variable in file.of(FOLLOWS)}
     for expression in file.order:
-        if expression in follows:
-            starts[expression.target] = _number(expression, starts)
+        if expression in follows and (number := _known_number(expression, starts)) is not None:
+            starts[expression.target] = number
     for variable in file.started:
         with placed(*variable.initial.place):
             if not math.isfinite(_number(variable.initial, starts)):
@@ -114,13 +114,18 @@ def _check_periods(file: ModelFile) -> None:
 
 
 def _number(expression: Expression, values: Mapping[str, float]) -> float:
-    """Evaluate an expression; nan if it has no value."""
+    """Evaluate an expression; nan if it has no value, 1 if that is known at run time only."""
+    number = _known_number(expression, values)
+    return 1.0 if number is None else number
+
+
+def _known_number(expression: Expression, values: Mapping[str, float]) -> float | None:
     try:
         return evaluated(expression.tree, values)
     except (ArithmeticError, ValueError):
         return math.nan
-    except KeyError:  # tables are not looked up here: the start of a simulation checks their values
-        return 1.0
+    except KeyError:  # tables and functions of C: the start of a simulation checks their values
+        return None
 
 
 def _check_units(file: ModelFile) -> None:

@@ -63,7 +63,8 @@ function(add_equations name file terminals folder)
   if(terminals)
     set(option --terminals ${terminals})
   endif()
-  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/equations/*.* ${FMU_SOURCE_DIR}/equations_*.py ${FMU_SOURCE_DIR}/declaration/*
+  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/equations/*.* ${FMU_SOURCE_DIR}/equations_*.py ${FMU_SOURCE_DIR}/plain_c/*.py
+       ${FMU_SOURCE_DIR}/declaration/*
        ${PROJECT_SOURCE_DIR}/rparm/expressions/*.py ${PROJECT_SOURCE_DIR}/src/instance/*.toml)
   add_custom_command(
     OUTPUT ${folder}/equations.c ${folder}/equations.h ${folder}/variables.toml ${folder}/README.md

@@ -31,7 +31,7 @@ OF_FMU = ("fmu/**/*.py", "fmu/**/*.toml", "fmu/**/*.in", "fmu/*.css", "fmu/*.htm
 OF_FMU += ("src/instance/*.toml",)
 # modules that are not for a model
 OF_RELEASES = ("bill_of_materials", "built", "derive", "pieces", "references", "wheel")
-OF_PLAIN_C = "plain_c"  # folder of fmu: reads the C of models, not files with equations
+OF_RELEASES += ("blocks", "derived")  # of plain_c: they write C of models
 FOR_TESTS = ("_in", "sampled", "tightest")  # ends of names of tables that no command reads
 
 
@@ -55,9 +55,8 @@ class CustomBuildHook(BuildHookInterface):
             else:
                 include[str(file)] = f"{SHARE}/{file.relative_to(root).as_posix()}"
         for file in sorted(file for pattern in OF_FMU for file in root.glob(pattern)):
-            if file.stem in OF_RELEASES or file.parent.name == OF_PLAIN_C:
-                continue
-            include[str(file)] = f"{SHARE}/{file.relative_to(root).as_posix()}"
+            if file.stem not in OF_RELEASES:
+                include[str(file)] = f"{SHARE}/{file.relative_to(root).as_posix()}"
         page = "examples/models/README.md"
         include[str(root / page)] = f"{SHARE}/{page}"
         write_pieces(release, staging)

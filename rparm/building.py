@@ -14,7 +14,7 @@ from rparm.files import whole, written
 from rparm.interruption import run_group, temporary_folder, uninterrupted
 
 # packages that the program imports
-NEEDED = ("latex2mathml", "markdown_it", "mdit_py_plugins", "pydantic")
+NEEDED = ("latex2mathml", "markdown_it", "mdit_py_plugins", "pycparser", "pydantic")
 
 
 def build(

@@ -13,8 +13,8 @@ from equations.graph import CONDITIONS, LEAVES, Value
 from rparm.expressions.expression import RELATIONS, in_order
 
 # what a formula of C is made of; that of a function is its call
-FORMULAS = {op: f"{{}} {op} {{}}" for op in ("+", "-", "*", "/", *RELATIONS)}
-FORMULAS |= {"==": "{} == {}", "and": "{} && {}", "or": "{} || {}", "not": "!{}"}
+FORMULAS = {op: f"{{}} {op} {{}}" for op in ("+", "-", "*", "/", "==", *RELATIONS)}
+FORMULAS |= {"and": "{} && {}", "or": "{} || {}", "not": "!{}"}
 FORMULAS |= {"negative": "-{}", "if": "{} ? {} : {}"}
 
 Leaves = Mapping[tuple[str, str], str]  # where C has a leaf, by its operation and name

@@ -119,12 +119,14 @@ class Graph:
     """Makes values, and finds those that exist.
 
     A relation of values that move is a switch: its result is a mode, which changes at events only;
-    `relations` has them by mode.
+    `relations` has them by mode. `functions` take values, and whether this is an instant.
     """
 
     known: dict[tuple, Value] = field(default_factory=dict)
     relations: dict[str, Relation] = field(default_factory=dict)
     tables: Mapping[str, Table] = field(default_factory=dict)
+    functions: Mapping[str, Callable[[list[Value], bool], Value]] = field(default_factory=dict)
+    unknowns: dict[Value, Value | None] = field(default_factory=dict)  # by condition
     segments: dict[str, Segment] = field(default_factory=dict)  # by the names of their leaves
     has_switches: bool = True  # else relations are evaluated with the values
     is_guarded: bool = True  # else an infinite slope makes derivatives infinite, as in C
@@ -171,15 +173,19 @@ class Graph:
                     value = self.value("if", is_negative, self.negative(given[0]), given[0])
                 case "min" | "max":
                     is_first = compare("<" if node.op == "min" else ">", *given)
-                    value = self._choice(is_first, *given)
+                    value = self.choice(is_first, *given)
                 case "if":
-                    value = self._choice(*given)
+                    value = self.choice(*given)
                 case "floor":
                     value = self._whole(*given, is_instant)
                 case "!=":
                     value = self.value("not", self.value("==", *given))
                 case "table":
                     value = self._looked_up(self.tables[node.name], given, is_instant)
+                case "call":
+                    value = self.functions[node.name](given, is_instant)
+                case "unit":
+                    value = given[0]
                 case op:
                     value = (compare if op in RELATIONS else self.value)(op, *given)
             found[node] = value
@@ -246,7 +252,7 @@ class Graph:
         self.segments[name] = Segment(leaf, x, bounds, first, count, low, high)
         return leaf
 
-    def _choice(self, condition: Value, first: Value, second: Value) -> Value:
+    def choice(self, condition: Value, first: Value, second: Value) -> Value:
         """The "if" of a text: not a number where a relation that decides is not defined."""
         chosen, unknown = self.value("if", condition, first, second), self.unknown(condition)
         return (
@@ -255,6 +261,11 @@ class Graph:
 
     def unknown(self, condition: Value) -> Value | None:
         """Whether a relation that decides on a condition has no value; None: all have one."""
+        if condition not in self.unknowns:
+            self.unknowns[condition] = self._unknown(condition)
+        return self.unknowns[condition]
+
+    def _unknown(self, condition: Value) -> Value | None:
         if condition.name in self.relations:
             sides = self.relations[condition.name].distance.arguments
         elif condition.op in (*RELATIONS, "=="):

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import equations_file
-from equations_content import COUNTS, OPTIONS, SWITCHES, ModelFile, ModelFileError
+from equations_content import COUNTS, OPTIONS, SWITCHES, ModelFile, ModelFileError, placed
 
 from equations.c_code import Fields
 from equations.graph import Graph
@@ -29,6 +29,7 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     # without states nothing is integrated: outputs follow at once
     has_switches = bool(file.of("states") or file.events)
     graph = file.graph = Graph(tables=file.tables, has_switches=has_switches)
+    graph.functions = file.code.called_by(graph) if file.code else {}
     for variable in file.of(*LEAVES):
         op = "mode" if variable.kind == CONDITION else LEAVES[variable.section]
         variable.leaf = graph.value(op, name=variable.name)
@@ -42,11 +43,12 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     known |= {"time": graph.value("time"), "pi": graph.number(math.pi)}
     for expression in file.order:
         tree = expression.tree
-        if expression.event == "when" and tree.op in RELATIONS:
-            sides = [graph.of_tree(side, known) for side in tree.arguments]
-            expression.value = graph.switch(tree.op, *sides)
-        else:
-            expression.value = graph.of_tree(tree, known, expression.event == "then")
+        with equations_file.located(path, file.text), placed(*expression.place):
+            if expression.event == "when" and tree.op in RELATIONS:
+                sides = [graph.of_tree(side, known) for side in tree.arguments]
+                expression.value = graph.switch(tree.op, *sides)
+            else:
+                expression.value = graph.of_tree(tree, known, expression.event == "then")
         if expression.is_rate:
             known[derivative_of(expression.target)] = expression.value
         elif expression.target:

@@ -1,6 +1,8 @@
 """Expressions of interpreted C: their types and values."""
 
-from collections.abc import Callable
+import math
+import re
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from equations.graph import DERIVATIVES, Graph, Value
@@ -35,11 +37,13 @@ ARGUMENTS |= dict.fromkeys(ROUNDING, 1)
 
 
 class Expressions(Memory):
-    """Calculates expressions.
+    """Calculates expressions; `known` are functions of libm and real.h with their arguments.
 
     doubles_move: double has derivatives, as real. is_exact: operations with 0 and 1 stay, which
     keeps signs of zeros. warn: gets warnings.
     """
+
+    known: Mapping[str, int] = ARGUMENTS
 
     def __init__(
         self,
@@ -134,6 +138,8 @@ class Expressions(Memory):
 
     def value(self, node: c_ast.Node, scope: Scope, state: State) -> tuple[Any, Any]:
         """Return type and value of an expression."""
+        self.here = node
+        self.spend()
         kind, value = self._value(node, scope, state)
         if value is UNSET:
             raise refused(node, f"{_shown(node)} has no value here on every path")
@@ -160,7 +166,7 @@ class Expressions(Memory):
             case c_ast.FuncCall():
                 return self.function_call(node, scope, state)
             case c_ast.CompoundLiteral():
-                kind = self.types.of(node.type)
+                kind = self.declared_kind(node)
                 return kind, self.initialized(node.init, kind, scope, state)
             case c_ast.ExprList():
                 results = [self.value(item, scope, state) for item in node.exprs]
@@ -168,15 +174,25 @@ class Expressions(Memory):
         raise refused(node, f"{type(node).__name__} is no part of the equations' C")
 
     def number(self, node: c_ast.Constant) -> tuple[Any, Any]:
-        if node.type == "int":
-            return INT, int(node.value, 0)
+        if node.type == "int" and not re.fullmatch("0[0-9]+|.{30,}", node.value):
+            return INT, self.in_range(int(node.value, 0), node)
         if node.type in ("double", "float"):
             if node.value[-1] in "fFlL" and not node.value.lower().startswith("0x"):
                 raise refused(node, f"{node.value}: write it without the last letter")
             hexadecimal = node.value.lower().startswith("0x")
-            number = float.fromhex(node.value) if hexadecimal else float(node.value)
-            return DOUBLE, self.graph.number(number)
-        raise refused(node, f"{node.value} is no number")
+            try:
+                number = float.fromhex(node.value) if hexadecimal else float(node.value)
+            except (OverflowError, ValueError):
+                number = math.inf
+            if math.isfinite(number):
+                return DOUBLE, self.graph.number(number)
+        raise refused(node, f"{node.value:.30} is no number that is read")
+
+    def in_range(self, number: int, node: c_ast.Node) -> int:
+        """Return a whole number, if an int has room for it."""
+        if not -(2**31) <= number < 2**31:
+            raise refused(node, "this whole number is too large for an int: use a double")
+        return number
 
     def enumerator(self, name: str) -> int:
         """Evaluate an enumerator: written, or one more than the one before it."""
@@ -188,12 +204,21 @@ class Expressions(Memory):
                     return at
         raise CTextError(f"{name} is not defined")
 
+    def declared_kind(self, node: c_ast.Decl | c_ast.CompoundLiteral) -> Any:
+        """Return the type of a variable; its initializer may give it its length."""
+        kind = self.types.of(node.type)
+        if isinstance(kind, Array) and kind.length is None:
+            if not isinstance(node.init, c_ast.InitList):
+                raise refused(node, "this array has no size")
+            kind = Array(kind.of, len(node.init.exprs))
+        return kind
+
     def constant(self, node: c_ast.ID) -> tuple[Address, Any]:
         """Evaluate a constant at the top of a file."""
         declared = self.program.constants.get(node.name)
         if declared is None:
             raise refused(node, f"{node.name} is not declared")
-        kind = self.types.of(declared)
+        kind = self.declared_kind(declared)
         address = self.new_object(kind)
         value = self.initialized(declared.init, kind, self.globals, State())
 
@@ -221,7 +246,7 @@ class Expressions(Memory):
             if not is_whole(kind):
                 raise refused(node, "++ and -- are for whole numbers: use += 1.0")
             by = 1 if "+" in node.op else -1
-            after = self.each(lambda a, _: a + by, before, state)
+            after = self.each(lambda a, _: self.in_range(a + by, node), before, state)
             self.store(self.place(node.expr, scope, state), after, state, node)
             return kind, before if node.op[0] == "p" else after
         kind, value = self.value(node.expr, scope, state)
@@ -266,7 +291,9 @@ class Expressions(Memory):
             calculate: Any = {
                 "+": float.__add__, "-": float.__sub__, "*": float.__mul__, "/": float.__truediv__,
             }[op]  # fmt: skip
-            return is_moving, self.graph.number(calculate(a.number, b.number))
+            result = calculate(a.number, b.number)
+            if math.isfinite(result):
+                return is_moving, self.graph.number(result)
         return is_moving, self.operation(op, a, b)
 
     def whole(self, op: str, a: Any, b: Any, state: State, node: c_ast.Node) -> Any:
@@ -288,7 +315,7 @@ class Expressions(Memory):
                 return quotient if op == "/" else x - quotient * y
             if op not in ("+", "-", "*"):
                 raise refused(node, f"{op} is not read")
-            return {"+": x + y, "-": x - y, "*": x * y}[op]
+            return self.in_range({"+": x + y, "-": x - y, "*": x * y}[op], node)
 
         return self.conditions.binary(calculate, a, b, state.known)
 
@@ -338,6 +365,8 @@ class Expressions(Memory):
             a = a if is_real(kind) else self.conditions.real(a, known_a)
             b = b if is_real(other) else self.conditions.real(b, known_b)
             kind = DOUBLE if is_whole(kind) else kind
+        elif kind != other and not all(is_real(k) or is_whole(k) for k in (kind, other)):
+            raise refused(node, "the types of both branches do not fit")
         kind = REAL if REAL in (kind, other) else kind
         return kind, self.chosen(condition, a, b)
 
@@ -426,7 +455,8 @@ class Expressions(Memory):
                 if designator is None:
                     raise refused(item, "write nested braces instead of .a.b = ...")
                 is_name = isinstance(designator, c_ast.ID)
-                name = designator.name if is_name else self.size(designator)
+                inner = getattr(designator, "expr", designator)  # pycparser has a node for it
+                name = designator.name if is_name else self.size(inner)
                 if name not in names:
                     raise refused(item, f"there is no {name} to initialize")
                 at, item = names.index(name), item.expr
@@ -438,6 +468,7 @@ class Expressions(Memory):
 
     def zero(self, kind: Any, node: c_ast.Node) -> Any:
         """Return the value of parts that an initializer leaves out."""
+        self.spend()
         if isinstance(kind, Structure):
             fields = self.types.fields(kind, node)
             return {name: self.zero(of, node) for name, of in fields.items()}
@@ -454,11 +485,11 @@ class Expressions(Memory):
             raise refused(node, "pointers to functions are not read: call the function")
         name = node.name.name
         given = [self.value(a, scope, state) for a in (node.args.exprs if node.args else [])]
-        if name in ARGUMENTS and (name in BUILT_IN or name not in self.program.functions):
+        if name in self.known and (name in BUILT_IN or name not in self.program.functions):
             return self.built_in(name, given, state, node)
         function = self.program.functions.get(name)
         if function is None:
-            known = ", ".join(sorted(DERIVATIVES))
+            known = ", ".join(sorted({*DERIVATIVES, *self.known} - {*BUILT_IN, *ROUNDING}))
             has = "has no body here" if name in self.program.declared else "is not known"
             raise refused(node, f"{name} {has}: besides functions of the text there are {known}")
         parameters = self.parameters(function)
@@ -479,8 +510,8 @@ class Expressions(Memory):
         self, name: str, given: list[tuple[Any, Any]], state: State, node: c_ast.Node
     ) -> tuple[Any, Any]:
         """Call a function of libm or of real.h."""
-        if len(given) != ARGUMENTS[name]:
-            raise refused(node, f"{name} has {ARGUMENTS[name]} arguments, not {len(given)}")
+        if len(given) != self.known[name]:
+            raise refused(node, f"{name} has {self.known[name]} arguments, not {len(given)}")
         if name == "abs":
             if not is_whole(given[0][0]):
                 raise refused(node, "abs is for whole numbers: use fabs")

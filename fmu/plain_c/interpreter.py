@@ -18,7 +18,7 @@ from plain_c.expressions import Expressions
 from plain_c.memory import UNSET, VOID, Array, LeafOf, Pointer, Scope, State, Structure
 from plain_c.text import CTextError, check_function, refused, walk
 
-MOST_ROUNDS = 100_000  # of loops, before a text is refused
+CELLS = 16  # variables that are copied in a step
 
 
 @dataclass(frozen=True)
@@ -38,16 +38,17 @@ class Interpreter(Expressions):
         super().__init__(*arguments, **options)
         self.checked: set[str] = set()
         self.calls: list[str] = []
-        self.rounds = 0
 
     # ---- Functions -------------------------------------------------------------------------------
 
     def run(self, name: str, leaf_of: LeafOf) -> tuple[Any, dict[tuple[str | int, ...], Any]]:
         """Run a function; return result and writes, by paths. `leaf_of` gives what it reads."""
+        self.steps, self.here = 0, None
         try:
             return self._run(name, leaf_of)
         except RecursionError:
-            raise CTextError(f"{name}: is nested too deeply") from None
+            place, reason = self.program.functions[name].decl, f"{name} is nested too deeply"
+            raise refused(place, f"{reason}: use variables for parts of it") from None
 
     def _run(self, name: str, leaf_of: LeafOf) -> tuple[Any, dict[tuple[str | int, ...], Any]]:
         function = self.program.functions.get(name)
@@ -126,6 +127,7 @@ class Interpreter(Expressions):
 
     def execute(self, todo: Todo | None, state: State) -> tuple[State, Any]:
         """Run statements; return the state at the end, None if they all return, and the result."""
+        self.spend(4 + len(state.memory) // CELLS)  # calls and branches copy the variables
         while todo is not None:
             node, scope, after = todo.statement, todo.scope, todo.after
             match node:
@@ -158,10 +160,12 @@ class Interpreter(Expressions):
         return state, None
 
     def returned(self, node: c_ast.Return, scope: Scope, state: State) -> Any:
-        if node.expr is None:
-            return None
         function = self.program.functions[self.calls[-1]]
         kind = self.types.of(function.decl.type.type)
+        if node.expr is None:
+            if kind != VOID:
+                raise refused(node, f"{function.decl.name} does not return a value here")
+            return None
         return self.scalar(*self.value(node.expr, scope, state), kind, state, node.expr)
 
     def branch(
@@ -239,9 +243,6 @@ class Interpreter(Expressions):
             raise refused(
                 node, "the number of rounds is not fixed: compare an int counter with a constant"
             )
-        self.rounds += 1
-        if self.rounds > MOST_ROUNDS:
-            raise refused(node, f"loops have more than {MOST_ROUNDS} rounds in all")
         if not condition.number:
             return todo.after
         return Todo(node.stmt, Scope(scope), replace(todo, scope=scope, is_round=True))
@@ -249,12 +250,7 @@ class Interpreter(Expressions):
     def declaration(self, node: c_ast.Decl, scope: Scope, state: State) -> None:
         if node.name is None or isinstance(node.type, c_ast.FuncDecl):
             return
-        kind = self.types.of(node)
-        if isinstance(kind, Array) and kind.length is None:
-            if not isinstance(node.init, c_ast.InitList):
-                raise refused(node, f"the array {node.name} has no size")
-            kind = Array(kind.of, len(node.init.exprs))
-        value = UNSET
+        kind, value = self.declared_kind(node), UNSET
         if isinstance(node.init, c_ast.InitList):
             value = self.initialized(node.init, kind, scope, state)
         elif node.init is not None:

@@ -14,6 +14,7 @@ from plain_c.values import Choice, Conditions, Known, Table
 
 REAL, DOUBLE, INT, BOOL, VOID = "real", "double", "int", "bool", "void"
 NAMES = {"double": DOUBLE, "int": INT, "_Bool": BOOL, "void": VOID}
+LONGEST_ARRAY = 10_000
 UNSET = object()  # what a variable has before it gets a value
 # leaf of an argument's part: its path from the name of the argument, and its type
 LeafOf = Callable[[tuple[str | int, ...], Any], Any]
@@ -71,7 +72,9 @@ class Types:
             return Pointer(self.of(node.type))
         if isinstance(node, c_ast.ArrayDecl):
             length = None if node.dim is None else self.size(node.dim)
-            return Array(self.of(node.type), length)
+            if length is not None and not 0 < length <= LONGEST_ARRAY:
+                raise refused(node, f"an array has 1 to {LONGEST_ARRAY} elements, not {length}")
+            return Array(self.sized(node.type), length)
         if isinstance(node, c_ast.Struct):
             return Structure(node.name or f"at {node.coord}")
         if isinstance(node, c_ast.Enum):
@@ -79,6 +82,13 @@ class Types:
         if isinstance(node, c_ast.IdentifierType):
             return self._named(node)
         raise refused(node, f"{type(node).__name__} is no type of the equations' C")
+
+    def sized(self, node: c_ast.Node) -> Any:
+        """Return the type of a part, whose length has to be known."""
+        kind = self.of(node)
+        if isinstance(kind, Array) and kind.length is None:
+            raise refused(node, "this array has no size")
+        return kind
 
     def _named(self, node: c_ast.IdentifierType) -> Any:
         name = " ".join(node.names)
@@ -99,9 +109,11 @@ class Types:
         if name not in self.structures:
             if name not in self.program.structs:
                 raise refused(node, f"struct {name} is not defined")
-            self.structures[name] = {
-                field.name: self.of(field) for field in self.program.structs[name].decls
-            }
+            found = self.structures[name] = {}
+            for field in self.program.structs[name].decls:
+                if not isinstance(field, c_ast.Decl) or field.name is None:
+                    raise refused(field, "each field of a struct needs a type and a name")
+                found[field.name] = self.sized(field)
         return self.structures[name]
 
 
@@ -132,19 +144,30 @@ class Scope:
 class Memory:
     """Objects of a program with their parts, and how these are read and written."""
 
+    most_steps = 10**6  # of a run, before its text is refused
+
     def __init__(self, program: Program, graph: Graph) -> None:
         self.program, self.graph = program, graph
         self.types = Types(program, self.size)
-        self.conditions = Conditions(graph)
+        self.conditions = Conditions(graph, self.spend)
         self.names: dict[Value, str] = {}  # of values, by the variables that got them
         self.inputs: dict[int, tuple[str, LeafOf]] = {}
         self.objects: dict[int, Any] = {}  # types
         self.titles: dict[int, str] = {}  # names of variables
         self.read: set[Address] = set()  # parts of arguments that were read before they were set
+        self.steps = 0  # of this run
+        self.here: c_ast.Node | None = None  # the expression that is read
 
     def size(self, node: c_ast.Node) -> int:
         """Evaluate a whole number that is known: length of an array, value of an enumerator."""
         raise NotImplementedError
+
+    def spend(self, steps: int = 1) -> None:
+        """Count steps; a text that takes too many is refused where it does."""
+        self.steps += steps
+        if self.steps > self.most_steps:
+            what = f"more than {self.most_steps} steps"
+            raise refused(self.here, f"{what}: use fewer rounds of loops, or fewer calls")
 
     def new_object(self, kind: Any) -> Address:
         self.objects[len(self.objects)] = kind
@@ -182,6 +205,7 @@ class Memory:
 
     def get(self, address: Address, kind: Any, state: State, node: c_ast.Node) -> Any:
         """Read the value at an address."""
+        self.spend()
         if isinstance(kind, Structure):
             fields = self.types.fields(kind, node)
             return {name: self.get(address + name, of, state, node) for name, of in fields.items()}
@@ -196,7 +220,8 @@ class Memory:
         return value
 
     def set_all(self, address: Address, value: Any, state: State) -> None:
-        """Return the store a value with all of its parts."""
+        """Store a value with all of its parts."""
+        self.spend()
         if isinstance(value, dict):
             for name, part in value.items():
                 self.set_all(address + name, part, state)

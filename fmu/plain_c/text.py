@@ -8,15 +8,20 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from pycparser import c_ast
+from pycparser.c_lexer import CLexer
 from pycparser.c_parser import CParser, ParseError
 
 # nothing of them is read: sin, bool and others are known
 SYSTEM_HEADERS = ("math.h", "stdbool.h", "stddef.h", "stdlib.h")
 PRELUDE = "typedef _Bool bool;\ntypedef unsigned long size_t;\n"
 DIRECTIVE = re.compile(r"\s*#\s*(\w*)\s*(.*?)\s*$")
-COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/|\"(?:\\.|[^\"\\\n])*\"", re.DOTALL)
+# a comment or a string, perhaps without an end: nothing is looked at twice
+COMMENT = re.compile(r"//[^\n]*|/\*.*?(?:\*/|\Z)|\"(?:\\.|[^\"\\\n])*\"?", re.DOTALL)
+LONGEST_WORD = 30  # characters in a message
+CONTINUED = re.compile(r"^((?:[^\n]*\\\n)+)([^\n]*)", re.MULTILINE)
 PLACE = re.compile(r"(?P<file>.*?):(?P<line>\d+)(?::\d+)?: (?P<text>.*)", re.DOTALL)
 # what to write instead of a statement or an expression that is no part of the equations' C
 INSTEAD = {
@@ -86,7 +91,7 @@ class Preprocessor:
         self.files.append(path)
         self.lines.append(f'# 1 "{shown}"')
         skipping: list[bool] = []  # of each #ifndef that is open
-        for number, line in enumerate(without_comments(text).split("\n"), 1):
+        for number, line in enumerate(without_comments(text, shown).split("\n"), 1):
             found = DIRECTIVE.match(line)
             if found is None:
                 self.lines.append("" if any(skipping) else line)
@@ -132,14 +137,16 @@ class Preprocessor:
         raise CTextError(f"{place}: <{name}> is not read: <math.h> and <stdbool.h> are enough")
 
 
-def without_comments(text: str) -> str:
+def without_comments(text: str, shown: str) -> str:
     """Replace comments by spaces, and join lines that end in a backslash."""
 
     def blank(found: re.Match[str]) -> str:
+        if found[0].startswith("/*") and not (found[0].endswith("*/") and len(found[0]) > 3):
+            line = found.string.count("\n", 0, found.start()) + 1
+            raise CTextError(f"{shown}:{line}: this comment has no end")
         return found[0] if found[0].startswith('"') else re.sub(r"[^\n]", " ", found[0])
 
-    joined = re.sub(r"((?:[^\n]*\\\n)+)([^\n]*)", _joined, text)
-    return COMMENT.sub(blank, joined)
+    return COMMENT.sub(blank, CONTINUED.sub(_joined, text))
 
 
 def _joined(found: re.Match[str]) -> str:
@@ -152,53 +159,60 @@ def read(path: Path, folders: Iterable[Path] = (), ignored: Iterable[str] = ()) 
     """Read the declarations of a file, with includes from `folders` but for `ignored` headers."""
     preprocessor = Preprocessor(folders, ignored)
     preprocessor.add(path)
-    text = '# 1 "prelude"\n' + PRELUDE + "\n".join(preprocessor.lines)
+    return parsed("\n".join(preprocessor.lines), preprocessor.files)
+
+
+def parsed(text: str, files: list[Path]) -> Program:
+    """Read the declarations of a text without comments and directives; its first file names it."""
+    name, parser = files[0].name, CParser(lexer=_Lexer)
     try:
-        tree = CParser().parse(text, path.name)
+        tree = parser.parse(f'# 1 "prelude"\n{PRELUDE}{text}', name)
     except ParseError as error:
-        raise CTextError(_rephrased(str(error), text, path.name)) from None
+        raise CTextError(_rephrased(str(error), *parser.clex.last)) from None
     except RecursionError:
-        raise CTextError(f"{path.name}: is nested too deeply") from None
-    program = Program(files=preprocessor.files)
+        raise CTextError(f"{name}: is nested too deeply") from None
+    program = Program(files=files)
     for node in tree.ext:
         _add(program, node)
     return program
 
 
-def _rephrased(message: str, text: str, name: str) -> str:
+class _Lexer(CLexer):
+    """Keeps place and text of the last token, for messages without a line."""
+
+    last = ("", "")
+
+    def token(self) -> Any:
+        """Return the next token."""
+        found = super().token()
+        if found is not None:
+            self.last = f"{self.filename}:{found.lineno}", found.value[:LONGEST_WORD]
+        return found
+
+
+def _rephrased(message: str, place: str, word: str) -> str:
     """Rephrase a message of pycparser for a reader who does not know parsers."""
     found = PLACE.fullmatch(message)
-    if found is None:  # "name: At end of input"
-        line = _lines(text, name)
-        return f"{name}:{line}: the file ends too early: a }} or ; is missing"
+    if message.endswith(": At end of input"):
+        return f"{place}: the file ends too early: a }} or ; is missing"
+    if found is None:
+        return f"{place}: {message.rpartition(': ')[2].lower()} near {word}"
     reason = found["text"]
     place = f"{found['file']}:{found['line']}"
     if reason.startswith("before: "):
-        token = reason.removeprefix("before: ")
+        token = reason.removeprefix("before: ")[:LONGEST_WORD]
         return f"{place}: {token} does not fit here: often a ; is missing before it"
     if reason == "Invalid function definition":
         return f"{place}: this is no declaration: a type or a ; may be missing before it"
     return f"{place}: {reason[:1].lower()}{reason[1:]}"
 
 
-def _lines(text: str, name: str) -> int:
-    """Return the number of the last line that is not empty, of the file with this name."""
-    current, number, last = "", 0, 1
-    for line in text.split("\n"):
-        found = re.fullmatch(r'# (\d+) "(.*)"', line)
-        if found:
-            number, current = int(found[1]), found[2]
-            continue
-        if current == name and line.strip():
-            last = number
-        number += 1
-    return last
-
-
 def _add(program: Program, node: c_ast.Node) -> None:
     """Put a declaration at the top of a file into the program."""
     if isinstance(node, c_ast.FuncDef):
         name = node.decl.name
+        if not isinstance(node.decl.type, c_ast.FuncDecl) or node.param_decls:
+            raise refused(node.decl, f"{name} has no list of arguments: write double {name}(...)")
         if name in program.functions:
             raise refused(node.decl, f"{name} is defined twice")
         program.functions[name] = node

@@ -6,6 +6,7 @@ the text resolves conditions: a mode that is 2 is not 3.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from equations.graph import Graph, Value, is_number
@@ -48,10 +49,11 @@ class Known:
 
 
 class Conditions:
-    """Makes conditions in a graph and resolves them."""
+    """Makes conditions in a graph and resolves them; `spend` counts the steps of that."""
 
-    def __init__(self, graph: Graph) -> None:
-        self.graph = graph
+    def __init__(self, graph: Graph, spend: Callable[[], None] = lambda: None) -> None:
+        self.graph, self.spend = graph, spend
+        self.decided = partial(graph.value, "if")  # makes a choice of a condition that is not known
         self.members: dict[Value, tuple[Value, frozenset[int]]] = {}  # where a leaf is one of these
         self.domains: dict[Value, frozenset[int]] = {}
         self.true, self.false = graph.number(1.0), graph.number(0.0)
@@ -148,6 +150,7 @@ class Conditions:
         return condition if truth is None else self.constant(truth)
 
     def _truth(self, condition: Value, known: Known) -> bool | None:
+        self.spend()
         if condition.op == "number":
             return condition.number != 0.0
         if condition in known.truths:
@@ -211,6 +214,7 @@ class Conditions:
 
     def simplified(self, value: Any, known: Known) -> Any:
         """Simplify a whole number or a pointer by the knowledge."""
+        self.spend()
         while isinstance(value, Choice):
             condition = self.resolve(value.condition, known)
             if condition.op != "number":
@@ -335,4 +339,4 @@ class Conditions:
             first = first.arguments[1]
         if second.op == "if" and second.arguments[0] is condition:
             second = second.arguments[2]
-        return first if first is second else self.graph.value("if", condition, first, second)
+        return first if first is second else self.decided(condition, first, second)

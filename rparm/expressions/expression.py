@@ -61,6 +61,7 @@ OPERATIONS: dict[str, Callable[..., float]] = {
     "and": lambda a, b: a and b,
     "or": lambda a, b: a or b,
     "not": operator.not_,
+    "unit": lambda a: a,
 }
 BUILT_IN = {"abs": abs, "min": min, "max": max, "floor": math.floor}
 OPERATIONS |= {name: BUILT_IN.get(name) or getattr(math, name) for name in (*FUNCTIONS, "floor")}
@@ -80,9 +81,10 @@ class Node:
 
     op is "number" (then `value` counts), "literal" (a condition: whether `value` is 1), "name"
     (then `name`), "text" (`name`, an item of an enumeration), "table" (a look-up in the table
-    `name`), an operator of `RELATIONS` or `EQUALITIES`, + - * / **, "negative", "and", "or", "not",
-    "if" (arguments: condition, value if true, otherwise), "floor", or a name of `FUNCTIONS`. min
-    and max have two arguments here.
+    `name`), "call" (of the function `name`), "unit" (its argument, in the unit `name`), an operator
+    of `RELATIONS` or `EQUALITIES`, + - * / **, "negative", "and", "or", "not", "if" (arguments:
+    condition, value if true, otherwise), "floor", or a name of `FUNCTIONS`. min and max have two
+    arguments here.
     Until `at_indexes` has replaced them: "element" of an array (arguments: its indexes; `name` has
     {} where they come), "sum" of the `body` over the index `name` (arguments: first and last).
     """
@@ -234,9 +236,17 @@ class Function:
     arguments: tuple[str, ...]
     body: Node
     has_unit_one: bool = False  # its value takes no other unit, although it is made of numbers
+    name: str = ""  # by which `table_unit` has units of its arguments and its value
 
     def of(self, given: Sequence[Node], column: int) -> Node:
         """Return its expression for these arguments; mistakes in it are at this column."""
+        if self.name:
+            units = (table_unit(self.name, i) for i in range(len(given)))
+            given = [
+                Node("unit", a.column, (a,), 0.0, u) for a, u in zip(given, units, strict=True)
+            ]
+            body = replace(self, name="").of(given, column)
+            return Node("unit", column, (body,), name=table_unit(self.name))
         known = dict(zip(self.arguments, given, strict=True))
         found: dict[Node, Node] = {}
         for node in in_order([self.body]):
@@ -246,6 +256,11 @@ class Function:
                 arguments = tuple(found[argument] for argument in node.arguments)
                 found[node] = replace(node, column=column, arguments=arguments)
         return replace(found[self.body], name=UNIT_ONE) if self.has_unit_one else found[self.body]
+
+
+def table_unit(name: str, argument: int | str = "") -> str:
+    """Return the key that units have for an argument of a table or function, or for its value."""
+    return f"{name}({argument})"
 
 
 @dataclass(frozen=True)
@@ -266,14 +281,14 @@ class Range:
 
 @dataclass(frozen=True)
 class Lookup:
-    """A table, or another operation, which is called as a function."""
+    """A table, a function of a C file or floor: an operation of its own."""
 
     name: str
     arguments: tuple[str, ...]
     op: str = "table"
 
     def of(self, given: Sequence[Node], column: int) -> Node:
-        """Return the look-up at these arguments."""
+        """Return the operation on these arguments."""
         return Node(self.op, column, tuple(given), name=self.name)
 
 
@@ -441,12 +456,14 @@ class _Parser:
         separator = "("
         while self.token.text == separator:
             self.take()
+            if self.token.text == ")" and further and not further.arguments:
+                break
             arguments.append(self.expression(CONDITIONAL))
             separator = ","
         self.expect(")")
         count = len(further.arguments) if further else FUNCTIONS[function.text]
-        if len(arguments) != (count or max(2, len(arguments))):
-            wanted = f"{count or '2 or more'} argument{'s' * (count != 1)}"
+        if len(arguments) != (max(2, len(arguments)) if count is None else count):
+            wanted = f"{'2 or more' if count is None else count} argument{'s' * (count != 1)}"
             text = f"{function.text}: expected {wanted}, got {len(arguments)}"
             raise ExpressionError(function.column, text)
         if further:

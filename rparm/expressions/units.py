@@ -11,7 +11,14 @@ from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 
-from rparm.expressions.expression import EQUALITIES, RELATIONS, ExpressionError, Node, in_order
+from rparm.expressions.expression import (
+    EQUALITIES,
+    RELATIONS,
+    ExpressionError,
+    Node,
+    in_order,
+    table_unit,
+)
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd")
 ANGLE = "rad"
@@ -170,8 +177,10 @@ def _unit(node: Node, given: list[Unit | None], units: Mapping[str, Unit]) -> Un
         return times(given[0] or ONE, given[1] or ONE, power)
     if node.op in ("+", "-", "min", "max"):
         return _same(node, given)
-    if node.op == "table":
+    if node.op in ("table", "call"):
         return _of_table(node, given, units)
+    if node.op == "unit":
+        return _checked(node, given[0], units.get(node.name, ONE))
     if node.op in (*RELATIONS, *EQUALITIES):
         _same(node, given)
         return ONE
@@ -191,18 +200,20 @@ def _unit(node: Node, given: list[Unit | None], units: Mapping[str, Unit]) -> Un
     return ONE
 
 
-def table_unit(name: str, argument: int | str = "") -> str:
-    """Return the key that units have for an argument of a table, or for its value."""
-    return f"{name}({argument})"
-
-
 def _of_table(node: Node, given: list[Unit | None], units: Mapping[str, Unit]) -> Unit:
+    has_none = node.op == "call" and table_unit(node.name) not in units
+    hint = ": write its units into [functions]" if has_none else ""
     for i, unit in enumerate(given):
-        expected = units.get(table_unit(node.name, i), ONE)
-        if unit not in (None, expected):
-            what = f"{node.name} takes unit {shown(expected)}"
-            raise ExpressionError(node.column, f"{what}, got {shown(unit)}")
+        _checked(node, unit, units.get(table_unit(node.name, i), ONE), hint)
     return units.get(table_unit(node.name), ONE)
+
+
+def _checked(node: Node, unit: Unit | None, expected: Unit, hint: str = "") -> Unit:
+    """Return the unit that is expected, for a table or function that the node names."""
+    if unit not in (None, expected):
+        what = f"{node.name.partition('(')[0]} takes unit {shown(expected)}, got {shown(unit)}"
+        raise ExpressionError(node.column, what + hint)
+    return expected
 
 
 def _same(node: Node, given: list[Unit | None]) -> Unit | None:
