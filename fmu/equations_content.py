@@ -171,6 +171,7 @@ class ModelFile:
     checks: dict[str, Expression] = field(default_factory=dict)  # conditions by message
     order: list[Expression] = field(default_factory=list)  # each after those that it names
     graph: Any = None  # what a generator makes of it
+    relation_texts: list[str] = field(default_factory=list)  # with their places, for messages
 
     def expression(self, *given: Any, **more: Any) -> Expression:
         """Read an expression that may call the file's functions."""

@@ -30,6 +30,11 @@ def text(value: str) -> str:
     return '"' + "".join(_character(byte) for byte in value.encode()) + '"'
 
 
+def shortened(value: str) -> str:
+    """A string of C of an expression, in one line."""
+    return text(" ".join(value.split()))
+
+
 def _character(byte: int) -> str:
     plain = 32 <= byte < 127 and chr(byte) not in '"\\?%'
     return chr(byte) if plain else f"\\{byte:03o}"

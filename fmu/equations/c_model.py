@@ -6,7 +6,7 @@ from itertools import chain
 
 from equations_content import OPTIONS, ModelFile
 
-from equations.c_code import Code, filled, indented, number, text
+from equations.c_code import Code, filled, indented, number, shortened, text
 from equations.c_events import FIELD, MODE, Events, arrays, leaves
 from equations.c_series import Series
 from equations.graph import FALLIBLE, Value
@@ -49,6 +49,7 @@ def source(file: ModelFile) -> str:
         events=events.functions("_in_domain" * has_domains),
         followed=[f"{STRUCTURE} copy;", f"values = {FOLLOWED};"] if events else [],
         checks=_checks(file),
+        expressions=_expressions(file),
         ranges=[
             *_parameter_lines(file),
             *_range_lines({k: v for k, v in _ranges(file).items() if k != "parameters"}),
@@ -56,6 +57,16 @@ def source(file: ModelFile) -> str:
         model_events=[".events = &events,"] if events else [],
     )
     return text.replace(f"{HERE}\n", "".join(f"{line}\n" for line in _tables(file, text)))
+
+
+def _expressions(file: ModelFile) -> list[str]:
+    """Rows of struct expression."""
+    fields = [(RATE.format(x.name), x) for x in file.of("states")]
+    fields += [(FIELD.format(v.name), v) for v in file.calculated]
+    return [
+        f"{{offsetof({STRUCTURE}, {name}), {shortened(variable.expression.text)}}},"
+        for name, variable in fields
+    ] or ["{0},"]
 
 
 def _tables(file: ModelFile, text: str) -> list[str]:

@@ -117,6 +117,9 @@ void sundials_text(int error_code, const char *module, const char *function, cha
                    void *sundials_pointer) {
     const struct sundials *sundials = sundials_pointer;
     const struct problem *problem = sundials->problem;
+    if (error_code == CV_BAD_T) {
+        return; // follows from a failure before, and only confuses
+    }
     char with_times[400]; // SUNDIALS writes 255 characters at most
     write_times(explained(text), problem->origin, with_times, sizeof with_times);
     message_write(&problem->sink, sundials_status(problem, error_code), "%s: %s",
@@ -210,6 +213,7 @@ enum status sundials_warm_up(void *memory) {
                      .absolute_tolerances = small_vector_data(sundials->work)},
         .horizon = INFINITY,
         .failed_at = -INFINITY,
+        .failed_x = wanted.failed_x,
     };
     enum status status = method->configure(memory);
     if (status == STATUS_OK) {
