@@ -69,10 +69,21 @@ static bool is_in_name(char c) {
            c == '.' || (unsigned char)c >= 0x80;
 }
 
+/* Returns the derivative of a state. */
+static const struct variable *rate_of(const struct instance *instance,
+                                      const struct variable *state) {
+    const struct model *model = instance->model;
+    return instance_is_state(instance, state)
+               ? variable_at(instance,
+                             model->derivatives.offset + state->offset - model->states.offset)
+               : NULL;
+}
+
 /* Returns the variable of the next name in *text that has one, and moves *text behind it; NULL at
- * the end. Indexes belong to names: x[1]. */
+ * the end. Indexes belong to names, x[1]; der(x) is the derivative of x. */
 static const struct variable *next_variable(const struct instance *instance, const char **text) {
     const struct variable *found = NULL;
+    bool is_rate = false;
     while (**text != '\0' && found == NULL) {
         size_t length = 0;
         while (is_in_name((*text)[length])) {
@@ -84,6 +95,8 @@ static const struct variable *next_variable(const struct instance *instance, con
         }
         if (length > 0) {
             found = variable_named(instance, *text, length);
+            found = is_rate && found != NULL ? rate_of(instance, found) : found;
+            is_rate = strncmp(*text, "der(", strlen("der(")) == 0;
         }
         *text += length > 0 ? length : 1;
     }
@@ -155,11 +168,12 @@ static void add_cause(const struct place *place, const char *text, struct explan
 
 /* ---- Explanations --------------------------------------------------------------------------- */
 
-/* Writes "derivative of " and the name of the state, or the name of the variable. */
+/* Adds "derivative of " and the name of the state, or the name of the variable. */
 static void add_name(const struct instance *instance, size_t offset, struct explanation *to) {
     const struct model *model = instance->model;
     const size_t from_derivatives = offset - model->derivatives.offset;
-    const bool is_rate = from_derivatives < model->derivatives.size &&
+    const bool is_rate = model->expression_count > 0 &&
+                         from_derivatives < model->derivatives.size &&
                          offset - model->states.offset >= model->states.size;
     const struct variable *variable =
         variable_at(instance, is_rate ? model->states.offset + from_derivatives : offset);
@@ -249,8 +263,7 @@ void instance_explain_step(struct instance *instance, enum status status,
     if (status == STATUS_NOT_FINITE) {
         explain_evaluation(instance, explanation);
     }
-    if (status == STATUS_TOO_MANY_STEPS &&
-        instance->configured.method != INTEGRATOR_CVODE_BDF &&
+    if (status == STATUS_TOO_MANY_STEPS && instance->configured.method != INTEGRATOR_CVODE_BDF &&
         integrator_seems_stiff(instance->integrator)) {
         add(explanation,
             "%s: the equations seem to be stiff, for which solver_method = cvode_bdf is made",

@@ -10,7 +10,8 @@ struct explanation {
     size_t length;
 };
 
-/* Adds why an expression is not finite with the values set now: the values of its names. Uses instance->first_derivatives. */
+/* Adds why an expression is not finite with the values set now: the values of its names. Uses
+ * instance->first_derivatives. */
 NONNULL void instance_explain_text(struct instance *instance, const char *text,
                                    struct explanation *explanation);
 

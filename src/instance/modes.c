@@ -81,9 +81,9 @@ static enum status update(struct instance *instance, const bool *triggered) {
         .reason_size = sizeof reason,
     };
     const double passed = event.is_timed ? instance_next_time(instance) : -INFINITY;
-    enum status status = events->update(instance->memory.values, &event);
+    const enum status status = events->update(instance->memory.values, &event);
     if (status == STATUS_OK && event.is_timed) {
-        status = check_next_time(instance, passed);
+        return check_next_time(instance, passed);
     }
     if (status != STATUS_OK && instance->sink.write != NULL) {
         struct explanation why = {.length = 0};

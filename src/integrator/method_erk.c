@@ -235,7 +235,7 @@ static int advance_carefully(struct erk *erk, double begin, double end, int64_t 
     struct problem *problem = erk->base.problem;
     const struct message_sink sink = problem->sink;
     double step = end - begin;
-    double good = begin; // the time of x
+    double good = begin;        // the time of x
     problem->sink.write = NULL; // the failure before has sent the message of all
     sundials_set_state(&erk->base, begin_x);
     sundials_get_state(&erk->base, x);

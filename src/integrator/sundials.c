@@ -117,11 +117,12 @@ void sundials_text(int error_code, const char *module, const char *function, cha
                    void *sundials_pointer) {
     const struct sundials *sundials = sundials_pointer;
     const struct problem *problem = sundials->problem;
-    if (error_code == CV_BAD_T) {
-        return; // follows from a failure before, and only confuses
+    const char *explanation = explained(text);
+    if (error_code == CV_BAD_T && explanation == text) {
+        return; // it follows from a failure before
     }
     char with_times[400]; // SUNDIALS writes 255 characters at most
-    write_times(explained(text), problem->origin, with_times, sizeof with_times);
+    write_times(explanation, problem->origin, with_times, sizeof with_times);
     message_write(&problem->sink, sundials_status(problem, error_code), "%s: %s",
                   sundials->method->name, with_times);
 }

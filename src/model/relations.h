@@ -63,7 +63,7 @@ struct relations {
     bool has_inputs; /* true if some relation depends on inputs and parameters only */
     const struct relation *relation;
     const struct segment *segment;
-    const double *nominal; /* of each state */
+    const double *nominal;           /* of each state */
     const char *const *change_names; /* of events, then of samplers */
     const struct assignment *assignment;
     int assignment_count;
