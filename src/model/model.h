@@ -199,10 +199,10 @@ struct model {
      * in text (size bytes), one line that says what is wrong and what is expected. */
     enum status (*check_parameters)(const void *values, char *text, size_t size);
 
+    /* NULL if the model has no modes. */
+    const struct model_events *events;
+
     /* Expressions of calculated fields; NULL if the model has no file. */
     const struct expression *expressions;
     size_t expression_count;
-
-    /* NULL if the model has no modes. */
-    const struct model_events *events;
 };
