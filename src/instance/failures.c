@@ -39,29 +39,25 @@ static void add_expression(struct explanation *to, const char *text) {
 
 /* ---- Names ---------------------------------------------------------------------------------- */
 
-static const struct variable *variable_at(const struct instance *instance, size_t offset) {
+/* Returns the variable of type float64 at this offset or, unless it is NULL, with this name; NULL
+ * if there is none. */
+static const struct variable *find(const struct instance *instance, size_t offset, const char *name,
+                                   size_t length) {
     const struct model_description *description = instance->description;
     for (size_t i = 0; i < description->variable_count; i++) {
         const struct variable *variable = &description->variables[i];
-        if (variable->owner == VARIABLE_OF_MODEL && variable->offset == offset) {
+        const bool fits = name == NULL ? variable->offset == offset
+                                       : strlen(variable->name) == length &&
+                                             strncmp(variable->name, name, length) == 0;
+        if (fits && variable->owner == VARIABLE_OF_MODEL && variable->type == VARIABLE_FLOAT64) {
             return variable;
         }
     }
     return NULL;
 }
 
-/* Returns the variable of type float64 with this name; NULL if there is none. */
-static const struct variable *variable_named(const struct instance *instance, const char *name,
-                                             size_t length) {
-    const struct model_description *description = instance->description;
-    for (size_t i = 0; i < description->variable_count; i++) {
-        const struct variable *variable = &description->variables[i];
-        if (variable->owner == VARIABLE_OF_MODEL && variable->type == VARIABLE_FLOAT64 &&
-            strlen(variable->name) == length && strncmp(variable->name, name, length) == 0) {
-            return variable;
-        }
-    }
-    return NULL;
+static const struct variable *variable_at(const struct instance *instance, size_t offset) {
+    return find(instance, offset, NULL, 0);
 }
 
 static bool is_in_name(char c) {
@@ -94,7 +90,7 @@ static const struct variable *next_variable(const struct instance *instance, con
             length += (*text)[length] == ']';
         }
         if (length > 0) {
-            found = variable_named(instance, *text, length);
+            found = find(instance, 0, *text, length);
             found = is_rate && found != NULL ? rate_of(instance, found) : found;
             is_rate = strncmp(*text, "der(", strlen("der(")) == 0;
         }
