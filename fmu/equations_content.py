@@ -194,6 +194,7 @@ class ModelFile:
     order: list[Expression] = field(default_factory=list)  # each after those that it names
     graph: Any = None  # what a generator makes of it
     fields: Any = None  # where it keeps the values
+    relation_texts: list[str] = field(default_factory=list)  # with their places, for messages
 
     def expression(
         self, element: Element, place: tuple[str, ...], text: object, *more: Any, **options: Any

@@ -9,14 +9,17 @@ from collections.abc import Iterable, Mapping
 from itertools import groupby
 from pathlib import Path
 
+from equations_content import Expression
+
 from equations.graph import CONDITIONS, LEAVES, Value
-from rparm.expressions.expression import RELATIONS, in_order
+from rparm.expressions.expression import RELATIONS, in_order, written
 
 # what a formula of C is made of; that of a function is its call
 FORMULAS = {op: f"{{}} {op} {{}}" for op in ("+", "-", "*", "/", "==", *RELATIONS)}
 FORMULAS |= {"and": "{} && {}", "or": "{} || {}", "not": "!{}"}
 FORMULAS |= {"negative": "-{}", "if": "{} ? {} : {}"}
 
+LONGEST = 200  # characters of a text with indexes
 Leaves = Mapping[tuple[str, str], str]  # where C has a leaf, by its operation and name
 
 
@@ -70,6 +73,13 @@ def number(value: float) -> str:
 def text(value: str) -> str:
     """A string of C with any characters."""
     return '"' + "".join(_character(byte) for byte in value.encode()) + '"'
+
+
+def shortened(name: str, expression: Expression) -> str:
+    """A string of C of an assignment, in one line; indexes have their values."""
+    has_indexes = "[" in expression.text
+    value = f"{written(expression.tree):.{LONGEST}}" if has_indexes else expression.text
+    return text(" ".join(f"{name}{value}".split()))
 
 
 def _character(byte: int) -> str:

@@ -17,6 +17,7 @@ from equations.c_code import (
     filled,
     indented,
     located,
+    shortened,
     text,
 )
 from equations.errors import NONE, Errors
@@ -152,6 +153,7 @@ class Events:
             f"{self.located.index(r) if r.time is None else 0}}},"
             for r in self.relations
         ]
+        assigned = self._rows_of_assignments()
         return filled(
             "events.c.in",
             relations=len(self.relations),
@@ -172,15 +174,19 @@ class Events:
             count=self._counts() or ["{0},"],
             **self._segments(places),
             samplers=len(file.sampled),
-            state_names=", ".join([text(x.name) for x in states] or ["NULL"]),
-            sampler_names=", ".join([text(s.name) for s in file.sampled] or ["NULL"]),
+            change_names=", ".join(
+                [text(f"event {event.name}") for event in file.events]
+                + [text(f"sampler {sampler.name}") for sampler in file.sampled]
+                or ["NULL"]
+            ),
+            assignment=assigned or ["{0},"],
+            assignments=len(assigned),
             discrete=", ".join(
                 [f"offsetof(struct equations_values, {self.discrete[0]})"]
                 + [f"{len(self.discrete)} * sizeof(double)"]
             )
             if self.discrete
             else "0, 0",
-            discrete_names=", ".join([text(v.name) for v in file.of("discrete")] or ["NULL"]),
             periods=self._periods(),
             write_start=self._starts() if _has_starts(file) else [],
             starts=[".start = start,"] if _has_starts(file) else [],
@@ -201,7 +207,9 @@ class Events:
                 for line in self._change(i, change)
             ],
             descriptions=self._describe(),
-            names=", ".join([text(f"indicator {r.name}") for r in self.located] or ["NULL"]),
+            names=", ".join(
+                [text(file.relation_texts[places[r.name]][:100]) for r in self.located] or ["NULL"]
+            ),
         ).splitlines()
 
     def _compare(self) -> list[str]:
@@ -244,6 +252,18 @@ class Events:
             row = (places[s.low.name], places[s.high.name], *bounds)
             table.append(f"{{{', '.join(map(str, row))}}},")
         return {"segments": len(segments), "segment": table or ["{0},"], "locate": code.lines}
+
+    def _rows_of_assignments(self) -> list[str]:
+        """Rows of struct assignment."""
+        counted = _counted(self.file)
+        found = [(-1, v.name, v.initial) for v in self.file.started if v.is_real]
+        for i, change in enumerate([*self.file.events, *self.file.sampled]):
+            found += [(i, n, e) for n, e in change.given.items() if n not in counted]
+        return [
+            f"{{{i}, offsetof(struct equations_values, {self.file.fields.value(name)}), "
+            f"{shortened(f'{name} = ', expression)}}},"
+            for i, name, expression in found
+        ]
 
     def _switches(self) -> list[str]:
         fields = [self.file.fields.count(v.name) for v in self.file.of(SWITCHES)]

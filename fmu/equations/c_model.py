@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from equations_content import OPTIONS, ModelFile
 
-from equations.c_code import Code, declared, filled, indented, number, text
+from equations.c_code import Code, declared, filled, indented, number, shortened, text
 from equations.c_events import Events, arrays, leaves
 from equations.c_series import Series
 from equations.graph import FALLIBLE, Value, is_number
@@ -48,6 +48,7 @@ def source(file: ModelFile) -> str:
         events=events.functions("_in_domain" * has_domains),
         followed=[f"{STRUCTURE} copy;", f"values = {FOLLOWED};"] if events else [],
         checks=_checks(file),
+        expressions=_expressions(file),
         ranges=[
             *_parameter_lines(file),
             *_range_lines({k: v for k, v in _ranges(file).items() if k != "parameters"}),
@@ -55,6 +56,16 @@ def source(file: ModelFile) -> str:
         model_events=[".events = &events,"] if events else [],
     )
     return text.replace(f"{HERE}\n", "".join(f"{line}\n" for line in _tables(file, text)))
+
+
+def _expressions(file: ModelFile) -> list[str]:
+    """Rows of struct expression."""
+    fields = [(file.fields.rate(x.name), x) for x in file.of("states")]
+    fields += [(file.fields.value(v.name), v) for v in file.calculated]
+    return [
+        f"{{offsetof({STRUCTURE}, {name}), {shortened('', variable.expression)}}},"
+        for name, variable in fields
+    ] or ["{0},"]
 
 
 def _tables(file: ModelFile, text: str) -> list[str]:
@@ -215,6 +226,7 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, list[str]]:
 
 def _at_start(file: ModelFile, structure: str, derivatives: Mapping[str, Value]) -> list[str]:
     """Add derivatives of start values to those of the states, until the initialization ends."""
+    derivatives = {to: d for to, d in derivatives.items() if not is_number(d, 0.0)}
     if not derivatives:
         return []
     code = Code(leaves(file))

@@ -127,6 +127,7 @@ class Graph:
     tables: Mapping[str, Table] = field(default_factory=dict)
     functions: Mapping[str, Callable[[list[Value], bool], Value]] = field(default_factory=dict)
     unknowns: dict[Value, Value | None] = field(default_factory=dict)  # by condition
+    nodes: list[Node] = field(default_factory=list)  # of a text, for each relation
     segments: dict[str, Segment] = field(default_factory=dict)  # by the names of their leaves
     has_switches: bool = True  # else relations are evaluated with the values
     is_guarded: bool = True  # else an infinite slope makes derivatives infinite, as in C
@@ -189,6 +190,7 @@ class Graph:
                 case op:
                     value = (compare if op in RELATIONS else self.value)(op, *given)
             found[node] = value
+            self.nodes += [node] * (len(self.relations) - len(self.nodes))
         return found[root]
 
     def _looked_up(self, table: Table, given: list[Value], is_instant: bool) -> Value:

@@ -5,11 +5,19 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import equations_file
-from equations_content import COUNTS, OPTIONS, SWITCHES, ModelFile, ModelFileError, placed
+from equations_content import (
+    COUNTS,
+    OPTIONS,
+    SWITCHES,
+    Expression,
+    ModelFile,
+    ModelFileError,
+    placed,
+)
 
 from equations.c_code import Fields
 from equations.graph import Graph
-from rparm.expressions.expression import CONDITION, RELATIONS, derivative_of
+from rparm.expressions.expression import CONDITION, RELATIONS, derivative_of, written
 
 __all__ = ["ModelFile", "ModelFileError", "read"]
 LEAVES = {
@@ -41,16 +49,26 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     known = {variable.name: variable.leaf for variable in file.of(*LEAVES)}
     known |= {mode: graph.value("mode", name=mode) for mode in file.modes}
     known |= {"time": graph.value("time"), "pi": graph.number(math.pi)}
+    sources: list[Expression] = []  # of each relation
     for expression in file.order:
         tree = expression.tree
         with equations_file.located(path, file.text), placed(*expression.place):
             if expression.event == "when" and tree.op in RELATIONS:
                 sides = [graph.of_tree(side, known) for side in tree.arguments]
                 expression.value = graph.switch(tree.op, *sides)
+                graph.nodes += [tree] * (len(graph.relations) - len(graph.nodes))
             else:
                 expression.value = graph.of_tree(tree, known, expression.event == "then")
+        sources += [expression] * (len(graph.relations) - len(sources))
         if expression.is_rate:
             known[derivative_of(expression.target)] = expression.value
         elif expression.target:
             known.setdefault(expression.target, expression.value)
+    places = [source.place for source in sources]
+    file.relation_texts = [
+        f"{place[0].strip('[]').replace('events.', 'event ')} ({written(node)})"
+        if place[-1] == "when"
+        else f"{written(node)} of {' '.join(place[:2])}"
+        for node, place in zip(graph.nodes, places, strict=True)
+    ]
     return file

@@ -116,6 +116,36 @@ def names(root: Node) -> frozenset[str]:
     return frozenset(found.difference(CONSTANTS))
 
 
+def written(root: Node) -> str:
+    """Return the text of an expression, with the brackets that it needs."""
+    found: dict[Node, tuple[str, int]] = {}  # with how tightly it binds
+    for node in in_order([root]):
+        own = {"negative": SIGN, "not": NOT, "if": CONDITIONAL, **BINDING}.get(node.op, POWER + 1)
+        given = [found[argument] for argument in node.arguments]
+        texts = [text for text, _ in given]
+        inner = [  # from the left, operators of one kind need no brackets
+            text if part > own or (part == own and i == 0 and own != POWER) else f"({text})"
+            for i, (text, part) in enumerate(given)
+        ]
+        match node.op:
+            case "number":
+                text = f"{node.value:.12g}"
+            case "literal":
+                text = "true" if node.value else "false"
+            case "name":
+                text = node.name
+            case "negative" | "not":
+                text = f"{'-' if node.op == 'negative' else 'not '}{inner[0]}"
+            case "if":
+                text = f"{inner[1]} if {inner[0]} else {texts[2]}"
+            case op if op in BINDING:
+                text = f" {op} ".join(inner)
+            case op:
+                text = f"{node.name if op == 'table' else op}({', '.join(texts)})"
+        found[node] = text, own
+    return found[root][0]
+
+
 def finite_number(given: Any) -> float:
     """Return `given` as a float; ValueError says what was expected if it is not a finite number."""
     if isinstance(given, bool) or not isinstance(given, int | float):

@@ -1,5 +1,6 @@
 #include "continuous_states.h"
 
+#include "failures.h"
 #include "modes.h"
 #include "settings.h"
 #include "state.h"
@@ -93,26 +94,23 @@ enum status instance_set_states(struct instance *instance, const double x[], siz
     return STATUS_OK;
 }
 
-static enum status copy_finite(const struct instance *instance, const char *what,
-                               const double from[], double to[], size_t count) {
-    for (size_t i = 0; i < count; i++) {
+/* Copies doubles of the values shown. */
+static enum status copy_finite(struct instance *instance, struct range range, double to[]) {
+    const double *from = doubles_of(instance_shown_values(instance), range);
+    for (size_t i = 0; i < count_of(range); i++) {
         if (!isfinite(from[i])) {
-            return instance_not_finite(instance, what);
+            return instance_field_not_finite(instance, range.offset + i * sizeof *from);
         }
     }
-    if (count > 0) {
-        memcpy(to, from, count * sizeof(double));
+    if (range.size > 0) {
+        memcpy(to, from, range.size);
     }
     return STATUS_OK;
 }
 
 enum status instance_get_states(struct instance *instance, double x[], size_t count) {
     const enum status status = check_count(instance, count);
-    return status != STATUS_OK
-               ? status
-               : copy_finite(instance, "a state",
-                             doubles_of(instance->memory.values, instance->model->states), x,
-                             count);
+    return status != STATUS_OK ? status : copy_finite(instance, instance->model->states, x);
 }
 
 enum status instance_get_derivatives(struct instance *instance, double dx[], size_t count) {
@@ -120,11 +118,7 @@ enum status instance_get_derivatives(struct instance *instance, double dx[], siz
     if (status == STATUS_OK) {
         status = instance_update_outputs(instance);
     }
-    return status != STATUS_OK ? status
-                               : copy_finite(instance, "the derivative of a state",
-                                             doubles_of(instance_shown_values(instance),
-                                                        instance->model->derivatives),
-                                             dx, count);
+    return status != STATUS_OK ? status : copy_finite(instance, instance->model->derivatives, dx);
 }
 
 enum status instance_get_nominals(struct instance *instance, double nominals[], size_t count) {

@@ -1,10 +1,12 @@
 #include "modes.h"
 
+#include "failures.h"
 #include "settings.h"
 #include "state.h"
 
 #include <limits.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 /* Returns the nominal value of a state, in its unit. */
@@ -63,7 +65,8 @@ static enum status update(struct instance *instance, const bool *triggered) {
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
         instance->du[i] = instance->memory.current_inputs[i].d[1];
     }
-    char reason[200];
+    char reason[300];
+    const char *text = NULL;
     reason[0] = '\0';
     const struct event event = {
         .t = instance->state.time.s,
@@ -73,17 +76,22 @@ static enum status update(struct instance *instance, const bool *triggered) {
         .du_is_known = !instance->is_integrated_outside,
         .tolerance = instance->event_tolerances,
         .max_events = instance->state.own.max_events,
+        .text = &text,
         .reason = reason,
         .reason_size = sizeof reason,
     };
     const double passed = event.is_timed ? instance_next_time(instance) : -INFINITY;
-    enum status status = events->update(instance->memory.values, &event);
+    const enum status status = events->update(instance->memory.values, &event);
     if (status == STATUS_OK && event.is_timed) {
-        status = check_next_time(instance, passed);
+        return check_next_time(instance, passed);
     }
-    if (status != STATUS_OK) {
-        message_write(&instance->sink, status, "no modes at t = %.17g: %s", event.t,
-                      reason[0] != '\0' ? reason : status_text(status));
+    if (status != STATUS_OK && instance->sink.write != NULL) {
+        struct explanation why = {.length = 0};
+        if (text != NULL) {
+            instance_explain_text(instance, text, &why);
+        }
+        message_write(&instance->sink, status, "at t = %.17g: %s%s", event.t,
+                      reason[0] != '\0' ? reason : status_text(status), why.text);
     }
     return status;
 }
@@ -96,16 +104,26 @@ enum status instance_update_modes(struct instance *instance, const bool *trigger
     return update(instance, triggered);
 }
 
-static void refuse_state_event(const struct instance *instance, const bool triggered[]) {
+/* Counts how often an indicator has fallen in a row. */
+static void note_indicator(const bool triggered[], struct event_counts *in_step) {
     size_t first = 0;
     while (!triggered[first]) {
         first++;
     }
+    in_step->in_a_row = first == in_step->last ? in_step->in_a_row + 1 : 1;
+    in_step->last = first;
+}
+
+static void refuse_state_event(const struct instance *instance, const struct event_counts *counts) {
+    char times[60];
+    times[0] = '\0';
+    if (counts->in_a_row > 1) {
+        (void)snprintf(times, sizeof times, ", the same %d times in a row,", counts->in_a_row);
+    }
     message_write(&instance->sink, STATUS_TOO_MANY_EVENTS,
-                  "the step ended at t = %.17g: %s fell to 0, one more event than "
-                  "max_events = %d",
-                  instance->state.own.time, instance->model->events->indicator_names[first],
-                  instance->state.own.max_events);
+                  "the step ended at t = %.17g: %s%s is one event more than max_events = %d",
+                  instance->state.own.time, instance->model->events->indicator_names[counts->last],
+                  times, instance->state.own.max_events);
 }
 
 static void refuse_time_event(const struct instance *instance) {
@@ -123,8 +141,11 @@ enum status instance_count_event(struct instance *instance, const bool triggered
         refuse_time_event(instance);
         return STATUS_TOO_MANY_EVENTS;
     }
+    if (!is_time_event) {
+        note_indicator(triggered, in_step);
+    }
     if (!is_time_event && in_step->of_states >= own->max_events) {
-        refuse_state_event(instance, triggered);
+        refuse_state_event(instance, in_step);
         return STATUS_TOO_MANY_EVENTS;
     }
     *(is_time_event ? &in_step->of_time : &in_step->of_states) += 1;
@@ -390,9 +411,8 @@ static enum status refuse_unseen_events(struct instance *instance, const bool tr
         if (triggered[i] && instance->indicators[i].kind != INDICATOR_UNUSED &&
             turns_before_zero(z[i], z[count + i], z[2 * count + i])) {
             message_write(&instance->sink, STATUS_INTERNAL,
-                          "at t = %.17g: events at which %s falls to 0 follow each other faster "
-                          "than they can be seen from outside: let a mode rest, or set the states "
-                          "onto the limit",
+                          "at t = %.17g: events follow each other faster than they can be seen "
+                          "from outside: %s; let a mode rest, or set the states onto the limit",
                           instance->state.time.s, instance->model->events->indicator_names[i]);
             return STATUS_INTERNAL;
         }

@@ -13,6 +13,8 @@ MUST_CHECK NONNULL_ARGUMENTS(1) enum status
 struct event_counts {
     int of_states; /* at most max_events */
     int of_time;   /* at most max_internal_steps: each ends a part of the step */
+    size_t last;   /* indicator of the last state event */
+    int in_a_row;  /* state events of this indicator up to the last one */
 };
 
 /* Counts an event at the current time. Fails, with a message, at the first event above its limit.

@@ -1,5 +1,6 @@
 #include "stepping.h"
 
+#include "failures.h"
 #include "history.h"
 #include "modes.h"
 #include "settings.h"
@@ -23,6 +24,8 @@ struct step {
     enum status answer;             /* last status of options->accept */
     struct event_counts events;     /* events so far */
     int64_t steps_before; /* internal steps from initialization to the begin of the step */
+    bool has_message;     /* true if a message has explained the failure of an event */
+    bool is_stuck;        /* true if the integrator has failed */
 };
 
 /* ---- Times ---------------------------------------------------------------------------------- */
@@ -280,6 +283,7 @@ static enum status move(struct step *step, enum continuation continuation) {
         return status;
     }
     status = advance(step);
+    step->is_stuck = status != STATUS_OK;
     // a step that ended early cannot be replayed: its end was not known when it began
     instance_note_part(instance, status,
                        !step->is_early && !step->meets_time_event && !is_at_event(instance));
@@ -323,6 +327,7 @@ static enum status meet_event(struct step *step, struct clock_time time) {
     if (status == STATUS_OK) {
         status = instance_update_modes(instance, triggered);
     }
+    step->has_message = status != STATUS_OK;
     if (status == STATUS_OK && !(clock_difference(step->end, state->time) > 0.0)) {
         note_handled_event(instance, end);
     }
@@ -336,6 +341,7 @@ static enum status begin_modes(struct step *step, enum continuation *continuatio
     if (state->event_point == EVENT_UNHANDLED) {
         const enum status status = instance_handle_event(instance, &step->events);
         if (status != STATUS_OK) {
+            step->has_message = true;
             return status;
         }
         *continuation =
@@ -346,7 +352,9 @@ static enum status begin_modes(struct step *step, enum continuation *continuatio
         return STATUS_OK;
     }
     begin_inputs(instance);
-    return instance_update_modes(instance, NULL);
+    const enum status status = instance_update_modes(instance, NULL);
+    step->has_message = status != STATUS_OK;
+    return status;
 }
 
 /* True if every state's derivative is 0 in the current modes. */
@@ -470,6 +478,22 @@ static enum status pass_time(struct step *step) {
     return status;
 }
 
+/* Sends the message about a step that has failed, unless it has been sent. */
+static void explain(const struct step *step, double communication_point, enum status status) {
+    struct instance *instance = step->instance;
+    struct explanation why = {.length = 0};
+    if (step->has_message || instance->sink.write == NULL) {
+        return;
+    }
+    if (step->is_stuck) {
+        instance_explain_step(instance, status, &why);
+    }
+    message_write(&instance->sink, status,
+                  "the step from t = %.17g to t = %.17g ended at %.17g: %s", communication_point,
+                  step->end.s, instance->state.time.s,
+                  why.length > 0 ? why.text : status_text(status));
+}
+
 static enum status do_step(struct step *step, double communication_point, double step_size) {
     struct instance *instance = step->instance;
     enum status status = STATUS_OK;
@@ -482,13 +506,8 @@ static enum status do_step(struct step *step, double communication_point, double
         }
     }
     status = instance->integrator == NULL ? pass_time(step) : integrate(step);
-    if (status == STATUS_TOO_MANY_EVENTS) {
-        return status; // the message has been sent
-    }
     if (status != STATUS_OK) {
-        message_write(
-            &instance->sink, status, "the step from t = %.17g to t = %.17g ended at %.17g: %s",
-            communication_point, step->end.s, instance->state.time.s, status_text(status));
+        explain(step, communication_point, status);
         return status;
     }
     if (step->options->ask_inputs != NULL) {

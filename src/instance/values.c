@@ -1,5 +1,6 @@
 #include "values.h"
 
+#include "failures.h"
 #include "modes.h"
 #include "settings.h"
 #include "state.h"
@@ -211,7 +212,7 @@ enum status instance_get_real(struct instance *instance, const unsigned referenc
             }
         }
         if (!isfinite(shown_real(&shown, &reals[reference]))) {
-            return instance_not_finite(instance, variable_of(description, reference)->name);
+            return instance_field_not_finite(instance, variable_of(description, reference)->offset);
         }
     }
     for (size_t i = 0; i < count; i++) {

@@ -19,6 +19,7 @@ struct integrator {
     double *absolute_tolerances;
     double *reached_x; /* the state at problem.reached */
     double *x;         /* room for the state that the method writes */
+    double *f;         /* room for a right-hand side */
     double values[];
 };
 
@@ -62,7 +63,7 @@ enum status integrator_create(const struct ode *ode, const struct message_sink *
                               struct integrator **integrator) {
     const size_t n = ode->state_count;
     *integrator = NULL;
-    struct integrator *created = calloc(1, sizeof *created + 3 * n * sizeof(double));
+    struct integrator *created = calloc(1, sizeof *created + 5 * n * sizeof(double));
     if (created == NULL) {
         return STATUS_OUT_OF_MEMORY;
     }
@@ -71,6 +72,8 @@ enum status integrator_create(const struct ode *ode, const struct message_sink *
     created->absolute_tolerances = created->values;
     created->reached_x = created->values + n;
     created->x = created->values + 2 * n;
+    created->f = created->values + 3 * n;
+    created->problem.failed_x = created->values + 4 * n;
     if (!workspace_create(&created->workspace, workspace_size(ode)) ||
         !location_create(&created->problem.ode, created->absolute_tolerances,
                          &created->problem.location)) {
@@ -215,7 +218,7 @@ static enum status advance(struct integrator *integrator, double t, int64_t max_
     if (has_reached(integrator, stopped_at)) {
         accept(integrator, stopped_at);
     } else if (status == STATUS_OK) {
-        status = STATUS_NO_CONVERGENCE;
+        status = problem_is_stuck(problem) ? STATUS_NOT_FINITE : STATUS_NO_CONVERGENCE;
     }
     return status;
 }
@@ -273,6 +276,78 @@ void integrator_set_observer(struct integrator *integrator, integrator_observer 
                              void *context) {
     integrator->problem.observer = observer;
     integrator->problem.observer_context = context;
+}
+
+/* ---- Failures ------------------------------------------------------------------------------- */
+
+const double *integrator_failure(const struct integrator *integrator, double *t) {
+    *t = integrator->problem.failed_at;
+    return *t > -INFINITY ? integrator->problem.failed_x : NULL;
+}
+
+/* Returns the error of a state, in its unit, that the tolerances allow. */
+static double allowed_error(const struct integrator *integrator, size_t i) {
+    return integrator->problem.settings.relative_tolerance * fabs(integrator->reached_x[i]) +
+           integrator->absolute_tolerances[i];
+}
+
+/* Writes f at the last state to integrator->f. Returns the largest rate (1/s) of a state, relative
+ * to its size; NaN if f is not finite. */
+static double rate_of_motion(struct integrator *integrator) {
+    const struct problem *problem = &integrator->problem;
+    const struct ode *ode = &problem->ode;
+    double rate = 0.0;
+    if (ode->rhs(problem->reached, integrator->reached_x, integrator->f, ode->context) !=
+            STATUS_OK ||
+        !problem_are_finite(integrator->f, ode->state_count)) {
+        return NAN;
+    }
+    for (size_t i = 0; i < ode->state_count; i++) {
+        const double size = allowed_error(integrator, i) / problem->settings.relative_tolerance;
+        rate = fmax(rate, fabs(integrator->f[i]) / size);
+    }
+    return rate;
+}
+
+/* Returns the fastest rate (1/s) at which deviations from the motion change: power iteration with
+ * the Jacobian, whose products are differences of right-hand sides. integrator->f: f at the last
+ * state. */
+static double rate_of_deviations(struct integrator *integrator) {
+    const struct problem *problem = &integrator->problem;
+    const struct ode *ode = &problem->ode;
+    double *x = integrator->x;
+    double *product = problem->failed_x;
+    double rate = 0.0;
+    for (size_t i = 0; i < ode->state_count; i++) {
+        product[i] = (i % 2 == 0 ? 1.0 : 0.5) * allowed_error(integrator, i);
+    }
+    for (int count = 0; count < 20; count++) {
+        const double factor = count == 0 ? 1.0 : 1.0 / rate;
+        for (size_t i = 0; i < ode->state_count; i++) {
+            x[i] = integrator->reached_x[i] + factor * product[i];
+        }
+        if (ode->rhs(problem->reached, x, product, ode->context) != STATUS_OK) {
+            return 0.0;
+        }
+        rate = 0.0;
+        for (size_t i = 0; i < ode->state_count; i++) {
+            product[i] -= integrator->f[i];
+            rate = fmax(rate, fabs(product[i]) / allowed_error(integrator, i));
+        }
+        if (!(rate > 0.0 && rate < INFINITY)) {
+            return 0.0;
+        }
+    }
+    return rate;
+}
+
+/* In a stiff problem deviations change far faster than the motion does, and no explicit method can
+ * make longer steps than their rate allows, however smooth the motion is. */
+bool integrator_seems_stiff(struct integrator *integrator) {
+    const double of_motion = rate_of_motion(integrator);
+    const double of_deviations = rate_of_deviations(integrator);
+    return of_deviations > 100.0 * of_motion &&
+           of_deviations * integrator->statistics.last_step > 0.01;
 }
 
 /* ---- Statistics ----------------------------------------------------------------------------- */

@@ -92,6 +92,14 @@ MUST_CHECK NONNULL enum status integrator_rest(struct integrator *integrator, co
  * NULL. After an event the next call must be a restart. */
 NONNULL const bool *integrator_event(const struct integrator *integrator);
 
+/* Returns the state at which the equations were last found not finite since the restart, and
+ * writes its time (s since the restart); NULL if there is none. */
+NONNULL const double *integrator_failure(const struct integrator *integrator, double *t);
+
+/* True if an advance that has taken too many steps probably did so because the problem is stiff.
+ * Evaluates the right-hand side. integrator_failure forgets its state. */
+NONNULL bool integrator_seems_stiff(struct integrator *integrator);
+
 NONNULL void integrator_get_statistics(const struct integrator *integrator,
                                        struct integrator_statistics *statistics);
 

@@ -5,6 +5,8 @@
 
 #include "location.h"
 
+#include <string.h>
+
 /* ---- The problem ---------------------------------------------------------------------------- */
 
 /* The ode with its settings, the limits since the last restart, and a count of evaluations. Times
@@ -19,6 +21,7 @@ struct problem {
     bool continues;    /* as in struct integrator_start */
     double reached;    /* end of the last advance; 0 after a restart */
     double failed_at; /* last time at which the right-hand side failed; -INFINITY if it never did */
+    double *failed_x; /* the state there */
     int64_t evaluation_count;      /* calls of the right-hand side, or series begun */
     integrator_observer *observer; /* NULL if there is none */
     void *observer_context;
@@ -39,6 +42,13 @@ static inline bool problem_are_finite(const double values[], size_t count) {
     return sum == 0.0;
 }
 
+/* Notes that the equations cannot be evaluated at t and x. */
+static inline enum status problem_fail(struct problem *problem, double t, const double x[]) {
+    problem->failed_at = t;
+    memmove(problem->failed_x, x, problem->ode.state_count * sizeof *x);
+    return STATUS_NOT_FINITE;
+}
+
 /* Writes f(t, x) to dx. Returns STATUS_NOT_FINITE if that fails or is not finite. Inline, because
  * these calls are most of a step. */
 static inline enum status problem_rhs(struct problem *problem, double t, const double x[],
@@ -48,8 +58,7 @@ static inline enum status problem_rhs(struct problem *problem, double t, const d
     if (ode->rhs(t, x, dx, ode->context) == STATUS_OK && problem_are_finite(dx, ode->state_count)) {
         return STATUS_OK;
     }
-    problem->failed_at = t;
-    return STATUS_NOT_FINITE;
+    return problem_fail(problem, t, x);
 }
 
 /* Writes the Jacobian as in ode.h; fails like problem_rhs. */
@@ -60,8 +69,7 @@ static inline enum status problem_jacobian(struct problem *problem, double t, co
         problem_are_finite(J, ode->state_count * ode->state_count)) {
         return STATUS_OK;
     }
-    problem->failed_at = t;
-    return STATUS_NOT_FINITE;
+    return problem_fail(problem, t, x);
 }
 
 /* Writes coefficients as in ode.h; a series begun at order 0 counts as an evaluation. Fails like
@@ -73,8 +81,10 @@ static inline enum status problem_series(struct problem *problem, double t, doub
     if (ode->series(t, time_scale, first, last, rows, ode->context) == STATUS_OK) {
         return STATUS_OK;
     }
-    problem->failed_at = t;
-    return STATUS_NOT_FINITE;
+    for (size_t i = 0; i < ode->state_count; i++) {
+        problem->failed_x[i] = rows[i][0];
+    }
+    return problem_fail(problem, t, problem->failed_x);
 }
 
 /* True if the method is stuck in front of a time at which the right-hand side cannot be evaluated.

@@ -232,9 +232,11 @@ static void add_work(const struct erk *erk, struct method_work *work) {
 static int advance_carefully(struct erk *erk, double begin, double end, int64_t max_steps,
                              const double begin_x[], double *stopped_at, double x[],
                              struct method_work *work) {
-    const struct problem *problem = erk->base.problem;
+    struct problem *problem = erk->base.problem;
+    const struct message_sink sink = problem->sink;
     double step = end - begin;
-    double good = begin; // the time of x
+    double good = begin;        // the time of x
+    problem->sink.write = NULL; // the failure before has sent the message of all
     sundials_set_state(&erk->base, begin_x);
     sundials_get_state(&erk->base, x);
     int flag = start(erk, begin, end, erk->next_step);
@@ -261,6 +263,7 @@ static int advance_carefully(struct erk *erk, double begin, double end, int64_t 
         sundials_set_state(&erk->base, x);
         flag = start(erk, good, end, step);
     }
+    problem->sink = sink;
     *stopped_at = good;
     return flag;
 }

@@ -107,7 +107,9 @@ static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
             *step *= 0.5;
             work->failed_steps++;
         } else {
-            return isfinite(defect) ? STATUS_NO_CONVERGENCE : STATUS_NOT_FINITE;
+            const double end = series->begin + *step * series->time_scale;
+            return isfinite(defect) ? STATUS_NO_CONVERGENCE
+                                    : problem_fail(series->problem, end, taylor->end_x);
         }
     }
 }
@@ -142,6 +144,7 @@ static enum status expand(struct taylor *taylor, double t, double length, bool i
             taylor->longest_scale = time_scale < length ? growing * time_scale : INFINITY;
             return status;
         }
+        (void)problem_fail(taylor->series.problem, t, x);
         work->failed_steps++;
         time_scale *= shrinking;
     }

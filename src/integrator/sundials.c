@@ -117,8 +117,12 @@ void sundials_text(int error_code, const char *module, const char *function, cha
                    void *sundials_pointer) {
     const struct sundials *sundials = sundials_pointer;
     const struct problem *problem = sundials->problem;
+    const char *explanation = explained(text);
+    if (error_code == CV_BAD_T && explanation == text) {
+        return; // it follows from a failure before
+    }
     char with_times[400]; // SUNDIALS writes 255 characters at most
-    write_times(explained(text), problem->origin, with_times, sizeof with_times);
+    write_times(explanation, problem->origin, with_times, sizeof with_times);
     message_write(&problem->sink, sundials_status(problem, error_code), "%s: %s",
                   sundials->method->name, with_times);
 }
@@ -210,6 +214,7 @@ enum status sundials_warm_up(void *memory) {
                      .absolute_tolerances = small_vector_data(sundials->work)},
         .horizon = INFINITY,
         .failed_at = -INFINITY,
+        .failed_x = wanted.failed_x,
     };
     enum status status = method->configure(memory);
     if (status == STATUS_OK) {

@@ -47,6 +47,8 @@ struct event {
     bool du_is_known; /* false if inputs move outside: du is 0 then */
     /* Tolerance of each state, in its unit: sum of its relative and absolute tolerance. */
     const double *tolerance;
+    /* Where update writes the text of the expression that is not finite, if it fails for that. */
+    const char **text;
     int max_events; /* largest number of events that follow each other at one instant */
     char *reason; /* room for one line of reason_size bytes: update writes why it fails. NULL if the
                      caller does not read it */
@@ -150,6 +152,14 @@ struct series {
                           double rows[][SERIES_LENGTH]);
 };
 
+/* ---- Texts ---------------------------------------------------------------------------------- */
+
+/* An expression of the file from which a model is made, for messages about its value. */
+struct expression {
+    size_t offset; /* of the double of the value structure that gets its value */
+    const char *text;
+};
+
 /* ---- The model ------------------------------------------------------------------------------ */
 
 struct model {
@@ -191,4 +201,8 @@ struct model {
 
     /* NULL if the model has no modes. */
     const struct model_events *events;
+
+    /* Expressions of calculated fields; NULL if the model has no file. */
+    const struct expression *expressions;
+    size_t expression_count;
 };

@@ -246,51 +246,129 @@ static void update_timed_modes(const struct call *call) {
     }
 }
 
+/* Writes why an expression is refused. */
+static enum status refuse(const struct call *call, const struct event *event,
+                          const struct assignment *refused) {
+    const char *name = refused->event < 0 ? "start" : call->model->change_names[refused->event];
+    if (event->reason != NULL) {
+        (void)snprintf(event->reason, event->reason_size, "%s: %.150s is not finite", name,
+                       refused->text);
+    }
+    if (event->text != NULL) {
+        *event->text = strchr(refused->text, '=') + 1;
+    }
+    return STATUS_NOT_FINITE;
+}
+
+/* Returns STATUS_NOT_FINITE, with the reason, if a whole number is none that an int holds. */
+static enum status check_counts(const struct call *call, const struct event *event) {
+    const struct relations *model = call->model;
+    for (int i = 0; i < model->count_count; i++) {
+        if (call->segments[model->segment_count + i] == RELATIONS_NO_COUNT) {
+            if (event->reason != NULL) {
+                (void)snprintf(event->reason, event->reason_size, "%s is beyond %d",
+                               model->count[i].name, INT_MAX);
+            }
+            return STATUS_NOT_FINITE;
+        }
+    }
+    return STATUS_OK;
+}
+
+/* Assigns what an event or a sampler does, or the start (-1). Returns STATUS_NOT_FINITE, with the
+ * reason and with the values before, if a state or discrete variable would not be finite. */
+static enum status assign(const struct call *call, int number, const struct event *event) {
+    const struct relations *model = call->model;
+    const struct assignment *refused = NULL;
+    for (int i = 0; i < model->assignment_count; i++) {
+        const struct assignment *own = &model->assignment[i];
+        call->room.assigned[i] = *(double *)(void *)((char *)call->values + own->offset);
+    }
+    if (number >= 0) {
+        model->change(call->values, call->t, number, call->room.tolerance);
+    } else if (model->start != NULL) {
+        model->start(call->values);
+    }
+    for (int i = model->assignment_count - 1; i >= 0; i--) {
+        const struct assignment *own = &model->assignment[i];
+        const double value = *(double *)(void *)((char *)call->values + own->offset);
+        refused = own->event == number && !isfinite(value) ? own : refused;
+    }
+    for (int i = 0; refused != NULL && i < model->assignment_count; i++) {
+        const struct assignment *own = &model->assignment[i];
+        *(double *)(void *)((char *)call->values + own->offset) = call->room.assigned[i];
+    }
+    return refused != NULL ? refuse(call, event, refused) : check_counts(call, event);
+}
+
 /* Performs an event or a sampler, and updates all modes. */
-static void perform(const struct call *call, int event) {
+static enum status perform(const struct call *call, int number, const struct event *event) {
     const struct relations *model = call->model;
     compare(call, call->room.tolerance, call->room.before);
-    model->change(call->values, call->t, event, call->room.tolerance);
+    const enum status status = assign(call, number, event);
+    if (status != STATUS_OK) {
+        return status;
+    }
     update_timed_modes(call);
     update_modes_until_stable(call, false);
     switch_fallen(call);
     update_modes_until_stable(call, false);
     memset(call->room.turned, 0, (size_t)model->relation_count * sizeof *call->room.turned);
+    return STATUS_OK;
 }
 
 /* Runs the samplers whose time has come, in their order. Ticks whose times differ only by rounding,
  * such as 3 0.1 and 1 0.3, are at one instant. */
-static void run_samplers(const struct call *call) {
+static enum status run_samplers(const struct call *call, const struct event *event) {
     const struct relations *model = call->model;
     double *ticks = discrete_of(call) + 1;
     const double rounding = 4.0 * DBL_EPSILON * fabs(call->passed);
     model->write_periods(call->values, call->room.every, call->room.offset);
     for (int i = 0; i < model->sampler_count; i++) {
         if (tick_time(model, call->room, call->values, i) <= call->passed + rounding) {
-            perform(call, model->event_count + i);
+            const enum status status = perform(call, model->event_count + i, event);
+            if (status != STATUS_OK) {
+                return status;
+            }
             ticks[i] += 1.0;
         }
     }
+    return STATUS_OK;
 }
 
-/* Runs the events that have become due, in their order. Returns false if there was none. */
-static bool run_due_events(const struct call *call) {
+/* Adds the name of an event to the reason. */
+static void add_name(const struct event *event, const char *name) {
+    if (event->reason != NULL) {
+        const size_t length = strlen(event->reason);
+        (void)snprintf(event->reason + length, event->reason_size - length, "%s%s",
+                       length > 0 && *name != ':' ? ", " : "", name);
+    }
+}
+
+/* Runs the events that have become due, in their order. *fires: false if there was none. is_last:
+ * the reason gets their names. */
+static enum status run_due_events(const struct call *call, const struct event *event, bool is_last,
+                                  bool *fires) {
     const struct relations *model = call->model;
     int *due = call->room.due;
-    bool fires = false;
-    for (int i = 0; i < model->event_count; i++) {
+    enum status status = STATUS_OK;
+    *fires = false;
+    for (int i = 0; status == STATUS_OK && i < model->event_count; i++) {
         model->find_due(call->values, call->t, due);
         if (due[i] && !call->active[i]) {
-            perform(call, i);
+            status = perform(call, i, event);
             call->active[i] = 1;
-            fires = true;
+            *fires = true;
+            if (status == STATUS_OK && is_last) {
+                add_name(event, model->change_names[i]);
+            }
         }
         model->find_due(call->values, call->t, due);
         for (int k = 0; k < model->event_count; k++) {
             call->active[k] = call->active[k] && due[k];
         }
     }
-    return fires;
+    return status;
 }
 
 /* True if a relation at its limit is about to pass it, so that it switches together with another
@@ -326,10 +404,10 @@ static bool can_tick(const char *name, double every, double offset, const struct
     }
     if (event->reason != NULL && !(offset >= 0.0 && isfinite(offset))) {
         (void)snprintf(event->reason, event->reason_size,
-                       "sampler %s: offset = %g s is refused: it must be 0 or more", name, offset);
+                       "%s: offset = %g s is refused: it must be 0 or more", name, offset);
     } else if (event->reason != NULL) {
         (void)snprintf(event->reason, event->reason_size,
-                       "sampler %s: every = %g s is refused: at a start time of %g s it must be "
+                       "%s: every = %g s is refused: at a start time of %g s it must be "
                        "%g s or more",
                        name, every, event->t, shortest);
     }
@@ -342,57 +420,13 @@ static enum status start_samplers(const struct call *call, const struct event *e
     const struct relations *model = call->model;
     model->write_periods(call->values, call->room.every, call->room.offset);
     for (int i = 0; i < model->sampler_count; i++) {
-        if (!can_tick(model->sampler_names[i], call->room.every[i], call->room.offset[i], event)) {
+        if (!can_tick(model->change_names[model->event_count + i], call->room.every[i],
+                      call->room.offset[i], event)) {
             return STATUS_INVALID_PARAMETERS;
         }
     }
     if (model->sampler_count > 0) {
         discrete_of(call)[0] = event->t;
-    }
-    return STATUS_OK;
-}
-
-/* Writes start values that follow from parameters, and starts the samplers. */
-static enum status start(const struct call *call, const struct event *event) {
-    const struct relations *model = call->model;
-    if (model->start != NULL) {
-        model->start(call->values);
-    }
-    const double *x = (const double *)(const void *)((const char *)call->values + model->states);
-    for (int i = 0; i < model->state_count; i++) {
-        if (!isfinite(x[i])) {
-            if (event->reason != NULL) {
-                (void)snprintf(event->reason, event->reason_size,
-                               "the start value of %s is not finite", model->state_names[i]);
-            }
-            return STATUS_NOT_FINITE;
-        }
-    }
-    return start_samplers(call, event);
-}
-
-/* Returns STATUS_NOT_FINITE, with the reason, if a discrete variable is not finite or no int. */
-static enum status check_discrete(const struct call *call, const struct event *event) {
-    const struct relations *model = call->model;
-    for (int i = 0; i < model->count_count; i++) {
-        if (call->segments[model->segment_count + i] == RELATIONS_NO_COUNT) {
-            if (event->reason != NULL) {
-                (void)snprintf(event->reason, event->reason_size, "%s is beyond %d",
-                               model->count[i].name, INT_MAX);
-            }
-            return STATUS_NOT_FINITE;
-        }
-    }
-    const double *discrete = discrete_in(model, call->values);
-    const size_t first = model->sampler_count > 0 ? 1 + (size_t)model->sampler_count : 0;
-    for (size_t i = first; i < model->discrete.size / sizeof *discrete; i++) {
-        if (!isfinite(discrete[i])) {
-            if (event->reason != NULL) {
-                (void)snprintf(event->reason, event->reason_size, "%s is not finite",
-                               model->discrete_names[i - first]);
-            }
-            return STATUS_NOT_FINITE;
-        }
     }
     return STATUS_OK;
 }
@@ -404,7 +438,10 @@ enum status relations_update(const struct relations *model, struct relations_roo
     double *tolerance = room.tolerance;
     const int was_begun = *call.is_begun;
     if (!was_begun) {
-        const enum status status = start(&call, event);
+        enum status status = assign(&call, -1, event);
+        if (status == STATUS_OK) {
+            status = start_samplers(&call, event);
+        }
         if (status != STATUS_OK) {
             return status;
         }
@@ -421,18 +458,18 @@ enum status relations_update(const struct relations *model, struct relations_roo
     if (was_begun) {
         pass(&call, event);
     }
-    run_samplers(&call);
-    for (int count = 0; count <= event->max_events; count++) {
-        if (!run_due_events(&call)) {
-            return check_discrete(&call, event);
-        }
+    enum status status = run_samplers(&call, event);
+    bool fires = true;
+    for (int count = 0; status == STATUS_OK && fires && count <= event->max_events; count++) {
+        status = run_due_events(&call, event, count == event->max_events, &fires);
     }
-    if (event->reason != NULL) {
-        (void)snprintf(event->reason, event->reason_size,
-                       "events follow each other more than max_events = %d times",
-                       event->max_events);
+    if (status == STATUS_OK && fires) {
+        char more[60];
+        (void)snprintf(more, sizeof more, ": more than max_events = %d times", event->max_events);
+        add_name(event, more);
+        status = STATUS_INTERNAL;
     }
-    return STATUS_INTERNAL;
+    return status;
 }
 
 void relations_errors(const struct relations *model, struct relations_room room, const void *values,

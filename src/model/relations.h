@@ -42,6 +42,13 @@ struct compared {
     int used;        /* 1 if a value that is needed reads it */
 };
 
+/* An expression that an event or a sampler of the file assigns to a state or discrete variable. */
+struct assignment {
+    int event;        /* as of `change`; -1: the start */
+    size_t offset;    /* of the variable */
+    const char *text; /* "name = expression" */
+};
+
 /* Errors of the values that distances depend on, and motion of the inputs. */
 struct given {
     const double *state_errors; /* of each state, in its unit */
@@ -65,10 +72,10 @@ struct relations {
     const struct relation *relation;
     const struct segment *segment;
     const struct count *count;
-    const double *nominal; /* of each state */
-    const char *const *state_names;
-    const char *const *sampler_names;
-    const char *const *discrete_names; /* of the discrete variables */
+    const double *nominal;           /* of each state */
+    const char *const *change_names; /* of events, then of samplers */
+    const struct assignment *assignment;
+    int assignment_count;
 
     /* Writes the start values of modes, and of states and discrete variables that follow from
      * parameters. NULL if there are none. */
@@ -96,6 +103,7 @@ struct relations_room {
     int *due;                           /* one per event */
     int *turned;                        /* one per relation; zeros */
     double *tolerance;                  /* one per state */
+    double *assigned;                   /* one per assignment */
     const double *zeros;                /* one per state and input */
 };
 

@@ -271,7 +271,7 @@ def test_start_values_of_discrete_variables_and_periods_can_be_set(folder: Path)
     ("start", "message"),
     [
         ({"Ts": 1e-6, "time": 1e9}, "sampler control: every = 1e-06 s is refused"),
-        ({"Kp": 1e308, "target": 1e308}, "u is not finite"),
+        ({"Kp": 1e308, "target": 1e308}, "sampler control: u = Kp * error + sum - Kd"),
     ],
 )
 def test_a_sampler_that_fails_is_named(folder: Path, start: dict[str, float], message: str) -> None:

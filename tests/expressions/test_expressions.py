@@ -15,6 +15,7 @@ from rparm.expressions.expression import (
     parse,
     parsed,
     with_kinds,
+    written,
 )
 from rparm.expressions.units import ONE, exponents, shown, unit_of, unit_of_exponents
 
@@ -66,7 +67,10 @@ def test_it_calculates_as_python(seed: int) -> None:
     for _ in range(100):
         text = number(chance, 5)
         expected = outcome(lambda text=text: eval(text, {"__builtins__": {}}, PYTHON))
-        found = outcome(lambda text=text: evaluated(parse(text), VALUES))
+        tree = parse(text)
+        found = outcome(lambda tree=tree: evaluated(tree, VALUES))
+        again = parse(written(tree))
+        assert outcome(lambda tree=again: evaluated(tree, VALUES)) == pytest.approx(found), text
         if expected is None or found is None:
             continue  # Python has complex roots
         defined += 1
