@@ -5,7 +5,9 @@ mode, and 1 while no value that is needed reads it. An event of the file fires w
 comes to hold in its modes. What all models do with that is in src/model/relations.c.
 """
 
+import sys
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 from equations_content import SWITCHES, Change, ModelFile, Sampler
 
@@ -19,6 +21,7 @@ Guards = dict[Value, Value | None]  # conditions; None: always
 FIELD = "v_{}"
 MODE = "m_{}"
 INDICATOR = "z_{}"
+SECOND = {"s": 1}
 NEXT_TIME = [
     "static double next_time(const void *values) {",
     "    return relations_next_time(&relations, ROOM, values);",
@@ -45,6 +48,45 @@ def arrays(file: ModelFile) -> Leaves:
     own = {("state", v.name): f"x[{i}]" for i, v in enumerate(file.of("states"))}
     own |= {("input", v.name): f"u[{i}]" for i, v in enumerate(file.of("inputs"))}
     return {**leaves(file), **own}
+
+
+@dataclass(frozen=True)
+class Tick:
+    """A number about a sampler, which `linearize` reads and derives: a local variable of the FMU."""
+
+    name: str
+    field: str
+    value: Value
+    exponents: dict[str, int]  # of its unit
+    description: str  # rparm/linearization/sampling.py knows it by that
+
+
+def ticks(file: ModelFile) -> list[Tick]:
+    """When samplers tick, and what each would set now; the largest double is no finite value."""
+    graph, found, taken = file.graph, [], {*file.variables, *file.modes}
+    one, zero, largest = map(graph.number, (1.0, 0.0, sys.float_info.max))
+    for i, sampler in enumerate(file.sampled, 1):
+        every, offset = (period.value for period in sampler.periods)
+        own = [("every", every, SECOND, "period"), ("offset", offset, SECOND, "offset")]
+        for target, given in sampler.given.items():
+            if target in file.modes:
+                new = graph.value("if", given.value, one, zero)
+                old, unit = graph.value("if", graph.value("mode", name=target), one, zero), {}
+            else:
+                variable = file.variables[target]
+                new, old, unit = given.value, variable.leaf, variable.exponents
+            if sampler.during is not None:
+                new = graph.value("if", sampler.during.value, new, old)
+            new = graph.value("if", graph.value("isfinite", new), new, largest)
+            own.append((target, new, unit, f"new value of {target}"))
+        for key, value, unit, text in own:
+            name = f"sampled_{sampler.name}_{key}"
+            while name in taken:
+                name += "_"
+            taken.add(name)
+            description = f"Sampler {i}, {sampler.name}: {text}"
+            found.append(Tick(name, f"tick_{len(found)}", value, unit, description))
+    return found
 
 
 def has_events(file: ModelFile) -> bool:

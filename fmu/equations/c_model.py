@@ -7,7 +7,7 @@ from itertools import chain
 from equations_content import OPTIONS, ModelFile
 
 from equations.c_code import Code, filled, indented, number, text
-from equations.c_events import FIELD, MODE, Events, arrays, leaves
+from equations.c_events import FIELD, MODE, Events, arrays, leaves, ticks
 from equations.c_series import Series
 from equations.graph import FALLIBLE, Value
 from rparm.expressions.expression import in_order
@@ -25,6 +25,7 @@ def header(file: ModelFile) -> str:
     groups = _ranges(file) | {
         "calculated": [FIELD.format(v.name) for v in file.calculated],
         "event indicators": list(events.indicators()),
+        "samplers": [tick.field for tick in ticks(file)],
     }
     fields = []
     for title, names in groups.items():
@@ -180,8 +181,9 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, list[str]]:
     fields = {RATE.format(state.name): state.value for state in file.of("states")}
     fields |= {FIELD.format(v.name): v.value for v in file.calculated}
     fields |= events.indicators()
+    fields |= {tick.field: tick.value for tick in ticks(file)}
     seeds = {graph.value("time"): graph.value("first")}  # it has no second derivative
-    for variable in file.of("parameters", "inputs", "states"):
+    for variable in file.of("parameters", "inputs", "states", "discrete"):
         first = seeds[variable.leaf] = graph.value("first", name=variable.name)
         seeds[first] = graph.value("second", name=variable.name)
     firsts = graph.derivatives(fields.values(), seeds)

@@ -10,9 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rparm.linearization.largest_step import LargestStep
-from rparm.linearization.linear import Linear, eigenvalues, hold, zeros
+from rparm.linearization.linear import Linear, eigenvalues, zeros
 from rparm.linearization.margins import Margins, closed, searched
 from rparm.linearization.responses import frequencies, frequency_response, sampled_response
+from rparm.linearization.sampling import hold
 from rparm.linearization.study import Study
 from rparm.report import pages
 from rparm.units import milliseconds

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rparm.linearization.linear import Linear, cleared, closure, eigenvalues, hold, scales
+from rparm.linearization.linear import Linear, cleared, closure, eigenvalues, scales
+from rparm.linearization.sampling import hold
 
 ROUNDING = 1e-15  # relative, of entries and operations
 PER_DECADE = 200  # frequencies of a grid, everywhere

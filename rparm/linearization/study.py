@@ -78,9 +78,8 @@ def study(request: Request) -> Study:
         time = start if request.time is None else request.time
         subject = stack.enter_context(FmuSubject(fmu, time))
         trimmed = _point(subject, request)
-        found = subject.at(trimmed.values)
-        subject.check(found)
-        found = _chosen(found.without(subject.held(found)), trimmed, request)
+        found = subject.finished(subject.at(trimmed.values))
+        found = _chosen(found, trimmed, request)
         return Study(path, found, _units(subject, found), request.free)
 
 

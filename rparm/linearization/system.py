@@ -129,7 +129,7 @@ class SystemSubject(ExitStack):
             return _next_event(self.ssp, name, values, self.time)
 
         if linear.is_sampled(part, self.ssp.models[name], outputs, announced):
-            wrong = f"{linear.SAMPLED}{self._way_out(name)}"
+            wrong = f"{linear.why_sampled(self.ssp.models[name])}{self._way_out(name)}"
             raise UserError(f"{self.ssp.path}: component {name!r} {wrong}")
 
     def _way_out(self, name: str) -> str:

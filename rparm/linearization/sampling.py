@@ -1,0 +1,188 @@
+"""Sampling: held inputs, the samplers of a file with equations, and the period they make.
+
+The FMU of such a file has local variables that say when each sampler ticks, and which values it
+would set now: a tick is differentiated like any other equation.
+"""
+
+import math
+import re
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rparm.errors import UserError
+from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.model import Model
+
+TERMS = 13  # of Taylor's series of an exponential
+SAME = 1e-12  # relative, of times that differ by rounding only
+UNDEFINED = sys.float_info.max  # in place of a new value that is not finite
+# description of a local variable, as fmu/equations writes it
+ABOUT = re.compile(r"Sampler (\d+), (\w+): (?:(period|offset)|new value of (.+))")
+
+
+@dataclass
+class Sampler:
+    """A sampler that an FMU declares, with the names of its variables."""
+
+    name: str
+    times: dict[str, str] = field(default_factory=dict)  # period and offset
+    new: dict[str, str] = field(default_factory=dict)  # new value of each variable that it sets
+
+
+@dataclass(frozen=True, eq=False)
+class Tick:
+    """New values of some states, after a tick of a sampler at a point.
+
+    Attributes
+    ----------
+    every, offset : float
+        Period, and time after the start, s.
+    rows : list of int
+        The states that it sets, r of all n.
+    partials : ndarray, shape (r, n + m)
+        Of the new values by states and inputs.
+    changes : dict of str to float
+        New value less the present one, by name.
+    modes : list of str
+        Modes that it changes here.
+    """
+
+    name: str
+    every: float
+    offset: float
+    rows: list[int]
+    partials: np.ndarray
+    changes: dict[str, float]
+    modes: list[str]
+
+
+# ---- Samplers of an FMU --------------------------------------------------------------------------
+def samplers(model: Model) -> list[Sampler]:
+    """Return the samplers that an FMU declares, in the order in which they tick at one instant."""
+    found: dict[int, Sampler] = {}
+    for variable in model.variables.values():
+        if variable.causality == "local" and (about := ABOUT.fullmatch(variable.description)):
+            number, name, time, target = about.groups()
+            sampler = found.setdefault(int(number), Sampler(name))
+            (sampler.times if time else sampler.new)[time or target] = variable.name
+    return [found[number] for number in sorted(found)]
+
+
+def held_numbers(model: Model, every: Sequence[Sampler]) -> list[str]:
+    """Return the discrete variables that samplers set, in the order of the model."""
+    given = {target for sampler in every for target in sampler.new}
+    return [
+        v.name
+        for v in model.variables.values()
+        if v.name in given and v.type == "Real" and v.name not in model.states
+    ]
+
+
+def ticks(
+    instance: Instance, every: Sequence[Sampler], states: Sequence[str], inputs: Sequence[str]
+) -> tuple[Tick, ...]:
+    """Return a tick of each sampler at the present values; UserError if one is not finite."""
+    found = []
+    for sampler in every:
+        modes = [name for name in sampler.new if name not in states]
+        targets = [name for name in sampler.new if name in states]
+        new = [sampler.new[name] for name in (*targets, *modes)]
+        times = [sampler.times[key] for key in ("period", "offset")]
+        values = instance.reals([*targets, *new, *times])
+        with instance.explained("at the point"):
+            values.get()
+        old, after = values.view[: len(targets)], values.view[len(targets) : -2]
+        for name, value in zip((*targets, *modes), after, strict=True):
+            if value == UNDEFINED:
+                where = f"{instance.name}: sampler {sampler.name}"
+                raise UserError(f"{where}: the new value of {name} is not finite at the point")
+        is_new = [value != instance.boolean(name) for name, value in zip(modes, after[len(old) :])]
+        found.append(
+            Tick(
+                sampler.name,
+                *values.view[-2:].tolist(),
+                [states.index(name) for name in targets],
+                instance.partials(new[: len(targets)], [*states, *inputs]),
+                dict(zip(targets, (after[: len(old)] - old).tolist(), strict=True)),
+                [name for name, changes in zip(modes, is_new, strict=True) if changes],
+            )
+        )
+    return tuple(found)
+
+
+# ---- From sample to sample -----------------------------------------------------------------------
+def hold(A: np.ndarray, B: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return F, G, S, shapes (n, n), (n, m), (n, m), of x(h) = F x + G u + S u', u at the begin."""
+    n, m = B.shape
+    if not n:
+        return np.zeros((0, 0)), np.zeros((0, m)), np.zeros((0, m))
+    whole = np.zeros((n + 2 * m, n + 2 * m))
+    whole[:n, :n], whole[:n, n : n + m] = A, B
+    whole[n : n + m, n + m :] = np.eye(m)
+    found = _exponential(whole * step)
+    return found[:n, :n], found[:n, n : n + m], found[:n, n + m :]
+
+
+def _exponential(matrix: np.ndarray) -> np.ndarray:
+    """Return exp of a matrix: Taylor's series of a part of it, squared; exact but for rounding."""
+    halvings = max(0, 4 + math.frexp(np.abs(matrix).sum(axis=1).max(initial=0.0))[1])
+    part = matrix / 2.0**halvings  # below 1/16: terms fall below rounding at once
+    result = term = np.eye(len(matrix))
+    for order in range(1, TERMS):
+        term = term @ part / order
+        result = result + term
+    for _ in range(halvings):
+        result = result @ result
+    return result
+
+
+def check_one_rate(every: Sequence[Tick]) -> None:
+    """Refuse ticks of several rates, and those that change modes."""
+    for tick in every:
+        if tick.modes:
+            raise UserError(
+                f"sampler {tick.name} changes {', '.join(tick.modes)} at this point, expected a "
+                "point at which samplers change no modes"
+            )
+    if not all(math.isclose(tick.every, every[0].every, rel_tol=SAME) for tick in every):
+        rates = ", ".join(f"{tick.name} every {tick.every:.6g} s" for tick in every)
+        raise UserError(f"samples at several rates, expected one for a linear model: {rates}")
+
+
+def period(
+    A: np.ndarray, B: np.ndarray, every: Sequence[Tick]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return what moves states and inputs, (n + m, n + m), over a period, and over its first ticks.
+
+    A period begins just before the tick with the smallest offset, and ends before the next one of
+    this sampler; inputs are held all the time.
+    """
+    n, m = B.shape
+    whole, first = np.eye(n + m), None
+    instants = _instants(every)
+    ends = [time for time, _ in instants[1:]] + [instants[0][0] + every[0].every]
+    for (time, here), end in zip(instants, ends, strict=True):
+        for tick in here:
+            whole[tick.rows] = tick.partials @ whole
+        first = whole.copy() if first is None else first
+        transition, forced, _ = hold(A, B, end - time)
+        whole[:n] = np.hstack([transition, forced]) @ whole
+    return whole, first
+
+
+def _instants(every: Sequence[Tick]) -> list[tuple[float, list[Tick]]]:
+    """Return the times of a period at which samplers tick, s, with the ticks in their order."""
+    found: list[tuple[float, list[Tick]]] = []
+    for tick in every:
+        time = math.fmod(tick.offset, tick.every)
+        rounding = SAME * (tick.every + tick.offset)
+        time = 0.0 if tick.every - time <= rounding else time
+        same = [here for other, here in found if abs(other - time) <= rounding]
+        if same:
+            same[0].append(tick)
+        else:
+            found.append((time, [tick]))
+    return sorted(found, key=lambda instant: instant[0])
