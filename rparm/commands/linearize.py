@@ -69,9 +69,9 @@ def do_linearize(options: argparse.Namespace) -> Ended:
     if found.trimmed:
         tables.append((page.equilibrium_table(found), page.EQUILIBRIUM))
     if is_small := n + m <= MOST_COLUMNS and n + p <= MOST_ROWS:
-        tables.append((page.matrices_table(found), page.MATRICES))
+        tables.append((page.matrices_table(found), page.matrices_text(found)))
     if n:
-        tables.append((page.poles_table(found), page.POLES))
+        tables.append((page.poles_table(found), page.poles_text(found)))
     if found.margins is not None:
         tables.append((page.margins_table(found.margins), page.MARGINS))
     if found.largest:

@@ -82,13 +82,13 @@ def _solved(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
 def bounded_response(model: Linear) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
     """Return the response of one output to one input over rad/s, and bounds of its rounding."""
     transfer = _transfer(model)
-    return lambda w: transfer.bounded(1j * np.asarray(w))
+    return lambda w: transfer.bounded(model.points(w))
 
 
 def frequency_response(model: Linear) -> Response:
     """Return the response of one output to one input over frequencies in rad/s; nan at a pole."""
     transfer = _transfer(model)
-    return lambda w: transfer.values(1j * np.asarray(w))
+    return lambda w: transfer.values(model.points(w))
 
 
 def _transfer(model: Linear) -> _Transfer:

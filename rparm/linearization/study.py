@@ -161,6 +161,8 @@ def document(found: Study, step: float | None) -> Document:
         "left_out": list(linear.left_out),
         "intervals": {name: list(map(finite, ends)) for name, ends in linear.intervals.items()},
     }
+    if linear.dt:
+        result["dt"] = linear.dt
     if step is not None:
         transition, forced = linear.sampled(step)
         result["zoh"] = {
@@ -222,7 +224,7 @@ def _save_mat(path: Path, found: Document, linear: Linear) -> None:
     names = ("states", "inputs", "outputs", "held")
     values = {name: np.array(found[name], dtype=object) for name in names}
     values |= {name: getattr(linear, name) for name in "ABCD"}
-    values["poles"] = linear.poles
+    values |= {"poles": linear.poles} | ({"dt": linear.dt} if linear.dt else {})
     if "zoh" in found:
         values["zoh"] = {name: np.array(value) for name, value in found["zoh"].items()}
     with path.open("wb") as file:
@@ -235,7 +237,7 @@ def _save_csv(path: Path, found: Document, linear: Linear) -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["", *linear.states, *linear.inputs])
         for name, a, b in zip(linear.states, linear.A, linear.B, strict=True):
-            writer.writerow([f"der({name})", *map(repr, [*a.tolist(), *b.tolist()])])
+            writer.writerow([f"{'next' if linear.dt else 'der'}({name})", *map(repr, [*a.tolist(), *b.tolist()])])
         for name, c, d in zip(linear.outputs, linear.C, linear.D, strict=True):
             writer.writerow([name, *map(repr, [*c.tolist(), *d.tolist()])])
 

@@ -1,8 +1,9 @@
 """Equilibria by Newton's method on directional derivatives, and the intervals of dry friction.
 
-An equilibrium is where ticks of samplers change nothing and all derivatives of states are 0, but those that are a velocity which is
-given, and outputs have the values that they are to have. Some states and inputs are free. Where
-nothing rests and a velocity is free, it is a steady motion: that of a motor under a voltage.
+An equilibrium is where ticks of samplers change nothing, all derivatives of states are 0, but those
+that are a velocity which is given, and outputs have the values that they are to have. Some states
+and inputs are free. Where nothing rests and a velocity is free, it is a steady motion: that of a
+motor under a voltage.
 """
 
 import math
@@ -117,11 +118,15 @@ class _Problem:
         return left, responses[:, self.columns], np.maximum(size, 1.0)
 
     def _is_given_velocity(self, found: Linear) -> np.ndarray:
-        """Return which derivatives are a given or free velocity: no equation binds them."""
+        """Return which derivatives are a given or free velocity: no equation binds them.
+
+        No sampler may read a position that moves: it would not rest.
+        """
         n = len(found.states)
+        is_read = np.any([t.partials[:, :n].any(axis=0) for t in found.ticks] or [[False]], axis=0)
         given = np.ones(n, bool)
         given[[column for column in self.columns if column < n]] = self.is_moving
-        return found.are_positions & found.A[:, given].any(axis=1)
+        return found.are_positions & found.A[:, given].any(axis=1) & ~is_read
 
     def is_equilibrium(self, point: np.ndarray) -> bool:
         left, _, size = self.evaluated(point)

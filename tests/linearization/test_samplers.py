@@ -1,0 +1,306 @@
+"""Discrete linear models of files with samplers, against exponentials, textbooks and runs."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import block_diag, expm
+
+import rparm
+from rparm import __main__ as cli
+from rparm.errors import UserError
+from rparm.fmi.fmu_file import CO_SIMULATION
+from rparm.linearization.responses import frequency_response
+from rparm.linearization.study import Request, study
+from tests.equations.examples import made
+from tests.equations.test_sampled import COUNTERS, FILTER, PWM
+
+# Astrom and Wittenmark, Computer-Controlled Systems: the double integrator, and deadbeat control
+DEADBEAT = """
+name = "Deadbeat"
+[parameters]
+h = { start = 1 }
+[inputs]
+r = {}
+[states]
+x1 = { derivative = "x2" }
+x2 = { derivative = "u" }
+[discrete]
+u = {}
+[sampled.feedback]
+every = "h"
+set = { u = "(r - x1) / h**2 - 1.5 * x2 / h" }
+"""
+PLANT = """
+name = "Plant"
+[parameters]
+m = { start = 1.3, unit = "kg", min = 1e-6 }
+c = { start = 4.0, unit = "N/m" }
+d = { start = 0.8, unit = "N.s/m" }
+Kp = { start = 20.0, unit = "N/m" }
+Kd = { start = 6.0, unit = "N.s/m" }
+Ki = { start = 10.0, unit = "N/(m.s)" }
+Ts = { start = 0.05, unit = "s", min = 1e-6 }
+[inputs]
+target = { unit = "m" }
+load = { unit = "N" }
+[states]
+x = { unit = "m", derivative = "v" }
+v = { unit = "m/s", derivative = "(u + load - c * x - d * v) / m" }
+[where]
+error = "target - x"
+[discrete]
+u = { unit = "N" }
+sum = { unit = "N" }
+last = { unit = "m" }
+[sampled.control]
+every = "Ts"
+set = { u = "Kp * error + sum - Kd * (x - last) / Ts", sum = "sum + Ki * Ts * error", last = "x" }
+[outputs]
+force = { value = "u + load - c * x", unit = "N" }
+"""
+# two instants a period; `second` sees the u of `first`; `never` does not tick; `extra` rests
+CRANE = """
+name = "Crane"
+modes = ["broken"]
+[parameters]
+h = { start = 0.2 }
+begin = { start = 0.0 }
+skipped = { start = 0 }
+p0 = { start = 0.3 }
+[inputs]
+r = { start = 0.1 }
+[states]
+phi = { start = "p0", derivative = "w" }
+w = { start = 0.2, derivative = "-sin(phi) - 0.3 * w**3 + u * cos(phi)" }
+[discrete]
+u = { start = 0.1 }
+e = {}
+extra = { start = 7 }
+[sampled.late]
+every = "h"
+offset = "begin + 0.3 * h"
+reinit = { w = "0.9 * w + 0.05 * tanh(e)" }
+[sampled.first]
+every = "2 * h / 2"
+offset = "begin + skipped * h"
+set = { u = "tan(r) - sin(phi) * cos(phi) - 0.4 * w", e = "e / 2 + max(phi**2, -1) - r" }
+[sampled.second]
+every = "h"
+offset = "begin"
+set = { e = "e + u * phi", broken = "phi > 3" }
+[sampled.never]
+every = "h"
+offset = "begin"
+while = "broken or phi > 4"
+set = { u = "99" }
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("samplers")
+
+
+def assert_close(found: np.ndarray, exact: np.ndarray) -> None:
+    np.testing.assert_allclose(found, exact, rtol=0, atol=2e-13 * np.abs(exact).max())
+
+
+def test_deadbeat_control_of_a_double_integrator_settles_in_two_samples(folder: Path) -> None:
+    found = rparm.linearize(made(folder, DEADBEAT))
+    plant, input_ = np.array([[1, 1], [0, 1]]), np.array([[0.5], [1]])
+    gain = np.array([[1, 1.5]])
+    assert_close(found.A, np.block([[plant - input_ @ gain, np.zeros((2, 1))], [-gain, 0]]))
+    assert_close(found.B, np.vstack([input_, [[1]]]))
+    assert_close(found.C, np.vstack([np.eye(2, 3), [[-1, -1.5, 0]]]))
+    assert_close(found.D, np.array([[0], [0], [1]]))
+    assert not found.poles.any() and found.dt == 1.0
+    end = found.A @ found.A @ found.A
+    assert not end.any()
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_sampled_pid_controller_of_a_second_order_plant(folder: Path, fmi: int) -> None:
+    path = made(folder, PLANT)
+    path = path if fmi == 2 else path.parent / "fmi3" / path.name
+    h, m, c, d, Kp, Kd, Ki = 0.08, 0.7, 3.0, 0.5, 11.0, 2.0, 4.0
+    at = {"Ts": h, "m": m, "c": c, "d": d, "Kp": Kp, "Kd": Kd, "Ki": Ki, "target": 0.2, "load": 1.0}
+    found = rparm.linearize(path, at=at, trim=["x", "u", "sum", "last"], fmi=fmi)
+    assert found.states == ("x", "v", "u", "sum", "last") and found.inputs == ("target", "load")
+    exact = {"x": 0.2, "v": 0, "u": c * 0.2 - 1.0, "sum": c * 0.2 - 1.0, "last": 0.2}
+    assert found.x == pytest.approx([*exact.values()], abs=1e-10)
+    # x, v, u, sum, last, target, load
+    tick = np.eye(7)
+    tick[2] = [-Kp - Kd / h, 0, 0, 1, Kd / h, Kp, 0]
+    tick[3, [0, 5]] = [-Ki * h, Ki * h]
+    tick[4] = np.eye(7)[0]
+    rates = np.zeros((7, 7))
+    rates[0, 1] = 1
+    rates[1, [0, 1, 2, 6]] = np.array([-c, -d, 1, 1]) / m
+    whole = expm(rates * h) @ tick
+    outputs = np.vstack([np.eye(5, 7), [-c, 0, 1, 0, 0, 0, 1]]) @ tick
+    assert_close(np.hstack([found.A, found.B]), whole[:5])
+    assert_close(np.hstack([found.C, found.D]), outputs)
+    for poles in (found.poles, np.linalg.eigvals(whole[:5, :5])):
+        assert np.sort_complex(poles) == pytest.approx(np.sort_complex(found.ss().poles()))
+    one = found.select(["load"], ["force"])
+    w = np.array([0.1, 3.0, np.pi / h])
+    system = one.ss()
+    assert system.dt == h
+    np.testing.assert_allclose(frequency_response(one)(w), system(np.exp(1j * w * h)), rtol=1e-9)
+
+
+def crane(z: np.ndarray, h: float, r: float) -> np.ndarray:
+    """A and B by hand: phi, w, u, e, r."""
+    phi, w, u, e = z
+    first, second, late = np.eye(5), np.eye(5), np.eye(5)
+    first[2] = [-np.cos(2 * phi), -0.4, 0, 0, 1 + np.tan(r) ** 2]
+    first[3] = [2 * phi, 0, 0, 0.5, -1]
+    second[3] = [u, 0, phi, 1, 0]
+    late[1] = [0, 0.9, 0, 0.05 * (1 - np.tanh(e) ** 2), 0]
+    rates = np.zeros((5, 5))
+    rates[0, 1] = 1
+    rates[1, :3] = [-np.cos(phi) - u * np.sin(phi), -0.9 * w**2, np.cos(phi)]
+    return (expm(0.7 * h * rates) @ late @ expm(0.3 * h * rates) @ second @ first)[:4]
+
+
+@pytest.mark.parametrize("begin, skipped", [(0.0, 3.0), (0.05, 0.0), (1.0, 5.0)])
+def test_samplers_with_offsets_compose_in_the_order_of_time(
+    folder: Path, begin: float, skipped: float
+) -> None:
+    """A shift of all offsets, or of one by periods, changes nothing: the first tick begins."""
+    z, point = np.array([0.3, 0.2, 0.1, -0.6]), {"e": -0.6, "r": 0.4}
+    found = rparm.linearize(
+        made(folder, CRANE), at=point | {"begin": begin, "skipped": skipped}
+    )
+    assert found.states == ("phi", "w", "u", "e") and found.left_out == ("extra",)
+    assert_close(np.hstack([found.A, found.B]), crane(z, 0.2, 0.4))
+    assert found.x == pytest.approx(z, abs=0)
+    moved = {tick.name: tick.changes for tick in found.ticks}
+    assert moved["never"] == {"u": 0.0} and moved["second"] == {"e": pytest.approx(0.03)}
+
+
+def test_states_that_follow_from_parameters_are_moved_too(folder: Path) -> None:
+    z, point = np.array([0.5, -0.1, 0.2, 0.3]), {"phi": 0.5, "w": -0.1, "u": 0.2, "e": 0.3}
+    found = rparm.linearize(made(folder, CRANE), at={**point, "h": 0.5, "r": 0.0})
+    assert_close(np.hstack([found.A, found.B]), crane(z, 0.5, 0.0))
+
+
+def test_a_run_follows_the_linear_model_to_first_order(folder: Path) -> None:
+    """The difference falls as the square of the deviation, over 20 periods of two instants."""
+    fmu = made(folder, CRANE)
+    found = rparm.linearize(fmu, at=dict.fromkeys(("phi", "w", "u", "e", "r"), 0.0))
+    trimmed = rparm.linearize(fmu, at={"r": 0.0}, trim=found.states)
+    assert trimmed.x == pytest.approx(np.zeros(4), abs=1e-9)
+    direction, differences = np.array([1.0, -0.7, 0.4, 0.8]), []
+    for size in (1e-3, 1e-5):
+        start = found.x + size * direction
+        given = dict(zip(("p0", "w", "u", "e"), start.tolist(), strict=True))
+        run = rparm.simulate(
+            fmu, stop_time=4.0, step=0.2, inputs={"r": 0.01 * size},
+            start_values={**given, "solver_method": "taylor"}, tolerance=1e-13,
+        )  # fmt: skip
+        z, r, rows = start - found.x, np.array([0.01 * size]), []
+        for _ in range(21):
+            rows.append(found.C @ z + found.D @ r)
+            z = found.A @ z + found.B @ r
+        exact = np.column_stack([run[name] for name in found.outputs]) - found.y
+        differences.append(np.abs(exact - rows).max() / size)
+    assert differences[0] < 1e-2
+    assert differences[1] / differences[0] == pytest.approx(1e-2, rel=0.05)
+
+
+def test_a_filter_is_discrete_without_continuous_states(folder: Path) -> None:
+    found = rparm.linearize(made(folder, FILTER), at={"a": 0.25})
+    assert_close(found.A, np.array([[0.75, 0], [1, 0]]))
+    assert_close(found.B, np.array([[0.25], [0]]))
+    assert_close(np.hstack([found.C, found.D]), np.hstack([found.A, found.B]))
+    assert found.dt == 0.1 and found.poles == pytest.approx([0.75, 0])
+
+
+def test_a_state_that_no_tick_moves_is_held(folder: Path) -> None:
+    """A brake holds the mass; a tick that reinits it does not leave it out."""
+    text = """name = "Brake"
+[inputs]
+f = {}
+[states]
+v = { derivative = "0 if abs(v) < 1 else f" }
+w = { derivative = "0 if abs(w) < 1 else f" }
+x = { derivative = "u - x" }
+[discrete]
+u = {}
+[sampled.s]
+every = "0.5"
+set = { u = "f" }
+reinit = { w = "0.5 * w + f" }
+"""
+    found = rparm.linearize(made(folder, text))
+    assert found.held == ("v",) and found.states == ("w", "x", "u")
+    assert_close(np.diag(found.A), np.array([0.5, np.exp(-0.5), 0.0]))
+
+
+LIMITED = """name = "Limited"
+[parameters]
+T = { start = 1 }
+[states]
+x = { derivative = "1 / T - x" }
+[discrete]
+u = {}
+[sampled.s]
+every = "T"
+offset = "T"
+set = { u = "sqrt(x - 2)" }
+while = "x > 1"
+"""
+REFUSED = {
+    "several rates": (COUNTERS, {}, "several rates, expected one for a linear model: fast every "
+                      "0.1 s, slow every 0.3 s, late every 0.1 s"),
+    "modes": (PWM, {}, "sampler end changes on at this point, expected a point at which"),
+    "no value": (LIMITED, {"at": {"x": 1.5}}, "sampler s: the new value of u is not finite"),
+    "no fixed point": (PLANT, {"at": {"target": 1}, "trim": ["x", "u"]},
+                       "no equilibrium found by x, u: sampler control changes sum by 0"),
+    "it moves": (DEADBEAT, {"at": {"r": 1}, "trim": ["x2", "u"]}, "the derivative of x1 stays at"),
+    "sampled twice": (DEADBEAT, {}, "step: the model is sampled already, every 1 s"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_no_linear_model_is_made(folder: Path, case: str) -> None:
+    text, options, message = REFUSED[case]
+    with pytest.raises(UserError, match=message) as raised:
+        rparm.linearize(made(folder, text), **options).zoh(0.1)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_condition_is_taken_as_it_is_at_the_point(folder: Path) -> None:
+    """The tick does nothing here, so that its new value need not be defined."""
+    assert_close(rparm.linearize(made(folder, LIMITED), at={"x": 0.5}).A, block_diag(np.exp(-1), 1))
+
+
+def test_an_instance_that_cannot_go_back_before_a_tick_is_refused(folder: Path) -> None:
+    with pytest.raises(UserError, match="has samplers: linearize it in model exchange"):
+        study(Request(made(folder, DEADBEAT), kind=CO_SIMULATION))
+
+
+def test_only_a_sample_time_that_there_is_is_named(folder: Path) -> None:
+    with pytest.raises(UserError, match="can be: set sample_time to 0$"):
+        rparm.linearize("RPSensor", at={"q1": 1})
+
+
+def test_files_and_page_say_that_it_is_sampled(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    saved = tmp_path / "m.csv"
+    options = ["--save", str(saved), "--output", str(tmp_path), "--json", "--at", "x1=0.5"]
+    assert cli.main(["linearize", str(made(folder, DEADBEAT)), *options]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["dt"] == 1.0 and found["poles"] == [[0, 0]] * 3
+    rows = [row[0] for row in csv.reader(saved.open(newline=""))]
+    assert rows == ["", "next(x1)", "next(x2)", "next(u)", "x1", "x2", "u"]
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    for text in ("Sampled every 1000 ms by feedback", "feedback changes u by -0.5", "unit circle"):
+        assert text in page
+    for name in ("bode", "steps", "poles"):
+        assert (tmp_path / f"{name}.png").stat().st_size > 5000
