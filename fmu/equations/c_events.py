@@ -52,7 +52,7 @@ def arrays(file: ModelFile) -> Leaves:
 
 @dataclass(frozen=True)
 class Tick:
-    """A number about a sampler, which `linearize` reads and derives: a local variable of the FMU."""
+    """A number about a sampler: a local variable of the FMU, which `linearize` differentiates."""
 
     name: str
     field: str
@@ -79,12 +79,12 @@ def ticks(file: ModelFile) -> list[Tick]:
                 new = graph.value("if", sampler.during.value, new, old)
             new = graph.value("if", graph.value("isfinite", new), new, largest)
             own.append((target, new, unit, f"new value of {target}"))
-        for key, value, unit, text in own:
+        for key, value, unit, meaning in own:
             name = f"sampled_{sampler.name}_{key}"
             while name in taken:
                 name += "_"
             taken.add(name)
-            description = f"Sampler {i}, {sampler.name}: {text}"
+            description = f"Sampler {i}, {sampler.name}: {meaning}"
             found.append(Tick(name, f"tick_{len(found)}", value, unit, description))
     return found
 

@@ -4,16 +4,17 @@ NAME.lock.toml beside the file has a line for each variable that ever was: its n
 its value reference. It grows and never changes.
 """
 
+import re
 import tomllib
 from pathlib import Path
 
 from equations_content import ModelFileError
-from equations_file import NAME
 
 from equations.declaration import Key
 
 RESERVED = (0, *range(80, 100))  # the time, the variables of the integrator
 LARGEST = 9999
+NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)  # longer than in a file: der_ and others stand in front
 HEAD = "# Value references of {name}: written by the build. Keep it with the model.\n"
 
 

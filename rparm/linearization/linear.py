@@ -1,6 +1,5 @@
 """Linear models: A, B, C and D of an FMU at a point, by its directional derivatives."""
 
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
@@ -369,11 +368,8 @@ class FmuSubject(ExitStack):
     def _before_ticks(self) -> dict[str, float]:
         """Return the start values that samplers change if they tick at the start."""
         given = {target for sampler in samplers(self.fmu.model) for target in sampler.new}
-        names = [
-            v.name
-            for v in self.fmu.model.variables.values()
-            if v.name in given and v.initial == "exact"
-        ]
+        variables = self.fmu.model.variables
+        names = [name for name in variables if name in given and variables[name].initial == "exact"]
         values = self._instance.reals(names)
         with self._instance.explained("at the start"):
             values.get()
@@ -465,8 +461,8 @@ def is_sampled(
 ) -> bool:
     """Return whether `outputs` follow inputs only at ticks.
 
-    It is so if it has samplers, if all that depend on inputs are discrete, or do not change with them now while the FMU
-    announces a time event.
+    It is so if it has samplers, if all that depend on inputs are discrete, or do not change with
+    them now while the FMU announces a time event.
     """
     if samplers(model):
         return True

@@ -23,13 +23,11 @@ Part = tuple[pages.Table, str, list[Picture]]
 NONE = "–"
 LISTED = 12  # names in a sentence
 REAL = 1e-6  # of a pole: a smaller real or imaginary part is rounding, as of poles that are equal
-POLES = (
+POLES = (  # of a continuous model, and of a sampled one
     "A deviation along a pole grows or dies out as e to the power of its real part times the time. "
-    "Damping is 1 without oscillation, 0 if it does not decay, below 0 if it grows."
-)
-SAMPLED_POLES = (
+    "Damping is 1 without oscillation, 0 if it does not decay, below 0 if it grows.",
     "From sample to sample a deviation along a pole is multiplied by it: it dies out within the "
-    "unit circle. Damping and time are those of a continuous pole with the same samples."
+    "unit circle. Damping and time are those of a continuous pole with the same samples.",
 )
 MARGINS = (
     "Each says how far one quantity may change at the break, all else fixed, before the loop "
@@ -57,11 +55,9 @@ PICTURES = (
 )
 MATRICES = (
     "A row for each derivative of a state and each output, a column for each state and input. "
-    "Units are those of the variables, and s."
-)
-SAMPLED_MATRICES = (
+    "Units are those of the variables, and s.",
     "A row for each state one sample later and each output, a column for each state and input. "
-    "Units are those of the variables."
+    "Units are those of the variables.",
 )
 TEXTS = pages.STYLE | {"text.parse_math": False}
 MOST_DRAWN = 2  # inputs and outputs that are drawn: with more, curves would share a colour
@@ -90,11 +86,11 @@ def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
         parts.append((steps_table(list(found.largest)), STEPS, []))
     if len(linear.states):
         pages.save_figure(poles_figure(linear, step, found.loop), folder / "poles.png")
-        parts.append((poles_table(found), poles_text(found), [("poles", "Poles")]))
+        parts.append((poles_table(found), POLES[linear.dt > 0], [("poles", "Poles")]))
     if pictures := _pictures(folder, found, step):
         parts.append((pages.Table("Answers", [], []), PICTURES, pictures))
     parts.append((point_table(found), POINT, []))
-    parts.append((matrices_table(found), matrices_text(found), []))
+    parts.append((matrices_table(found), MATRICES[linear.dt > 0], []))
     name = f"{found.path.stem}, {found.variant}" if found.variant else found.path.stem
     return pages.write_page(
         folder / pages.INDEX,
@@ -208,16 +204,6 @@ def equilibrium_table(found: Study) -> pages.Table:
         numbers = _short(found.linear.at[name]), *map(_or_none, ends)
         rows.append([name, *numbers, found.units.get(name, "")])
     return pages.Table("Equilibrium", ["variable", "value", "from", "to", "unit"], rows)
-
-
-def poles_text(found: Study) -> str:
-    """Return the text below the poles."""
-    return SAMPLED_POLES if found.linear.dt else POLES
-
-
-def matrices_text(found: Study) -> str:
-    """Return the text below the matrices."""
-    return SAMPLED_MATRICES if found.linear.dt else MATRICES
 
 
 def poles_table(found: Study) -> pages.Table:
@@ -472,9 +458,7 @@ def _grid(model: Linear, found: Margins | None = None) -> np.ndarray:
     fastest = [math.pi / model.dt] if model.dt else []
     every = np.abs([*poles[np.isfinite(poles) & (poles != 0)], *crossings, *fastest])
     low, high = every.min(initial=np.inf), every.max(initial=0.0)
-    channels = [
-        model.rates_of(zeros(one.A, one.B, one.C, one.D)) for _, one in _channels(model)
-    ]
+    channels = [model.rates_of(zeros(one.A, one.B, one.C, one.D)) for _, one in _channels(model)]
     between = [p for some in channels for p in some if low <= abs(p) <= high]
     steep = [p for p in (*poles, *between) if abs(p.real) > ON_AXIS * abs(p)]
     grid = frequencies(steep, [*every, *crossings], AROUND)

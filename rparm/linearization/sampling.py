@@ -73,12 +73,8 @@ def samplers(model: Model) -> list[Sampler]:
 
 def held_numbers(model: Model, every: Sequence[Sampler]) -> list[str]:
     """Return the discrete variables that samplers set, in the order of the model."""
-    given = {target for sampler in every for target in sampler.new}
-    return [
-        v.name
-        for v in model.variables.values()
-        if v.name in given and v.type == "Real" and v.name not in model.states
-    ]
+    given = {target for sampler in every for target in sampler.new}.difference(model.states)
+    return [n for n, v in model.variables.items() if n in given and v.type == "Real"]
 
 
 def ticks(
@@ -87,27 +83,26 @@ def ticks(
     """Return a tick of each sampler at the present values; UserError if one is not finite."""
     found = []
     for sampler in every:
-        modes = [name for name in sampler.new if name not in states]
         targets = [name for name in sampler.new if name in states]
-        new = [sampler.new[name] for name in (*targets, *modes)]
-        times = [sampler.times[key] for key in ("period", "offset")]
-        values = instance.reals([*targets, *new, *times])
+        modes = [name for name in sampler.new if name not in states]
+        reals = instance.reals([*targets, *sampler.new.values(), *sampler.times.values()])
         with instance.explained("at the point"):
-            values.get()
-        old, after = values.view[: len(targets)], values.view[len(targets) : -2]
-        for name, value in zip((*targets, *modes), after, strict=True):
+            reals.get()
+        values = dict(zip(reals.names, reals.view.tolist(), strict=True))
+        new = {name: values[variable] for name, variable in sampler.new.items()}
+        for name, value in new.items():
             if value == UNDEFINED:
                 where = f"{instance.name}: sampler {sampler.name}"
                 raise UserError(f"{where}: the new value of {name} is not finite at the point")
-        is_new = [value != instance.boolean(name) for name, value in zip(modes, after[len(old) :])]
         found.append(
             Tick(
                 sampler.name,
-                *values.view[-2:].tolist(),
+                values[sampler.times["period"]],
+                values[sampler.times["offset"]],
                 [states.index(name) for name in targets],
-                instance.partials(new[: len(targets)], [*states, *inputs]),
-                dict(zip(targets, (after[: len(old)] - old).tolist(), strict=True)),
-                [name for name, changes in zip(modes, is_new, strict=True) if changes],
+                instance.partials([sampler.new[name] for name in targets], [*states, *inputs]),
+                {name: new[name] - values[name] for name in targets},
+                [name for name in modes if new[name] != instance.boolean(name)],
             )
         )
     return tuple(found)
@@ -152,9 +147,7 @@ def check_one_rate(every: Sequence[Tick]) -> None:
         raise UserError(f"samples at several rates, expected one for a linear model: {rates}")
 
 
-def period(
-    A: np.ndarray, B: np.ndarray, every: Sequence[Tick]
-) -> tuple[np.ndarray, np.ndarray]:
+def period(A: np.ndarray, B: np.ndarray, every: Sequence[Tick]) -> tuple[np.ndarray, np.ndarray]:
     """Return what moves states and inputs, (n + m, n + m), over a period, and over its first ticks.
 
     A period begins just before the tick with the smallest offset, and ends before the next one of

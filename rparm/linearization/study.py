@@ -232,12 +232,13 @@ def _save_mat(path: Path, found: Document, linear: Linear) -> None:
 
 
 def _save_csv(path: Path, found: Document, linear: Linear) -> None:
-    """Write the table [A B; C D], a column a state and input, a row an x' and output."""
+    """Write the table [A B; C D], a column a state and input, a row an x' or x+ and output."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["", *linear.states, *linear.inputs])
+        row = "next({})" if linear.dt else "der({})"
         for name, a, b in zip(linear.states, linear.A, linear.B, strict=True):
-            writer.writerow([f"{'next' if linear.dt else 'der'}({name})", *map(repr, [*a.tolist(), *b.tolist()])])
+            writer.writerow([row.format(name), *map(repr, [*a.tolist(), *b.tolist()])])
         for name, c, d in zip(linear.outputs, linear.C, linear.D, strict=True):
             writer.writerow([name, *map(repr, [*c.tolist(), *d.tolist()])])
 

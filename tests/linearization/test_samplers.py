@@ -166,26 +166,26 @@ def crane(z: np.ndarray, h: float, r: float) -> np.ndarray:
     return (expm(0.7 * h * rates) @ late @ expm(0.3 * h * rates) @ second @ first)[:4]
 
 
-@pytest.mark.parametrize("begin, skipped", [(0.0, 3.0), (0.05, 0.0), (1.0, 5.0)])
+@pytest.mark.parametrize(
+    "z, shift",
+    [
+        ([0.3, 0.2, 0.1, -0.6], {"skipped": 3}),
+        ([0.3, 0.2, 0.1, -0.6], {"begin": 0.05}),
+        ([0.5, -0.1, 0.2, 0.3], {"begin": 1.0, "skipped": 5}),
+    ],
+)
 def test_samplers_with_offsets_compose_in_the_order_of_time(
-    folder: Path, begin: float, skipped: float
+    folder: Path, z: list[float], shift: dict[str, float]
 ) -> None:
     """A shift of all offsets, or of one by periods, changes nothing: the first tick begins."""
-    z, point = np.array([0.3, 0.2, 0.1, -0.6]), {"e": -0.6, "r": 0.4}
-    found = rparm.linearize(
-        made(folder, CRANE), at=point | {"begin": begin, "skipped": skipped}
-    )
-    assert found.states == ("phi", "w", "u", "e") and found.left_out == ("extra",)
-    assert_close(np.hstack([found.A, found.B]), crane(z, 0.2, 0.4))
-    assert found.x == pytest.approx(z, abs=0)
-    moved = {tick.name: tick.changes for tick in found.ticks}
-    assert moved["never"] == {"u": 0.0} and moved["second"] == {"e": pytest.approx(0.03)}
-
-
-def test_states_that_follow_from_parameters_are_moved_too(folder: Path) -> None:
-    z, point = np.array([0.5, -0.1, 0.2, 0.3]), {"phi": 0.5, "w": -0.1, "u": 0.2, "e": 0.3}
-    found = rparm.linearize(made(folder, CRANE), at={**point, "h": 0.5, "r": 0.0})
-    assert_close(np.hstack([found.A, found.B]), crane(z, 0.5, 0.0))
+    point = dict(zip(("phi", "w", "u", "e"), z, strict=True))  # phi follows from p0
+    found = rparm.linearize(made(folder, CRANE), at=point | shift | {"r": 0.4, "h": 0.5})
+    assert found.states == tuple(point) and found.left_out == ("extra",)
+    assert_close(np.hstack([found.A, found.B]), crane(np.array(z), 0.5, 0.4))
+    assert found.x.tolist() == z
+    changes = {tick.name: tick.changes for tick in found.ticks}
+    assert changes["never"] == {"u": 0.0}
+    assert changes["second"] == {"e": pytest.approx(z[2] * z[0])}
 
 
 def test_a_run_follows_the_linear_model_to_first_order(folder: Path) -> None:
