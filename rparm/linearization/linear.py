@@ -446,14 +446,14 @@ def held_states(found: Linear, model: Model) -> list[str]:
     return [name for i, (name, out) in enumerate(every) if out and i not in ticking]
 
 
-def why_sampled(model: Model) -> str:
-    """Say what samples an FMU that no linear model in continuous time can stand for."""
-    why = "which no linear model in continuous time can be"
-    if own := samplers(model):
-        return f"is sampled by {', '.join(sampler.name for sampler in own)}, {why}"
+def why_sampled(model: Model, way_out: str = "") -> str:
+    """Say that an FMU is sampled, which needs a discrete model, and what to do."""
+    own = ", ".join(sampler.name for sampler in samplers(model))
     every = (n for n, v in model.variables.items() if "sample" in n and v.is_a(PARAMETERS))
-    switch = next(every, "")
-    return f"is sampled, {why}" + (f": set {switch} to 0" if switch else "")
+    switch = "" if own else next(every, "")
+    ways = ", or ".join(filter(None, [switch and f"set {switch} to 0", way_out]))
+    why = "which no linear model in continuous time can be"
+    return f"is sampled{own and f' by {own}'}, {why}{ways and f': {ways}'}"
 
 
 def is_sampled(

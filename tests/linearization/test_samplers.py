@@ -2,6 +2,7 @@
 
 import csv
 import json
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -287,6 +288,23 @@ def test_an_instance_that_cannot_go_back_before_a_tick_is_refused(folder: Path) 
 def test_only_a_sample_time_that_there_is_is_named(folder: Path) -> None:
     with pytest.raises(UserError, match="can be: set sample_time to 0$"):
         rparm.linearize("RPSensor", at={"q1": 1})
+
+
+SYSTEM = """<?xml version="1.0" encoding="UTF-8"?>
+<SystemStructureDescription version="1.0" name="One"
+  xmlns="http://ssp-standard.org/SSP1/SystemStructureDescription">
+  <System name="One"><Elements><Component name="loop" source="resources/Deadbeat.fmu">
+  <Connectors><Connector name="r" kind="input"/></Connectors></Component></Elements></System>
+</SystemStructureDescription>"""
+
+
+def test_a_system_with_samplers_is_refused_by_their_names(folder: Path, tmp_path: Path) -> None:
+    path = tmp_path / "One.ssp"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("SystemStructure.ssd", SYSTEM)
+        archive.write(made(folder, DEADBEAT), "resources/Deadbeat.fmu")
+    with pytest.raises(UserError, match="'loop' is sampled by feedback, which [^:]*: take it as"):
+        rparm.linearize(path)
 
 
 def test_files_and_page_say_that_it_is_sampled(
