@@ -3,7 +3,7 @@
 import xml.etree.ElementTree as ET
 
 from declaration.load import Declaration
-from declaration.schema import Boolean, Enumeration, Experiment, Unit, Variable
+from declaration.schema import Boolean, Display, Enumeration, Experiment, Float64, Unit, Variable
 from program import Provenance
 
 LOG_CATEGORIES = {
@@ -38,8 +38,18 @@ def add_units(root: ET.Element, units: dict[str, Unit]) -> None:
         element = ET.SubElement(definitions, "Unit", name=name)
         exponents = {base: str(exponent) for base, exponent in unit.exponents.items()}
         ET.SubElement(element, "BaseUnit", exponents)
-        for display, factor in unit.display.items():
-            ET.SubElement(element, "DisplayUnit", name=display, factor=repr(factor))
+        displays = {name: Display(name=name, factor=f) for name, f in unit.display.items()}
+        for display in (displays | unit.further).values():
+            keys = {"name": display.name, "factor": repr(display.factor)}
+            keys |= {"offset": repr(display.offset)} if display.offset else {}
+            ET.SubElement(element, "DisplayUnit", keys)
+
+
+def display_unit(variable: Float64, units: dict[str, Unit]) -> dict[str, str]:
+    """Return the attribute for the display unit of a variable, if it has one."""
+    displays = [*units[variable.unit].display][:1]
+    displays = [variable.display.name] if variable.display else displays
+    return {"displayUnit": display for display in displays}
 
 
 def type_name(variable: str) -> str:

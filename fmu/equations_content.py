@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,21 +12,33 @@ from typing import Any
 from declaration.load import shown
 from equations_tables import Table
 
-from rparm.expressions.expression import NUMBER, Function, Lookup, Node, parse
-from rparm.expressions.units import exponents
+from rparm.expressions.expression import (
+    CONDITION,
+    NUMBER,
+    Function,
+    Kind,
+    Lookup,
+    Node,
+    at_indexes,
+    in_order,
+    parse,
+)
+from rparm.expressions.units import Measure, measured
 
 FOLLOWS = "calculated"  # section of parameters that follow from others
-OPTIONS, SWITCHES = "options", "switches"  # of parameters and inputs that are Booleans
-WRITTEN = {
+# of parameters, inputs and discrete variables that are no real numbers
+OPTIONS, SWITCHES, COUNTS = "options", "switches", "counts"
+WRITTEN = {  # where files have them
     FOLLOWS: "parameters",
     OPTIONS: "parameters",
     SWITCHES: "inputs",
-}  # where files have them
-BOOLEAN = "Boolean"
+    COUNTS: "discrete",
+}
+BOOLEAN, INTEGER = "Boolean", "Integer"
+MOST_OPERATIONS = 1_000_000  # of all expressions
 # what other languages have, by what it looks like, and what to do instead
 INSTEAD = {
-    r"\[": "arrays are not supported: give each element a name and write sums out",
-    r"==|^(?:equations?|algebraic|residuals?|dae)$": (
+    r"^(?:equations?|algebraic|residuals?|dae)$": (
         "equations in implicit form are not supported: solve them for the derivative of each state"
     ),
     r"\b(?:sample[rds]?|pre|previous|hold|clock|interval)\s*(?:\(|$)": (
@@ -42,28 +54,28 @@ class ModelFileError(Exception):
     """What is wrong with the file, in one line."""
 
 
+@dataclass(frozen=True)
+class Element:
+    """An entry of the file, or one of those that `for` makes of it."""
+
+    name: str
+    shown: str  # in messages
+    entry: Any
+    indexes: dict[str, int] = field(default_factory=dict)
+
+
 @dataclass(eq=False)
 class Expression:
     """An expression of the file."""
 
     place: tuple[str, ...]
     text: str
-    kind: str = NUMBER
+    tree: Node
+    kind: Kind = NUMBER
     target: str = ""  # the variable or mode that it is assigned to; of a period: time
     is_rate: bool = False  # of the target
     event: str = ""  # "when" one happens, or "then"
-    functions: Mapping[str, Function] = field(default_factory=dict)  # of the file
-    tree: Node = field(init=False)
     value: Any = field(init=False)  # what a generator makes of it
-
-    def __post_init__(self) -> None:
-        with placed(*self.place):
-            if not isinstance(self.text, str):
-                raise ModelFileError(f"expected an expression in quotes, got {shown(self.text)}")
-            try:
-                self.tree = parse(self.text, self.functions)
-            except ValueError as error:
-                raise ModelFileError(f"{error}{instead_of(self.text)}") from None
 
 
 @dataclass(eq=False)
@@ -72,12 +84,14 @@ class Variable:
 
     name: str
     section: str
-    start: float | bool | None = None
+    start: float | bool | int | None = None  # of an enumeration the number of the item, from 1
     min: float | None = None
     max: float | None = None
     nominal: float | None = None
-    unit: str = ""  # as the file has it
+    kind: Kind = NUMBER
+    unit: str = ""  # of SI, if the file has a name for it
     exponents: dict[str, int] = field(default_factory=dict)  # of the base units and rad
+    display: tuple[str, float, float] | None = None  # unit in the file, with factor and offset
     description: str = ""
     expression: Expression | None = None  # derivative of a state, value of others
     initial: Expression | None = None  # start value that follows from parameters
@@ -95,9 +109,9 @@ class Variable:
         return f"[{WRITTEN.get(self.section, self.section)}]"
 
     @property
-    def is_boolean(self) -> bool:
-        """Whether it is a condition."""
-        return self.section in (OPTIONS, SWITCHES)
+    def is_real(self) -> bool:
+        """Whether it is neither a condition nor a count nor an enumeration."""
+        return self.section not in (OPTIONS, SWITCHES, COUNTS)
 
 
 @dataclass
@@ -160,30 +174,49 @@ class ModelFile:
     path: Path
     text: str
     reserved: set[str]  # names that it must not give
-    units: dict[str, dict[str, int]] = field(default_factory=dict)  # exponents, of [units]
+    sizes: dict[str, int] = field(default_factory=dict)
+    units: dict[str, Measure] = field(default_factory=dict)  # of [units]
     functions: dict[str, Function | Lookup] = field(default_factory=dict)
     tables: dict[str, Table] = field(default_factory=dict)
     table_units: dict[str, dict[str, int]] = field(default_factory=dict)  # by `table_unit`
+    dimensions: dict[str, int] = field(default_factory=dict)  # numbers of indexes, by name
+    indexes: set[str] = field(default_factory=set)  # all that `for` gives
+    parsed: dict[str, Node] = field(default_factory=dict)  # texts, before their indexes
+    operations: int = 0  # of all expressions
     modes: dict[str, bool] = field(default_factory=dict)  # with their values at the start
     variables: dict[str, Variable] = field(default_factory=dict)
     sampled: list[Sampler] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
-    checks: dict[str, Expression] = field(default_factory=dict)  # conditions by message
+    checks: list[tuple[str, Expression]] = field(default_factory=list)  # messages and conditions
     order: list[Expression] = field(default_factory=list)  # each after those that it names
     graph: Any = None  # what a generator makes of it
 
-    def expression(self, *given: Any, **more: Any) -> Expression:
-        """Read an expression that may call the file's functions."""
-        return Expression(*given, **more, functions=self.functions)
+    def expression(
+        self, element: Element, place: tuple[str, ...], text: object, *more: Any, **options: Any
+    ) -> Expression:
+        """Read an expression of an entry that may call the file's functions."""
+        with placed(*place):
+            if not isinstance(text, str):
+                raise ModelFileError(f"expected an expression in quotes, got {shown(text)}")
+            try:
+                if text not in self.parsed:
+                    self.parsed[text] = parse(text, self.functions)
+                tree = at_indexes(self.parsed[text], self.sizes | element.indexes)
+            except ValueError as error:
+                raise ModelFileError(f"{error}{instead_of(text)}") from None
+            self.operations += len(in_order([tree]))
+            if self.operations > MOST_OPERATIONS:
+                raise ModelFileError(f"the file has more than {MOST_OPERATIONS} operations")
+        return Expression(place, text, tree, *more, **options)
 
-    def exponents_of(self, unit: str) -> dict[str, int]:
-        """Return the exponents of a unit, which the file or SI has; ValueError if none has it."""
-        return self.units[unit] if unit in self.units else exponents(unit)
+    def measured(self, unit: str) -> Measure:
+        """Return a unit, which the file or SI has; ValueError if none has it."""
+        return self.units[unit] if unit in self.units else measured(unit)
 
     @property
     def has_units(self) -> bool:
         """Whether units are checked."""
-        return any(variable.unit for variable in self.variables.values())
+        return any(variable.unit or variable.display for variable in self.variables.values())
 
     @property
     def changes(self) -> list[Change]:
@@ -191,9 +224,10 @@ class ModelFile:
         return [*self.sampled, *self.events]
 
     @property
-    def conditions(self) -> set[str]:
-        """Names that are true or false."""
-        return {*self.modes, *(v.name for v in self.variables.values() if v.is_boolean)}
+    def kinds(self) -> dict[str, Kind]:
+        """Kinds of names that are no real numbers."""
+        found: dict[str, Kind] = {v.name: v.kind for v in self.variables.values() if not v.is_real}
+        return found | dict.fromkeys(self.modes, CONDITION)
 
     @property
     def calculated(self) -> list[Variable]:
@@ -203,7 +237,7 @@ class ModelFile:
     @property
     def started(self) -> list[Variable]:
         """States and discrete variables whose start values follow from parameters."""
-        return [v for v in self.of("states", "discrete") if v.initial is not None]
+        return [v for v in self.of("states", "discrete", COUNTS) if v.initial is not None]
 
     @property
     def assigned(self) -> list[Expression]:
@@ -215,7 +249,12 @@ class ModelFile:
     def constant(self) -> list[Expression]:
         """All expressions of parameters only."""
         found = [v.expression for v in self.of(FOLLOWS)] + [v.initial for v in self.started]
-        return found + [e for s in self.sampled for e in s.periods] + [*self.checks.values()]
+        found += [e for s in self.sampled for e in s.periods]
+        return found + [condition for _, condition in self.checks]
+
+    def place_of(self, name: str) -> str:
+        """Return the section that has a name."""
+        return self.variables[name].place if name in self.variables else "modes"
 
     def of(self, *sections: str) -> list[Variable]:
         """Return variables of these sections, in the order of the file."""

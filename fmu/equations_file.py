@@ -9,19 +9,21 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Callable, Collection, Iterable, Mapping
-from difflib import get_close_matches
-from graphlib import CycleError, TopologicalSorter
+from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import equations_tables
 from declaration.load import shown
+from equations_arrays import FOR, elements, every, target
 from equations_content import (
     BOOLEAN,
+    COUNTS,
     FOLLOWS,
+    INTEGER,
     OPTIONS,
     SWITCHES,
+    Element,
     Event,
     Expression,
     ModelFile,
@@ -31,6 +33,7 @@ from equations_content import (
     instead_of,
     placed,
 )
+from equations_meaning import check
 
 from rparm.expressions.expression import (
     CONDITION,
@@ -39,36 +42,34 @@ from rparm.expressions.expression import (
     FURTHER,
     NO_NAMES,
     NUMBER,
+    WHOLE,
     ExpressionError,
     Function,
+    Kind,
     Lookup,
-    check_kinds,
-    derivative_of,
-    evaluated,
     finite_number,
     in_order,
-    names,
+    with_kinds,
 )
 from rparm.expressions.units import (
     ANGLE,
     BASE,
-    Unit,
+    Measure,
     table_unit,
-    times,
-    unit_of,
     unit_of_exponents,
 )
-from rparm.expressions.units import shown as unit_shown
 
 LARGEST = 10**6  # bytes
-MOST_VARIABLES = 1000
+MOST_ENTRIES = 1000
+MOST_VARIABLES = 20_000
+MOST_SIZE = 20_000
 LONGEST_TEXT = 1000  # characters of a description
 LONGEST_MESSAGE = 500  # bytes: src/instance/settings.c has no room for more
 NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,99}", re.ASCII)
 # files that Windows cannot have, with any suffix
 DEVICE = re.compile("(?i:con|prn|aux|nul|com[1-9]|lpt[1-9])")
 CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
-LATER = ("sum", "der", "floor", "ceil", "round", "mod")
+LATER = ("sum", "der")
 RESERVED = {*FUNCTIONS, *NO_NAMES, "pi", "time", "GUID", "NAME", "TOKEN_FMI3"}
 NUMBERS = ("start", "min", "max", "nominal")
 OF_ALL = ("start", "unit", "min", "max", "description")
@@ -76,17 +77,19 @@ SECTIONS = {  # keys of their entries, and the one that each needs
     "parameters": ((*OF_ALL, "type"), "start"),
     "inputs": ((*OF_ALL, "type"), ""),
     "states": ((*OF_ALL, "nominal", "derivative"), "derivative"),
-    "discrete": (("start", "unit", "description"), ""),
-    "where": ((), ""),  # they are expressions
+    "discrete": (("start", "unit", "description", "type"), ""),
+    "where": (("value", "unit", "description"), "value"),  # or expressions
     "outputs": (("value", "unit", "description"), "value"),
 }
 OWN_KEYS = {
     FOLLOWS: (("value", "unit", "description"), "value"),
-    OPTIONS: (("type", "start", "description"), "start"),
+    OPTIONS: (("type", "start", "min", "max", "description"), "start"),
     SWITCHES: (("type", "start", "description"), ""),
+    COUNTS: (("type", "start", "min", "max", "description"), ""),
 }
+NOT_REAL = {"parameters": OPTIONS, "inputs": SWITCHES, "discrete": COUNTS}
 HEAD = (
-    *("name", "description", "experiment", "modes", "units", "tables", "functions"),
+    *("name", "description", "experiment", "modes", "sizes", "units", "tables", "functions"),
     *("sampled", "events", "check"),
     *SECTIONS,
 )
@@ -94,8 +97,10 @@ EXPERIMENT = {"stop": 10.0, "step": 0.01, "tolerance": 1e-8}
 TABLE = ("x", "y", "z", "file", "interpolation", "outside")
 EVENT = ("when", "while", "reinit", "set")
 SAMPLER = ("every", "offset", "while", "reinit", "set")
+LARGEST_INTEGER = 2**31 - 1
 TABLES = (
     "experiment",
+    "sizes",
     "units",
     "tables",
     "functions",
@@ -112,7 +117,7 @@ SECOND = unit_of_exponents({"s": 1})
 
 def _named(name: str) -> str:
     """Return a name as messages have it: in quotes if it is none."""
-    return name if NAME.fullmatch(name) else shown(name)
+    return name if re.fullmatch(rf"{NAME.pattern}(\[[^]]+\].*)?", name) else shown(name)
 
 
 def tables_of(path: Path) -> tuple[str, dict[str, Any]]:
@@ -161,9 +166,9 @@ TEXT = _expect(
 LIST = _expect("a list of names", list, lambda names: all(type(name) is str for name in names))
 
 
-def _modes(value: Any) -> list[tuple[str, bool]]:
-    """Return the modes with their values at the start."""
-    if isinstance(value, dict) and all(type(start) is bool for start in value.values()):
+def _modes(value: Any) -> list[tuple[str, Any]]:
+    """Return the modes with their values at the start, or tables of their elements."""
+    if isinstance(value, dict) and all(type(start) in (bool, dict) for start in value.values()):
         return [*value.items()]
     try:
         return [(name, False) for name in LIST(value)]
@@ -171,10 +176,20 @@ def _modes(value: Any) -> list[tuple[str, bool]]:
         raise ValueError("expected a list of names, or a table of true and false") from None
 
 
+def _type(value: Any) -> Kind:
+    """Return the kind of variables of a type."""
+    if value in (BOOLEAN, INTEGER):
+        return CONDITION if value == BOOLEAN else WHOLE
+    are_texts = isinstance(value, list) and value and all(type(item) is str for item in value)
+    if are_texts and len({*value}) == len(value) and all(map(NAME.fullmatch, value)):
+        return tuple(value)
+    raise ValueError(f'expected "{BOOLEAN}", "{INTEGER}" or a list of different names')
+
+
 READ = {
     **dict.fromkeys((*NUMBERS, *EXPERIMENT), finite_number),
-    "start": lambda given: given if type(given) is bool else finite_number(given),
-    "type": _expect(f'"{BOOLEAN}"', str, lambda name: name == BOOLEAN),
+    "start": lambda given: given if type(given) in (bool, str) else finite_number(given),
+    "type": _type,
     **dict.fromkeys(("unit", "description"), _text),
     **dict.fromkeys(TABLES, _expect("a table", dict, lambda _: True)),
     **dict.fromkeys((*BASE, ANGLE), _expect("a whole exponent", int, lambda e: abs(e) < 100)),
@@ -206,8 +221,7 @@ def _value(key: str, value: object, what: str) -> Any:
         try:
             return READ[key](value) if key in READ else value
         except ValueError as error:
-            instead = instead_of("[") if isinstance(value, list) else ""
-            raise ModelFileError(f"{error}, got {shown(value)}{instead}") from None
+            raise ModelFileError(f"{error}, got {shown(value)}") from None
 
 
 def read_tables(
@@ -221,56 +235,93 @@ def read_tables(
         experiment = _experiment(_entries(head.get("experiment", {}), EXPERIMENT))
     reserved = RESERVED | set(solver_names)
     file = ModelFile(head["name"], head.get("description", ""), experiment, path, text, reserved)
+    for size, number in head.get("sizes", {}).items():
+        with placed("[sizes]", _named(size)):
+            _check_name(size, file)
+            if type(number) is not int or not 0 <= number <= MOST_SIZE:
+                raise ModelFileError(
+                    f"expected a whole number from 0 to {MOST_SIZE}, got {shown(number)}"
+                )
+        file.sizes[size] = number
     for symbol, given in head.get("units", {}).items():
         with placed("[units]", shown(symbol)):
-            file.units[symbol] = _entries(given, (*BASE, ANGLE), what="base unit")
+            known = _entries(given, (*BASE, ANGLE), what="base unit")
+            file.units[symbol] = Measure(known, base=symbol)
     for name, entry in head.get("tables", {}).items():
         _read_table(file, name, entry)
     _read_functions(file, head.get("functions", {}))
+    modes = head.get("modes", [])
+    entries = [*SECTIONS, "sampled", "events"]
+    if sum(len(head.get(section, {})) for section in entries) + len(modes) > MOST_ENTRIES:
+        raise ModelFileError(f"has more than {MOST_ENTRIES} variables, modes, samplers and events")
     for section in SECTIONS:
-        for name, entry in head.get(section, {}).items():
-            _read_variable(file, section, name, entry)
+        for element in _elements(file, f"[{section}]", head.get(section, {}).items()):
+            _read_variable(file, section, element)
     if not file.variables:
         raise ModelFileError("has no variables, expected a section such as [states]")
-    for mode, start in head.get("modes", []):
-        with placed("modes", shown(mode)):
-            _check_name(mode, file)
-        file.modes[mode] = start
-    for name, entry in head.get("sampled", {}).items():
-        _read_sampler(file, name, entry)
-    for name, entry in head.get("events", {}).items():
-        _read_event(file, name, entry)
+    for element in _elements(file, "modes", modes):
+        with placed("modes", _named(element.shown)):
+            _check_name(element.name, file)
+            start = element.entry
+            if isinstance(start, dict):
+                start = _entries(start, ("start",), "start")["start"]
+            if type(start) is not bool:
+                raise ModelFileError(f"expected true or false, got {shown(start)}")
+        file.modes[element.name] = start
+    for element in _elements(file, "[sampled]", head.get("sampled", {}).items()):
+        _read_sampler(file, element)
+    for element in _elements(file, "[events]", head.get("events", {}).items()):
+        _read_event(file, element)
     for message, condition in head.get("check", {}).items():
-        place = ("[check]", shown(message))
-        with placed(*place):
-            message = _text(message)
-            if len(message.encode()) > LONGEST_MESSAGE:
-                raise ModelFileError(f"expected a message of at most {LONGEST_MESSAGE} bytes")
-        file.checks[message] = file.expression(place, condition, CONDITION)
+        _read_check(file, message, condition)
     return file
 
 
+def _elements(
+    file: ModelFile, place: str, entries: Iterable[tuple[str, object]]
+) -> Iterator[Element]:
+    """Yield the entries of a section, each as often as its `for` says."""
+    for key, entry in entries:
+        with placed(place):
+            found = [*elements(file, key, entry)]
+        yield from found
+
+
+def _read_check(file: ModelFile, message: str, entry: object) -> None:
+    """Read a condition, which has to hold for all values of its indexes."""
+    place = ("[check]", shown(message))
+    with placed(*place):
+        text = _text(message)
+        if len(text.encode()) > LONGEST_MESSAGE:
+            raise ModelFileError(f"expected a message of at most {LONGEST_MESSAGE} bytes")
+        given = _entries(entry, ("value", FOR), "value") if isinstance(entry, dict) else {}
+        found = every(file, given.get(FOR))
+    for indexes in found:
+        element = Element(text, text, given.get("value", entry), indexes)
+        condition = file.expression(element, place, element.entry, CONDITION)
+        file.checks.append((text, condition))
+
+
 def _read_table(file: ModelFile, name: str, entry: object) -> None:
-    place = f"[tables.{_named(name)}]"
-    with placed(place):
+    with placed(f"[tables.{_named(name)}]"):
         _check_function_name(name, file)
-        units = entry.get("unit", {}) if isinstance(entry, dict) else {}
-        bare = {k: v for k, v in entry.items() if k != "unit"} if units else entry
-        given = _entries(bare, (*TABLE, "unit"), "x")
+        given = dict(entry) if isinstance(entry, dict) else {}
+        units = given.pop("unit", {})
+        given = _entries(given or entry, (*TABLE, "unit"), "x")
         arguments = ("x", "y") if "z" in given else ("x",)
-        file.tables[name] = equations_tables.read(name, given, file.path.parent)
-        file.functions[name] = Lookup(name, arguments)
         keys = (*arguments, "z" if "z" in given else "y")
         if not isinstance(units, dict) or not all(type(unit) is str for unit in units.values()):
-            raise ModelFileError(
-                f"unit: expected a table such as {{ x = 'm' }}, got {shown(units)}"
-            )
+            wanted = "unit: expected a table such as { x = 'm' }"
+            raise ModelFileError(f"{wanted}, got {shown(units)}")
+        measures = {}
         for key in units:
             if key not in keys:
                 raise ModelFileError(f"unit: unknown key {shown(key)}, expected {', '.join(keys)}")
-            unit = units[key]
-            found = file.exponents_of(unit)
-            file.table_units[table_unit(name, "" if key == keys[-1] else keys.index(key))] = found
+            measures[key] = file.measured(units[key])
+            axis = "" if key == keys[-1] else keys.index(key)
+            file.table_units[table_unit(name, axis)] = measures[key].exponents
+        file.tables[name] = equations_tables.read(name, given, file.path.parent, measures)
+        file.functions[name] = Lookup(name, arguments)
 
 
 def _check_function_name(name: str, file: ModelFile) -> None:
@@ -286,15 +337,17 @@ def _read_functions(file: ModelFile, entries: dict[str, object]) -> None:
             _check_function_name(name, file)
             given = _entries(entry, ("arguments", "value"), "value")
             arguments = given.get("arguments", [])
-            are_names = all(NAME.fullmatch(a) and a not in RESERVED for a in arguments)
+            taken = (*RESERVED, *file.sizes)
+            are_names = all(NAME.fullmatch(a) and a not in taken for a in arguments)
             if not arguments or not are_names or len({*arguments}) < len(arguments):
                 raise ModelFileError("arguments: expected names, each once and none reserved")
-            value = file.expression(("value",), given["value"])
+            element = Element(name, name, given["value"])
+            value = file.expression(element, ("value",), element.entry)
             for node in in_order([value.tree]):
                 if node.op == "name" and node.name not in (*arguments, *CONSTANTS):
                     raise ExpressionError(node.column, f"{shown(node.name)} is no argument")
-            check_kinds(value.tree)
-        file.functions[name] = Function(tuple(arguments), value.tree)
+            body = with_kinds(value.tree)
+        file.functions[name] = Function(tuple(arguments), body)
 
 
 def _experiment(given: dict[str, float]) -> dict[str, float]:
@@ -308,69 +361,129 @@ def _experiment(given: dict[str, float]) -> dict[str, float]:
     return found
 
 
-def _read_variable(file: ModelFile, section: str, name: str, entry: object) -> None:
-    place = (f"[{section}]", _named(name))
+def _read_variable(file: ModelFile, section: str, element: Element) -> None:
+    place = (f"[{section}]", _named(element.shown))
     with placed(*place):
-        _check_name(name, file)
-        given = {"start": 0.0} if section in ("inputs", "states", "discrete") else {}
-        if section == "where":
-            texts = {"": entry}
-        else:
-            section, entry, texts = _texts_of(section, entry)
-            given = {} if "start" in texts else given
-            given |= _entries(entry, *(OWN_KEYS | SECTIONS)[section])
-            if given.pop("type", None) is None and type(given.get("start")) is bool:
-                raise ModelFileError(f"start: expected a number, got {shown(given['start'])}")
-            texts |= {key: given.pop(key) for key in ("derivative", "value") if key in given}
-        variable = Variable(name, section, **given)
-        with placed("unit"):
-            unit = variable.unit or "1"
-            variable.exponents = file.exponents_of(unit)
+        _check_name(element.name, file)
+        entry = element.entry
+        if section == "where" and not isinstance(entry, dict):
+            entry = {"value": entry}
+        given = _entries(entry, *_keys(section, entry))
+        section = _section(section, given)
+        texts = {key: given.pop(key) for key in ("derivative", "value") if key in given}
+        _set_start(section, given, texts)
+        variable = Variable(element.name, section, **given)
+        _set_unit(variable, file)
         _check_range(variable)
     for key, text in texts.items():
-        whole = (*place, key) if key else place
-        expression = file.expression(whole, text, NUMBER, name, key == "derivative")
+        whole = (*place, key) if isinstance(element.entry, dict) else place
+        options = (variable.kind, element.name, key == "derivative")
+        expression = file.expression(element, whole, text, *options)
         if key == "start":
             variable.initial = expression
         else:
             variable.expression = expression
-    file.variables[name] = variable
+    file.variables[element.name] = variable
 
 
-def _texts_of(section: str, entry: object) -> tuple[str, object, dict[str, object]]:
-    """Take a start value that is an expression from an entry; return its section and the rest."""
-    if not isinstance(entry, dict):
-        return section, entry, {}
-    if section == "parameters" and "value" in entry:
-        return FOLLOWS, entry, {}
-    if entry.get("type") == BOOLEAN and section in ("parameters", "inputs"):
-        if type(entry.get("start", False)) is not bool:
-            raise ModelFileError(f"start: expected true or false, got {shown(entry['start'])}")
-        return (
-            (OPTIONS, entry, {})
-            if section == "parameters"
-            else (SWITCHES, {"start": False} | entry, {})
-        )
-    if section in ("states", "discrete") and isinstance(entry.get("start"), str):
-        return section, {k: v for k, v in entry.items() if k != "start"}, {"start": entry["start"]}
-    return section, entry, {}
+def _keys(section: str, entry: object) -> tuple[tuple[str, ...], str]:
+    """Return the keys that an entry may have, and the one that it needs."""
+    if section == "parameters" and isinstance(entry, dict) and "value" in entry:
+        return OWN_KEYS[FOLLOWS]
+    if section in NOT_REAL and isinstance(entry, dict) and "type" in entry:
+        return OWN_KEYS[NOT_REAL[section]]
+    return SECTIONS[section]
+
+
+def _section(section: str, given: dict[str, Any]) -> str:
+    """Return the section of a variable by its type, which becomes its kind."""
+    if section == "parameters" and "value" in given:
+        return FOLLOWS
+    kind = given.pop("type", NUMBER)
+    if kind == NUMBER:
+        return section
+    if section == "inputs" and kind != CONDITION:
+        raise ModelFileError(f'type: expected "{BOOLEAN}": other inputs are real numbers')
+    if kind != WHOLE and {"min", "max"} & given.keys():
+        raise ModelFileError("min and max are for numbers")
+    given["kind"] = kind
+    return NOT_REAL[section]
+
+
+def _set_start(section: str, given: dict[str, Any], texts: dict[str, Any]) -> None:
+    """Read a start value by its kind; one that follows from parameters goes into the texts."""
+    kind, start = given.get("kind", NUMBER), given.get("start")
+    if isinstance(kind, tuple) and (start is None or start in kind):
+        given["start"] = kind.index(start or kind[0]) + 1
+        return
+    if isinstance(start, str):
+        if section not in ("states", "discrete", COUNTS):
+            wanted = f"one of {', '.join(map(shown, kind))}" if isinstance(kind, tuple) else kind
+            wanted = "true or false" if kind == CONDITION else wanted
+            raise ModelFileError(f"start: expected {wanted}, got {shown(start)}")
+        texts["start"] = given.pop("start")
+    elif start is None and section in ("inputs", "states", "discrete", SWITCHES, COUNTS):
+        given["start"] = False if kind == CONDITION else 0.0
+    if "start" in given:
+        fits = type(given["start"]) is (bool if kind == CONDITION else float)
+        if not fits or isinstance(kind, tuple):
+            wanted = "true or false" if kind == CONDITION else "a number"
+            wanted = f"one of {', '.join(map(shown, kind))}" if isinstance(kind, tuple) else wanted
+            raise ModelFileError(f"start: expected {wanted}, got {_literal(given['start'])}")
+    for key in ("start", "min", "max"):
+        if kind == WHOLE and key in given:
+            if not given[key].is_integer() or abs(given[key]) > LARGEST_INTEGER:
+                raise ModelFileError(f"{key}: expected a whole number, got {given[key]:g}")
+            given[key] = int(given[key])
+
+
+def _literal(value: object) -> str:
+    return f"{value}".lower() if isinstance(value, bool) else shown(value)
+
+
+def _set_unit(variable: Variable, file: ModelFile) -> None:
+    """Find the unit of a variable, and write its numbers in SI."""
+    if not variable.is_real:
+        return
+    with placed("unit"):
+        unit = file.measured(variable.unit or "1")
+    variable.exponents = unit.exponents
+    if not unit.is_display:
+        return
+    # number = factor value + offset, as FMI has it
+    variable.display = (variable.unit, float(1 / unit.factor), float(-unit.offset / unit.factor))
+    variable.unit = unit.base
+    for key in NUMBERS:
+        if (number := getattr(variable, key)) is not None:
+            is_given = key != "start" or number != 0.0
+            setattr(variable, key, unit.in_si(number, key == "nominal") if is_given else number)
 
 
 def _check_name(name: str, file: ModelFile) -> None:
-    if not NAME.fullmatch(name):
+    base, *_ = name.partition("[")
+    if not NAME.fullmatch(base):
         raise ModelFileError("expected a name: a letter, then letters, digits, _")
-    if name in file.reserved or name.startswith("der_"):
+    if base in file.reserved or name.startswith("der_"):
         raise ModelFileError("this name is reserved, choose another one")
+    _check_dimensions(name, base, file)
     if name in file.variables:
         raise ModelFileError(f"this name is in {file.variables[name].place} already")
     if name in file.modes:
         raise ModelFileError("this name is in modes already")
-    if name in file.functions:
+    if base in file.sizes:
+        raise ModelFileError("this name is in [sizes] already")
+    if base in file.functions:
         raise ModelFileError("this name is a function or table already")
-    if len(file.variables) + len(file.modes) + len(file.changes) >= MOST_VARIABLES:
-        raise ModelFileError(
-            f"has more than {MOST_VARIABLES} variables, modes, samplers and events"
-        )
+    if len(file.variables) + len(file.modes) + len(file.events) >= MOST_VARIABLES:
+        raise ModelFileError(f"has more than {MOST_VARIABLES} variables, modes and events")
+
+
+def _check_dimensions(name: str, base: str, file: ModelFile) -> None:
+    """Check that a name has as many indexes everywhere."""
+    count = name.count(",") + 1 if "[" in name else 0
+    if file.dimensions.setdefault(base, count) != count:
+        counts = f"{file.dimensions[base]} indexes elsewhere, {count} here"
+        raise ModelFileError(f"{base} has {counts}: choose another name")
 
 
 def _check_range(variable: Variable) -> None:
@@ -382,55 +495,59 @@ def _check_range(variable: Variable) -> None:
         raise ModelFileError(f"nominal = {variable.nominal:g}: expected a number above 0")
 
 
-def _read_event(file: ModelFile, name: str, entry: object) -> None:
-    place, given = _change(file, "events", name, entry, EVENT)
-    when = file.expression((place, "when"), given["when"], CONDITION, event="when")
-    file.events.append(Event(name, *_given(file, place, given, ""), when))
+def _read_event(file: ModelFile, element: Element) -> None:
+    place, given = _change(file, "events", element, EVENT)
+    when = file.expression(element, (place, "when"), given["when"], CONDITION, event="when")
+    file.events.append(Event(element.name, *_given(file, element, place, given, ""), when))
 
 
-def _read_sampler(file: ModelFile, name: str, entry: object) -> None:
-    place, given = _change(file, "sampled", name, entry, SAMPLER)
+def _read_sampler(file: ModelFile, element: Element) -> None:
+    place, given = _change(file, "sampled", element, SAMPLER)
     every, offset = (
-        file.expression((place, key), given.get(key, "0"), NUMBER, "time")
+        file.expression(element, (place, key), given.get(key, "0"), NUMBER, "time")
         for key in ("every", "offset")
     )
-    if not (given.get("set") or given.get("reinit")):
-        raise ModelFileError(f"{place}: expected set or reinit: what it does")
-    file.sampled.append(Sampler(name, *_given(file, place, given, "then"), every, offset))
+    changes = _given(file, element, place, given, "then")
+    file.sampled.append(Sampler(element.name, *changes, every, offset))
 
 
 def _change(
-    file: ModelFile, section: str, name: str, entry: object, keys: tuple[str, ...]
+    file: ModelFile, section: str, element: Element, keys: tuple[str, ...]
 ) -> tuple[str, dict[str, Any]]:
     """Return the place of an event or sampler, and its entries; it needs the first of its keys."""
-    place = f"[{section}.{_named(name)}]"
+    place = f"[{section}.{_named(element.shown)}]"
     with placed(place):
-        _check_name(name, file)
-        return place, _entries(entry, keys, keys[0])
+        _check_name(element.name, file)
+        given = _entries(element.entry, keys, keys[0])
+        if not (given.get("set") or given.get("reinit")):
+            raise ModelFileError("expected set or reinit: what it does")
+        return place, given
 
 
 def _given(
-    file: ModelFile, place: str, given: dict[str, Any], event: str
+    file: ModelFile, element: Element, place: str, given: dict[str, Any], event: str
 ) -> tuple[Expression | None, dict[str, Expression], dict[str, Expression]]:
     """Return `while`, `reinit` and `set`; event: of the expression of `while`."""
-    states, discrete = ({v.name for v in file.of(section)} for section in ("states", "discrete"))
     kinds = {
-        "reinit": (dict.fromkeys(states, NUMBER), "a state"),
-        "set": (
-            dict.fromkeys(discrete, NUMBER) | dict.fromkeys(file.modes, CONDITION),
-            "one of modes or of [discrete]",
-        ),
+        "reinit": (("states",), "a state"),
+        "set": (("discrete", COUNTS), "one of modes or of [discrete]"),
     }
     found: dict[str, dict[str, Expression]] = {"reinit": {}, "set": {}}
-    for key, (known, what) in kinds.items():
-        for target, text in given.get(key, {}).items():
-            if target not in known:
-                raise ModelFileError(f"{place}: {key}: expected {what}, got {shown(target)}")
-            whole = (place, f"{key}: {target}")
-            found[key][target] = file.expression(whole, text, known[target], target, event="then")
+    for key, (sections, what) in kinds.items():
+        for written, text in given.get(key, {}).items():
+            whole = (place, f"{key}: {written}")
+            with placed(*whole):
+                name = target(written, element, file.sizes)
+            variable = file.variables.get(name)
+            is_mode = key == "set" and name in file.modes
+            if not is_mode and (variable is None or variable.section not in sections):
+                raise ModelFileError(f"{place}: {key}: expected {what}, got {shown(name)}")
+            kind = CONDITION if is_mode else variable.kind
+            found[key][name] = file.expression(element, whole, text, kind, name, event="then")
     during = None
     if "while" in given:
-        during = file.expression((place, "while"), given["while"], CONDITION, event=event)
+        whole = (place, "while")
+        during = file.expression(element, whole, given["while"], CONDITION, event=event)
     return during, found["reinit"], found["set"]
 
 
@@ -440,11 +557,7 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
         text, tables = tables_of(path)
         try:
             file = read_tables(path, text, tables, solver_names)
-            _check_names(file)
-            file.order = _in_order(file)
-            _check_periods(file)
-            if file.has_units:
-                _check_units(file)
+            check(file)
         except ModelFileError as error:
             raise ModelFileError(f"{_line(text, str(error))}{error}") from None
     return file
@@ -452,7 +565,7 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
 
 def _line(text: str, message: str) -> str:
     """Find the line of a message's section and name, as far as that is sure."""
-    place = re.match(r"(\[.*?\])(?:: ['\"]?(\w+))?|(\w+): ", message)
+    place = re.match(r"(\[(?:[^][]|\[[^]]*\])*\])(?:: ['\"]?(\w+))?|(\w+): ", message)
     lines = text.split("\n")
     begin, key = 0, place and (place[2] or place[3])
     if place and place[1]:
@@ -472,103 +585,3 @@ def _line(text: str, message: str) -> str:
         if key and re.match(rf"\s*[\"']?{re.escape(key)}(?![\w-]).*=", line):
             return f"line {i}: "
     return f"line {begin}: " if 0 < begin <= len(lines) else ""
-
-
-def _check_names(file: ModelFile) -> None:
-    """Check the names and kinds in all expressions."""
-    rates = [derivative_of(state.name) for state in file.of("states")]
-    known = {*file.variables, *file.modes, "time", *CONSTANTS, *rates}
-    parameters = {v.name for v in file.of("parameters", FOLLOWS, OPTIONS)} | {*CONSTANTS}
-    for expressions, allowed, mistake in (
-        (file.assigned, known, "unknown name {}"),
-        (file.constant, parameters, "{} is no parameter"),
-    ):
-        for expression in expressions:
-            with placed(*expression.place):
-                for node in in_order([expression.tree]):
-                    if node.op == "name" and node.name not in allowed:
-                        meant = get_close_matches(node.name, allowed, n=1)
-                        hint = f", did you mean {meant[0]!r}?" if meant else ""
-                        raise ExpressionError(node.column, mistake.format(shown(node.name)) + hint)
-                check_kinds(expression.tree, expression.kind, file.conditions)
-
-
-def _in_order(file: ModelFile) -> list[Expression]:
-    """Order all expressions: [where] and [outputs] first, each after those that it names."""
-    entries = {variable.name: variable for variable in file.calculated}
-    entries |= {derivative_of(state.name): state for state in file.of("states")}
-    for variable in entries.values():
-        used = names(variable.expression.tree) & entries.keys()
-        variable.arguments = tuple(entries[name] for name in sorted(used))
-    try:
-        TopologicalSorter({v: v.arguments for v in entries.values()}).prepare()
-    except CycleError as error:
-        loop = error.args[1][::-1]
-        way = shown(" -> ".join(variable.name for variable in loop))
-        raise ModelFileError(
-            f"{loop[0].place}: {loop[0].name}: algebraic loop {way}: "
-            "solve these equations for one of them first"
-        ) from None
-    variables = in_order(entries.values())
-    happening = [expression for change in file.changes for expression in change.expressions]
-    constant = [e for e in file.constant if e.target not in entries]
-    return [*(v.expression for v in variables), *happening, *constant]
-
-
-def _check_periods(file: ModelFile) -> None:
-    """Check that samplers tick, and starts exist, with the start values of the parameters."""
-    starts = {variable.name: variable.start for variable in file.of("parameters", OPTIONS)}
-    follows = {variable.expression for variable in file.of(FOLLOWS)}
-    for expression in file.order:
-        if expression in follows:
-            starts[expression.target] = _number(expression, starts)
-    for variable in file.started:
-        with placed(*variable.initial.place):
-            if not math.isfinite(_number(variable.initial, starts)):
-                raise ModelFileError("is not a finite number at the start values")
-    for sampler in file.sampled:
-        every, offset = (_number(expression, starts) for expression in sampler.periods)
-        with placed(*sampler.every.place):
-            if not 0 < every < math.inf:
-                raise ModelFileError(f"is {every:g} s at the start values, expected more than 0")
-        with placed(*sampler.offset.place):
-            if not 0 <= offset < math.inf:
-                raise ModelFileError(f"is {offset:g} s at the start values, expected 0 or more")
-
-
-def _number(expression: Expression, values: Mapping[str, float]) -> float:
-    """Evaluate an expression; nan if it has no value."""
-    try:
-        return evaluated(expression.tree, values)
-    except (ArithmeticError, ValueError):
-        return math.nan
-    except KeyError:  # tables are not looked up here: the start of a simulation checks their values
-        return 1.0
-
-
-def _check_units(file: ModelFile) -> None:
-    """Check that units fit, and find the units of [where]."""
-    declared = [v for v in file.variables.values() if v.section != "where"]
-    units = {v.name: unit_of_exponents(v.exponents) for v in declared} | {"time": SECOND}
-    units |= {key: unit_of_exponents(found) for key, found in file.table_units.items()}
-    for state in file.of("states"):
-        units[derivative_of(state.name)] = times(units[state.name], SECOND, -1)
-    for expression in file.order:
-        with placed(*expression.place):
-            expected = units.get(expression.target)
-            if expression.is_rate:
-                expected = times(expected, SECOND, -1)
-            unit = unit_of(expression.tree, units, expected)
-        if expression.target:
-            units.setdefault(expression.target, unit)
-    for variable in file.of("where"):
-        with placed("[where]", variable.name):
-            variable.exponents = _whole(units[variable.name])
-
-
-def _whole(unit: Unit) -> dict[str, int]:
-    if any(exponent.denominator > 1 for exponent in unit):
-        raise ModelFileError(
-            f"has unit {unit_shown(unit)}, whose exponents are no whole numbers: use its square"
-        )
-    return {base: int(exponent) for base, exponent in zip(BASE, unit, strict=True)}

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from rparm.expressions.expression import finite_number
+from rparm.expressions.units import Measure
 
 LARGEST_FILE = 50_000_000  # bytes
 FAR = 1e300  # beyond every value: the bound where there is none
@@ -63,8 +64,8 @@ class Table:
             yield self.array("c", i), dimensions, numbers
 
 
-def read(name: str, given: dict[str, Any], folder: Path) -> Table:
-    """Read a table from its entry; a file's path counts from the folder."""
+def read(name: str, given: dict[str, Any], folder: Path, units: Mapping[str, Measure]) -> Table:
+    """Read a table from its entry; a file's path counts from the folder. units: of x, y and z."""
     kind, outside = given.get("interpolation", "linear"), given.get("outside", "hold")
     for key, value, known in (
         ("interpolation", kind, INTERPOLATIONS),
@@ -75,13 +76,18 @@ def read(name: str, given: dict[str, Any], folder: Path) -> Table:
     if "z" in given:
         if kind != "linear" or "file" in given:
             raise ValueError("z: a table of two arguments is linear, and given by lists")
-        return _grid(name, given, outside)
+        return _grid(name, given, outside, units)
     columns = _columns(given, folder) if "file" in given else _lists(given)
+    columns = {key: _in_si(values, units.get(key)) for key, values in columns.items()}
     x, y = _checked(columns["x"], "x"), columns["y"]
     if len(x) != len(y):
         raise ValueError(f"y: has {len(y)} values, expected {len(x)}, as x has")
     coefficients = _polynomials(x, y, kind)
     return Table(name, *_with_outside(x, y, coefficients, kind, outside))
+
+
+def _in_si(values: list[float], unit: Measure | None) -> list[float]:
+    return [unit.in_si(value) for value in values] if unit and unit.is_display else values
 
 
 # ---- Values --------------------------------------------------------------------------------------
@@ -213,16 +219,19 @@ def _with_outside(
     return (_held(x),), tuple(zip(below, *inside, above, strict=True))
 
 
-def _grid(name: str, given: dict[str, Any], outside: str) -> Table:
+def _grid(name: str, given: dict[str, Any], outside: str, units: Mapping[str, Measure]) -> Table:
     """Return a bilinear table; z has a row for each x."""
     if outside == "error":
         raise ValueError("outside: a table of two arguments holds or extends")
-    x, y = (_checked([*_numbers(given.get(key), key)], key) for key in ("x", "y"))
+    x, y = (
+        _checked(_in_si([*_numbers(given.get(key), key)], units.get(key)), key)
+        for key in ("x", "y")
+    )
     if not isinstance(given["z"], list) or len(given["z"]) != len(x):
         raise ValueError(f"z: expected {len(x)} rows, one for each x")
     z = []
     for row, values in enumerate(given["z"], 1):
-        z.append([*_numbers(values, f"z: row {row}")])
+        z.append(_in_si([*_numbers(values, f"z: row {row}")], units.get("z")))
         if len(z[-1]) != len(y):
             raise ValueError(f"z: row {row}: has {len(z[-1])} values, expected {len(y)}")
     cells: list[tuple[float, float, float, float]] = []

@@ -36,6 +36,9 @@ def value_of_toml(value: object) -> str:
     """A value of TOML: JSON's texts, lists and numbers are the same, but for one character."""
     if isinstance(value, float):
         return repr(value)
+    if isinstance(value, dict):
+        pairs = (f"{value_of_toml(key)} = {value_of_toml(entry)}" for key, entry in value.items())
+        return f"{{ {', '.join(pairs)} }}"
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 

@@ -107,6 +107,7 @@ def type_checks(name: str, variable: Variable, structure: str) -> list[str]:
     checks += [
         f'_Static_assert({item.constant} == {value}, "{name}: {item.constant} must be {value}");'
         for value, item in enumerate(items, start=1)
+        if item.constant
     ]
     return checks
 

@@ -221,7 +221,15 @@ def assemble(path: Path, file: schema.File) -> Declaration:
     check_indicators(file.model.event_indicators, variables, f"{path}: [model]")
     check_terminals(file.terminals, variables, f"{path}: terminal ")
     by_reference = sorted(variables.items(), key=lambda item: item[1].reference)
-    used = {v.unit: units[v.unit] for v in variables.values() if isinstance(v, schema.Float64)}
+    real = [v for v in variables.values() if isinstance(v, schema.Float64)]
+    further: dict[str, dict[str, schema.Display]] = {v.unit: {} for v in real}
+    for variable in real:
+        if variable.display is not None:
+            further[variable.unit][variable.display.name] = variable.display
+    used = {
+        name: units[name].model_copy(update={"further": displays}) if displays else units[name]
+        for name, displays in further.items()
+    }
     return Declaration(path, file.model, file.experiment, used, dict(by_reference), file.terminals)
 
 

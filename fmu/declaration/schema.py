@@ -12,11 +12,12 @@ include       further files, relative to this one, whose [variables] and [units]
 [model]       name (also the identifier), description, header, values (C type of the value
               structure), symbol (the C object of type struct model), event_indicators (names of
               local continuous variables, in the order of the model's indicators; default: none),
-              time_events (true: the model has time events)
+              time_events (true: the model has time events), naming ("structured": names have
+              indexes)
 [experiment]  start, stop, tolerance, step: the default experiment
 [units]       "name" = { exponents of the SI base units, display.NAME = factor }, beside units.toml
 [variables.NAME]
-    reference     value reference, unique, 0 to 9999
+    reference     value reference, unique, 0 to 99999
     owner         "model" (default) or "instance": the structure that holds the value
     field         C designator of the value in that structure
     type          "float64" (default), "int32", "enumeration" or "boolean"
@@ -25,9 +26,11 @@ include       further files, relative to this one, whose [variables] and [units]
     start         where initial is exact, and of inputs; of an enumeration the name of an item, of
                   a boolean true or false
     unit, nominal of a float64
+    display       of a float64: name, factor and offset of its own display unit, in which a value
+                  is factor * value + offset
     min, max      of a float64 or int32
-    items         of an enumeration: [variables.NAME.items.ITEM] with description and constant,
-                  the C constant of that value; the values are 1, 2, ... in the order of the
+    items         of an enumeration: [variables.NAME.items.ITEM] with description and, if C has
+                  one of that value, constant; the values are 1, 2, ... in the order of the
                   file
     derivative_of name of the variable that this one is the time derivative of
     reinit        true: events may change this state
@@ -94,7 +97,8 @@ def variable_name(text: str) -> str:
     """Refuse names that the generated header, where they get a prefix, needs for its macros."""
     if text in ("GUID", "NAME", "TOKEN_FMI3"):
         raise ValueError("is reserved for the generated header")
-    return identifier(text)
+    identifier(re.sub(r"\[[0-9]+(,[0-9]+)*\]$", "", text))
+    return text
 
 
 def usual_initial(keys: dict[str, Any]) -> str | None:
@@ -121,6 +125,7 @@ class Model(Table):
     symbol: Identifier
     event_indicators: list[str] = []
     time_events: bool = False
+    naming: Literal["flat", "structured"] = "flat"
 
     @property
     def has_events(self) -> bool:
@@ -146,6 +151,14 @@ class Experiment(Table):
         return self
 
 
+class Display(Table):
+    """A display unit, in which a value is factor * value + offset."""
+
+    name: str
+    factor: float
+    offset: float = 0.0
+
+
 class Unit(Table):
     """Exponents of the SI base units, and factors of the display units."""
 
@@ -158,22 +171,23 @@ class Unit(Table):
     cd: int = 0
     rad: int = 0
     display: dict[str, float] = {}
+    further: dict[str, Display] = {}  # display units of some variables
 
     @property
     def exponents(self) -> dict[str, int]:
         """Exponents that are not 0, by base unit."""
-        return self.model_dump(exclude={"display"}, exclude_defaults=True)
+        return self.model_dump(exclude={"display", "further"}, exclude_defaults=True)
 
 
 class Item(Table):
-    constant: Identifier
+    constant: Identifier | None = None
     description: str
 
 
 class Variable(Table):
     """What variables of all types have; each type adds start, min and max as numbers or None."""
 
-    reference: int = Field(ge=0, le=9999)
+    reference: int = Field(ge=0, le=99999)
     owner: Literal["model", "instance"] = "model"
     field: str
     causality: Literal[
@@ -208,7 +222,9 @@ class Variable(Table):
     @property
     def interface(self) -> dict[str, Any]:
         """What users depend on: neither the texts nor where C keeps the value."""
-        hidden = {"owner", "field", "description"} | (set() if self.reinit else {"reinit"})
+        hidden = {"owner", "field", "description", "display"} | (
+            set() if self.reinit else {"reinit"}
+        )
         return self.model_dump(exclude=hidden, exclude_none=True)
 
     @model_validator(mode="after")
@@ -235,6 +251,7 @@ class Variable(Table):
 class Float64(Variable):
     type: Literal["float64"] = "float64"
     unit: str
+    display: Display | None = None
     start: float | None = None
     min: float | None = None
     max: float | None = None

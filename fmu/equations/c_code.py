@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 from equations.graph import CONDITIONS, LEAVES, Value
@@ -12,16 +13,26 @@ from rparm.expressions.expression import RELATIONS, in_order
 
 # what a formula of C is made of; that of a function is its call
 FORMULAS = {op: f"{{}} {op} {{}}" for op in ("+", "-", "*", "/", *RELATIONS)}
-FORMULAS |= {"and": "{} && {}", "or": "{} || {}", "not": "!{}"}
+FORMULAS |= {"==": "{} == {}", "and": "{} && {}", "or": "{} || {}", "not": "!{}"}
 FORMULAS |= {"negative": "-{}", "if": "{} ? {} : {}"}
 
 Leaves = Mapping[tuple[str, str], str]  # where C has a leaf, by its operation and name
 
 
+def c_name(prefix: str, name: str) -> str:
+    """Return the name in C of a variable or of an element, which no other has with the prefix."""
+    base, *indexes = re.findall(r"\w+", name)
+    return "_".join([f"{prefix}{len(indexes) or ''}", base, *indexes])
+
+
+# of the value, as a double or an int, the derivative and the event indicator
+field_of, mode_of, rate_of, indicator_of = (partial(c_name, prefix) for prefix in "vmdz")
+
+
 def number(value: float) -> str:
     """Return a double that reads back as the same."""
-    if math.isnan(value):
-        return "NAN"
+    if not math.isfinite(value):
+        return "NAN" if math.isnan(value) else "INFINITY" if value > 0.0 else "(-INFINITY)"
     return f"({value!r})" if math.copysign(1.0, value) < 0 else repr(value)
 
 
@@ -41,7 +52,9 @@ def formula(op: str, *given: str) -> str:
 
 
 def located(bounds: str, x: str) -> str:
-    """The segment of x in C."""
+    """The segment of x in C; without bounds the largest whole number up to it."""
+    if not bounds:
+        return f"relations_floor({x})"
     return f"relations_locate({bounds}, sizeof {bounds} / sizeof *{bounds}, {x})"
 
 

@@ -5,23 +5,33 @@ mode, and 1 while no value that is needed reads it. An event of the file fires w
 comes to hold in its modes. What all models do with that is in src/model/relations.c.
 """
 
+import re
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from equations_content import SWITCHES, Change, ModelFile, Sampler
+from equations_content import COUNTS, SWITCHES, Change, ModelFile, Sampler
 
-from equations.c_code import Code, Leaves, filled, indented, located, text
+from equations.c_code import (
+    Code,
+    Leaves,
+    c_name,
+    field_of,
+    filled,
+    indented,
+    indicator_of,
+    located,
+    mode_of,
+    text,
+)
 from equations.errors import NONE, Errors
 from equations.graph import MOVING, Graph, Relation, Value, is_unknown
-from rparm.expressions.expression import in_order
+from rparm.expressions.expression import CONDITION, Kind, in_order
 
 Guards = dict[Value, Value | None]  # conditions; None: always
 
-FIELD = "v_{}"
-MODE = "m_{}"
-INDICATOR = "z_{}"
 SECOND = {"s": 1}
+INDEXES = re.compile(r"\[([0-9,]+)\]")
 NEXT_TIME = [
     "static double next_time(const void *values) {",
     "    return relations_next_time(&relations, ROOM, values);",
@@ -35,8 +45,9 @@ def leaves(file: ModelFile) -> Leaves:
     found = {("time", ""): "t", ("first", ""): "dt"}
     for v in file.of("parameters", "inputs", "states", "discrete"):
         for op, structure in ((v.leaf.op, "values"), ("first", "d"), ("second", "dd")):
-            found[op, v.name] = f"{structure}->{FIELD.format(v.name)}"
-    found |= {("mode", name): f"values->{MODE.format(name)}" for name in file.conditions}
+            found[op, v.name] = f"{structure}->{field_of(v.name)}"
+    for name, kind in file.kinds.items():
+        found["mode" if kind == CONDITION else "integer", name] = f"values->{mode_of(name)}"
     segments = enumerate(file.graph.segments)
     found |= {("integer", name): f"values->segments[{i}]" for i, name in segments}
     relations = enumerate(file.graph.relations)
@@ -69,34 +80,44 @@ def ticks(file: ModelFile) -> list[Tick]:
         every, offset = (period.value for period in sampler.periods)
         own = [("every", every, SECOND, "period"), ("offset", offset, SECOND, "offset")]
         for target, given in sampler.given.items():
-            if target in file.modes:
-                new = graph.value("if", given.value, one, zero)
-                old, unit = graph.value("if", graph.value("mode", name=target), one, zero), {}
-            else:
-                variable = file.variables[target]
-                new, old, unit = given.value, variable.leaf, variable.exponents
+            variable, new, unit = file.variables.get(target), given.value, {}
+            old = variable.leaf if variable else graph.value("mode", name=target)
+            if old.op == "mode":
+                new, old = (graph.value("if", value, one, zero) for value in (new, old))
             if sampler.during is not None:
                 new = graph.value("if", sampler.during.value, new, old)
+            if old.op in ("state", "discrete"):
+                meaning, unit = "new value", variable.exponents
+            else:  # the change, which is 0 or not
+                meaning, new = "change", graph.value("-", new, old)
             new = graph.value("if", graph.value("isfinite", new), new, largest)
-            own.append((target, new, unit, f"new value of {target}"))
+            own.append((target, new, unit, f"{meaning} of {target}"))
         for key, value, unit, meaning in own:
-            name = f"sampled_{sampler.name}_{key}"
-            while name in taken:
+            plain = f"sampled_{sampler.name}_{key}"
+            indexes = ",".join(INDEXES.findall(plain))
+            name, end = INDEXES.sub("", plain), indexes and f"[{indexes}]"
+            while name + end in taken:
                 name += "_"
-            taken.add(name)
+            taken.add(name + end)
             description = f"Sampler {i}, {sampler.name}: {meaning}"
-            found.append(Tick(name, f"tick_{len(found)}", value, unit, description))
+            found.append(Tick(name + end, f"tick_{len(found)}", value, unit, description))
     return found
 
 
 def has_events(file: ModelFile) -> bool:
     """Return whether a file has anything that only events, or the initialization, may write."""
-    written = file.sampled or file.of("discrete", SWITCHES)
+    written = file.sampled or file.of("discrete", COUNTS, SWITCHES)
     return bool(file.graph.relations or written or _has_starts(file))
 
 
 def _has_starts(file: ModelFile) -> bool:
-    return bool(file.started or any(file.modes.values()))
+    return bool(file.started or any(file.modes.values()) or file.of(COUNTS))
+
+
+def _counted(file: ModelFile) -> dict[str, tuple[Kind, int]]:
+    """Modes and discrete variables that are no real numbers: kinds, and values at the start."""
+    found = {mode: (CONDITION, int(start)) for mode, start in file.modes.items()}
+    return found | {v.name: (v.kind, int(v.start or 0)) for v in file.of(COUNTS)}
 
 
 class Events:
@@ -123,8 +144,8 @@ class Events:
     @property
     def discrete(self) -> list[str]:
         """Fields of discrete states: times of samplers, and the discrete variables."""
-        ticks = [f"ticks_{sampler.name}" for sampler in self.file.sampled]
-        variables = [FIELD.format(v.name) for v in self.file.of("discrete")]
+        ticks = [c_name("ticks", sampler.name) for sampler in self.file.sampled]
+        variables = [field_of(v.name) for v in self.file.of("discrete")]
         return [*(["start", *ticks] if ticks else []), *variables]
 
     def indicators(self) -> dict[str, Value]:
@@ -133,7 +154,7 @@ class Events:
         for relation in self.located:
             z, used = self.signed(relation), self.used[relation.name]
             z = z if used is None else self.graph.value("if", used, z, one)
-            found[INDICATOR.format(relation.name)] = z
+            found[indicator_of(relation.name)] = z
         return found
 
     def signed(self, relation: Relation) -> Value:
@@ -148,13 +169,13 @@ class Events:
         return [
             *(["/* discrete states */"] if self.discrete else []),
             *(f"double {field};" for field in self.discrete),
-            *(f"int {MODE.format(v.name)}; /* input */" for v in self.file.of(SWITCHES)),
+            *(f"int {mode_of(v.name)}; /* input */" for v in self.file.of(SWITCHES)),
             "/* modes; C has no empty arrays */",
             "int is_begun;",
             f"int relations[{len(self.relations) or 1}];",
             f"int active[{len(self.file.events) + 1}];",
             *([f"int segments[{len(segments)}];"] if (segments := self.graph.segments) else []),
-            *(f"int {MODE.format(mode)};" for mode in self.file.modes),
+            *(f"int {mode_of(name)};" for name in _counted(self.file)),
         ]
 
     def functions(self, in_domain: str = "") -> list[str]:
@@ -180,7 +201,7 @@ class Events:
             in_domain=in_domain,
             states=len(states),
             inputs=len(file.of("inputs")),
-            state_offset=f"offsetof(struct equations_values, {FIELD.format(states[0].name)})"
+            state_offset=f"offsetof(struct equations_values, {field_of(states[0].name)})"
             if states
             else "0",
             has_inputs=int(any(r.is_of_inputs for r in self.relations)),
@@ -188,7 +209,9 @@ class Events:
             + (len(self.relations) or 1)
             + len(file.events)
             + len(file.graph.segments)
-            + len(file.modes),
+            + len(_counted(file)),
+            counts=len(_counted(file)),
+            count=self._counts() or ["{0},"],
             **self._segments(places),
             samplers=len(file.sampled),
             state_names=", ".join([text(x.name) for x in states] or ["NULL"]),
@@ -259,25 +282,26 @@ class Events:
         table = []
         for i, s in enumerate(segments):
             code.lines.append(f"segment[{i}] = {located(s.bounds, code.of(s.argument))};")
-            row = (places[s.low.name], places[s.high.name], s.count, int(s.low.is_of_inputs))
+            bounds = (s.first, s.first + s.count - 1, int(s.low.is_of_inputs))
+            row = (places[s.low.name], places[s.high.name], *bounds)
             table.append(f"{{{', '.join(map(str, row))}}},")
         return {"segments": len(segments), "segment": table or ["{0},"], "locate": code.lines}
 
     def _switches(self) -> list[str]:
-        fields = [MODE.format(v.name) for v in self.file.of(SWITCHES)]
+        fields = [mode_of(v.name) for v in self.file.of(SWITCHES)]
         if not fields:
             return []
         begin = f"offsetof(struct equations_values, {fields[0]})"
         return [f".discrete_inputs = {{{begin}, {len(fields)} * sizeof(int)}},"]
 
     def _starts(self) -> list[str]:
-        new = {f"values->{FIELD.format(v.name)}": v.initial.value for v in self.file.started}
-        modes = self.file.modes.items()
+        new = {v.name: v.initial.value for v in self.file.started}
+        counted = _counted(self.file).items()
         return [
             "static void start(void *values_pointer) {",
             "    struct equations_values *values = values_pointer;",
-            *(f"    values->{MODE.format(mode)} = {start:d};" for mode, start in modes),
-            *indented(Code(leaves(self.file)).assign(new).lines),
+            *(f"    values->{mode_of(name)} = {start};" for name, (_, start) in counted),
+            *indented(self._assigned(Code(leaves(self.file)), new)),
             "}",
             "",
         ]
@@ -291,17 +315,38 @@ class Events:
     def _change(self, index: int, change: Change) -> list[str]:
         """What an event or a sampler of the file does."""
         states = [state.name for state in self.file.of("states")]
-        code, new = Code(leaves(self.file)), {}
-        for name, given in change.given.items():
-            if name in self.file.modes:
-                new[MODE.format(name)] = code.constant(f"{code.of(given.value)} != 0", "int")
-            else:
-                new[FIELD.format(name)] = code.constant(code.of(given.value))
-        lines = [f"values->{field} = {value};" for field, value in new.items()]
+        code = Code(leaves(self.file))
+        lines = self._assigned(code, {name: e.value for name, e in change.given.items()})
+        code.lines, lines = lines[: -len(change.given)], lines[-len(change.given) :]
         lines += [f"tolerance[{states.index(name)}] = 0.0;" for name in change.reinit]
         if isinstance(change, Sampler) and change.during is not None:
             lines = [f"if ({code.of(change.during.value)}) {{", *indented(lines), "}"]
         return [f"if (event == {index}) {{", *indented(code.lines + lines), "}"]
+
+    def _assigned(self, code: Code, new: Mapping[str, Value]) -> list[str]:
+        """Statements that give variables and modes their new values, all at the end."""
+        counted, fields = _counted(self.file), {}
+        for name, value in new.items():
+            kind, _ = counted.get(name, ("", 0))
+            found = code.of(value)
+            if kind == CONDITION:
+                fields[mode_of(name)] = code.constant(f"{found} != 0", "int")
+            elif kind:
+                fields[mode_of(name)] = code.constant(f"relations_whole({found})", "int")
+            else:
+                fields[field_of(name)] = code.constant(found)
+        return code.lines + [f"values->{field} = {value};" for field, value in fields.items()]
+
+    def _counts(self) -> list[str]:
+        """Rows of struct count: name, smallest and largest value."""
+        rows = []
+        for name, (kind, _) in _counted(self.file).items():
+            is_item = isinstance(kind, tuple)
+            bounds = "-INT_MAX, INT_MAX"
+            if is_item or kind == CONDITION:
+                bounds = f"1, {len(kind)}" if is_item else "0, 1"
+            rows.append(f"{{{text(name)}, {bounds}}},")
+        return rows
 
     def _describe(self) -> list[str]:
         code = Code(leaves(self.file))

@@ -6,13 +6,12 @@ from itertools import chain
 
 from equations_content import OPTIONS, ModelFile
 
-from equations.c_code import Code, filled, indented, number, text
-from equations.c_events import FIELD, MODE, Events, arrays, leaves, ticks
+from equations.c_code import Code, field_of, filled, indented, mode_of, number, rate_of, text
+from equations.c_events import Events, arrays, leaves, ticks
 from equations.c_series import Series
 from equations.graph import FALLIBLE, Value
 from rparm.expressions.expression import in_order
 
-RATE = "d_{}"  # fields have prefixes, so that any name of a variable will do
 STRUCTURE = "struct equations_values"
 SYMBOL = "equations_model"
 HERE = "/* tables */"  # the line where they stand
@@ -23,7 +22,7 @@ def header(file: ModelFile) -> str:
     """Return the text of equations.h."""
     events = Events(file)
     groups = _ranges(file) | {
-        "calculated": [FIELD.format(v.name) for v in file.calculated],
+        "calculated": [field_of(v.name) for v in file.calculated],
         "event indicators": list(events.indicators()),
         "samplers": [tick.field for tick in ticks(file)],
     }
@@ -77,15 +76,15 @@ def _tables(file: ModelFile, text: str) -> list[str]:
 def _ranges(file: ModelFile) -> dict[str, list[str]]:
     """Fields that are set from outside and their derivatives, by the ranges of struct model."""
     ranges = {
-        section: [FIELD.format(v.name) for v in file.of(section)]
+        section: [field_of(v.name) for v in file.of(section)]
         for section in ("parameters", "inputs", "states")
     }
-    return ranges | {"derivatives": [RATE.format(state.name) for state in file.of("states")]}
+    return ranges | {"derivatives": [rate_of(state.name) for state in file.of("states")]}
 
 
 def _options(file: ModelFile) -> list[str]:
     """Fields of Boolean parameters, ints behind the others, in pairs: there are no gaps."""
-    names = [MODE.format(v.name) for v in file.of(OPTIONS)]
+    names = [mode_of(v.name) for v in file.of(OPTIONS)]
     return [*names, "unused"] if len(names) % 2 else names
 
 
@@ -149,7 +148,7 @@ def _domains(
         names = ("domains_header", "domains_declared", "domains")
         return {"in_domain": "", **{name: [] for name in names}}
     ranges = _ranges(file)
-    calculated = ranges["derivatives"] + [FIELD.format(v.name) for v in file.calculated]
+    calculated = ranges["derivatives"] + [field_of(v.name) for v in file.calculated]
     groups = {key: ranges[key] for key in ("states", "inputs")}
     groups |= {"calculated": calculated, "indicators": list(events.indicators())}
     distances = {f"distance[{i}]": r.distance for i, r in enumerate(events.relations)}
@@ -178,8 +177,8 @@ def _domains(
 def _calculated(file: ModelFile, events: Events) -> dict[str, list[str]]:
     """Calculated fields and their derivatives along a curve."""
     graph = file.graph
-    fields = {RATE.format(state.name): state.value for state in file.of("states")}
-    fields |= {FIELD.format(v.name): v.value for v in file.calculated}
+    fields = {rate_of(state.name): state.value for state in file.of("states")}
+    fields |= {field_of(v.name): v.value for v in file.calculated}
     fields |= events.indicators()
     fields |= {tick.field: tick.value for tick in ticks(file)}
     seeds = {graph.value("time"): graph.value("first")}  # it has no second derivative
@@ -192,7 +191,8 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, list[str]]:
     curve.assign({f"d->{name}": value for name, value in zip(fields, firsts, strict=True)})
     split = len(curve.lines)
     curve.assign({f"dd->{name}": value for name, value in zip(fields, seconds, strict=True)})
-    started = {f"->{FIELD.format(v.name)} += ": v.initial.value for v in file.started}
+    real = [v for v in file.started if v.is_real]
+    started = {f"->{field_of(v.name)} += ": v.initial.value for v in real}
     start_firsts = graph.derivatives(started.values(), seeds)
     start_seconds = graph.derivatives(start_firsts, seeds)
     return {
@@ -218,10 +218,10 @@ def _checks(file: ModelFile) -> list[str]:
     """Refuses parameters that are not finite or break a condition, or leave it undefined."""
     graph, code = file.graph, Code(leaves(file))
     conditions = [
-        (f"isfinite(values->{FIELD.format(v.name)})", f"{v.name} is not finite")
+        (f"isfinite(values->{field_of(v.name)})", f"{v.name} is not finite")
         for v in file.of("parameters")
     ]
-    for message, check in file.checks.items():
+    for message, check in file.checks:
         holds, unknown = check.value, graph.unknown(check.value)
         if unknown is not None:
             holds = graph.value("and", graph.value("not", unknown), holds)

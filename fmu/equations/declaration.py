@@ -7,12 +7,13 @@ from typing import Any
 
 from declaration.load import UNITS
 from declaration.load import read as read_declaration
-from equations_content import FOLLOWS, OPTIONS, SWITCHES, ModelFile, Variable, placed
+from equations_content import COUNTS, FOLLOWS, OPTIONS, SWITCHES, ModelFile, Variable, placed
 from equations_file import NUMBERS
 
 from equations import c_events, c_model
-from equations.c_events import FIELD, INDICATOR, MODE
+from equations.c_code import field_of, indicator_of, mode_of, rate_of
 from equations.graph import MOVING, Relation, Value
+from rparm.expressions.expression import CONDITION, WHOLE
 from rparm.expressions.units import shown
 
 INSTANCE = UNITS.parents[2] / "src" / "instance"
@@ -23,11 +24,13 @@ TIME_EVENTS = INSTANCE / "time_event_variables.toml"
 
 Key = tuple[str, str]  # name and kind of a variable
 Leaf = tuple[str, str]  # of the graph: operation and name
+TYPES = {CONDITION: "boolean", WHOLE: "int32"}
 CAUSALITIES = {
     "parameters": "parameter",
     FOLLOWS: "calculatedParameter",
     OPTIONS: "parameter",
     SWITCHES: "input",
+    COUNTS: "output",
     "inputs": "input",
     "states": "output",
     "discrete": "output",
@@ -81,7 +84,7 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
     for state in states:
         rate = state.exponents | {"s": state.exponents.get("s", 0) - file.has_units}
         tables[f"der_{state.name}"] = {
-            **_local(c_model.RATE.format(state.name)),
+            **_local(rate_of(state.name)),
             "unit": _unit(units, rate),
             "derivative_of": state.name,
             **_dependencies(state.value, file),
@@ -89,10 +92,10 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
         }
     for mode in file.modes if c_events.has_events(file) else ():
         own = {"type": "boolean", "variability": "discrete", "description": f"Mode {mode}"}
-        tables[mode] = _local(MODE.format(mode)) | own
+        tables[mode] = _local(mode_of(mode)) | own
     for name, relation in indicators.items():
         tables[name] = {
-            **_local(INDICATOR.format(relation.name)),
+            **_local(indicator_of(relation.name)),
             "unit": "1",
             **_dependencies(relation.distance, file),
             "description": "Distance from an event; 1 while it plays no role",
@@ -107,6 +110,7 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
         "values": c_model.STRUCTURE,
         "symbol": c_model.SYMBOL,
         "event_indicators": [*indicators],
+        "naming": "structured" if any(file.dimensions.values()) else "flat",
         "time_events": len(indicators) < len(relations) or bool(file.sampled),
     }
     includes = [TIME, *([EVENTS] if relations else [])]
@@ -143,16 +147,9 @@ def _entries_of(
 ) -> dict[str, object]:
     """Table of a variable of the file."""
     causality = CAUSALITIES[variable.section]
-    if variable.is_boolean:
-        return {
-            "field": MODE.format(variable.name),
-            "type": "boolean",
-            "causality": causality,
-            "variability": "tunable" if variable.section == OPTIONS else "discrete",
-            "start": variable.start,
-            "description": variable.description or variable.name,
-        }
-    entries = _local(FIELD.format(variable.name)) | {"causality": causality}
+    if not variable.is_real:
+        return _entries_of_count(variable, file)
+    entries = _local(field_of(variable.name)) | {"causality": causality}
     if causality == "parameter":
         is_fixed = ("parameter", variable.name) in _fixed(file)
         entries["variability"] = "fixed" if is_fixed else "tunable"
@@ -172,10 +169,36 @@ def _entries_of(
         entries |= {"initial": "calculated", **_initially({(op, variable.name)}, {}, file)}
     with placed(file.path, variable.place, variable.name, "unit"):
         entries["unit"] = _unit(units, variable.exponents, variable.unit)
+    if variable.display:
+        entries["display"] = dict(zip(("name", "factor", "offset"), variable.display, strict=True))
     numbers = {key: getattr(variable, key) for key in NUMBERS}
     entries |= {key: number for key, number in numbers.items() if number is not None}
     if variable.section == "outputs":
         entries |= _dependencies(variable.value, file)
+    return entries | {"description": variable.description or variable.name}
+
+
+def _entries_of_count(variable: Variable, file: ModelFile) -> dict[str, object]:
+    """Table of a condition, a whole number or an enumeration."""
+    kind, is_parameter = variable.kind, variable.section == OPTIONS
+    leaf: Leaf = (variable.leaf.op, variable.name)
+    variability = "discrete" if not is_parameter else "fixed" if leaf in _fixed(file) else "tunable"
+    entries: dict[str, object] = {
+        "field": mode_of(variable.name),
+        "type": TYPES.get(kind, "enumeration") if isinstance(kind, str) else "enumeration",
+        "causality": CAUSALITIES[variable.section],
+        "variability": variability,
+    }
+    if isinstance(kind, tuple):
+        entries["items"] = {item: {"description": item} for item in kind}
+    bounds = {"min": variable.min, "max": variable.max}
+    entries |= {key: number for key, number in bounds.items() if number is not None}
+    if variable.section == COUNTS:
+        entries |= _known_of(_reached({leaf}, file, ["discrete"]), file)
+        entries |= _initially({leaf}, {}, file)
+    else:
+        start = variable.start
+        entries["start"] = kind[start - 1] if isinstance(kind, tuple) else start
     return entries | {"description": variable.description or variable.name}
 
 
@@ -233,7 +256,8 @@ def _reached(leaves: Iterable[Leaf], file: ModelFile, changed: Collection[str]) 
             todo += [
                 leaf for v in file.started if v.name == name for leaf in v.initial.value.leaves
             ]
-        for change in file.changes if op in changed else ():
+        is_changed = op in changed or _is_in(file, name, COUNTS)
+        for change in file.changes if is_changed else ():
             if name in change.given:
                 own = [*change.conditions, change.given[name]]
                 todo += [leaf for expression in own for leaf in expression.value.leaves]

@@ -11,11 +11,11 @@ Of tables: entry, of an array by one or two segments, and locate, the segment of
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 
-from equations_tables import Table
+from equations_tables import FAR, Table
 
 from rparm.expressions.expression import RELATIONS, Node, in_order, parse
 
@@ -29,8 +29,9 @@ LEAVES = (
 MOVING = ("input", "state", "time")
 RUNTIME = ("first", "second")  # derivatives that may be 0 in one call and not in another
 CONDITIONS = ("mode", "and", "or", "not", "isnan", "isfinite", "==", *RELATIONS)
-STILL = (*CONDITIONS, "value_of", "entry", "locate")  # derivatives are 0
+STILL = (*CONDITIONS, "value_of", "entry", "locate", "floor")  # derivatives are 0
 PRODUCTS_UP_TO = 8  # whole exponents that are repeated multiplication
+MOST_COUNTED = 2**30  # by floor of what moves
 WHOLE_UP_TO = 64  # whole exponents whose derivatives are defined at 0
 # derivatives of y = f(x) or f(x, z) by each argument
 DERIVATIVES = {
@@ -102,11 +103,12 @@ class Relation:
 
 @dataclass(frozen=True)
 class Segment:
-    """The segment of a table in which a value that moves is; it changes at events only."""
+    """The segment of a table, or the whole number, at a value that moves; events change it."""
 
     leaf: Value
     argument: Value
-    bounds: str  # array of them
+    bounds: str  # array of them; "" of whole numbers
+    first: int  # number of the first one
     count: int  # of the table's segments
     low: Relation  # holds above its begin
     high: Relation  # holds from its end on
@@ -172,6 +174,10 @@ class Graph:
                     value = self._choice(is_first, *given)
                 case "if":
                     value = self._choice(*given)
+                case "floor":
+                    value = self._whole(*given, is_instant)
+                case "!=":
+                    value = self.value("not", self.value("==", *given))
                 case "table":
                     value = self._looked_up(self.tables[node.name], given, is_instant)
                 case op:
@@ -202,15 +208,42 @@ class Graph:
         bounds = table.array("bounds", axis)
         if is_instant or not (self.has_switches and x.moves):
             return self.value("locate", x, name=bounds)
+        ends = [table.array(end, axis) for end in ENDS]
+        count = len(table.axes[axis].origins)
+        return self._between(
+            x, bounds, 0, count, lambda leaf: [self.value("entry", leaf, name=end) for end in ends]
+        )
+
+    def _whole(self, x: Value, is_instant: bool) -> Value:
+        """The largest whole number up to x, which stays between events if x moves."""
+        if is_instant or not (self.has_switches and x.moves):
+            return self.value("floor", x)
+        end = self.number(float(MOST_COUNTED))
+
+        def is_inside(leaf: Value) -> list[Value]:
+            return [self.value("<", self.negative(end), leaf), self.value("<", leaf, end)]
+
+        def ends(leaf: Value) -> list[Value]:
+            bounds = [leaf, self.value("+", leaf, self.number(1.0))]
+            far = [self.number(-FAR), self.number(FAR)]
+            choices = zip(is_inside(leaf), bounds, far, strict=True)
+            return [self.value("if", *choice) for choice in choices]
+
+        leaf = self._between(x, "", -MOST_COUNTED, 2 * MOST_COUNTED + 1, ends)
+        is_known = self.value("and", *is_inside(leaf))
+        return self.value("if", is_known, leaf, self.number(math.nan))
+
+    def _between(
+        self, x: Value, bounds: str, first: int, count: int, ends: Callable[[Value], list[Value]]
+    ) -> Value:
+        """The number of the segment of x, whose ends follow from it."""
         for known in self.segments.values():
             if known.argument is x and known.bounds == bounds:
                 return known.leaf
         name = f"segment {len(self.segments) + 1}"
         leaf = self.value("integer", name=name)
-        sides = [self.value("entry", leaf, name=table.array(end, axis)) for end in ENDS]
-        low, high = (self.relations[self.switch(">=", x, side).name] for side in sides)
-        count = len(table.axes[axis].origins)
-        self.segments[name] = Segment(leaf, x, bounds, count, low, high)
+        low, high = (self.relations[self.switch(">=", x, end).name] for end in ends(leaf))
+        self.segments[name] = Segment(leaf, x, bounds, first, count, low, high)
         return leaf
 
     def _choice(self, condition: Value, first: Value, second: Value) -> Value:
@@ -224,7 +257,7 @@ class Graph:
         """Whether a relation that decides on a condition has no value; None: all have one."""
         if condition.name in self.relations:
             sides = self.relations[condition.name].distance.arguments
-        elif condition.op in RELATIONS:
+        elif condition.op in (*RELATIONS, "=="):
             sides = condition.arguments
         else:
             unknown = [self.unknown(argument) for argument in condition.arguments]

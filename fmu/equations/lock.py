@@ -13,8 +13,9 @@ from equations_content import ModelFileError
 from equations.declaration import Key
 
 RESERVED = (0, *range(80, 100))  # the time, the variables of the integrator
-LARGEST = 9999
-NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)  # longer than in a file: der_ and others stand in front
+LARGEST = 99_999
+# longer than in a file: der_ and others stand in front
+ELEMENT = re.compile(r"[A-Za-z]\w*(\[[0-9]+(,[0-9]+)*\])?", re.ASCII)
 HEAD = "# Value references of {name}: written by the build. Keep it with the model.\n"
 
 
@@ -71,7 +72,7 @@ def _read(path: Path) -> dict[Key, int]:
 def _entry(entry: object) -> tuple[Key, int]:
     match entry:
         case {"name": str(name), "kind": str(kind), "reference": int(reference)}:
-            fine = len(entry) == 3 and NAME.fullmatch(name) and kind.isalpha()
+            fine = len(entry) == 3 and ELEMENT.fullmatch(name) and kind.isalpha()
             if fine and reference not in RESERVED and 0 < reference <= LARGEST:
                 return (name, kind), reference
     raise ValueError(f"{str(entry)[:100]} has no name, kind and free reference")

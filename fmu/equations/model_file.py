@@ -5,10 +5,10 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import equations_file
-from equations_content import OPTIONS, SWITCHES, ModelFile, ModelFileError
+from equations_content import COUNTS, OPTIONS, SWITCHES, ModelFile, ModelFileError
 
 from equations.graph import Graph
-from rparm.expressions.expression import RELATIONS, derivative_of
+from rparm.expressions.expression import CONDITION, RELATIONS, derivative_of
 
 __all__ = ["ModelFile", "ModelFileError", "read"]
 LEAVES = {
@@ -16,8 +16,9 @@ LEAVES = {
     "inputs": "input",
     "states": "state",
     "discrete": "discrete",
-    OPTIONS: "mode",
-    SWITCHES: "mode",
+    OPTIONS: "integer",  # conditions are modes
+    SWITCHES: "integer",
+    COUNTS: "integer",
 }
 
 
@@ -28,7 +29,8 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     has_switches = bool(file.of("states") or file.events)
     graph = file.graph = Graph(tables=file.tables, has_switches=has_switches)
     for variable in file.of(*LEAVES):
-        variable.leaf = graph.value(LEAVES[variable.section], name=variable.name)
+        op = "mode" if variable.kind == CONDITION else LEAVES[variable.section]
+        variable.leaf = graph.value(op, name=variable.name)
     known = {variable.name: variable.leaf for variable in file.of(*LEAVES)}
     known |= {mode: graph.value("mode", name=mode) for mode in file.modes}
     known |= {"time": graph.value("time"), "pi": graph.number(math.pi)}

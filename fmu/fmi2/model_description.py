@@ -24,7 +24,7 @@ def model_description(
         modelName=model.name,
         guid=declaration.guid,
         **description_parts.texts_of(declaration, provenance),
-        variableNamingConvention="flat",
+        variableNamingConvention=model.naming,
         numberOfEventIndicators=str(len(model.event_indicators)),
     )
     add_interfaces(root, model.name, sources)
@@ -114,8 +114,7 @@ def add_variable(
         element.set("declaredType", description_parts.type_name(name))
     if isinstance(variable, Float64):
         element.set("unit", variable.unit)
-        for display in list(units[variable.unit].display)[:1]:
-            element.set("displayUnit", display)
+        element.attrib |= description_parts.display_unit(variable, units)
     if variable.derivative_of is not None:
         element.set("derivative", index[variable.derivative_of])
     if variable.reinit:

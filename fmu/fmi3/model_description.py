@@ -25,7 +25,7 @@ def model_description(declaration: Declaration, provenance: Provenance) -> str:
         modelName=model.name,
         instantiationToken=declaration.token("fmi3"),
         **description_parts.texts_of(declaration, provenance),
-        variableNamingConvention="flat",
+        variableNamingConvention=model.naming,
     )
     add_interfaces(root, model.name, has_events=model.has_events)
     description_parts.add_units(root, declaration.units)
@@ -83,14 +83,14 @@ def add_types(root: ET.Element, declaration: Declaration) -> None:
 def float_type_name(variable: Float64) -> str:
     """Return the name of the type of a floating-point number, for example "Float64 in rad/s"."""
     nominal = "" if variable.nominal is None else f", nominal {variable.nominal!r}"
-    return f"Float64 in {variable.unit}{nominal}"
+    shown = "" if variable.display is None else f", shown in {variable.display.name}"
+    return f"Float64 in {variable.unit}{nominal}{shown}"
 
 
 def add_float_type(parent: ET.Element, variable: Float64, units: dict[str, Unit]) -> None:
     keys = {"name": float_type_name(variable), "unit": variable.unit}
     element = ET.SubElement(parent, "Float64Type", keys)
-    for display in list(units[variable.unit].display)[:1]:
-        element.set("displayUnit", display)
+    element.attrib |= description_parts.display_unit(variable, units)
     if variable.nominal is not None:
         element.set("nominal", repr(variable.nominal))
 

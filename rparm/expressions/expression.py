@@ -7,6 +7,7 @@ import math
 import operator
 import re
 from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from typing import Any, TypeVar
@@ -18,29 +19,31 @@ FUNCTIONS: dict[str, int | None] = dict.fromkeys(
     1,
 ) | {"atan2": 2, "min": None, "max": None}
 RELATIONS = ("<", "<=", ">", ">=")
+EQUALITIES = ("==", "!=")  # of what is counted or named
 CONSTANTS = ("pi",)
 LITERALS = {"true": 1.0, "false": 0.0}
 # not to be used as names: operators, and words that other languages execute or give a value
 WORDS = ("and", "or", "not", "if", "else")
 NO_NAMES = (*WORDS, *LITERALS, "True", "False", "None", "lambda")
 Item = TypeVar("Item", bound=Any)  # hashable, with `arguments` of its own kind
-NUMBER, CONDITION = "a number", "a condition"
 LOGIC = ("and", "or", "not")
 DEEPEST = 100  # levels of brackets and other nesting
 UNIT_ONE = "1"  # name of an operation whose value has this unit
-MOST_OPERATIONS = 10_000  # that functions make of an expression: they multiply
+MOST_OPERATIONS = 100_000  # that functions and sums make of an expression: they multiply
+TOO_LARGE = f"functions and sums make more than {MOST_OPERATIONS} operations of this expression"
 DERIVATIVE = "der"  # of a state, in front of a bracket
 SPACE = re.compile(r"\s*")
 TOKEN = re.compile(
-    r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?![\w.])"
+    r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?!\w|\.(?!\.))"
     r"|(?P<name>[^\W\d]\w*(?:\.[^\W\d]\w*)*)"
-    r"|(?P<operator>\*\*|<=|>=|[-+*/<>(),])"
+    r"|(?P<text>\"[^\"]*\"|'[^']*')"
+    r"|(?P<operator>\*\*|[<>=!]=|\.\.|[-+*/<>(),\[\]=])"
 )
 SHOWN = 30  # characters of the text in a message
 # how tightly operators bind
 CONDITIONAL, OR, AND, NOT, RELATION, SUM, PRODUCT, SIGN, POWER = range(1, 10)
 BINDING = {"if": CONDITIONAL, "or": OR, "and": AND, "+": SUM, "-": SUM, "*": PRODUCT, "/": PRODUCT}
-BINDING |= {"**": POWER} | dict.fromkeys(RELATIONS, RELATION)
+BINDING |= {"**": POWER} | dict.fromkeys((*RELATIONS, *EQUALITIES), RELATION)
 LONGEST = 1000  # characters
 OPERATIONS: dict[str, Callable[..., float]] = {
     "+": operator.add,
@@ -49,6 +52,8 @@ OPERATIONS: dict[str, Callable[..., float]] = {
     "/": operator.truediv,
     "**": math.pow,
     "negative": operator.neg,
+    "==": operator.eq,
+    "!=": operator.ne,
     "<": operator.lt,
     "<=": operator.le,
     ">": operator.gt,
@@ -57,8 +62,8 @@ OPERATIONS: dict[str, Callable[..., float]] = {
     "or": lambda a, b: a or b,
     "not": operator.not_,
 }
-BUILT_IN = {"abs": abs, "min": min, "max": max}
-OPERATIONS |= {name: BUILT_IN.get(name) or getattr(math, name) for name in FUNCTIONS}
+BUILT_IN = {"abs": abs, "min": min, "max": max, "floor": math.floor}
+OPERATIONS |= {name: BUILT_IN.get(name) or getattr(math, name) for name in (*FUNCTIONS, "floor")}
 
 
 # ---- The tree ------------------------------------------------------------------------------------
@@ -74,9 +79,12 @@ class Node:
     """An operation, a number or a name.
 
     op is "number" (then `value` counts), "literal" (a condition: whether `value` is 1), "name"
-    (then `name`), "table" (a look-up in the table `name`), an operator of `RELATIONS`, + - * / **,
-    "negative", "and", "or", "not", "if" (arguments: condition, value if true, otherwise), or a name
-    of `FUNCTIONS`. min and max have two arguments here.
+    (then `name`), "text" (`name`, an item of an enumeration), "table" (a look-up in the table
+    `name`), an operator of `RELATIONS` or `EQUALITIES`, + - * / **, "negative", "and", "or", "not",
+    "if" (arguments: condition, value if true, otherwise), "floor", or a name of `FUNCTIONS`. min
+    and max have two arguments here.
+    Until `at_indexes` has replaced them: "element" of an array (arguments: its indexes; `name` has
+    {} where they come), "sum" of the `body` over the index `name` (arguments: first and last).
     """
 
     op: str
@@ -84,6 +92,7 @@ class Node:
     arguments: tuple["Node", ...] = ()
     value: float = 0.0
     name: str = ""
+    body: "Node | None" = None
 
 
 def in_order(roots: Iterable[Item], known: Container[Item] = ()) -> list[Item]:
@@ -119,22 +128,88 @@ def finite_number(given: Any) -> float:
 
 
 # ---- Kinds of its parts --------------------------------------------------------------------------
-def check_kinds(root: Node, expected: str = NUMBER, conditions: Collection[str] = ()) -> None:
-    """Raise ExpressionError where a part is of the wrong kind; `conditions` are Booleans' names."""
-    for node in in_order([root]):
-        for number, argument in enumerate(node.arguments):
-            is_condition = node.op in LOGIC or (node.op == "if" and number == 0)
-            _check(argument, CONDITION if is_condition else NUMBER, conditions)
-    _check(root, expected, conditions)
+NUMBER, WHOLE, CONDITION, TEXT = "a number", "a whole number", "a condition", "a text"
+KEEP_WHOLE = ("+", "-", "*", "negative", "abs", "min", "max", "if")  # of whole numbers
+Kind = str | tuple[str, ...]  # the items of an enumeration
 
 
-def _check(node: Node, expected: str, conditions: Collection[str]) -> None:
-    is_condition = node.op == "name" and node.name in conditions
-    found = CONDITION if is_condition or node.op in ("literal", *LOGIC, *RELATIONS) else NUMBER
-    if found != expected:
-        constants = {"number": "the number", "literal": "true" if node.value else "false"}
-        what = node.name or constants.get(node.op, repr(node.op))
-        raise ExpressionError(node.column, f"expected {expected}, {what} gives {found}")
+def with_kinds(
+    root: Node, expected: Kind = NUMBER, kinds: Mapping[str, Kind] | None = None
+) -> Node:
+    """Return the tree with numbers (from 1) in place of items of enumerations.
+
+    ExpressionError where a part is of the wrong kind. `kinds` has the names that are no numbers.
+    """
+    nodes, found = in_order([root]), {}
+    for node in nodes:
+        found[node] = _kind(node, [found[argument] for argument in node.arguments], kinds or {})
+    items: dict[Node, Node] = {}
+    needed, pairs = {root: expected}, [(root, expected)]
+    for node in reversed(nodes):
+        of_arguments = [*zip(node.arguments, _needed(node, needed[node], found), strict=True)]
+        pairs += of_arguments[::-1]
+        needed |= of_arguments
+        if node.op == "text" and not isinstance(needed[node], str):
+            items[node] = _constant(node, needed[node].index(node.name) + 1)
+    for node, kind in reversed(pairs):
+        _check(node, found[node], kind)
+    if items:
+        for node in nodes:
+            given = tuple(items.get(argument, argument) for argument in node.arguments)
+            if given != node.arguments:
+                items[node] = replace(node, arguments=given)
+    return items.get(root, root)
+
+
+def _kind(node: Node, given: list[Kind], kinds: Mapping[str, Kind]) -> Kind:
+    if node.op == "name":
+        return kinds.get(node.name, NUMBER)
+    if node.op == "text":
+        return TEXT
+    if node.op in ("literal", *LOGIC, *RELATIONS, *EQUALITIES):
+        return CONDITION
+    if node.op == "if" and not {*given[1:]} <= {NUMBER, WHOLE, CONDITION}:
+        return max(given[1:], key=lambda kind: isinstance(kind, tuple))
+    is_whole = node.op == "number" and node.value.is_integer()
+    is_whole |= node.op in KEEP_WHOLE and {*given[node.op == "if" :]} == {WHOLE}
+    return WHOLE if is_whole or node.op == "floor" else NUMBER
+
+
+def _needed(node: Node, own: Kind, found: Mapping[Node, Kind]) -> list[Kind]:
+    """Return the kinds that the arguments must have."""
+    given = [found[argument] for argument in node.arguments]
+    if node.op in LOGIC:
+        return [CONDITION] * len(given)
+    if node.op == "if":
+        is_item = not {*given[1:]} <= {NUMBER, WHOLE, CONDITION}
+        return [CONDITION, *[own if is_item else NUMBER] * 2]
+    if node.op in EQUALITIES:
+        enumerations = [kind for kind in given if isinstance(kind, tuple)]
+        if not enumerations and {*given} not in ({WHOLE}, {CONDITION}):
+            what = "compares whole numbers, conditions and enumerations"
+            raise ExpressionError(node.column, f"{node.op!r} {what}, not {given[0]} and {given[1]}")
+        return [enumerations[0] if enumerations else given[0]] * 2
+    return [NUMBER] * len(given)
+
+
+def _check(node: Node, found: Kind, needed: Kind) -> None:
+    if found == needed or (found, needed) == (WHOLE, NUMBER):
+        return
+    if found == TEXT and (node.op == "if" or node.name in needed) and isinstance(needed, tuple):
+        return
+    constants = {"number": "the number", "literal": "true" if node.value else "false"}
+    what = shown_text(node.name) if node.op == "text" else node.name
+    what = what or constants.get(node.op, repr(node.op))
+    wanted, given = (
+        kind if isinstance(kind, str) else f"one of {', '.join(map(shown_text, kind))}"
+        for kind in (needed, found)
+    )
+    raise ExpressionError(node.column, f"expected {wanted}, {what} gives {given}")
+
+
+def shown_text(text: str) -> str:
+    """Return a text as expressions have it."""
+    return f'"{text:.{SHOWN}}"'
 
 
 # ---- Its parser ----------------------------------------------------------------------------------
@@ -174,15 +249,32 @@ class Function:
 
 
 @dataclass(frozen=True)
+class Range:
+    """An index with its first and last value."""
+
+    index: str
+    first: Node
+    last: Node
+
+    def values(self, indexes: Mapping[str, int]) -> range:
+        """Return its values; `indexes`: sizes and other indexes."""
+        first, last = (_index(at_indexes(node, indexes)) for node in (self.first, self.last))
+        if last - first >= MOST_OPERATIONS:
+            raise ExpressionError(self.last.column, f"more than {MOST_OPERATIONS} values")
+        return range(first, last + 1)
+
+
+@dataclass(frozen=True)
 class Lookup:
-    """A table, which is called as a function."""
+    """A table, or another operation, which is called as a function."""
 
     name: str
     arguments: tuple[str, ...]
+    op: str = "table"
 
     def of(self, given: Sequence[Node], column: int) -> Node:
         """Return the look-up at these arguments."""
-        return Node("table", column, tuple(given), name=self.name)
+        return Node(self.op, column, tuple(given), name=self.name)
 
 
 def parse(text: str, functions: Mapping[str, Function | Lookup] | None = None) -> Node:
@@ -190,11 +282,23 @@ def parse(text: str, functions: Mapping[str, Function | Lookup] | None = None) -
 
     functions: further ones, by name.
     """
-    parser = _Parser(_tokens(text), {**FURTHER, **(functions or {})})
+    parser = _Parser(_tokens(text), FURTHER if functions is None else {**FURTHER, **functions})
     root = parser.expression(CONDITIONAL)
     if parser.token.kind != "end":
         raise parser.unexpected("an operator")
     return root
+
+
+def parse_ranges(text: str) -> list[Range]:
+    """Parse "i = 1..n, j = 1..i"; ExpressionError says what is wrong with it."""
+    parser = _Parser(_tokens(text), FURTHER)
+    found = [parser.range()]
+    while parser.token.text == ",":
+        parser.take()
+        found.append(parser.range())
+    if parser.token.kind != "end":
+        raise parser.unexpected("','")
+    return found
 
 
 def _tokens(text: str) -> list[Token]:
@@ -254,7 +358,7 @@ class _Parser:
             otherwise = self.expression(CONDITIONAL)
             return Node("if", operator.column, (condition, left, otherwise))
         right = self.expression(SIGN if binding == POWER else binding + 1)
-        if binding == RELATION and self.token.text in RELATIONS:
+        if binding == RELATION and self.token.text in (*RELATIONS, *EQUALITIES):
             raise self.unexpected("no second relation: write a < b and b < c")
         return Node(operator.text, operator.column, (left, right))
 
@@ -262,14 +366,15 @@ class _Parser:
         token = self.token
         if token.kind == "number":
             return self.number()
+        if token.kind == "text":
+            self.take()
+            return Node("text", token.column, name=token.text[1:-1])
         if token.text in LITERALS:
             self.take()
             return Node("literal", token.column, value=LITERALS[token.text])
         if token.kind == "name" and token.text not in NO_NAMES:
             self.take()
-            if self.token.text == "(":
-                return self.call(token)
-            return Node("name", token.column, name=token.text)
+            return self.call(token) if self.token.text == "(" else self.variable(token)
         if token.text == "(":
             self.take()
             inner = self.expression(CONDITIONAL)
@@ -284,6 +389,37 @@ class _Parser:
             return Node("not", token.column, (self.expression(NOT),))
         raise self.unexpected("a number, a name or '('")
 
+    def variable(self, token: Token, form: str = "{}") -> Node:
+        """Parse the indexes of a variable, if it has any; form: of its name."""
+        if self.token.text != "[":
+            return Node("name", token.column, name=form.format(token.text))
+        indexes = []
+        while self.token.text == ("," if indexes else "["):
+            self.take()
+            indexes.append(self.expression(CONDITIONAL))
+        self.expect("]")
+        name = form.format(f"{token.text}[{','.join(['{}'] * len(indexes))}]")
+        return Node("element", token.column, tuple(indexes), name=name)
+
+    def range(self) -> Range:
+        """Parse "i = 1..n"."""
+        token = self.take()
+        if token.kind != "name" or token.text in NO_NAMES or "." in token.text:
+            raise ExpressionError(token.column, f"expected an index such as i, got {token.shown}")
+        self.expect("=")
+        first = self.expression(CONDITIONAL)
+        self.expect("..")
+        return Range(token.text, first, self.expression(CONDITIONAL))
+
+    def sum(self, column: int) -> Node:
+        """Parse the range and the terms of a sum."""
+        self.take()
+        over = self.range()
+        self.expect(",")
+        body = self.expression(CONDITIONAL)
+        self.expect(")")
+        return Node("sum", column, (over.first, over.last), name=over.index, body=body)
+
     def number(self) -> Node:
         token = self.take()
         value = float(token.text)
@@ -294,10 +430,12 @@ class _Parser:
     def call(self, function: Token) -> Node:
         """Parse the arguments of a function."""
         if function.text == DERIVATIVE:
-            return self.derivative(function)
+            return self.derivative()
+        if function.text == "sum":
+            return self.sum(function.column)
         further = self._functions.get(function.text)
         if function.text not in FUNCTIONS and further is None:
-            known = ", ".join([*FUNCTIONS, *self._functions, DERIVATIVE])
+            known = ", ".join([*FUNCTIONS, *self._functions, DERIVATIVE, "sum"])
             raise ExpressionError(function.column, f"no function {function.shown} (known: {known})")
         arguments = []
         separator = "("
@@ -322,18 +460,18 @@ class _Parser:
         if isinstance(function, Function):
             self._operations += len(in_order([function.body]))
         if self._operations > MOST_OPERATIONS:
-            text = f"functions make more than {MOST_OPERATIONS} operations of this expression"
-            raise ExpressionError(column, text)
+            raise ExpressionError(column, TOO_LARGE)
         return function.of(arguments, column)
 
-    def derivative(self, function: Token) -> Node:
+    def derivative(self) -> Node:
         """Parse the state whose derivative is meant."""
         self.expect("(")
         state = self.take()
         if state.kind != "name":
             raise ExpressionError(state.column, f"expected a state, got {state.shown}")
+        found = self.variable(state, derivative_of("{}"))
         self.expect(")")
-        return Node("name", function.column, name=derivative_of(state.text))
+        return found
 
 
 def derivative_of(state: str) -> str:
@@ -341,15 +479,103 @@ def derivative_of(state: str) -> str:
     return f"{DERIVATIVE}({state})"
 
 
-# functions that are no operations of their own; their names are free for variables
-FURTHER: dict[str, Function] = {}
+# functions whose names are free for variables
+FURTHER: dict[str, Function | Lookup] = {"floor": Lookup("floor", ("x",), "floor")}
 for _name, _arguments, _body in (
     ("sign", "x", "1 if x > 0 else -1 if x < 0 else 0"),
     ("hypot", "x y", "sqrt(x**2 + y**2)"),
     ("log10", "x", f"log(x) / {math.log(10)!r}"),
     ("cbrt", "x", f"x**{1 / 3!r} if x >= 0 else -(-x)**{1 / 3!r}"),
+    ("ceil", "x", "-floor(-x)"),
+    ("round", "x", "floor(x + 0.5)"),
+    ("mod", "x y", "x - y * floor(x / y)"),
 ):
-    FURTHER[_name] = Function(tuple(_arguments.split()), parse(_body), _name == "sign")
+    FURTHER[_name] = Function(tuple(_arguments.split()), parse(_body, FURTHER), _name == "sign")
+
+
+# ---- Indexes -------------------------------------------------------------------------------------
+def at_indexes(root: Node, indexes: Mapping[str, int]) -> Node:
+    """Replace indexes by their values, elements by their names, and sums by their terms.
+
+    Conditions on indexes alone are decided. ExpressionError where an index is none.
+    """
+    return _AtIndexes(dict(indexes)).of(root)
+
+
+class _AtIndexes:
+    def __init__(self, indexes: dict[str, int]) -> None:
+        self.indexes = indexes
+        self.count = 0  # of operations
+
+    def of(self, root: Node) -> Node:
+        found: dict[Node, Node] = {}
+        decided: set[Node] = set()  # by indexes and numbers
+        fixed: set[Node] = set()  # by numbers
+        nodes = in_order([root])
+        self.count += len(nodes)
+        if self.count > MOST_OPERATIONS:
+            raise ExpressionError(root.column, TOO_LARGE)
+        for node in nodes:
+            given = tuple(found[argument] for argument in node.arguments)
+            new = node if given == node.arguments else replace(node, arguments=given)
+            if node.op == "name" and node.name in self.indexes:
+                new = _constant(node, self.indexes[node.name])
+                decided.add(new)
+            elif node.op in ("number", "literal"):
+                fixed.add(new)
+            elif node.op == "element":
+                name = node.name.format(*map(_index, given))
+                new = Node("name", node.column, name=name)
+            elif node.op == "sum":
+                new = self.summed(node, given)
+            elif node.op in ("if", "and", "or") and decided.intersection(given):
+                new = _decided(new, decided)
+            elif node.op in OPERATIONS and {*given} <= fixed:
+                fixed.add(new)
+            elif node.op in OPERATIONS and {*given} <= fixed | decided:
+                with suppress(ArithmeticError, ValueError):
+                    new = _constant(node, evaluated(new, {}))
+                    decided.add(new)
+            found[node] = new
+        return found[root]
+
+    def summed(self, node: Node, given: tuple[Node, ...]) -> Node:
+        """Return the terms of a sum, added from the first on."""
+        if node.name in self.indexes:
+            raise ExpressionError(node.column, f"index {node.name!r} has a meaning already")
+        terms = []
+        for value in Range(node.name, *given).values({}):
+            self.indexes[node.name] = value
+            terms.append(self.of(node.body))
+        self.indexes.pop(node.name, None)
+        if not terms:
+            return _constant(node, 0)
+        return reduce(lambda a, b: Node("+", node.column, (a, b)), terms)
+
+
+def _constant(node: Node, value: float | bool) -> Node:
+    return Node("literal" if type(value) is bool else "number", node.column, value=float(value))
+
+
+def _decided(node: Node, decided: Collection[Node]) -> Node:
+    """Return the part of an operation that counts, where a condition is decided."""
+    first, second, *_ = node.arguments
+    if node.op == "if":
+        chosen = node.arguments[1 if first.value else 2]
+        return chosen if first in decided else node
+    rest, known = (second, first) if first in decided else (first, second)
+    return rest if known.value == (node.op == "and") else known
+
+
+def _index(node: Node) -> int:
+    """Return the value of an index; ExpressionError if it is not known or not whole."""
+    try:
+        value = evaluated(node, {})
+    except (KeyError, ArithmeticError, ValueError):
+        value = math.nan
+    if not math.isfinite(value) or value != int(value):
+        raise ExpressionError(node.column, "expected an index: of whole numbers, sizes and indexes")
+    return int(value)
 
 
 # ---- Values --------------------------------------------------------------------------------------
@@ -377,9 +603,7 @@ def parsed(text: str) -> Expression:
     """Parse and check an expression; ValueError says what is wrong with it."""
     if len(text) > LONGEST:
         raise ValueError(f"has more than {LONGEST} characters")
-    tree = parse(text)
-    check_kinds(tree)
-    return Expression(text, tree)
+    return Expression(text, with_kinds(at_indexes(parse(text), {})))
 
 
 def evaluated(root: Node, values: Mapping[str, float]) -> float:

@@ -4,11 +4,14 @@ A unit is the exponents of the SI base units; rad counts as 1. A number without 
 unit of what it is added to, compared with or assigned to; in products it is 1.
 """
 
+import math
 import re
 from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
 from fractions import Fraction
 
-from rparm.expressions.expression import RELATIONS, ExpressionError, Node, in_order
+from rparm.expressions.expression import EQUALITIES, RELATIONS, ExpressionError, Node, in_order
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd")
 ANGLE = "rad"
@@ -35,26 +38,93 @@ DERIVED = {
     "lm": "cd", "lx": "lm/(m.m)", "Bq": "1/s", "Gy": "J/kg", "Sv": "J/kg", "kat": "mol/s",
 }  # fmt: skip
 SYMBOLS: dict[str, dict[str, int]] = {base: {base: 1} for base in (*BASE, ANGLE)}
+PREFIXES = {prefix: Fraction(10) ** power for prefix, power in {
+    "T": 12, "G": 9, "M": 6, "k": 3, "h": 2, "d": -1, "c": -2, "m": -3, "u": -6, "n": -9, "p": -12,
+}.items()}  # fmt: skip
+# further symbols, by how many of a product one is; their prefixes and products are display units
+SCALED = {
+    "min": (Fraction(60), "s"), "h": (Fraction(3600), "s"), "d": (Fraction(86400), "s"),
+    "deg": (Fraction(math.pi) / 180, "rad"), "rev": (Fraction(math.pi) * 2, "rad"),
+    "rpm": (Fraction(math.pi) / 30, "rad/s"), "bar": (Fraction(10**5), "Pa"),
+    "g": (Fraction(1, 1000), "kg"), "t": (Fraction(1000), "kg"), "l": (Fraction(1, 1000), "m3"),
+}  # fmt: skip
+CELSIUS, ZERO_CELSIUS = "degC", Fraction("273.15")
 FACTOR = re.compile(r"([A-Za-z]+)(-?[1-9])?", re.ASCII)
 PRODUCT = re.compile(r"([^/()]+)(?:/(?:([^./()]+)|\(([^/()]+)\)))?")  # a.b, a/b or a/(b.c)
 
 
-def exponents(text: str) -> dict[str, int]:
-    """Return exponents of base units and rad in a product of symbols; ValueError if it is none."""
+@dataclass(frozen=True)
+class Measure:
+    """A unit as a user writes it: in SI a number is factor * number + offset of `base`."""
+
+    exponents: dict[str, int]  # of base units and rad, if not 0
+    factor: Fraction = Fraction(1)
+    offset: Fraction = Fraction(0)
+    base: str = ""  # the unit of SI, with prefixes left out; "": it has no name in the text
+
+    @property
+    def is_display(self) -> bool:
+        """Whether it is no unit of SI."""
+        return (self.factor, self.offset) != (1, 0)
+
+    def in_si(self, number: float, is_size: bool = False) -> float:
+        """Return a number in SI, rounded once; is_size: it is a difference."""
+        if not self.is_display:
+            return number
+        offset = 0 if is_size else self.offset
+        return float(Fraction(repr(number)) * self.factor + offset)
+
+
+def measured(text: str) -> Measure:
+    """Read a product of symbols; ValueError if it is none."""
+    if text == CELSIUS:
+        return Measure({"K": 1}, offset=ZERO_CELSIUS, base="K")
     product = PRODUCT.fullmatch(text)
     if product is None or (text.startswith("1") and text != "1" and not text.startswith("1/")):
         raise ValueError(f"unit {text!r} is no product of SI symbols such as kg.m/s2")
     found: dict[str, int] = {}
+    total, bases = Fraction(1), text
     for part, sign in ((product[1], 1), (product[2] or product[3], -1)):
         for factor in part.split(".") if part and part != "1" else ():
             symbol = FACTOR.fullmatch(factor)
-            if symbol is None or symbol[1] not in SYMBOLS:
+            known = _scaled(symbol[1]) if symbol else None
+            if known is None:
                 expected = "SI symbol with an exponent, such as s2"
                 raise ValueError(f"unit {text!r}: {factor!r} is no {expected}")
             power = sign * int(symbol[2] or 1)
-            for base, exponent in SYMBOLS[symbol[1]].items():
-                found[base] = found.get(base, 0) + power * exponent
-    return {base: exponent for base, exponent in found.items() if exponent}
+            scale, base = known
+            total *= scale**power
+            bases = re.sub(rf"(?<![A-Za-z]){symbol[1]}(?![A-Za-z])", base, bases)
+            of_base = SYMBOLS[base] if base in SYMBOLS else exponents(base)
+            for unit, exponent in of_base.items():
+                found[unit] = found.get(unit, 0) + power * exponent
+    found = {unit: exponent for unit, exponent in found.items() if exponent}
+    return Measure(found, total, base=bases if total == 1 or _is_of_si(bases, found) else "")
+
+
+def _is_of_si(text: str, expected: dict[str, int]) -> bool:
+    """Return whether a text is the unit of SI with these exponents."""
+    with suppress(ValueError):
+        return measured(text) == Measure(expected, base=text)
+    return False
+
+
+def _scaled(name: str) -> tuple[Fraction, str] | None:
+    """Return how many of a unit of SI a symbol is; None for an unknown one."""
+    if name in SYMBOLS:
+        return Fraction(1), name
+    if name in SCALED:
+        return SCALED[name]
+    prefix, rest = name[:1], name[1:]
+    if prefix not in PREFIXES or rest not in (*SYMBOLS, *SCALED) or rest in ("kg", "t", "d", "h"):
+        return None
+    scale, base = _scaled(rest)
+    return PREFIXES[prefix] * scale, base
+
+
+def exponents(text: str) -> dict[str, int]:
+    """Return exponents of base units and rad in a product of symbols; ValueError if it is none."""
+    return measured(text).exponents
 
 
 for _symbol, _product in DERIVED.items():
@@ -102,7 +172,7 @@ def _unit(node: Node, given: list[Unit | None], units: Mapping[str, Unit]) -> Un
         return _same(node, given)
     if node.op == "table":
         return _of_table(node, given, units)
-    if node.op in RELATIONS:
+    if node.op in (*RELATIONS, *EQUALITIES):
         _same(node, given)
         return ONE
     if node.op == "if":

@@ -20,7 +20,7 @@ TERMS = 13  # of Taylor's series of an exponential
 SAME = 1e-12  # relative, of times that differ by rounding only
 UNDEFINED = sys.float_info.max  # in place of a new value that is not finite
 # description of a local variable, as fmu/equations writes it
-ABOUT = re.compile(r"Sampler (\d+), (\w+): (?:(period|offset)|new value of (.+))")
+ABOUT = re.compile(r"Sampler (\d+), ([^:]+): (?:(period|offset)|(?:new value|change) of (.+))")
 
 
 @dataclass
@@ -29,7 +29,8 @@ class Sampler:
 
     name: str
     times: dict[str, str] = field(default_factory=dict)  # period and offset
-    new: dict[str, str] = field(default_factory=dict)  # new value of each variable that it sets
+    # new value of each variable that it sets; of modes and others that are no reals, the change
+    new: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +85,6 @@ def ticks(
     found = []
     for sampler in every:
         targets = [name for name in sampler.new if name in states]
-        modes = [name for name in sampler.new if name not in states]
         reals = instance.reals([*targets, *sampler.new.values(), *sampler.times.values()])
         with instance.explained("at the point"):
             reals.get()
@@ -102,7 +102,7 @@ def ticks(
                 [states.index(name) for name in targets],
                 instance.partials([sampler.new[name] for name in targets], [*states, *inputs]),
                 {name: new[name] - values[name] for name in targets},
-                [name for name in modes if new[name] != instance.boolean(name)],
+                [name for name in new if name not in states and new[name]],
             )
         )
     return tuple(found)

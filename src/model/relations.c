@@ -82,7 +82,7 @@ static bool update_segment(const struct call *call, int i, bool is_exact) {
     } else if (!is_exact && !is_above && found >= before) {
         found = before - 1;
     }
-    *number = found < 0 ? 0 : found < segment->count ? found : segment->count - 1;
+    *number = found < segment->first ? segment->first : found < segment->last ? found : segment->last;
     call->holds[segment->low] = 1;
     call->holds[segment->high] = 0;
     return *number != before;
@@ -371,9 +371,18 @@ static enum status start(const struct call *call, const struct event *event) {
     return start_samplers(call, event);
 }
 
-/* Returns STATUS_NOT_FINITE, with the reason, if a discrete variable is not finite. */
+/* Returns STATUS_NOT_FINITE, with the reason, if a discrete variable is not finite or no int. */
 static enum status check_discrete(const struct call *call, const struct event *event) {
     const struct relations *model = call->model;
+    for (int i = 0; i < model->count_count; i++) {
+        if (call->segments[model->segment_count + i] == RELATIONS_NO_COUNT) {
+            if (event->reason != NULL) {
+                (void)snprintf(event->reason, event->reason_size, "%s is beyond %d",
+                               model->count[i].name, INT_MAX);
+            }
+            return STATUS_NOT_FINITE;
+        }
+    }
     const double *discrete = discrete_in(model, call->values);
     const size_t first = model->sampler_count > 0 ? 1 + (size_t)model->sampler_count : 0;
     for (size_t i = first; i < model->discrete.size / sizeof *discrete; i++) {
@@ -446,12 +455,20 @@ static bool is_count(double ticks) {
 bool relations_are_plausible(const struct relations *model, const void *values) {
     const int *modes = modes_in(model, values);
     const int count = (int)(model->modes.size / sizeof *modes);
-    const int first = 1 + model->relation_count + model->event_count + 1; // segment
+    const int segments = 1 + model->relation_count + model->event_count + 1;
+    const int counts = segments + model->segment_count;
     bool are_fine = modes[0] == 1;
     for (int i = 0; i < count; i++) {
-        const bool is_segment = i >= first && i < first + model->segment_count;
-        const int end = is_segment ? model->segment[i - first].count : 2;
-        are_fine = are_fine && modes[i] >= 0 && modes[i] < end;
+        int first = 0;
+        int last = 1;
+        if (i >= counts) {
+            first = model->count[i - counts].first;
+            last = model->count[i - counts].last;
+        } else if (i >= segments) {
+            first = model->segment[i - segments].first;
+            last = model->segment[i - segments].last;
+        }
+        are_fine = are_fine && modes[i] >= first && modes[i] <= last;
     }
     for (int i = 0; i < model->sampler_count; i++) {
         are_fine = are_fine && is_count(discrete_in(model, values)[1 + i]);

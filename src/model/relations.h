@@ -8,6 +8,7 @@
 
 #include "model.h"
 
+#include <limits.h>
 #include <math.h>
 
 /* Constant properties of a relation. */
@@ -19,13 +20,19 @@ struct relation {
     size_t indicator;   /* of a relation that is not timed */
 };
 
-/* The segment of a table in which a value is, and the relations of the value with its ends. It
- * changes at events only. */
+/* The segment of a table in which a value is, or the whole number up to a value, and the relations
+ * of the value with its ends. It changes at events only. */
 struct segment {
     int low;           /* relation that holds from the segment's begin on */
     int high;          /* relation that holds from its end on */
-    int count;         /* number of the table's segments */
+    int first, last;   /* numbers of the table's segments */
     bool is_of_inputs; /* true if the value depends on inputs and parameters only */
+};
+
+/* A mode of the model, or a discrete variable that is a whole number. */
+struct count {
+    const char *name;
+    int first, last; /* smallest and largest value */
 };
 
 struct compared {
@@ -46,16 +53,18 @@ struct given {
 struct relations {
     size_t values_size;
     /* int[]: 1 if initialization has ended; the mode of each relation; 1 per event that is due; 0;
-     * the number of each segment; further modes of the model */
+     * the number of each segment; counts of the model */
     struct range modes;
     size_t states; /* offset of the states */
     /* double[], discrete states of the model: with samplers first the start time, s, and the number
      * of ticks of each sampler; then its discrete variables */
     struct range discrete;
-    int relation_count, event_count, sampler_count, segment_count, state_count, input_count;
+    int relation_count, event_count, sampler_count, segment_count, count_count, state_count,
+        input_count;
     bool has_inputs; /* true if some relation depends on inputs and parameters only */
     const struct relation *relation;
     const struct segment *segment;
+    const struct count *count;
     const double *nominal; /* of each state */
     const char *const *state_names;
     const char *const *sampler_names;
@@ -111,6 +120,18 @@ static inline int relations_locate(const double begins[], size_t count, double x
         *(x >= begins[middle] ? &low : &high) = middle;
     }
     return (int)low;
+}
+
+enum { RELATIONS_NO_COUNT = INT_MIN, RELATIONS_MOST_COUNTED = 1 << 30 };
+
+/* Returns a whole number; RELATIONS_NO_COUNT if an int cannot hold it. */
+static inline int relations_whole(double x) {
+    return fabs(x) <= INT_MAX ? (int)x : RELATIONS_NO_COUNT;
+}
+
+/* Returns the largest whole number up to x, within +-RELATIONS_MOST_COUNTED. */
+static inline int relations_floor(double x) {
+    return (int)floor(fmax(-RELATIONS_MOST_COUNTED, fmin(x, RELATIONS_MOST_COUNTED)));
 }
 
 /* Returns a bound of the error of y, a function of an argument with an error, from y's values at

@@ -78,14 +78,14 @@ MISTAKES = {
     "loop of one": (STATE + '[where]\na = "a"', "[where]: a: algebraic loop 'a -> a'"),
     "modes": ("modes = 3\n" + STATE, "modes: expected a list of names, or a table of true and"),
     "mode as a number": ("modes = { a = 1 }\n" + STATE, "modes: expected a list of names, or a t"),
-    "mode twice": ('modes = ["a", "a"]\n' + STATE, "modes: 'a': this name is in modes"),
+    "mode twice": ('modes = ["a", "a"]\n' + STATE, "modes: a: this name is in modes already"),
     "mode as number": (
         'modes = ["a"]\n' + STATE + '[where]\nb = "a"', "column 1: expected a number",
     ),
     "event": (STATE + "[events.e]\n", "[events.e]: when is missing"),
     "event key": (STATE + '[events.e]\nwhen = "x < 0"\nthen = 1', "[events.e]: unknown key 'then'"),
     "no condition": (
-        STATE + '[events.e]\nwhen = "x - 1"', "[events.e]: when: column 3: expected a condition",
+        STATE + '[events.e]\nwhen = "x - 1"\nreinit = { x = "0" }', "[events.e]: when: column 3: expected a condition",
     ),
     "derivative of a derivative": (
         STATE + '[where]\na = "der(der(x))"', "column 8: expected ')', got '('",
@@ -111,7 +111,7 @@ MISTAKES = {
             f'f{i} = {{ arguments = ["a"], value = "f{i - 1}(a) + f{i - 1}(a)" }}\n'
             for i in range(1, 40)
         ),
-        "functions make more than 10000 operations of this expression",
+        "functions and sums make more than 100000 operations of this expression",
     ),
     "argument": (
         STATE + '[functions]\nf = { arguments = ["a b"], value = "1" }', "arguments: expected na",
@@ -195,14 +195,14 @@ MISTAKES = {
     "control": (STATE.replace("[", 'description = "\\u0001"\n[', 1), "description: has a control"),
     "deep": (STATE + f'[where]\na = "{"(" * 200}"', "a: column 102: more than 100 levels"),
     "many": (
-        HEAD + "[inputs]\n" + "".join(f"u{i} = {{}}\n" for i in range(1001)), "u1000: has more",
+        HEAD + "[inputs]\n" + "".join(f"u{i} = {{}}\n" for i in range(1001)), "has more than 1000",
     ),
-    "array": (STATE + '[where]\na = "x[1]"', "'[1]' is no number, name or operator; arrays"),
+    "array": (STATE + '[where]\na = "x[1]"', "column 1: unknown name 'x[1]'"),
     "array of starts": (
-        HEAD + "[parameters]\np = { start = [1, 2] }", "[1, 2]; arrays are not supported: give",
+        HEAD + "[parameters]\np = { start = [1, 2] }", "start: expected a number, got [1, 2]",
     ),
     "implicit": (
-        STATE + '[where]\na = "x == 1"', "equations in implicit form are not supported: solve them",
+        STATE + '[where]\na = "x == 1"', "column 3: '==' compares whole numbers, conditions and",
     ),
     "residuals": (STATE + "[algebraic]\n", "equations in implicit form are not supported: solve"),
     "sampler": (STATE + '[where]\na = "sample(x)"', "samplers are written as [sampled.NAME]"),
@@ -266,7 +266,7 @@ MISTAKES = {
         HEAD + '[parameters]\np = { start = 1, unit = "s" }\nq = { value = "p**2", unit = "s" }',
         "[parameters]: q: value: column 2: expected unit s, got s2",
     ),
-    "type": (HEAD + '[inputs]\nu = { type = "Real" }', "u: type: expected \"Boolean\", got 'Real'"),
+    "type": (HEAD + '[inputs]\nu = { type = "Real" }', "u: type: expected \"Boolean\", \"Integer\" or"),
     "type of a state": (
         HEAD + '[states]\nx = { type = "Boolean", derivative = "1" }', "x: unknown key 'type'",
     ),
@@ -372,7 +372,9 @@ def test_value_references_stay_when_the_file_changes(tmp_path: Path) -> None:
     "text",
     ["x", "[[variables]]\nname = 'x'\n", "a = 1", "variables = 3"]
     + [2 * f"[[variables]]\nname = 'x'\nkind = '{kind}'\nreference = 5\n" for kind in ("local", "")]
-    + [f"[[variables]]\nname = 'x'\nkind = 'input'\nreference = {r}\n" for r in (0, 80, 99, 10000)],
+    + [
+        f"[[variables]]\nname = 'x'\nkind = 'input'\nreference = {r}\n" for r in (0, 80, 99, 100000)
+    ],
 )
 def test_a_lock_file_that_says_nothing_clear_is_refused(text: str, tmp_path: Path) -> None:
     path = tmp_path / "model.lock.toml"

@@ -1,0 +1,78 @@
+"""The elements of entries with indexes: "x[i]" = { for = "i = 1..n", ... }."""
+
+from collections.abc import Iterator, Mapping
+
+from declaration.load import shown
+from equations_content import Element, ModelFile, ModelFileError, placed
+
+from rparm.expressions.expression import ExpressionError, Node, at_indexes, parse, parse_ranges
+
+FOR = "for"
+MOST_ELEMENTS = 20_000
+
+
+def elements(file: ModelFile, key: str, entry: object) -> Iterator[Element]:
+    """Yield the entry with each value of its indexes; without `for` the entry itself.
+
+    A start value may be a list, of one number for each.
+    """
+    own = dict(entry) if isinstance(entry, dict) else entry
+    over = own.pop(FOR, None) if isinstance(own, dict) else None
+    if "[" not in key:
+        if over is not None:
+            raise ModelFileError(f"{key}: for: expected indexes in the name, such as {key}[i]")
+        yield Element(key, key, own)
+        return
+    with placed(shown(key)):
+        tree = _name_with_indexes(key)
+        found = [(name_of(tree, file.sizes | at), at) for at in every(file, over)]
+        starts = own.get("start") if isinstance(own, dict) else None
+        if isinstance(starts, list) and len(starts) != len(found):
+            raise ModelFileError(f"start: expected {len(found)} values, got {len(starts)}")
+    for number, (name, at) in enumerate(found):
+        given = own | {"start": starts[number]} if isinstance(starts, list) else own
+        yield Element(name, key if not at else f"{key} at {_shown(at)}", given, at)
+
+
+def name_of(tree: Node, indexes: Mapping[str, int]) -> str:
+    """Return the name of an element, whose indexes are 0 or more."""
+    found = at_indexes(tree, indexes)
+    if "-" in found.name:
+        raise ExpressionError(tree.column, f"{found.name}: expected indexes of 0 or more")
+    return found.name
+
+
+def target(text: str, element: Element, sizes: Mapping[str, int]) -> str:
+    """Return the name that a key of `set` or `reinit` stands for."""
+    return name_of(_name_with_indexes(text), sizes | element.indexes) if "[" in text else text
+
+
+def _name_with_indexes(text: str) -> Node:
+    tree = parse(text)
+    if tree.op != "element" or "." in tree.name:
+        raise ModelFileError("expected a name with its indexes, such as x[i]")
+    return tree
+
+
+def every(file: ModelFile, text: object) -> list[dict[str, int]]:
+    """List all values of the indexes of a `for`, the last index fastest; once nothing for None."""
+    found: list[dict[str, int]] = [{}]
+    if text is None:
+        return found
+    with placed(FOR):
+        if not isinstance(text, str):
+            raise ModelFileError(f'expected a range such as "i = 1..n", got {shown(text)}')
+        for over in parse_ranges(text):
+            if over.index in (*file.reserved, *file.sizes):
+                raise ModelFileError(f"{over.index!r} is a name already: expected an index")
+            file.indexes.add(over.index)
+            found = [
+                at | {over.index: value} for at in found for value in over.values(file.sizes | at)
+            ]
+            if len(found) > MOST_ELEMENTS:
+                raise ModelFileError(f"more than {MOST_ELEMENTS} elements")
+    return found
+
+
+def _shown(indexes: Mapping[str, int]) -> str:
+    return ", ".join(f"{index} = {value}" for index, value in indexes.items())

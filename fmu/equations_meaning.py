@@ -1,0 +1,151 @@
+"""Checks what a file with equations means: names, kinds, order and units of its expressions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from difflib import get_close_matches
+from graphlib import CycleError, TopologicalSorter
+
+from declaration.load import shown
+from equations_content import FOLLOWS, OPTIONS, Expression, ModelFile, ModelFileError, placed
+
+from rparm.expressions.expression import (
+    CONSTANTS,
+    ExpressionError,
+    derivative_of,
+    evaluated,
+    in_order,
+    names,
+    with_kinds,
+)
+from rparm.expressions.units import BASE, Unit, times, unit_of, unit_of_exponents
+from rparm.expressions.units import shown as unit_shown
+
+SECOND = unit_of_exponents({"s": 1})
+MOST_COMPARED = 1000  # names that may have been meant
+
+
+def check(file: ModelFile) -> None:
+    """Check all expressions, and order them: each after those that it names; ModelFileError."""
+    _check_names(file)
+    file.order = _in_order(file)
+    _check_periods(file)
+    if file.has_units:
+        _check_units(file)
+
+
+def _check_names(file: ModelFile) -> None:
+    """Check the names and kinds in all expressions."""
+    rates = [derivative_of(state.name) for state in file.of("states")]
+    known = dict.fromkeys((*file.variables, *file.modes, "time", *CONSTANTS, *rates))
+    constant = file.of("parameters", FOLLOWS, OPTIONS)
+    parameters = dict.fromkeys((*(v.name for v in constant), *CONSTANTS))
+    kinds = file.kinds
+    for index in file.indexes & known.keys():
+        raise ModelFileError(f"{file.place_of(index)}: {index}: this name is an index of for, too")
+    for expressions, allowed, mistake in (
+        (file.assigned, known, "unknown name {}"),
+        (file.constant, parameters, "{} is no parameter"),
+    ):
+        for expression in expressions:
+            with placed(*expression.place):
+                for node in in_order([expression.tree]):
+                    if node.op == "name" and node.name not in allowed:
+                        hint = _hint(node.name, allowed, file)
+                        raise ExpressionError(node.column, mistake.format(shown(node.name)) + hint)
+                expression.tree = with_kinds(expression.tree, expression.kind, kinds)
+
+
+def _hint(name: str, allowed: Collection[str], file: ModelFile) -> str:
+    """Say what may have been meant by an unknown name."""
+    base, bracket, _ = name.partition("[")
+    count = file.dimensions.get(base, 0)
+    if count and not bracket:
+        return f", expected {base}[{', '.join('ijklmn'[:count])}]"
+    if count:
+        elements = [other for other in allowed if other.startswith(f"{base}[")]
+        return f", expected {elements[0]} .. {elements[-1]}" if elements else ""
+    meant = get_close_matches(name, allowed, n=1) if len(allowed) <= MOST_COMPARED else []
+    return f", did you mean {meant[0]!r}?" if meant else ""
+
+
+def _in_order(file: ModelFile) -> list[Expression]:
+    """Order all expressions: [where] and [outputs] first, each after those that it names."""
+    entries = {variable.name: variable for variable in file.calculated}
+    entries |= {derivative_of(state.name): state for state in file.of("states")}
+    for variable in entries.values():
+        used = names(variable.expression.tree) & entries.keys()
+        variable.arguments = tuple(entries[name] for name in sorted(used))
+    try:
+        TopologicalSorter({v: v.arguments for v in entries.values()}).prepare()
+    except CycleError as error:
+        loop = error.args[1][::-1]
+        way = shown(" -> ".join(variable.name for variable in loop))
+        raise ModelFileError(
+            f"{loop[0].place}: {loop[0].name}: algebraic loop {way}: "
+            "solve these equations for one of them first"
+        ) from None
+    variables = in_order(entries.values())
+    happening = [expression for change in file.changes for expression in change.expressions]
+    constant = [e for e in file.constant if e.target not in entries]
+    return [*(v.expression for v in variables), *happening, *constant]
+
+
+def _check_periods(file: ModelFile) -> None:
+    """Check that samplers tick, and starts exist, with the start values of the parameters."""
+    starts = {variable.name: variable.start for variable in file.of("parameters", OPTIONS)}
+    follows = {variable.expression for variable in file.of(FOLLOWS)}
+    for expression in file.order:
+        if expression in follows:
+            starts[expression.target] = _number(expression, starts)
+    for variable in file.started:
+        with placed(*variable.initial.place):
+            if not math.isfinite(_number(variable.initial, starts)):
+                raise ModelFileError("is not a finite number at the start values")
+    for sampler in file.sampled:
+        every, offset = (_number(expression, starts) for expression in sampler.periods)
+        with placed(*sampler.every.place):
+            if not 0 < every < math.inf:
+                raise ModelFileError(f"is {every:g} s at the start values, expected more than 0")
+        with placed(*sampler.offset.place):
+            if not 0 <= offset < math.inf:
+                raise ModelFileError(f"is {offset:g} s at the start values, expected 0 or more")
+
+
+def _number(expression: Expression, values: Mapping[str, float]) -> float:
+    """Evaluate an expression; nan if it has no value."""
+    try:
+        return evaluated(expression.tree, values)
+    except (ArithmeticError, ValueError):
+        return math.nan
+    except KeyError:  # tables are not looked up here: the start of a simulation checks their values
+        return 1.0
+
+
+def _check_units(file: ModelFile) -> None:
+    """Check that units fit, and find the units of [where]."""
+    declared = [v for v in file.variables.values() if v.section != "where" or v.unit or v.display]
+    units = {v.name: unit_of_exponents(v.exponents) for v in declared} | {"time": SECOND}
+    units |= {key: unit_of_exponents(found) for key, found in file.table_units.items()}
+    for state in file.of("states"):
+        units[derivative_of(state.name)] = times(units[state.name], SECOND, -1)
+    for expression in file.order:
+        with placed(*expression.place):
+            expected = units.get(expression.target)
+            if expression.is_rate:
+                expected = times(expected, SECOND, -1)
+            unit = unit_of(expression.tree, units, expected)
+        if expression.target:
+            units.setdefault(expression.target, unit)
+    for variable in file.of("where"):
+        with placed("[where]", variable.name):
+            variable.exponents = _whole(units[variable.name])
+
+
+def _whole(unit: Unit) -> dict[str, int]:
+    if any(exponent.denominator > 1 for exponent in unit):
+        raise ModelFileError(
+            f"has unit {unit_shown(unit)}, whose exponents are no whole numbers: use its square"
+        )
+    return {base: int(exponent) for base, exponent in zip(BASE, unit, strict=True)}
