@@ -8,19 +8,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from rparm.errors import UserError, WrongValueError, did_you_mean, hint, placed
+from rparm.errors import UnplacedError, UserError, WrongValueError, did_you_mean, hint, placed
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import PARAMETERS, Model, Value, Variable
-from rparm.linearization.sampling import (
-    Tick,
-    check_one_rate,
-    held_numbers,
-    hold,
-    period,
-    samplers,
-    ticks,
-)
+from rparm.linearization.sampling import Tick, held_numbers, hold, period, samplers, ticks
 from rparm.units import typed_quantity
 
 if TYPE_CHECKING:
@@ -178,23 +170,15 @@ class Linear:
         )
 
     def discretized(self) -> "Linear":
-        """Return the model from period to period of its samplers, all of one rate; UserError."""
-        check_one_rate(self.ticks)
+        """Return the model from period to period of its samplers, of one rate; UnplacedError."""
         n = len(self.states)
         with np.errstate(over="ignore", invalid="ignore"):
             whole, first = period(self.A, self.B, self.ticks)
         if not np.isfinite(whole).all():
-            raise UserError("deviations overflow within a period of its samplers")
-        outputs = np.hstack([self.C, self.D]) @ first
-        return replace(
-            self,
-            A=whole[:n, :n],
-            B=whole[:n, n:],
-            C=outputs[:, :n],
-            D=outputs[:, n:],
-            dt=self.ticks[0].every,
-            between=self,
-        )
+            raise UnplacedError("deviations overflow within a period of its samplers")
+        A, B = np.split(whole[:n], [n], axis=1)
+        C, D = np.split(np.hstack([self.C, self.D]) @ first, [n], axis=1)
+        return replace(self, A=A, B=B, C=C, D=D, dt=self.ticks[0].every, between=self)
 
 
 def _state_space(*arguments: object, **names: object) -> "StateSpace":
@@ -285,15 +269,11 @@ def linear_model(instance: Instance) -> Linear:
     Discrete variables that samplers set are states, too, which rest between ticks.
     """
     model = instance.fmu.model
-    variables, declared = model.variables.values(), samplers(model)
-    inputs = [v.name for v in variables if v.causality == "input" and v.type == "Real"]
+    known, declared = model.variables, samplers(model)
+    inputs = [n for n, v in known.items() if v.causality == "input" and v.type == "Real"]
     kept = held_numbers(model, declared)
     states = (*model.states, *kept)
-    outputs = [
-        name
-        for name in model.real_outputs
-        if model.variables[name].variability != "discrete" or name in kept
-    ]
+    outputs = [n for n in model.real_outputs if n in kept or known[n].variability != "discrete"]
     unknowns, knowns = [*model.derivatives, *outputs], [*states, *inputs]
     values = instance.reals([*knowns, *unknowns])
     with instance.explained("at the point"):

@@ -169,12 +169,11 @@ def notes(found: Study) -> list[str]:
             point.states, point.rates, point.are_positions, strict=True)
         if abs(rate) > least and (is_position or not found.trimmed)  # else rounding
     ]  # fmt: skip
-    changes = [(t.name, *change) for t in point.ticks for change in t.changes.items()]
     moving += [
-        f"{tick} changes {name} by {change:.6g}"
-        for tick, name, change in changes
+        f"{tick.name} changes {name} by {change:.6g}"
+        for tick in point.ticks for name, change in tick.changes.items()
         if abs(change) > least and not found.trimmed
-    ]
+    ]  # fmt: skip
     if moving and found.trimmed:
         texts.append(f"In steady motion: {_names(moving)}.")
     elif moving:

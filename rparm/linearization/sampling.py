@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rparm.errors import UserError
+from rparm.errors import UnplacedError, UserError
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.model import Model
 
@@ -35,29 +35,15 @@ class Sampler:
 
 @dataclass(frozen=True, eq=False)
 class Tick:
-    """New values of some states, after a tick of a sampler at a point.
-
-    Attributes
-    ----------
-    every, offset : float
-        Period, and time after the start, s.
-    rows : list of int
-        The states that it sets, r of all n.
-    partials : ndarray, shape (r, n + m)
-        Of the new values by states and inputs.
-    changes : dict of str to float
-        New value less the present one, by name.
-    modes : list of str
-        Modes that it changes here.
-    """
+    """New values of r of n states, after a tick of a sampler at a point."""
 
     name: str
-    every: float
-    offset: float
-    rows: list[int]
-    partials: np.ndarray
-    changes: dict[str, float]
-    modes: list[str]
+    every: float  # s
+    offset: float  # s, after the start
+    rows: list[int]  # the states, (r,)
+    partials: np.ndarray  # of the new values by states and inputs, (r, n + m)
+    changes: dict[str, float]  # new value less the present one, by state
+    modes: list[str]  # others that it changes here
 
 
 # ---- Samplers of an FMU --------------------------------------------------------------------------
@@ -134,25 +120,26 @@ def _exponential(matrix: np.ndarray) -> np.ndarray:
     return result
 
 
-def check_one_rate(every: Sequence[Tick]) -> None:
+def _check(every: Sequence[Tick]) -> None:
     """Refuse ticks of several rates, and those that change modes."""
     for tick in every:
         if tick.modes:
-            raise UserError(
+            raise UnplacedError(
                 f"sampler {tick.name} changes {', '.join(tick.modes)} at this point, expected a "
                 "point at which samplers change no modes"
             )
     if not all(math.isclose(tick.every, every[0].every, rel_tol=SAME) for tick in every):
         rates = ", ".join(f"{tick.name} every {tick.every:.6g} s" for tick in every)
-        raise UserError(f"samples at several rates, expected one for a linear model: {rates}")
+        raise UnplacedError(f"samples at several rates, expected one for a linear model: {rates}")
 
 
 def period(A: np.ndarray, B: np.ndarray, every: Sequence[Tick]) -> tuple[np.ndarray, np.ndarray]:
     """Return what moves states and inputs, (n + m, n + m), over a period, and over its first ticks.
 
     A period begins just before the tick with the smallest offset, and ends before the next one of
-    this sampler; inputs are held all the time.
+    this sampler; inputs are held all the time. UnplacedError: rates differ, or modes change.
     """
+    _check(every)
     n, m = B.shape
     whole, first = np.eye(n + m), None
     instants = _instants(every)
