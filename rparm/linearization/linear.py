@@ -115,22 +115,22 @@ class Linear:
 
     def ss(self) -> "StateSpace":
         """Return the model for python-control, if installed; in its names dots become _."""
-        return _state_space(self.A, self.B, self.C, self.D, self.dt, **self._labels)
+        matrices = self.A, self.B, self.C, self.D, self.dt
+        return import_module("control").ss(*matrices, **self._labels)
 
     def zoh(self, step: float) -> "StateSpace":
         """Return the model from one sample to the next, `step` s apart, for held inputs."""
-        transition, forced = self.sampled(step)
-        return _state_space(transition, forced, self.C, self.D, step, **self._labels)
+        return self.sampled(step).ss()
 
-    def sampled(self, step: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return A and B of `zoh`; UserError if deviations grow beyond what a double holds."""
+    def sampled(self, step: float) -> "Linear":
+        """Return the model of `zoh`; UserError if deviations grow beyond what a double holds."""
         if self.dt:
             raise UserError(f"step: the model is sampled already, every {self.dt:g} s")
         with np.errstate(over="ignore", invalid="ignore"):
             transition, forced, _ = hold(self.A, self.B, step)
         if not (np.isfinite(transition).all() and np.isfinite(forced).all()):
             raise UserError(f"step: deviations overflow in {step:g} s, expected a shorter one")
-        return transition, forced
+        return replace(self, A=transition, B=forced, dt=step)
 
     @property
     def _labels(self) -> dict[str, list[str]]:
@@ -179,11 +179,6 @@ class Linear:
         A, B = np.split(whole[:n], [n], axis=1)
         C, D = np.split(np.hstack([self.C, self.D]) @ first, [n], axis=1)
         return replace(self, A=A, B=B, C=C, D=D, dt=self.ticks[0].every, between=self)
-
-
-def _state_space(*arguments: object, **names: object) -> "StateSpace":
-    """Return a system of python-control, which nothing else here needs."""
-    return import_module("control").ss(*arguments, **names)
 
 
 def _places(known: Sequence[str], wanted: Sequence[str] | None, option: str) -> list[int]:

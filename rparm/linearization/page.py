@@ -10,10 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rparm.linearization.largest_step import LargestStep
-from rparm.linearization.linear import Linear, eigenvalues, zeros
+from rparm.linearization.linear import Linear, zeros
 from rparm.linearization.margins import Margins, closed, searched
-from rparm.linearization.responses import frequencies, frequency_response, sampled_response
-from rparm.linearization.sampling import hold
+from rparm.linearization.responses import frequencies, frequency_response
 from rparm.linearization.study import Study
 from rparm.report import pages
 from rparm.units import milliseconds
@@ -288,9 +287,10 @@ def bode_figure(model: Linear, step: float | None, found: Margins | None = None)
         for (label, one, values), color in zip(shown, _colors(), strict=False):
             _bode(gain, phase, values, grid, color, label)
             if step is not None:
-                below = _below(grid, one, step)
+                sampled = one.sampled(step)
+                below = _below(grid, sampled)
                 name = f"{label}, held for {milliseconds(step)}"
-                response = sampled_response(one, step)(below)
+                response = frequency_response(sampled)(below)
                 _bode(gain, phase, response, below, color, name, pages.DASHED)
         for axes, level in ((gain, 0.0), (phase, -180.0)):
             if step is not None:
@@ -333,9 +333,9 @@ def nyquist_figure(loop: Linear, step: float | None) -> Figure:
         grid = searched(loop)
         _nyquist(axes, frequency_response(loop)(grid), "-", "continuous")
         if step is not None:
-            below = _below(grid, loop, step)
-            name = f"held for {milliseconds(step)}"
-            _nyquist(axes, sampled_response(loop, step)(below), pages.DASHED, name)
+            sampled, name = loop.sampled(step), f"held for {milliseconds(step)}"
+            response = frequency_response(sampled)(_below(grid, sampled))
+            _nyquist(axes, response, pages.DASHED, name)
         circle = np.exp(1j * np.linspace(0, 2 * math.pi, 200))
         axes.plot(circle.real, circle.imag, color=pages.MUTED, linewidth=0.8, linestyle=":")
         axes.plot(-1, 0, "+", color=pages.ERROR_COLORS[0], markersize=14, markeredgewidth=2)
@@ -377,16 +377,13 @@ def steps_figure(model: Linear, step: float | None) -> Figure:
 
 
 def _step(model: Linear, length: float, end: float) -> tuple[np.ndarray, np.ndarray]:
-    if model.dt:
-        transition, forced, length = model.A, model.B, model.dt
-    else:
-        transition, forced, _ = hold(model.A, model.B, length)
-    count = min(int(end / length), MOST_DOTS) + 1
+    model = model if model.dt else model.sampled(length)
+    count = int(end / model.dt) + 1
     x, values = np.zeros(len(model.A)), np.empty(count)
     for i in range(count):
         values[i] = (model.C @ x + model.D[:, 0])[0]
-        x = transition @ x + forced[:, 0]
-    return length * np.arange(count), values
+        x = model.A @ x + model.B[:, 0]
+    return model.dt * np.arange(count), values
 
 
 def poles_figure(model: Linear, step: float | None, loop: Linear | None = None) -> Figure:
@@ -414,8 +411,8 @@ def poles_figure(model: Linear, step: float | None, loop: Linear | None = None) 
         if step is None:
             sampled.set_visible(False)
         else:
-            found = np.linalg.eigvals(hold(model.A, model.B, step)[0])
-            _draw_sampled_poles(sampled, found, f"held for {milliseconds(step)}")
+            text = f"held for {milliseconds(step)}"
+            _draw_sampled_poles(sampled, model.sampled(step).poles, text)
     return figure
 
 
@@ -461,15 +458,14 @@ def _grid(model: Linear, found: Margins | None = None) -> np.ndarray:
     between = [p for some in channels for p in some if low <= abs(p) <= high]
     steep = [p for p in (*poles, *between) if abs(p.real) > ON_AXIS * abs(p)]
     grid = frequencies(steep, [*every, *crossings], AROUND)
-    return grid[grid < math.pi / model.dt] if model.dt else grid
+    return _below(grid, model) if model.dt else grid
 
 
-def _below(grid: np.ndarray, model: Linear, step: float) -> np.ndarray:
+def _below(grid: np.ndarray, sampled: Linear) -> np.ndarray:
     """Choose frequencies below half the sampling rate, dense where sampled poles are."""
-    z = eigenvalues(hold(model.A, model.B, step)[0])
-    own = frequencies(np.log(z[z != 0]) / step, (), 0.0)
-    every = np.union1d(grid, own)
-    return every[(every >= grid[0]) & (every < math.pi / step)]
+    poles = sampled.rates_of(sampled.poles)
+    every = np.union1d(grid, frequencies(poles[np.isfinite(poles)], (), 0.0))
+    return every[(every >= grid[0]) & (every < math.pi / sampled.dt)]
 
 
 def _end(model: Linear, step: float | None) -> float:
@@ -478,6 +474,7 @@ def _end(model: Linear, step: float | None) -> float:
     rates = np.abs(poles[np.isfinite(poles) & (poles != 0)])
     end = SETTLED / rates.min(initial=1.0 if not len(rates) else np.inf)
     fastest = poles.real.max(initial=0.0)
+    end = min(end, MOST_DOTS * model.dt) if model.dt else end
     step = model.dt or step
     end = min(end, GROWN / fastest) if fastest > 0 else end
     return max(end, 20 * step) if step is not None else end

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rparm.linearization.linear import Linear, cleared, closure, eigenvalues, scales
-from rparm.linearization.sampling import hold
 
 ROUNDING = 1e-15  # relative, of entries and operations
 PER_DECADE = 200  # frequencies of a grid, everywhere
@@ -95,13 +94,6 @@ def _transfer(model: Linear) -> _Transfer:
     scale = suited(model.A, model.B, model.C)
     A, B, C = model.A * scale / scale[:, None], model.B / scale[:, None], model.C * scale
     return _Transfer(A, B, C, model.D)
-
-
-def sampled_response(model: Linear, step: float) -> Response:
-    """Return the response of the model that is sampled, with inputs held in between."""
-    transition, forced, _ = hold(model.A, model.B, step)
-    transfer = _Transfer(transition, forced, model.C, model.D)
-    return lambda w: transfer.values(np.exp(1j * step * np.asarray(w)))
 
 
 def frequencies(steep: Iterable[complex], further: Iterable[float], decades: float) -> np.ndarray:

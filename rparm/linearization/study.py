@@ -164,13 +164,9 @@ def document(found: Study, step: float | None) -> Document:
     if linear.dt:
         result["dt"] = linear.dt
     if step is not None:
-        transition, forced = linear.sampled(step)
-        result["zoh"] = {
-            "step": step,
-            "A": transition.tolist(),
-            "B": forced.tolist(),
-            "poles": pairs(np.linalg.eigvals(transition)),
-        }
+        zoh = linear.sampled(step)
+        result["zoh"] = {"step": step, "A": zoh.A.tolist(), "B": zoh.B.tolist()}
+        result["zoh"]["poles"] = pairs(np.linalg.eigvals(zoh.A))
     if found.variant:
         result["variant"] = found.variant
     if found.largest:
