@@ -47,9 +47,9 @@ def add_units(root: ET.Element, units: dict[str, Unit]) -> None:
 
 def display_unit(variable: Float64, units: dict[str, Unit]) -> dict[str, str]:
     """Return the attribute for the display unit of a variable, if it has one."""
-    displays = [*units[variable.unit].display][:1]
-    displays = [variable.display.name] if variable.display else displays
-    return {"displayUnit": display for display in displays}
+    if variable.display:
+        return {"displayUnit": variable.display.name}
+    return dict(zip(["displayUnit"], units[variable.unit].display, strict=False))
 
 
 def type_name(variable: str) -> str:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -190,6 +191,7 @@ class ModelFile:
     checks: list[tuple[str, Expression]] = field(default_factory=list)  # messages and conditions
     order: list[Expression] = field(default_factory=list)  # each after those that it names
     graph: Any = None  # what a generator makes of it
+    fields: Any = None  # where it keeps the values
 
     def expression(
         self, element: Element, place: tuple[str, ...], text: object, *more: Any, **options: Any
@@ -233,6 +235,11 @@ class ModelFile:
     def calculated(self) -> list[Variable]:
         """Variables that follow from others at any time."""
         return self.of(FOLLOWS, "where", "outputs")
+
+    @cached_property
+    def places(self) -> dict[str, int]:
+        """Places of the time and of the variables in the order of the file."""
+        return {name: place for place, name in enumerate(("time", *self.variables))}
 
     @property
     def started(self) -> list[Variable]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
-from functools import partial
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from itertools import groupby
 from pathlib import Path
 
 from equations.graph import CONDITIONS, LEAVES, Value
@@ -25,8 +26,39 @@ def c_name(prefix: str, name: str) -> str:
     return "_".join([f"{prefix}{len(indexes) or ''}", base, *indexes])
 
 
-# of the value, as a double or an int, the derivative and the event indicator
-field_of, mode_of, rate_of, indicator_of = (partial(c_name, prefix) for prefix in "vmdz")
+class Fields:
+    """Names in C of variables: elements of one array that follow each other share an array of C."""
+
+    def __init__(self, sections: Iterable[Iterable[str]]) -> None:
+        self.suffixes: dict[str, str] = {}
+        for names in sections:
+            for base, run in groupby(names, lambda name: name.partition("[")[0]):
+                elements = [*run]
+                for i, name in enumerate(elements):
+                    place = f"[{i}]" if "[" in name else ""
+                    self.suffixes[name] = c_name("", elements[0] if place else base) + place
+
+    def value(self, name: str) -> str:
+        """A number."""
+        return f"v{self.suffixes[name]}"
+
+    def count(self, name: str) -> str:
+        """A condition, whole number or enumeration."""
+        return f"m{self.suffixes[name]}"
+
+    def rate(self, name: str) -> str:
+        """The derivative of a state."""
+        return f"d{self.suffixes[name]}"
+
+
+def declared(c_type: str, fields: Iterable[str]) -> list[str]:
+    """Return the declarations of fields, in arrays where they are elements."""
+    sizes = Counter(field.partition("[")[0] for field in fields)
+    arrays = {field.partition("[")[0] for field in fields if "[" in field}
+    return [
+        f"{c_type} {name}[{size}];" if name in arrays else f"{c_type} {name};"
+        for name, size in sizes.items()
+    ]
 
 
 def number(value: float) -> str:

@@ -16,12 +16,10 @@ from equations.c_code import (
     Code,
     Leaves,
     c_name,
-    field_of,
+    declared,
     filled,
     indented,
-    indicator_of,
     located,
-    mode_of,
     text,
 )
 from equations.errors import NONE, Errors
@@ -30,6 +28,7 @@ from rparm.expressions.expression import CONDITION, Kind, in_order
 
 Guards = dict[Value, Value | None]  # conditions; None: always
 
+INDICATOR = "z_{}"
 SECOND = {"s": 1}
 INDEXES = re.compile(r"\[([0-9,]+)\]")
 NEXT_TIME = [
@@ -45,9 +44,11 @@ def leaves(file: ModelFile) -> Leaves:
     found = {("time", ""): "t", ("first", ""): "dt"}
     for v in file.of("parameters", "inputs", "states", "discrete"):
         for op, structure in ((v.leaf.op, "values"), ("first", "d"), ("second", "dd")):
-            found[op, v.name] = f"{structure}->{field_of(v.name)}"
+            found[op, v.name] = f"{structure}->{file.fields.value(v.name)}"
     for name, kind in file.kinds.items():
-        found["mode" if kind == CONDITION else "integer", name] = f"values->{mode_of(name)}"
+        found["mode" if kind == CONDITION else "integer", name] = (
+            f"values->{file.fields.count(name)}"
+        )
     segments = enumerate(file.graph.segments)
     found |= {("integer", name): f"values->segments[{i}]" for i, name in segments}
     relations = enumerate(file.graph.relations)
@@ -145,7 +146,7 @@ class Events:
     def discrete(self) -> list[str]:
         """Fields of discrete states: times of samplers, and the discrete variables."""
         ticks = [c_name("ticks", sampler.name) for sampler in self.file.sampled]
-        variables = [field_of(v.name) for v in self.file.of("discrete")]
+        variables = [self.file.fields.value(v.name) for v in self.file.of("discrete")]
         return [*(["start", *ticks] if ticks else []), *variables]
 
     def indicators(self) -> dict[str, Value]:
@@ -154,7 +155,7 @@ class Events:
         for relation in self.located:
             z, used = self.signed(relation), self.used[relation.name]
             z = z if used is None else self.graph.value("if", used, z, one)
-            found[indicator_of(relation.name)] = z
+            found[INDICATOR.format(relation.name)] = z
         return found
 
     def signed(self, relation: Relation) -> Value:
@@ -168,14 +169,15 @@ class Events:
             return []
         return [
             *(["/* discrete states */"] if self.discrete else []),
-            *(f"double {field};" for field in self.discrete),
-            *(f"int {mode_of(v.name)}; /* input */" for v in self.file.of(SWITCHES)),
+            *declared("double", self.discrete),
+            *(["/* inputs */"] if self.file.of(SWITCHES) else []),
+            *declared("int", [self.file.fields.count(v.name) for v in self.file.of(SWITCHES)]),
             "/* modes; C has no empty arrays */",
             "int is_begun;",
             f"int relations[{len(self.relations) or 1}];",
             f"int active[{len(self.file.events) + 1}];",
             *([f"int segments[{len(segments)}];"] if (segments := self.graph.segments) else []),
-            *(f"int {mode_of(name)};" for name in _counted(self.file)),
+            *declared("int", map(self.file.fields.count, _counted(self.file))),
         ]
 
     def functions(self, in_domain: str = "") -> list[str]:
@@ -201,7 +203,7 @@ class Events:
             in_domain=in_domain,
             states=len(states),
             inputs=len(file.of("inputs")),
-            state_offset=f"offsetof(struct equations_values, {field_of(states[0].name)})"
+            state_offset=f"offsetof(struct equations_values, {file.fields.value(states[0].name)})"
             if states
             else "0",
             has_inputs=int(any(r.is_of_inputs for r in self.relations)),
@@ -288,7 +290,7 @@ class Events:
         return {"segments": len(segments), "segment": table or ["{0},"], "locate": code.lines}
 
     def _switches(self) -> list[str]:
-        fields = [mode_of(v.name) for v in self.file.of(SWITCHES)]
+        fields = [self.file.fields.count(v.name) for v in self.file.of(SWITCHES)]
         if not fields:
             return []
         begin = f"offsetof(struct equations_values, {fields[0]})"
@@ -300,7 +302,10 @@ class Events:
         return [
             "static void start(void *values_pointer) {",
             "    struct equations_values *values = values_pointer;",
-            *(f"    values->{mode_of(name)} = {start};" for name, (_, start) in counted),
+            *(
+                f"    values->{self.file.fields.count(name)} = {start};"
+                for name, (_, start) in counted
+            ),
             *indented(self._assigned(Code(leaves(self.file)), new)),
             "}",
             "",
@@ -330,11 +335,13 @@ class Events:
             kind, _ = counted.get(name, ("", 0))
             found = code.of(value)
             if kind == CONDITION:
-                fields[mode_of(name)] = code.constant(f"{found} != 0", "int")
+                fields[self.file.fields.count(name)] = code.constant(f"{found} != 0", "int")
             elif kind:
-                fields[mode_of(name)] = code.constant(f"relations_whole({found})", "int")
+                fields[self.file.fields.count(name)] = code.constant(
+                    f"relations_whole({found})", "int"
+                )
             else:
-                fields[field_of(name)] = code.constant(found)
+                fields[self.file.fields.value(name)] = code.constant(found)
         return code.lines + [f"values->{field} = {value};" for field, value in fields.items()]
 
     def _counts(self) -> list[str]:

@@ -2,14 +2,14 @@
 
 import re
 from collections.abc import Mapping
-from itertools import chain
 
 from equations_content import OPTIONS, ModelFile
 
-from equations.c_code import Code, field_of, filled, indented, mode_of, number, rate_of, text
+from equations.c_code import Code, declared, filled, indented, number, text
 from equations.c_events import Events, arrays, leaves, ticks
 from equations.c_series import Series
-from equations.graph import FALLIBLE, Value
+from equations.graph import FALLIBLE, Value, is_number
+from equations.rolled import rolled
 from rparm.expressions.expression import in_order
 
 STRUCTURE = "struct equations_values"
@@ -22,15 +22,15 @@ def header(file: ModelFile) -> str:
     """Return the text of equations.h."""
     events = Events(file)
     groups = _ranges(file) | {
-        "calculated": [field_of(v.name) for v in file.calculated],
+        "calculated": [file.fields.value(v.name) for v in file.calculated],
         "event indicators": list(events.indicators()),
         "samplers": [tick.field for tick in ticks(file)],
     }
     fields = []
     for title, names in groups.items():
-        fields += [f"/* {title} */", *(f"double {name};" for name in names)] if names else []
+        fields += [f"/* {title} */", *declared("double", names)] if names else []
         if title == "parameters":
-            fields += [f"int {name};" for name in _options(file)]
+            fields += declared("int", _options(file))
     return filled("equations.h.in", fields=fields + events.fields())
 
 
@@ -76,15 +76,15 @@ def _tables(file: ModelFile, text: str) -> list[str]:
 def _ranges(file: ModelFile) -> dict[str, list[str]]:
     """Fields that are set from outside and their derivatives, by the ranges of struct model."""
     ranges = {
-        section: [field_of(v.name) for v in file.of(section)]
+        section: [file.fields.value(v.name) for v in file.of(section)]
         for section in ("parameters", "inputs", "states")
     }
-    return ranges | {"derivatives": [rate_of(state.name) for state in file.of("states")]}
+    return ranges | {"derivatives": [file.fields.rate(state.name) for state in file.of("states")]}
 
 
 def _options(file: ModelFile) -> list[str]:
     """Fields of Boolean parameters, ints behind the others, in pairs: there are no gaps."""
-    names = [mode_of(v.name) for v in file.of(OPTIONS)]
+    names = [file.fields.count(v.name) for v in file.of(OPTIONS)]
     return [*names, "unused"] if len(names) % 2 else names
 
 
@@ -108,13 +108,22 @@ def _range_lines(ranges: Mapping[str, list[str]]) -> list[str]:
 
 def _smooth(file: ModelFile) -> dict[str, list[str]]:
     """What the methods of integration evaluate, a smooth function between events."""
-    one, states = file.graph.number(1.0), file.of("states")
-    rates = [state.value for state in states]
-    columns = [file.graph.derivatives(rates, {state.leaf: one}) for state in states]
-    parts = {"right_hand_side": ("dx", rates), "jacobian": ("J", chain(*columns))}
+    states = file.of("states")
+    rates, count = [state.value for state in states], len(states)
+    rows = file.graph.gradients(rates, [state.leaf for state in states])
+    entries = {
+        f"J[{j * count + i}]": rows[i][state.leaf]
+        for j, state in enumerate(states)
+        for i in range(count)
+        if state.leaf in rows[i] and not is_number(rows[i][state.leaf], 0.0)
+    }
+    clear = [f"for (size_t i = 0; i < {count * count}; i++) {{", "    J[i] = 0.0;", "}"]
+    motion = {f"dx[{i}]": rate for i, rate in enumerate(rates)}
+    (right_hand_side,) = rolled(Code(arrays(file)).assign(motion).lines)
+    (jacobian,) = rolled(Code(arrays(file)).assign(entries).lines)
     return {
-        part: Code(arrays(file)).assign({f"{name}[{i}]": v for i, v in enumerate(values)}).lines
-        for part, (name, values) in parts.items()
+        "right_hand_side": right_hand_side,
+        "jacobian": clear * (len(entries) < count * count) + jacobian,
     }
 
 
@@ -148,7 +157,7 @@ def _domains(
         names = ("domains_header", "domains_declared", "domains")
         return {"in_domain": "", **{name: [] for name in names}}
     ranges = _ranges(file)
-    calculated = ranges["derivatives"] + [field_of(v.name) for v in file.calculated]
+    calculated = ranges["derivatives"] + [file.fields.value(v.name) for v in file.calculated]
     groups = {key: ranges[key] for key in ("states", "inputs")}
     groups |= {"calculated": calculated, "indicators": list(events.indicators())}
     distances = {f"distance[{i}]": r.distance for i, r in enumerate(events.relations)}
@@ -177,8 +186,8 @@ def _domains(
 def _calculated(file: ModelFile, events: Events) -> dict[str, list[str]]:
     """Calculated fields and their derivatives along a curve."""
     graph = file.graph
-    fields = {rate_of(state.name): state.value for state in file.of("states")}
-    fields |= {field_of(v.name): v.value for v in file.calculated}
+    fields = {file.fields.rate(state.name): state.value for state in file.of("states")}
+    fields |= {file.fields.value(v.name): v.value for v in file.calculated}
     fields |= events.indicators()
     fields |= {tick.field: tick.value for tick in ticks(file)}
     seeds = {graph.value("time"): graph.value("first")}  # it has no second derivative
@@ -192,15 +201,17 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, list[str]]:
     split = len(curve.lines)
     curve.assign({f"dd->{name}": value for name, value in zip(fields, seconds, strict=True)})
     real = [v for v in file.started if v.is_real]
-    started = {f"->{field_of(v.name)} += ": v.initial.value for v in real}
+    started = {f"->{file.fields.value(v.name)} += ": v.initial.value for v in real}
     start_firsts = graph.derivatives(started.values(), seeds)
     start_seconds = graph.derivatives(start_firsts, seeds)
+    outputs = Code(leaves(file)).assign({f"to->{n}": v for n, v in fields.items()}).lines
+    first, second = rolled(curve.lines[:split], curve.lines[split:])
     return {
         "started": _at_start(file, "d", dict(zip(started, start_firsts, strict=True))),
         "started_twice": _at_start(file, "dd", dict(zip(started, start_seconds, strict=True))),
-        "outputs": Code(leaves(file)).assign({f"to->{n}": v for n, v in fields.items()}).lines,
-        "derivatives": curve.lines[:split],
-        "second_derivatives": curve.lines[split:],
+        "outputs": rolled(outputs)[0],
+        "derivatives": first,
+        "second_derivatives": second,
     }
 
 
@@ -218,7 +229,7 @@ def _checks(file: ModelFile) -> list[str]:
     """Refuses parameters that are not finite or break a condition, or leave it undefined."""
     graph, code = file.graph, Code(leaves(file))
     conditions = [
-        (f"isfinite(values->{field_of(v.name)})", f"{v.name} is not finite")
+        (f"isfinite(values->{file.fields.value(v.name)})", f"{v.name} is not finite")
         for v in file.of("parameters")
     ]
     for message, check in file.checks:

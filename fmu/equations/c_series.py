@@ -6,10 +6,11 @@ y' = g x' with g = dy/dx, so that k y_k is the sum over i = 1 .. k of i x_i g_(k
 move is taken out of the sums, so that more of them are the same.
 """
 
+import re
 from collections.abc import Mapping
 from functools import partial, reduce
 
-from equations.c_code import Code, Leaves, formula
+from equations.c_code import Code, Leaves, formula, indented
 from equations.graph import (
     CONDITIONS,
     DERIVATIVES,
@@ -21,6 +22,7 @@ from equations.graph import (
     unsigned,
     with_partials,
 )
+from equations.rolled import SHORTEST, rolled
 from rparm.expressions.expression import in_order
 
 
@@ -58,17 +60,24 @@ class Series:
     def parts(self) -> dict[str, list[str]]:
         """What equations.c.in has blocks for."""
         terms = [f"{name} += {term};" for term, name in self.sums.items()]
-        return {
+        parts = {
             "still": self.still.lines,
             "first": self.first.lines,
             "start": self.start.lines,
             "integrals": self.integrals,
             "sums": [f"double {name} = 0.0;" for name in self.sums.values()],
-            "terms": [
-                "for (int i = 1; i < k; i++) {", *(f"    {term}" for term in terms), "}"
-            ] if terms else [],
+            "terms": terms,
             "later": self.later.lines,
-        }  # fmt: skip
+        }
+        if sum(map(len, parts.values())) >= SHORTEST:
+            for part in ("sums", "terms", "later"):
+                parts[part] = [re.sub(r"\bs(\d+)\b", r"s[\1]", line) for line in parts[part]]
+            parts["sums"] = [line.removeprefix("double ") for line in parts["sums"]]
+            parts["integrals"] = [f"double s[{len(self.sums) or 1}];", *parts["integrals"]]
+        found = dict(zip(parts, rolled(*parts.values()), strict=True))
+        if terms:
+            found["terms"] = ["for (int i = 1; i < k; i++) {", *indented(found["terms"]), "}"]
+        return found
 
     def _own_leaves(self, k: str) -> Leaves:
         """Coefficient k of all leaves."""

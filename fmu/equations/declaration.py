@@ -11,7 +11,7 @@ from equations_content import COUNTS, FOLLOWS, OPTIONS, SWITCHES, ModelFile, Var
 from equations_file import NUMBERS
 
 from equations import c_events, c_model
-from equations.c_code import field_of, indicator_of, mode_of, rate_of
+from equations.c_events import INDICATOR
 from equations.graph import MOVING, Relation, Value
 from rparm.expressions.expression import CONDITION, WHOLE
 from rparm.expressions.units import shown
@@ -84,7 +84,7 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
     for state in states:
         rate = state.exponents | {"s": state.exponents.get("s", 0) - file.has_units}
         tables[f"der_{state.name}"] = {
-            **_local(rate_of(state.name)),
+            **_local(file.fields.rate(state.name)),
             "unit": _unit(units, rate),
             "derivative_of": state.name,
             **_dependencies(state.value, file),
@@ -92,10 +92,10 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
         }
     for mode in file.modes if c_events.has_events(file) else ():
         own = {"type": "boolean", "variability": "discrete", "description": f"Mode {mode}"}
-        tables[mode] = _local(mode_of(mode)) | own
+        tables[mode] = _local(file.fields.count(mode)) | own
     for name, relation in indicators.items():
         tables[name] = {
-            **_local(indicator_of(relation.name)),
+            **_local(INDICATOR.format(relation.name)),
             "unit": "1",
             **_dependencies(relation.distance, file),
             "description": "Distance from an event; 1 while it plays no role",
@@ -149,7 +149,7 @@ def _entries_of(
     causality = CAUSALITIES[variable.section]
     if not variable.is_real:
         return _entries_of_count(variable, file)
-    entries = _local(field_of(variable.name)) | {"causality": causality}
+    entries = _local(file.fields.value(variable.name)) | {"causality": causality}
     if causality == "parameter":
         is_fixed = ("parameter", variable.name) in _fixed(file)
         entries["variability"] = "fixed" if is_fixed else "tunable"
@@ -184,7 +184,7 @@ def _entries_of_count(variable: Variable, file: ModelFile) -> dict[str, object]:
     leaf: Leaf = (variable.leaf.op, variable.name)
     variability = "discrete" if not is_parameter else "fixed" if leaf in _fixed(file) else "tunable"
     entries: dict[str, object] = {
-        "field": mode_of(variable.name),
+        "field": file.fields.count(variable.name),
         "type": TYPES.get(kind, "enumeration") if isinstance(kind, str) else "enumeration",
         "causality": CAUSALITIES[variable.section],
         "variability": variability,
@@ -230,9 +230,13 @@ def _known_of(leaves: set[Leaf], file: ModelFile) -> dict[str, list[str]]:
     moving = {name for op, name in leaves if op in MOVING or _is_in(file, name, SWITCHES)}
     parameters = {name for op, name in leaves if op == "parameter" or _is_in(file, name, OPTIONS)}
     return {
-        "dependencies": [name or "time" for name in ("", *file.variables) if name in moving],
-        "parameters": [name for name in file.variables if name in parameters],
+        "dependencies": _in_order({name or "time" for name in moving}, file),
+        "parameters": _in_order(parameters, file),
     }
+
+
+def _in_order(names: set[str], file: ModelFile) -> list[str]:
+    return sorted(names & file.places.keys(), key=file.places.__getitem__)
 
 
 def _is_in(file: ModelFile, name: str, *sections: str) -> bool:
@@ -253,9 +257,8 @@ def _reached(leaves: Iterable[Leaf], file: ModelFile, changed: Collection[str]) 
         if name in file.graph.segments:
             todo += file.graph.segments[name].argument.leaves
         if "state" in changed:
-            todo += [
-                leaf for v in file.started if v.name == name for leaf in v.initial.value.leaves
-            ]
+            initial = file.variables[name].initial if name in file.variables else None
+            todo += initial.value.leaves if initial is not None else ()
         is_changed = op in changed or _is_in(file, name, COUNTS)
         for change in file.changes if is_changed else ():
             if name in change.given:
@@ -269,10 +272,9 @@ def _initially(
 ) -> dict[str, list[str]]:
     """What it follows from at the end of the initialization, when events may happen."""
     found = _reached(leaves, file, ["state", "mode", "discrete"])
-    started = {variable.name for variable in file.started}
     known_here = {name or "time" for op, name in found if op in (*MOVING, "parameter")}
     known_here |= {name for _, name in found if _is_in(file, name, OPTIONS, SWITCHES)}
-    names = known_here - started
+    names = {n for n in known_here if n == "time" or file.variables[n].initial is None}
     if known and names == {*known["dependencies"], *known["parameters"]}:
         return {}
-    return {"initially": [name for name in ("time", *file.variables) if name in names]}
+    return {"initially": _in_order(names, file)}

@@ -364,6 +364,24 @@ class Graph:
                 found[y] = self.chain(y, [found[argument] for argument in y.arguments])
         return [found[root] for root in roots]
 
+    def gradients(self, roots: Iterable[Value], by: Iterable[Value]) -> list[dict[Value, Value]]:
+        """For each root its derivatives by these leaves, where it follows from them."""
+        roots, one, zero = list(roots), self.number(1.0), self.number(0.0)
+        leaves = {(leaf.op, leaf.name): leaf for leaf in by}
+        found: dict[Value, dict[Value, Value]] = {}
+        for y in in_order(roots):
+            if (y.op, y.name) in leaves:
+                found[y] = {y: one}
+            elif y.op in STILL:
+                found[y] = {}
+            else:
+                given = [found[argument] for argument in y.arguments]
+                found[y] = {
+                    x: self.chain(y, [slopes.get(x, zero) for slopes in given])
+                    for x in dict.fromkeys(x for slopes in given for x in slopes)
+                }
+        return [found[root] for root in roots]
+
     def derivative(self, y: Value, x: Value) -> Value:
         """The partial derivative of y by a leaf."""
         return self.derivatives([y], {x: self.number(1.0)})[0]

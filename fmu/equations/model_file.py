@@ -7,6 +7,7 @@ from pathlib import Path
 import equations_file
 from equations_content import COUNTS, OPTIONS, SWITCHES, ModelFile, ModelFileError
 
+from equations.c_code import Fields
 from equations.graph import Graph
 from rparm.expressions.expression import CONDITION, RELATIONS, derivative_of
 
@@ -31,6 +32,11 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     for variable in file.of(*LEAVES):
         op = "mode" if variable.kind == CONDITION else LEAVES[variable.section]
         variable.leaf = graph.value(op, name=variable.name)
+    counts = [v.name for v in file.of(COUNTS)]
+    calculated = [v.name for v in file.calculated]
+    sections = ("parameters", "inputs", "states", "discrete", OPTIONS, SWITCHES)
+    names = [[v.name for v in file.of(section)] for section in sections]
+    file.fields = Fields([*names, calculated, [*file.modes, *counts]])
     known = {variable.name: variable.leaf for variable in file.of(*LEAVES)}
     known |= {mode: graph.value("mode", name=mode) for mode in file.modes}
     known |= {"time": graph.value("time"), "pi": graph.number(math.pi)}
