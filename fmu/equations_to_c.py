@@ -1,8 +1,8 @@
 """Writes the C of a file with equations and the variables.toml of its FMU, for the project's build.
 
 Value references are those of its lock file, which has to have all: `rparm build` writes it. An
-entry of [where] that the lock file does not name is no variable of the FMU. Terminals, which such
-a file cannot declare, come from another file.
+entry of [where] or a number about a sampler that the lock file does not name is no variable of the
+FMU. Terminals, which such a file cannot declare, come from another file.
 """
 
 import argparse
@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from equations import declaration, lock
+from equations import c_events, declaration, lock
 from equations.model_file import ModelFileError, read
 from generate import write_if_changed
 from program import program
@@ -53,6 +53,7 @@ def main() -> None:
     lock_file = lock.path_of(arguments.file)
     references = lock.references(lock_file, [])
     hidden = {variable.name for variable in file.of("where")}
+    hidden |= {tick.name for tick in c_events.ticks(file)}
     for name, kind in declaration.keys(file):
         if (name, kind) not in references and name not in hidden:
             raise ModelFileError(f"{lock_file}: has no {name}: build the model by rparm build")

@@ -359,8 +359,8 @@ def linearize(
     Returns
     -------
     Linear
-        `A`, `B`, `C`, `D`; `states`, `inputs`, `outputs`, `held`; `ss()` and `zoh(step)` give them
-        to python-control.
+        `A`, `B`, `C`, `D`; `states`, `inputs`, `outputs`, `held`; `dt`, in s, if samplers make it
+        discrete; `ss()` and `zoh(step)` give them to python-control.
     """
     with _needing("control"):
         from rparm.linearization.study import Request, study

@@ -5,7 +5,10 @@ mode, and 1 while no value that is needed reads it. An event of the file fires w
 comes to hold in its modes. What all models do with that is in src/model/relations.c.
 """
 
+import re
+import sys
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 from equations_content import COUNTS, SWITCHES, Change, ModelFile, Sampler
 
@@ -28,6 +31,8 @@ from rparm.expressions.expression import CONDITION, Kind, in_order
 Guards = dict[Value, Value | None]  # conditions; None: always
 
 INDICATOR = "z_{}"
+SECOND = {"s": 1}
+INDEXES = re.compile(r"\[([0-9,]+)\]")
 NEXT_TIME = [
     "static double next_time(const void *values) {",
     "    return relations_next_time(&relations, ROOM, values);",
@@ -60,6 +65,49 @@ def arrays(file: ModelFile) -> Leaves:
     own = {("state", v.name): f"x[{i}]" for i, v in enumerate(file.of("states"))}
     own |= {("input", v.name): f"u[{i}]" for i, v in enumerate(file.of("inputs"))}
     return {**leaves(file), **own}
+
+
+@dataclass(frozen=True)
+class Tick:
+    """A number about a sampler: a local variable of the FMU, which `linearize` differentiates."""
+
+    name: str
+    field: str
+    value: Value
+    exponents: dict[str, int]  # of its unit
+    description: str  # rparm/linearization/sampling.py knows it by that
+
+
+def ticks(file: ModelFile) -> list[Tick]:
+    """When samplers tick, and what each would set now; the largest double is no finite value."""
+    graph, found, taken = file.graph, [], {*file.variables, *file.modes}
+    one, zero, largest = map(graph.number, (1.0, 0.0, sys.float_info.max))
+    for i, sampler in enumerate(file.sampled, 1):
+        every, offset = (period.value for period in sampler.periods)
+        own = [("every", every, SECOND, "period"), ("offset", offset, SECOND, "offset")]
+        for target, given in sampler.given.items():
+            variable, new, unit = file.variables.get(target), given.value, {}
+            old = variable.leaf if variable else graph.value("mode", name=target)
+            if old.op == "mode":
+                new, old = (graph.value("if", value, one, zero) for value in (new, old))
+            if sampler.during is not None:
+                new = graph.value("if", sampler.during.value, new, old)
+            if old.op in ("state", "discrete"):
+                meaning, unit = "new value", variable.exponents
+            else:  # the change, which is 0 or not
+                meaning, new = "change", graph.value("-", new, old)
+            new = graph.value("if", graph.value("isfinite", new), new, largest)
+            own.append((target, new, unit, f"{meaning} of {target}"))
+        for key, value, unit, meaning in own:
+            plain = f"sampled_{sampler.name}_{key}"
+            indexes = ",".join(INDEXES.findall(plain))
+            name, end = INDEXES.sub("", plain), indexes and f"[{indexes}]"
+            while name + end in taken:
+                name += "_"
+            taken.add(name + end)
+            description = f"Sampler {i}, {sampler.name}: {meaning}"
+            found.append(Tick(name + end, f"tick_{len(found)}", value, unit, description))
+    return found
 
 
 def has_events(file: ModelFile) -> bool:

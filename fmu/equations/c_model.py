@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from equations_content import OPTIONS, ModelFile
 
 from equations.c_code import Code, declared, filled, indented, number, shortened, text
-from equations.c_events import Events, arrays, leaves
+from equations.c_events import Events, arrays, leaves, ticks
 from equations.c_series import Series
 from equations.graph import FALLIBLE, Value, is_number
 from equations.rolled import rolled
@@ -24,6 +24,7 @@ def header(file: ModelFile) -> str:
     groups = _ranges(file) | {
         "calculated": [file.fields.value(v.name) for v in file.calculated],
         "event indicators": list(events.indicators()),
+        "samplers": [tick.field for tick in ticks(file)],
     }
     fields = []
     for title, names in groups.items():
@@ -199,8 +200,9 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, list[str]]:
     fields = {file.fields.rate(state.name): state.value for state in file.of("states")}
     fields |= {file.fields.value(v.name): v.value for v in file.calculated}
     fields |= events.indicators()
+    fields |= {tick.field: tick.value for tick in ticks(file)}
     seeds = {graph.value("time"): graph.value("first")}  # it has no second derivative
-    for variable in file.of("parameters", "inputs", "states"):
+    for variable in file.of("parameters", "inputs", "states", "discrete"):
         first = seeds[variable.leaf] = graph.value("first", name=variable.name)
         seeds[first] = graph.value("second", name=variable.name)
     firsts = graph.derivatives(fields.values(), seeds)

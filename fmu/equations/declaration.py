@@ -51,6 +51,7 @@ def keys(file: ModelFile) -> list[Key]:
         *((f"der_{state.name}", "local") for state in file.of("states")),
         *((mode, "mode") for mode in file.modes),
         *((name, "local") for name in _indicators(file)),
+        *((tick.name, "local") for tick in c_events.ticks(file)),
     ]
 
 
@@ -99,6 +100,9 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
             **_dependencies(relation.distance, file),
             "description": "Distance from an event; 1 while it plays no role",
         }
+    for tick in c_events.ticks(file):
+        own = {"unit": _unit(units, tick.exponents), "description": tick.description}
+        tables[tick.name] = _local(tick.field) | own
     model = {
         "name": file.name,
         "description": file.description or file.name,

@@ -9,13 +9,13 @@ import tomllib
 from pathlib import Path
 
 from equations_content import ModelFileError
-from equations_file import NAME
 
 from equations.declaration import Key
 
 RESERVED = (0, *range(80, 100))  # the time, the variables of the integrator
 LARGEST = 99_999
-ELEMENT = re.compile(rf"{NAME.pattern}(\[[0-9]+(,[0-9]+)*\])?", re.ASCII)
+# longer than in a file: der_ and others stand in front
+ELEMENT = re.compile(r"[A-Za-z]\w*(\[[0-9]+(,[0-9]+)*\])?", re.ASCII)
 HEAD = "# Value references of {name}: written by the build. Keep it with the model.\n"
 
 

@@ -65,13 +65,13 @@ def do_linearize(options: argparse.Namespace) -> Ended:
     if options.step is not None:
         found.linear.sampled(options.step)  # a step that is too long is refused before the tables
     n, m, p = (len(getattr(found.linear, key)) for key in ("states", "inputs", "outputs"))
-    tables = []
+    tables, is_sampled = [], found.linear.dt > 0
     if found.trimmed:
         tables.append((page.equilibrium_table(found), page.EQUILIBRIUM))
     if is_small := n + m <= MOST_COLUMNS and n + p <= MOST_ROWS:
-        tables.append((page.matrices_table(found), page.MATRICES))
+        tables.append((page.matrices_table(found), page.MATRICES[is_sampled]))
     if n:
-        tables.append((page.poles_table(found), page.POLES))
+        tables.append((page.poles_table(found), page.POLES[is_sampled]))
     if found.margins is not None:
         tables.append((page.margins_table(found.margins), page.MARGINS))
     if found.largest:

@@ -244,15 +244,17 @@ class _ModelExchange(Instance):
         self._update()
 
     def set_states(self, values: Mapping[str, float]) -> None:
-        """Move some states, by name, and pass the events that this causes."""
+        """Move some states and discrete variables, by name, and pass the events of that."""
         states = self.reals(self.fmu.model.states)
         with self.explained("at its states"):
             states.get()
-            for name, value in values.items():
-                states.view[states.names.index(name)] = value
+            for name in values.keys() & set(states.names):
+                states.view[states.names.index(name)] = values[name]
             x = states.view.ctypes.data_as(POINTER(c_double))
             self.fmi.setContinuousStates(x, len(states.names))
             self.fmi.enterEventMode()
+        for name in values.keys() - set(states.names):
+            self.set(name, values[name])
         self._update()
 
     def _update(self) -> None:

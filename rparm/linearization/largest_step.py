@@ -15,7 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rparm.linearization.linear import Linear, hold
+from rparm.linearization.linear import Linear
+from rparm.linearization.sampling import hold
 from rparm.linearization.system import SystemSubject, connected, looped
 from rparm.systems import ssp
 from rparm.systems.comparison import Rest

@@ -1,6 +1,5 @@
 """Linear models: A, B, C and D of an FMU at a point, by its directional derivatives."""
 
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
@@ -9,27 +8,23 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from rparm.errors import UserError, WrongValueError, did_you_mean, hint, placed
+from rparm.errors import UnplacedError, UserError, WrongValueError, did_you_mean, hint, placed
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import PARAMETERS, Model, Value, Variable
+from rparm.linearization.sampling import Tick, held_numbers, hold, period, samplers, ticks
 from rparm.units import typed_quantity
 
 if TYPE_CHECKING:
     from control import StateSpace
 
-TERMS = 13  # of Taylor's series of an exponential
 CANCELLED = 1e-13  # of the terms of a sum: rounding of a sum that is 0
 ROUNDING = 1e-15  # relative, for each row and column: of singular values that are 0
-SAMPLED = (
-    "is sampled, which no linear model in continuous time can be: set its sample time to 0 if it "
-    "has one"
-)
 
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """Small deviations from a point: x' = A x + B u, y = C x + D u.
+    """Small deviations from a point: x' = A x + B u, y = C x + D u; or, sampled, x+ = A x + B u.
 
     Attributes
     ----------
@@ -52,6 +47,13 @@ class Linear:
         States that are left out as they play no part between inputs and outputs.
     hidden : ndarray
         Poles that are left out with them, 1/s.
+    dt : float
+        Time between samples, s; 0: continuous. x is just before the first tick of a period, y just
+        after it.
+    ticks : tuple of Tick
+        Ticks of samplers at the point. Until `discretized`, x' holds between them.
+    between : Linear or None
+        The model between ticks that has been discretized.
     """
 
     states: tuple[str, ...]
@@ -71,12 +73,39 @@ class Linear:
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     dropped: tuple[str, ...] = ()
     hidden: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))
+    dt: float = 0.0
+    ticks: tuple[Tick, ...] = ()
+    between: "Linear | None" = None
 
     @property
     def poles(self) -> np.ndarray:
-        """Eigenvalues of A in 1/s, the slowest first, shape (n,)."""
+        """Eigenvalues of A, in 1/s unless it is sampled, the slowest first, shape (n,)."""
         found = eigenvalues(self.A)
-        return found[np.lexsort((found.imag, np.abs(found)))]
+        return found[np.lexsort((found.imag, np.abs(self.rates_of(found))))]
+
+    def rates_of(self, poles: np.ndarray) -> np.ndarray:
+        """Return poles or zeros in 1/s, also of a sampled model: -inf for 0."""
+        if not self.dt:
+            return poles
+        with np.errstate(divide="ignore"):
+            return np.log(np.abs(poles)) / self.dt + 1j * (np.angle(poles) / self.dt)
+
+    def points(self, w: np.ndarray) -> np.ndarray:
+        """Return where frequencies w in rad/s lie in the plane of s, or z."""
+        return np.exp(1j * self.dt * np.asarray(w)) if self.dt else 1j * np.asarray(w)
+
+    @property
+    def balance(self) -> tuple[list[str], np.ndarray, np.ndarray]:
+        """Return all k numbers that are 0 at an equilibrium: texts, (k,), derivatives (k, n + m).
+
+        First the derivatives of all states, then the changes by ticks.
+        """
+        texts = [f"the derivative of {name} stays at" for name in self.states]
+        texts += [f"sampler {t.name} changes {name} by" for t in self.ticks for name in t.changes]
+        one = np.eye(len(self.states), len(self.states) + len(self.inputs))
+        values = [self.rates, *(list(tick.changes.values()) for tick in self.ticks)]
+        rows = [np.hstack([self.A, self.B]), *(t.partials - one[t.rows] for t in self.ticks)]
+        return texts, np.concatenate(values), np.vstack(rows)
 
     @property
     def are_positions(self) -> np.ndarray:
@@ -86,20 +115,22 @@ class Linear:
 
     def ss(self) -> "StateSpace":
         """Return the model for python-control, if installed; in its names dots become _."""
-        return _state_space(self.A, self.B, self.C, self.D, **self._labels)
+        matrices = self.A, self.B, self.C, self.D, self.dt
+        return import_module("control").ss(*matrices, **self._labels)
 
     def zoh(self, step: float) -> "StateSpace":
         """Return the model from one sample to the next, `step` s apart, for held inputs."""
-        transition, forced = self.sampled(step)
-        return _state_space(transition, forced, self.C, self.D, step, **self._labels)
+        return self.sampled(step).ss()
 
-    def sampled(self, step: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return A and B of `zoh`; UserError if deviations grow beyond what a double holds."""
+    def sampled(self, step: float) -> "Linear":
+        """Return the model of `zoh`; UserError if deviations grow beyond what a double holds."""
+        if self.dt:
+            raise UserError(f"step: the model is sampled already, every {self.dt:g} s")
         with np.errstate(over="ignore", invalid="ignore"):
             transition, forced, _ = hold(self.A, self.B, step)
         if not (np.isfinite(transition).all() and np.isfinite(forced).all()):
             raise UserError(f"step: deviations overflow in {step:g} s, expected a shorter one")
-        return transition, forced
+        return replace(self, A=transition, B=forced, dt=step)
 
     @property
     def _labels(self) -> dict[str, list[str]]:
@@ -138,35 +169,16 @@ class Linear:
             held=(*self.held, *(name for name in self.states if name in held)),
         )
 
-
-def hold(A: np.ndarray, B: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return F, G, S, shapes (n, n), (n, m), (n, m), of x(h) = F x + G u + S u', u at the begin."""
-    n, m = B.shape
-    if not n:
-        return np.zeros((0, 0)), np.zeros((0, m)), np.zeros((0, m))
-    whole = np.zeros((n + 2 * m, n + 2 * m))
-    whole[:n, :n], whole[:n, n : n + m] = A, B
-    whole[n : n + m, n + m :] = np.eye(m)
-    found = _exponential(whole * step)
-    return found[:n, :n], found[:n, n : n + m], found[:n, n + m :]
-
-
-def _exponential(matrix: np.ndarray) -> np.ndarray:
-    """Return exp of a matrix: Taylor's series of a part of it, squared; exact but for rounding."""
-    halvings = max(0, 4 + math.frexp(np.abs(matrix).sum(axis=1).max(initial=0.0))[1])
-    part = matrix / 2.0**halvings  # below 1/16: terms fall below rounding at once
-    result = term = np.eye(len(matrix))
-    for order in range(1, TERMS):
-        term = term @ part / order
-        result = result + term
-    for _ in range(halvings):
-        result = result @ result
-    return result
-
-
-def _state_space(*arguments: object, **names: object) -> "StateSpace":
-    """Return a system of python-control, which nothing else here needs."""
-    return import_module("control").ss(*arguments, **names)
+    def discretized(self) -> "Linear":
+        """Return the model from period to period of its samplers, of one rate; UnplacedError."""
+        n = len(self.states)
+        with np.errstate(over="ignore", invalid="ignore"):
+            whole, first = period(self.A, self.B, self.ticks)
+        if not np.isfinite(whole).all():
+            raise UnplacedError("deviations overflow within a period of its samplers")
+        A, B = np.split(whole[:n], [n], axis=1)
+        C, D = np.split(np.hstack([self.C, self.D]) @ first, [n], axis=1)
+        return replace(self, A=A, B=B, C=C, D=D, dt=self.ticks[0].every, between=self)
 
 
 def _places(known: Sequence[str], wanted: Sequence[str] | None, option: str) -> list[int]:
@@ -247,22 +259,28 @@ def scales(A: np.ndarray) -> np.ndarray:
 
 # ---- Of an FMU -----------------------------------------------------------------------------------
 def linear_model(instance: Instance) -> Linear:
-    """Linearize an initialized instance, with all states; UserError if a value is not finite."""
+    """Linearize an initialized instance, with all states; UserError if a value is not finite.
+
+    Discrete variables that samplers set are states, too, which rest between ticks.
+    """
     model = instance.fmu.model
-    variables = model.variables.values()
-    inputs = [v.name for v in variables if v.causality == "input" and v.type == "Real"]
-    outputs = [n for n in model.real_outputs if model.variables[n].variability != "discrete"]
-    unknowns, knowns = [*model.derivatives, *outputs], [*model.states, *inputs]
+    known, declared = model.variables, samplers(model)
+    inputs = [n for n, v in known.items() if v.causality == "input" and v.type == "Real"]
+    kept = held_numbers(model, declared)
+    states = (*model.states, *kept)
+    outputs = [n for n in model.real_outputs if n in kept or known[n].variability != "discrete"]
+    unknowns, knowns = [*model.derivatives, *outputs], [*states, *inputs]
     values = instance.reals([*knowns, *unknowns])
     with instance.explained("at the point"):
         values.get()
     partials = instance.partials(unknowns, knowns)
     _check_finite(instance, values.names, values.view)
     _check_finite(instance, unknowns, partials.sum(axis=1))
-    n, m = len(model.states), len(inputs)
-    x, u, rates, y = np.split(values.view, np.cumsum([n, m, n]))
+    n, m, resting = len(states), len(inputs), np.zeros((len(kept), len(knowns)))
+    partials = np.insert(partials, len(model.states), resting, axis=0)
+    x, u, rates, y = np.split(values.view, np.cumsum([n, m, n - len(kept)]))
     return Linear(
-        states=model.states,
+        states=states,
         inputs=tuple(inputs),
         outputs=tuple(outputs),
         A=partials[:n, :n],
@@ -272,8 +290,9 @@ def linear_model(instance: Instance) -> Linear:
         x=x,
         u=u,
         y=y,
-        rates=rates,
+        rates=np.append(rates, resting[:, :1]),
         at=dict(zip(knowns, [*x.tolist(), *u.tolist()], strict=True)),
+        ticks=ticks(instance, declared, states, inputs),
         left_out=tuple(name for name in model.real_outputs if name not in outputs),
     )
 
@@ -315,28 +334,47 @@ class FmuSubject(ExitStack):
         for name in values.keys() - later.keys():
             instance.set(name, values[name])
         instance.enter_initialization()
+        moved = self._before_ticks() | later
         instance.exit_initialization()
-        if later:
-            self._move(later)
+        if moved:
+            self._move(moved)
         return linear_model(instance)
 
+    def _before_ticks(self) -> dict[str, float]:
+        """Return the start values that samplers change if they tick at the start."""
+        given = {target for sampler in samplers(self.fmu.model) for target in sampler.new}
+        variables = self.fmu.model.variables
+        names = [name for name in variables if name in given and variables[name].initial == "exact"]
+        values = self._instance.reals(names)
+        with self._instance.explained("at the start"):
+            values.get()
+        return dict(zip(names, values.view.tolist(), strict=True))
+
     def _move(self, states: Mapping[str, float]) -> None:
-        """Set states whose start values follow from parameters."""
+        """Set states that the initialization gives other values."""
         move = getattr(self._instance, "set_states", None)
         if move is None:
-            why = self.variable(next(iter(states))).why_it_follows
-            raise UserError(f"{self.fmu.path}: {why}, or linearize it in model exchange")
+            follow = [v for v in map(self.variable, states) if v.follows]
+            why = f"{follow[0].why_it_follows}, or" if follow else "has samplers:"
+            raise UserError(f"{self.fmu.path}: {why} linearize it in model exchange")
         move(states)
 
     def held(self, found: Linear) -> list[str]:
         """Return the states of `found` that are held."""
         return held_states(found, self.fmu.model)
 
-    def check(self, found: Linear) -> None:
-        """Refuse an FMU that is sampled: its derivatives are 0 between samples."""
+    def finished(self, found: Linear) -> Linear:
+        """Return the model of a point without states that are held, sampled if it has samplers.
+
+        UserError if its samplers have several rates, or if it is sampled and does not say how.
+        """
         instance, model = self._instance, self.fmu.model
+        with placed(str(self.fmu.path)):
+            if found.ticks:
+                return found.discretized().without(self.held(found))
         if is_sampled(found, model, model.real_outputs, lambda: next_event(instance)):
-            raise UserError(f"{self.fmu.path}: {SAMPLED}")
+            raise UserError(f"{self.fmu.path}: {why_sampled(model)}")
+        return found.without(self.held(found))
 
 
 def next_event(instance: Instance) -> float | None:
@@ -371,13 +409,26 @@ def held_states(found: Linear, model: Model) -> list[str]:
     responses = np.hstack([found.A, found.B]) != 0
     is_still = (found.rates == 0) & (found.x == 0) & ~responses.any(axis=1)
     causes = [model.dependencies.get(name, ("anything",)) for name in model.derivatives]
+    causes += [()] * (len(found.states) - len(causes))
+    ticking = {row for tick in found.ticks for row in tick.rows}
     held = is_still & np.array([bool(some) for some in causes], bool)
     moved_by_held = np.zeros(len(held), bool)
     n = len(found.states)
     if held.any():
         by_others = responses[:, :n][:, ~held].any(axis=1) | responses[:, n:].any(axis=1)
         moved_by_held = responses.any(axis=1) & ~by_others & (found.rates == 0)
-    return [name for name, out in zip(found.states, held | moved_by_held, strict=True) if out]
+    every = zip(found.states, held | moved_by_held, strict=True)
+    return [name for i, (name, out) in enumerate(every) if out and i not in ticking]
+
+
+def why_sampled(model: Model, way_out: str = "") -> str:
+    """Say that an FMU is sampled, which needs a discrete model, and what to do."""
+    own = ", ".join(sampler.name for sampler in samplers(model))
+    every = (n for n, v in model.variables.items() if "sample" in n and v.is_a(PARAMETERS))
+    switch = "" if own else next(every, "")
+    ways = ", or ".join(filter(None, [switch and f"set {switch} to 0", way_out]))
+    why = "which no linear model in continuous time can be"
+    return f"is sampled{own and f' by {own}'}, {why}{ways and f': {ways}'}"
 
 
 def is_sampled(
@@ -385,9 +436,11 @@ def is_sampled(
 ) -> bool:
     """Return whether `outputs` follow inputs only at ticks.
 
-    It is so if all that depend on inputs are discrete, or do not change with them now while the FMU
-    announces a time event.
+    It is so if it has samplers, if all that depend on inputs are discrete, or do not change with
+    them now while the FMU announces a time event.
     """
+    if samplers(model):
+        return True
     following = [name for name in outputs if _depends_on_inputs(model, name)]
     rows = [found.outputs.index(name) for name in following if name in found.outputs]
     if not following or not rows:

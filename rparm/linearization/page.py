@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rparm.linearization.largest_step import LargestStep
-from rparm.linearization.linear import Linear, eigenvalues, hold, zeros
+from rparm.linearization.linear import Linear, zeros
 from rparm.linearization.margins import Margins, closed, searched
-from rparm.linearization.responses import frequencies, frequency_response, sampled_response
+from rparm.linearization.responses import frequencies, frequency_response
 from rparm.linearization.study import Study
 from rparm.report import pages
 from rparm.units import milliseconds
@@ -22,9 +22,11 @@ Part = tuple[pages.Table, str, list[Picture]]
 NONE = "–"
 LISTED = 12  # names in a sentence
 REAL = 1e-6  # of a pole: a smaller real or imaginary part is rounding, as of poles that are equal
-POLES = (
+POLES = (  # of a continuous model, and of a sampled one
     "A deviation along a pole grows or dies out as e to the power of its real part times the time. "
-    "Damping is 1 without oscillation, 0 if it does not decay, below 0 if it grows."
+    "Damping is 1 without oscillation, 0 if it does not decay, below 0 if it grows.",
+    "From sample to sample a deviation along a pole is multiplied by it: it dies out within the "
+    "unit circle. Damping and time are those of a continuous pole with the same samples.",
 )
 MARGINS = (
     "Each says how far one quantity may change at the break, all else fixed, before the loop "
@@ -41,7 +43,8 @@ POINT = (
     "with a run."
 )
 EQUILIBRIUM = (
-    "All derivatives are 0, except those of positions in a steady motion. Where dry friction or a "
+    "All derivatives are 0, except those of positions in a steady motion, and ticks of samplers "
+    "change nothing. Where dry friction or a "
     "stop holds a joint, every value between the two ends is an equilibrium while the others stay "
     "as they are; the value shown is in the middle."
 )
@@ -51,7 +54,9 @@ PICTURES = (
 )
 MATRICES = (
     "A row for each derivative of a state and each output, a column for each state and input. "
-    "Units are those of the variables, and s."
+    "Units are those of the variables, and s.",
+    "A row for each state one sample later and each output, a column for each state and input. "
+    "Units are those of the variables.",
 )
 TEXTS = pages.STYLE | {"text.parse_math": False}
 MOST_DRAWN = 2  # inputs and outputs that are drawn: with more, curves would share a colour
@@ -80,11 +85,11 @@ def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
         parts.append((steps_table(list(found.largest)), STEPS, []))
     if len(linear.states):
         pages.save_figure(poles_figure(linear, step, found.loop), folder / "poles.png")
-        parts.append((poles_table(found), POLES, [("poles", "Poles")]))
+        parts.append((poles_table(found), POLES[linear.dt > 0], [("poles", "Poles")]))
     if pictures := _pictures(folder, found, step):
         parts.append((pages.Table("Answers", [], []), PICTURES, pictures))
     parts.append((point_table(found), POINT, []))
-    parts.append((matrices_table(found), MATRICES, []))
+    parts.append((matrices_table(found), MATRICES[linear.dt > 0], []))
     name = f"{found.path.stem}, {found.variant}" if found.variant else found.path.stem
     return pages.write_page(
         folder / pages.INDEX,
@@ -128,6 +133,12 @@ def _not_drawn(found: Study) -> list[str]:
 def notes(found: Study) -> list[str]:
     """Say what has been left out, in a sentence each."""
     linear, texts = found.linear, []
+    if linear.dt:
+        names = _names(list(dict.fromkeys(tick.name for tick in linear.ticks)))
+        texts.append(
+            f"Sampled every {milliseconds(linear.dt)} by {names}. States are those just before the "
+            "first tick of a period, outputs those just after it; inputs are held in between."
+        )
     if linear.held:
         texts.append(
             f"Held: {_names(linear.held)}. They do not respond to small changes of the inputs, "
@@ -149,12 +160,18 @@ def notes(found: Study) -> list[str]:
             )
     if found.margins is not None and not found.margins.stable:
         texts.append("The closed loop is unstable here: it has no margins.")
+    point = linear.between or linear
     least = 1e-8 * max(1.0, float(np.abs(linear.x).max(initial=0.0)))
     moving = [
         f"{name}' = {rate:.6g}"
         for name, rate, is_position in zip(
-            linear.states, linear.rates, linear.are_positions, strict=True)
+            point.states, point.rates, point.are_positions, strict=True)
         if abs(rate) > least and (is_position or not found.trimmed)  # else rounding
+    ]  # fmt: skip
+    moving += [
+        f"{tick.name} changes {name} by {change:.6g}"
+        for tick in point.ticks for name, change in tick.changes.items()
+        if abs(change) > least and not found.trimmed
     ]  # fmt: skip
     if moving and found.trimmed:
         texts.append(f"In steady motion: {_names(moving)}.")
@@ -189,25 +206,30 @@ def equilibrium_table(found: Study) -> pages.Table:
 
 def poles_table(found: Study) -> pages.Table:
     """Return poles, conjugate pairs in one row."""
-    values = found.linear.poles
-    rows = []
-    for exact in values:
-        size = abs(exact)
-        pole = complex(*(x if abs(x) > REAL * size else 0.0 for x in (exact.real, exact.imag)))
+    linear, rows = found.linear, []
+    for exact, exact_rate in zip(linear.poles, linear.rates_of(linear.poles), strict=True):
+        pole, rate = _without_rounding(exact), _without_rounding(exact_rate)
         if pole.imag < 0:
             continue  # its conjugate stands for both
-        is_pair = pole.imag > 0
         rows.append(
             [
-                _short(float(pole.real)),
-                f"± {_short(float(pole.imag))}" if is_pair else NONE,
-                _short(float(abs(pole.imag)) / (2 * math.pi)) if is_pair else NONE,
-                _short(-pole.real / size + 0.0) if size else NONE,
-                _short(1 / abs(pole.real)) if pole.real else NONE,
+                _short(pole.real),
+                f"± {_short(pole.imag)}" if pole.imag else NONE,
+                _short(abs(rate.imag) / (2 * math.pi)) if rate.imag else NONE,
+                _short(-rate.real / abs(exact_rate) + 0.0) if rate else NONE,
+                _short(1 / abs(rate.real)) if rate.real else NONE,
             ]
         )
     head = ["real part (1/s)", "imaginary (rad/s)", "frequency (Hz)", "damping", "1/real (s)"]
+    if linear.dt:
+        head = ["real part", "imaginary", "frequency (Hz)", "damping", "time constant (s)"]
     return pages.Table("Poles" if found.loop is None else "Poles of the broken loop", head, rows)
+
+
+def _without_rounding(pole: complex) -> complex:
+    """Return a pole with 0 for a part that is rounding, or 0 for a rate that is not finite."""
+    least = REAL * abs(pole)
+    return complex(*(float(x) if abs(x) > least else 0.0 for x in (pole.real, pole.imag)))
 
 
 def margins_table(found: Margins) -> pages.Table:
@@ -238,7 +260,7 @@ def matrices_table(found: Study) -> pages.Table:
     """Return the matrix [A B; C D]."""
     linear = found.linear
     whole = np.block([[linear.A, linear.B], [linear.C, linear.D]])
-    names = (*(f"{name}'" for name in linear.states), *linear.outputs)
+    names = (*(name + "'+"[linear.dt > 0] for name in linear.states), *linear.outputs)
     pairs = zip(names, whole, strict=True)
     rows = [[name, *(_short(float(x)) for x in row)] for name, row in pairs]
     return pages.Table("A, B, C and D", ["", *linear.states, *linear.inputs], rows)
@@ -265,9 +287,10 @@ def bode_figure(model: Linear, step: float | None, found: Margins | None = None)
         for (label, one, values), color in zip(shown, _colors(), strict=False):
             _bode(gain, phase, values, grid, color, label)
             if step is not None:
-                below = _below(grid, one, step)
+                sampled = one.sampled(step)
+                below = _below(grid, sampled)
                 name = f"{label}, held for {milliseconds(step)}"
-                response = sampled_response(one, step)(below)
+                response = frequency_response(sampled)(below)
                 _bode(gain, phase, response, below, color, name, pages.DASHED)
         for axes, level in ((gain, 0.0), (phase, -180.0)):
             if step is not None:
@@ -310,9 +333,9 @@ def nyquist_figure(loop: Linear, step: float | None) -> Figure:
         grid = searched(loop)
         _nyquist(axes, frequency_response(loop)(grid), "-", "continuous")
         if step is not None:
-            below = _below(grid, loop, step)
-            name = f"held for {milliseconds(step)}"
-            _nyquist(axes, sampled_response(loop, step)(below), pages.DASHED, name)
+            sampled, name = loop.sampled(step), f"held for {milliseconds(step)}"
+            response = frequency_response(sampled)(_below(grid, sampled))
+            _nyquist(axes, response, pages.DASHED, name)
         circle = np.exp(1j * np.linspace(0, 2 * math.pi, 200))
         axes.plot(circle.real, circle.imag, color=pages.MUTED, linewidth=0.8, linestyle=":")
         axes.plot(-1, 0, "+", color=pages.ERROR_COLORS[0], markersize=14, markeredgewidth=2)
@@ -341,7 +364,9 @@ def steps_figure(model: Linear, step: float | None) -> Figure:
         for axes, output in zip(every, model.outputs, strict=True):
             for name, color in zip(model.inputs, _colors(), strict=False):
                 one = model.select([name], [output])
-                axes.plot(*_step(one, end / POINTS, end), color=color, label=f"step of {name}")
+                style = {"color": color, "label": f"step of {name}"}
+                style |= {"drawstyle": "steps-post", "marker": "."} if model.dt else {}
+                axes.plot(*_step(one, end / POINTS, end), **style)
                 if step is not None and end <= MOST_DOTS * step:
                     axes.plot(*_step(one, step, end), ".", color=color)
             axes.set_ylabel(output)
@@ -352,19 +377,23 @@ def steps_figure(model: Linear, step: float | None) -> Figure:
 
 
 def _step(model: Linear, length: float, end: float) -> tuple[np.ndarray, np.ndarray]:
-    transition, forced, _ = hold(model.A, model.B, length)
-    count = int(end / length) + 1
+    model = model if model.dt else model.sampled(length)
+    count = int(end / model.dt) + 1
     x, values = np.zeros(len(model.A)), np.empty(count)
     for i in range(count):
         values[i] = (model.C @ x + model.D[:, 0])[0]
-        x = transition @ x + forced[:, 0]
-    return length * np.arange(count), values
+        x = model.A @ x + model.B[:, 0]
+    return model.dt * np.arange(count), values
 
 
 def poles_figure(model: Linear, step: float | None, loop: Linear | None = None) -> Figure:
     """Draw poles in the plane of s, and of the sampled model in the plane of z."""
     with mpl.rc_context(TEXTS):
         figure = Figure(figsize=(9, 4.2), layout="constrained")
+        if model.dt:
+            text = f"sampled every {milliseconds(model.dt)}"
+            _draw_sampled_poles(figure.subplots(), model.poles, text)
+            return figure
         plain, sampled = figure.subplots(1, 2)
         plain.axvline(0, color=pages.INK, linewidth=0.8)
         style = {"color": pages.RUN_COLOR, "label": "poles", "markersize": 9}
@@ -382,18 +411,23 @@ def poles_figure(model: Linear, step: float | None, loop: Linear | None = None) 
         if step is None:
             sampled.set_visible(False)
         else:
-            circle = np.exp(1j * np.linspace(0, 2 * math.pi, 200))
-            sampled.plot(circle.real, circle.imag, color=pages.INK, linewidth=0.8)
-            found = np.linalg.eigvals(hold(model.A, model.B, step)[0])
-            sampled.plot(found.real, found.imag, "x", color=pages.RUN_COLOR, markersize=9)
-            sampled.set_aspect("equal")
-            sampled.set_xlabel(f"held for {milliseconds(step)}: within the circle dies out")
+            text = f"held for {milliseconds(step)}"
+            _draw_sampled_poles(sampled, model.sampled(step).poles, text)
     return figure
+
+
+def _draw_sampled_poles(axes: Axes, found: np.ndarray, text: str) -> None:
+    circle = np.exp(1j * np.linspace(0, 2 * math.pi, 200))
+    axes.plot(circle.real, circle.imag, color=pages.INK, linewidth=0.8)
+    axes.plot(found.real, found.imag, "x", color=pages.RUN_COLOR, markersize=9)
+    axes.set_aspect("equal")
+    axes.set_xlabel(f"{text}: within the circle dies out")
 
 
 def drawn(model: Linear) -> Linear:
     """Select what pictures show: the first outputs that respond, and inputs they respond to."""
-    s = 1j * frequencies(model.poles, (), AROUND)[:, None, None]
+    grid = frequencies(model.rates_of(model.poles), (), AROUND)
+    s = model.points(grid)[:, None, None]
     states = np.linalg.solve(s * np.eye(len(model.A)) - model.A, model.B + 0 * s)
     answers = np.abs(model.C @ states + model.D).max(axis=0)  # (outputs, inputs)
     responds = answers > ROUNDING * answers.max(initial=0.0)
@@ -416,27 +450,31 @@ def _colors() -> Iterator[str]:
 def _grid(model: Linear, found: Margins | None = None) -> np.ndarray:
     """Choose frequencies in rad/s around the poles of a model, or of a loop, closed too."""
     crossings = [x.frequency for x in (found.gain_crossings if found else ())]
-    poles = np.array([*model.poles, *(closed(model).poles if found else ())])
-    every = np.abs([*poles[poles != 0], *crossings])
+    poles = model.rates_of(np.array([*model.poles, *(closed(model).poles if found else ())]))
+    fastest = [math.pi / model.dt] if model.dt else []
+    every = np.abs([*poles[np.isfinite(poles) & (poles != 0)], *crossings, *fastest])
     low, high = every.min(initial=np.inf), every.max(initial=0.0)
-    channels = [zeros(one.A, one.B, one.C, one.D) for _, one in _channels(model)]
+    channels = [model.rates_of(zeros(one.A, one.B, one.C, one.D)) for _, one in _channels(model)]
     between = [p for some in channels for p in some if low <= abs(p) <= high]
     steep = [p for p in (*poles, *between) if abs(p.real) > ON_AXIS * abs(p)]
-    return frequencies(steep, [*every, *crossings], AROUND)
+    grid = frequencies(steep, [*every, *crossings], AROUND)
+    return _below(grid, model) if model.dt else grid
 
 
-def _below(grid: np.ndarray, model: Linear, step: float) -> np.ndarray:
+def _below(grid: np.ndarray, sampled: Linear) -> np.ndarray:
     """Choose frequencies below half the sampling rate, dense where sampled poles are."""
-    z = eigenvalues(hold(model.A, model.B, step)[0])
-    own = frequencies(np.log(z[z != 0]) / step, (), 0.0)
-    every = np.union1d(grid, own)
-    return every[(every >= grid[0]) & (every < math.pi / step)]
+    poles = sampled.rates_of(sampled.poles)
+    every = np.union1d(grid, frequencies(poles[np.isfinite(poles)], (), 0.0))
+    return every[(every >= grid[0]) & (every < math.pi / sampled.dt)]
 
 
 def _end(model: Linear, step: float | None) -> float:
     """Return how long a step is shown, s: until the slowest pole has settled."""
-    rates = np.abs(model.poles[model.poles != 0])
+    poles = model.rates_of(model.poles)
+    rates = np.abs(poles[np.isfinite(poles) & (poles != 0)])
     end = SETTLED / rates.min(initial=1.0 if not len(rates) else np.inf)
-    fastest = model.poles.real.max(initial=0.0)
+    fastest = poles.real.max(initial=0.0)
+    end = min(end, MOST_DOTS * model.dt) if model.dt else end
+    step = model.dt or step
     end = min(end, GROWN / fastest) if fastest > 0 else end
     return max(end, 20 * step) if step is not None else end

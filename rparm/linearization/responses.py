@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rparm.linearization.linear import Linear, cleared, closure, eigenvalues, hold, scales
+from rparm.linearization.linear import Linear, cleared, closure, eigenvalues, scales
 
 ROUNDING = 1e-15  # relative, of entries and operations
 PER_DECADE = 200  # frequencies of a grid, everywhere
@@ -81,26 +81,19 @@ def _solved(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
 def bounded_response(model: Linear) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
     """Return the response of one output to one input over rad/s, and bounds of its rounding."""
     transfer = _transfer(model)
-    return lambda w: transfer.bounded(1j * np.asarray(w))
+    return lambda w: transfer.bounded(model.points(w))
 
 
 def frequency_response(model: Linear) -> Response:
     """Return the response of one output to one input over frequencies in rad/s; nan at a pole."""
     transfer = _transfer(model)
-    return lambda w: transfer.values(1j * np.asarray(w))
+    return lambda w: transfer.values(model.points(w))
 
 
 def _transfer(model: Linear) -> _Transfer:
     scale = suited(model.A, model.B, model.C)
     A, B, C = model.A * scale / scale[:, None], model.B / scale[:, None], model.C * scale
     return _Transfer(A, B, C, model.D)
-
-
-def sampled_response(model: Linear, step: float) -> Response:
-    """Return the response of the model that is sampled, with inputs held in between."""
-    transition, forced, _ = hold(model.A, model.B, step)
-    transfer = _Transfer(transition, forced, model.C, model.D)
-    return lambda w: transfer.values(np.exp(1j * step * np.asarray(w)))
 
 
 def frequencies(steep: Iterable[complex], further: Iterable[float], decades: float) -> np.ndarray:

@@ -78,9 +78,8 @@ def study(request: Request) -> Study:
         time = start if request.time is None else request.time
         subject = stack.enter_context(FmuSubject(fmu, time))
         trimmed = _point(subject, request)
-        found = subject.at(trimmed.values)
-        subject.check(found)
-        found = _chosen(found.without(subject.held(found)), trimmed, request)
+        found = subject.finished(subject.at(trimmed.values))
+        found = _chosen(found, trimmed, request)
         return Study(path, found, _units(subject, found), request.free)
 
 
@@ -162,14 +161,12 @@ def document(found: Study, step: float | None) -> Document:
         "left_out": list(linear.left_out),
         "intervals": {name: list(map(finite, ends)) for name, ends in linear.intervals.items()},
     }
+    if linear.dt:
+        result["dt"] = linear.dt
     if step is not None:
-        transition, forced = linear.sampled(step)
-        result["zoh"] = {
-            "step": step,
-            "A": transition.tolist(),
-            "B": forced.tolist(),
-            "poles": pairs(np.linalg.eigvals(transition)),
-        }
+        zoh = linear.sampled(step)
+        result["zoh"] = {"step": step, "A": zoh.A.tolist(), "B": zoh.B.tolist()}
+        result["zoh"]["poles"] = pairs(np.linalg.eigvals(zoh.A))
     if found.variant:
         result["variant"] = found.variant
     if found.largest:
@@ -223,7 +220,7 @@ def _save_mat(path: Path, found: Document, linear: Linear) -> None:
     names = ("states", "inputs", "outputs", "held")
     values = {name: np.array(found[name], dtype=object) for name in names}
     values |= {name: getattr(linear, name) for name in "ABCD"}
-    values["poles"] = linear.poles
+    values |= {"poles": linear.poles} | ({"dt": linear.dt} if linear.dt else {})
     if "zoh" in found:
         values["zoh"] = {name: np.array(value) for name, value in found["zoh"].items()}
     with path.open("wb") as file:
@@ -231,12 +228,13 @@ def _save_mat(path: Path, found: Document, linear: Linear) -> None:
 
 
 def _save_csv(path: Path, found: Document, linear: Linear) -> None:
-    """Write the table [A B; C D], a column a state and input, a row an x' and output."""
+    """Write the table [A B; C D], a column a state and input, a row an x' or x+ and output."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["", *linear.states, *linear.inputs])
+        row = "next({})" if linear.dt else "der({})"
         for name, a, b in zip(linear.states, linear.A, linear.B, strict=True):
-            writer.writerow([f"der({name})", *map(repr, [*a.tolist(), *b.tolist()])])
+            writer.writerow([row.format(name), *map(repr, [*a.tolist(), *b.tolist()])])
         for name, c, d in zip(linear.outputs, linear.C, linear.D, strict=True):
             writer.writerow([name, *map(repr, [*c.tolist(), *d.tolist()])])
 

@@ -129,7 +129,7 @@ class SystemSubject(ExitStack):
             return _next_event(self.ssp, name, values, self.time)
 
         if linear.is_sampled(part, self.ssp.models[name], outputs, announced):
-            wrong = f"{linear.SAMPLED}{self._way_out(name)}"
+            wrong = linear.why_sampled(self.ssp.models[name], self._way_out(name))
             raise UserError(f"{self.ssp.path}: component {name!r} {wrong}")
 
     def _way_out(self, name: str) -> str:
@@ -137,7 +137,7 @@ class SystemSubject(ExitStack):
             bypassed(self.ssp, self.connections, name)
         except UserError:
             return ""
-        return f", or take it as ideal by --without {name}"
+        return f"take it as ideal by --without {name}"
 
     def _is_real(self, component: str, output: str) -> bool:
         return self.ssp.models[component].variables[output].type == "Real"

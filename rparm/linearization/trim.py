@@ -1,8 +1,9 @@
 """Equilibria by Newton's method on directional derivatives, and the intervals of dry friction.
 
-An equilibrium is where all derivatives of states are 0, but those that are a velocity which is
-given, and outputs have the values that they are to have. Some states and inputs are free. Where
-nothing rests and a velocity is free, it is a steady motion: that of a motor under a voltage.
+An equilibrium is where ticks of samplers change nothing, all derivatives of states are 0, but those
+that are a velocity which is given, and outputs have the values that they are to have. Some states
+and inputs are free. Where nothing rests and a velocity is free, it is a steady motion: that of a
+motor under a voltage.
 """
 
 import math
@@ -79,8 +80,10 @@ class _Problem:
         self.columns = [known.index(name) for name in free]
         self.is_moving = False
         self.rows = [first.outputs.index(name) for name in targets]
-        self.equations = [*first.states, *targets]
-        self.count = len(self.equations) - np.count_nonzero(self._is_given_velocity(first))
+        self.texts, _, responses = first.balance
+        unbound = ~responses.any(axis=1)
+        unbound[: len(first.states)] |= self._is_given_velocity(first)
+        self.count = len(targets) + np.count_nonzero(~unbound)
         self.start = np.array([*first.x, *first.u])[self.columns]
 
     def may_move(self) -> bool:
@@ -105,20 +108,25 @@ class _Problem:
         self.check_range(point)
         found = self.subject.at(self.set_to(point))
         wanted = np.array([*self.targets.values()])
-        left = np.concatenate([found.rates, found.y[self.rows] - wanted])
-        responses = np.block([[found.A, found.B], [found.C[self.rows], found.D[self.rows]]])
-        whole = np.array([*found.x, *found.u])
-        size = np.abs(responses) @ np.abs(whole) + np.concatenate([0 * found.x, np.abs(wanted)])
+        _, left, responses = found.balance
+        aims = np.concatenate([0 * left, np.abs(wanted)])
+        left = np.concatenate([left, found.y[self.rows] - wanted])
+        responses = np.vstack([responses, np.hstack([found.C, found.D])[self.rows]])
+        size = np.abs(responses) @ np.abs([*found.x, *found.u]) + aims
         unbound = np.flatnonzero(self._is_given_velocity(found))
         left[unbound] = responses[unbound] = 0.0
         return left, responses[:, self.columns], np.maximum(size, 1.0)
 
     def _is_given_velocity(self, found: Linear) -> np.ndarray:
-        """Return which derivatives are a given or free velocity: no equation binds them."""
+        """Return which derivatives are a given or free velocity: no equation binds them.
+
+        No sampler may read a position that moves: it would not rest.
+        """
         n = len(found.states)
+        is_read = np.any([t.partials[:, :n].any(axis=0) for t in found.ticks] or [[False]], axis=0)
         given = np.ones(n, bool)
         given[[column for column in self.columns if column < n]] = self.is_moving
-        return found.are_positions & found.A[:, given].any(axis=1)
+        return found.are_positions & found.A[:, given].any(axis=1) & ~is_read
 
     def is_equilibrium(self, point: np.ndarray) -> bool:
         left, _, size = self.evaluated(point)
@@ -142,9 +150,10 @@ class _Problem:
             point = point + step
             left, responses, size = tried
         worst = int(np.argmax(np.abs(left) / size))
-        name = self.equations[worst]
-        what = f"the derivative of {name} stays at {left[worst]:.6g}"
-        if name in self.targets:
+        if worst < len(self.texts):
+            what = f"{self.texts[worst]} {left[worst]:.6g}"
+        else:
+            name = list(self.targets)[worst - len(self.texts)]
             what = f"{name} stays {left[worst]:+.6g} off its value"
         few = f"; free at most {self.count} variables" if len(self.free) > self.count else ""
         names = ", ".join(self.free)

@@ -184,7 +184,7 @@ static bool is_time(const struct variable *variable) {
 
 static bool is_moving(const struct instance *instance, const struct variable *variable) {
     if (variable->owner != VARIABLE_OF_MODEL || variable->variability == VARIABILITY_DISCRETE) {
-        return false;
+        return instance_is_kept_number(instance, variable);
     }
     return variable->causality == CAUSALITY_INPUT || instance_is_state(instance, variable) ||
            (variable->causality == CAUSALITY_PARAMETER &&
@@ -210,7 +210,8 @@ static enum status prepare_matrix(struct instance *instance, enum known_kinds ki
         const struct variable *known =
             kinds == KNOWN_MOTION
                 ? find_as(instance, knowns[i], is_moving,
-                          "an input, a state or, in initialization mode, a parameter")
+                          "an input, a state, a discrete variable with a start value or, in "
+                          "initialization mode, a parameter")
                 : find_as(instance, knowns[i], is_argument,
                           "an input, a state, a parameter or the time");
         if (known == NULL) {

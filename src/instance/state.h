@@ -240,6 +240,14 @@ static inline bool instance_is_state(const struct instance *instance,
            variable->offset - instance->model->states.offset < instance->model->states.size;
 }
 
+/* True if the variable is a double that events write and that has a start value. */
+static inline bool instance_is_kept_number(const struct instance *instance,
+                                           const struct variable *variable) {
+    return variable_is_discrete_state(variable) && variable->type == VARIABLE_FLOAT64 &&
+           (variable->initial == INITIAL_EXACT ||
+            (instance->model->events != NULL && instance->model->events->starts_follow));
+}
+
 /* Returns the index of an input of type float64 among the inputs. */
 static inline size_t instance_input_index(const struct instance *instance,
                                           const struct variable *variable) {

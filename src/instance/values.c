@@ -105,6 +105,8 @@ ALWAYS_INLINE enum variable_type type_for(const struct instance *instance, enum 
 static inline bool is_settable(const struct instance *instance, const struct variable *variable) {
     const enum phase phase = instance->state.phase;
     return variable_is_settable(variable, phase) ||
+           (phase == PHASE_STEPPING && instance->is_integrated_outside &&
+            instance_is_kept_number(instance, variable)) ||
            ((phase == PHASE_CONTINUOUS_TIME || instance->states_are_settable) &&
             instance_is_state(instance, variable));
 }

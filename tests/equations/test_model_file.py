@@ -365,6 +365,8 @@ def test_value_references_stay_when_the_file_changes(tmp_path: Path) -> None:
     many = "".join(f"u{i} = {{}}\n" for i in range(100))
     found = references(STATE + f"[inputs]\n{many}")
     assert len({*found.values()}) == 102 and not {0, *range(80, 100)} & {*found.values()}
+    sampler = SAMPLED.replace("u", 100 * "u") + f'every = "1"\nset = {{ {100 * "u"} = "x" }}\n'
+    assert references(sampler) == references(sampler)  # names with something in front are longer
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from scipy.io import loadmat
 import rparm
 from rparm import __main__ as cli
 from rparm.linearization.page import steps_figure
-from rparm.linearization.responses import frequency_response, sampled_response
+from rparm.linearization.responses import frequency_response
 
 POSE = {"q1": "30 deg", "q2": "0.1 m"}
 H = 0.01
@@ -70,7 +70,7 @@ def test_it_is_that_of_python_control() -> None:
     one = model.select(["tau1"], ["q1"])
     w = np.array([0.1, 1.0, 50.0])
     np.testing.assert_allclose(frequency_response(one)(w), one.ss()(1j * w), rtol=1e-9)
-    response = sampled_response(one, H)(w)
+    response = frequency_response(one.sampled(H))(w)
     np.testing.assert_allclose(response, one.zoh(H)(np.exp(1j * w * H)), rtol=1e-9)
 
 

@@ -1,0 +1,261 @@
+"""Discrete linear models of files with samplers, against exponentials, textbooks and runs."""
+
+import csv
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import block_diag, expm
+
+import rparm
+from rparm import __main__ as cli
+from rparm.errors import UserError
+from rparm.fmi.fmu_file import CO_SIMULATION
+from rparm.linearization.responses import frequency_response
+from rparm.linearization.study import Request, study
+from tests.equations.examples import made
+from tests.equations.test_sampled import COUNTERS, FILTER, PID, PWM
+
+# Astrom and Wittenmark, Computer-Controlled Systems: the double integrator, and deadbeat control
+DEADBEAT = """name = "Deadbeat"
+parameters.h.start = 1
+inputs.r = {}
+states = { x1 = { derivative = "x2" }, x2 = { derivative = "u" } }
+discrete.u = {}
+sampled.feedback = { every = "h", set = { u = "(r - x1) / h**2 - 1.5 * x2 / h" } }
+"""
+# two instants a period; `second` sees the u of `first`; `never` does not tick; `extra` rests
+CRANE = """name = "Crane"
+modes = ["broken"]
+inputs.r.start = 0.1
+discrete = { u = { start = 0.1 }, e = {}, extra = { start = 7 } }
+[parameters]
+h = { start = 0.2 }
+begin = { start = 0 }
+skipped = { start = 0 }
+p0 = { start = 0.3 }
+[states]
+phi = { start = "p0", derivative = "w" }
+w = { start = 0.2, derivative = "-sin(phi) - 0.3 * w**3 + u * cos(phi)" }
+[sampled]
+late = { every = "h", offset = "begin + 0.3 * h", reinit = { w = "0.9 * w + 0.05 * tanh(e)" } }
+[sampled.first]
+every = "2 * h / 2"
+offset = "begin + skipped * h"
+set = { u = "tan(r) - sin(phi) * cos(phi) - 0.4 * w", e = "e / 2 + max(phi**2, -1) - r" }
+[sampled.second]
+every = "h"
+offset = "begin"
+set = { e = "e + u * phi", broken = "phi > 3" }
+[sampled.never]
+every = "h"
+offset = "begin"
+while = "broken or phi > 4"
+set = { u = "99" }
+"""
+# each mass has its sampler
+TWO = """name = "Two"
+sizes.n = 2
+[states]
+"x[i]" = { for = "i = 1..n", derivative = "u[i] - x[i]" }
+[discrete]
+"u[i]" = { for = "i = 1..n" }
+on = { type = "Boolean", start = true }
+level = { type = "Integer", start = 3 }
+[sampled."s[i]"]
+for = "i = 1..n"
+every = "0.1"
+offset = "0.08 - 0.02 * i"
+set = { "u[i]" = "level * sum(j = 1..n, x[j])", on = "x[i] < 1", level = "4 if x[i] > 1 else 3" }
+"""
+LIMITED = """name = "Limited"
+parameters.T.start = 1
+states.x.derivative = "1 / T - x"
+discrete.u = {}
+sampled.s = { every = "T", offset = "T", set = { u = "sqrt(x - 2)" }, while = "x > 1" }
+"""
+BRAKE = """name = "Brake"
+inputs.f = {}
+discrete.u = {}
+sampled.s = { every = "0.5", set = { u = "f" }, reinit = { w = "0.5 * w + f" } }
+[states]
+v = { derivative = "0 if abs(v) < 1 else f" }
+w = { derivative = "0 if abs(w) < 1 else f" }
+x = { derivative = "u - x" }
+"""
+SYSTEM = """<SystemStructureDescription version="1.0" name="One"
+  xmlns="http://ssp-standard.org/SSP1/SystemStructureDescription">
+  <System name="One"><Elements><Component name="loop" source="resources/Deadbeat.fmu">
+  <Connectors><Connector name="r" kind="input"/></Connectors></Component></Elements></System>
+</SystemStructureDescription>"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("samplers")
+
+
+def assert_close(found: np.ndarray, exact: np.ndarray) -> None:
+    np.testing.assert_allclose(found, exact, rtol=0, atol=2e-13 * np.abs(exact).max())
+
+
+def test_deadbeat_control_of_a_double_integrator_settles_in_two_samples(folder: Path) -> None:
+    found = rparm.linearize(made(folder, DEADBEAT))
+    plant, input_ = np.array([[1, 1], [0, 1]]), np.array([[0.5], [1]])
+    gain = np.array([[1, 1.5]])
+    assert_close(found.A, np.block([[plant - input_ @ gain, np.zeros((2, 1))], [-gain, 0]]))
+    assert_close(found.B, np.vstack([input_, [[1]]]))
+    assert_close(found.C, np.vstack([np.eye(2, 3), [[-1, -1.5, 0]]]))
+    assert_close(found.D, np.array([[0], [0], [1]]))
+    assert not found.poles.any() and found.dt == 1.0
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_sampled_pid_controller_of_a_mass(folder: Path, fmi: int) -> None:
+    path, h, m, Kp, Kd, Ki = made(folder, PID), 0.08, 0.7, 11.0, 2.0, 4.0
+    at = {"Ts": h, "m": m, "Kp": Kp, "Kd": Kd, "Ki": Ki, "target": 0.2}
+    path = path if fmi == 2 else path.parent / "fmi3" / path.name
+    found = rparm.linearize(path, at=at, trim=["x", "u", "sum", "last"])
+    assert found.states == ("x", "v", "u", "sum", "last")
+    assert found.x == pytest.approx([0.2, 0, 0, 0, 0.2], abs=1e-10)
+    tick, rates = np.eye(5), np.zeros((5, 5))
+    tick[2:] = [[-Kp - Kd / h, 0, 0, 1, Kd / h], [-Ki * h, 0, 0, 1, 0], [1, 0, 0, 0, 0]]
+    rates[0, 1], rates[1, 2] = 1, 1 / m
+    assert_close(found.A, expm(rates * h) @ tick)
+    assert_close(found.C, tick)
+
+
+def crane(z: np.ndarray, h: float, r: float) -> np.ndarray:
+    """A and B by hand: phi, w, u, e, r."""
+    phi, w, u, e = z
+    first, second, late = np.eye(5), np.eye(5), np.eye(5)
+    first[2] = [-np.cos(2 * phi), -0.4, 0, 0, 1 + np.tan(r) ** 2]
+    first[3] = [2 * phi, 0, 0, 0.5, -1]
+    second[3] = [u, 0, phi, 1, 0]
+    late[1] = [0, 0.9, 0, 0.05 * (1 - np.tanh(e) ** 2), 0]
+    rates = np.zeros((5, 5))
+    rates[0, 1] = 1
+    rates[1, :3] = [-np.cos(phi) - u * np.sin(phi), -0.9 * w**2, np.cos(phi)]
+    return (expm(0.7 * h * rates) @ late @ expm(0.3 * h * rates) @ second @ first)[:4]
+
+
+@pytest.mark.parametrize("shift", [{"skipped": 3}, {"begin": 0.05}, {"begin": 1.0, "skipped": 5}])
+def test_samplers_with_offsets_compose_in_the_order_of_time(
+    folder: Path, shift: dict[str, float]
+) -> None:
+    """A shift of all offsets, or of one by periods, changes nothing: the first tick begins."""
+    point = {"phi": 0.5, "w": -0.1, "u": 0.2, "e": 0.3}  # phi follows from p0
+    found = rparm.linearize(made(folder, CRANE), at=point | shift | {"r": 0.4, "h": 0.5})
+    assert found.states == tuple(point) and found.left_out == ("extra",)
+    assert_close(np.hstack([found.A, found.B]), crane(np.array([*point.values()]), 0.5, 0.4))
+    assert found.x.tolist() == [*point.values()]
+    changes = {tick.name: tick.changes for tick in found.ticks}
+    assert changes["never"] == {"u": 0.0} and changes["second"] == {"e": pytest.approx(0.1)}
+
+
+def test_samplers_with_indexes_have_names_with_indexes(folder: Path) -> None:
+    found = rparm.linearize(made(folder, TWO))
+    assert found.states == ("x[1]", "x[2]", "u[1]", "u[2]") and found.outputs == found.states
+    first, second = np.eye(4), np.eye(4)
+    first[3] = second[2] = [3, 3, 0, 0]
+    rates = np.vstack([np.eye(2, 4, 2) - np.eye(2, 4), np.zeros((2, 4))])
+    assert_close(found.A, expm(0.08 * rates) @ second @ expm(0.02 * rates) @ first)
+    assert_close(found.C, first)
+
+
+def test_a_run_follows_the_linear_model_to_first_order(folder: Path) -> None:
+    """The difference falls as the square of the deviation, over 20 periods of two instants."""
+    fmu = made(folder, CRANE)
+    found = rparm.linearize(fmu, at=dict.fromkeys(("phi", "w", "u", "e", "r"), 0.0))
+    trimmed = rparm.linearize(fmu, at={"r": 0.0}, trim=found.states)
+    assert trimmed.x == pytest.approx(np.zeros(4), abs=1e-9)
+    direction, differences = np.array([1.0, -0.7, 0.4, 0.8]), []
+    for size in (1e-3, 1e-5):
+        z, r, rows = size * direction, np.array([0.01 * size]), []
+        given = dict(zip(("p0", "w", "u", "e"), z.tolist(), strict=True))
+        run = rparm.simulate(
+            fmu, stop_time=4.0, step=0.2, inputs={"r": r[0]},
+            start_values={**given, "solver_method": "taylor"}, tolerance=1e-13,
+        )  # fmt: skip
+        for _ in range(21):
+            rows.append(found.C @ z + found.D @ r)
+            z = found.A @ z + found.B @ r
+        exact = np.column_stack([run[name] for name in found.outputs])
+        differences.append(np.abs(exact - rows).max() / size)
+    assert differences[0] < 1e-2
+    assert differences[1] / differences[0] == pytest.approx(1e-2, rel=0.05)
+
+
+def test_a_filter_is_discrete_without_continuous_states(folder: Path) -> None:
+    found = rparm.linearize(made(folder, FILTER), at={"a": 0.25})
+    whole = np.hstack([found.A, found.B])
+    assert_close(whole, np.array([[0.75, 0, 0.25], [1, 0, 0]]))
+    assert_close(np.hstack([found.C, found.D]), whole)
+    one, w = found.select(["u"], ["y"]), np.array([0.1, 3.0, 31.0])
+    system = one.ss()
+    assert system.dt == 0.1
+    np.testing.assert_allclose(frequency_response(one)(w), system(np.exp(0.1j * w)), rtol=1e-9)
+
+
+def test_a_state_that_no_tick_moves_is_held(folder: Path) -> None:
+    """A brake holds both masses, but a tick moves one."""
+    found = rparm.linearize(made(folder, BRAKE))
+    assert found.held == ("v",) and found.states == ("w", "x", "u")
+    assert_close(np.diag(found.A), np.array([0.5, np.exp(-0.5), 0.0]))
+
+
+RATES = "fast every 0.1 s, slow every 0.3 s, late every 0.1 s"
+REFUSED = {
+    "several rates": (COUNTERS, {}, f"Counters.fmu: samples at several rates, .* {RATES}$"),
+    "modes": (PWM, {}, "sampler end changes on at this point, expected a point at which"),
+    "condition": (TWO, {"at": {"x[1]": 2.0}}, r"sampler s\[1\] changes on, level at this point"),
+    "no value": (LIMITED, {"at": {"x": 1.5}}, "sampler s: the new value of u is not finite"),
+    "no fixed point": (PID, {"trim": ["x", "u"]}, "found by x, u: sampler control changes sum by"),
+    "it moves": (DEADBEAT, {"at": {"r": 1}, "trim": ["x2", "u"]}, "the derivative of x1 stays at"),
+    "sampled twice": (DEADBEAT, {}, "step: the model is sampled already, every 1 s"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_no_linear_model_is_made(folder: Path, case: str) -> None:
+    text, options, message = REFUSED[case]
+    with pytest.raises(UserError, match=message) as raised:
+        rparm.linearize(made(folder, text), **options).zoh(0.1)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_condition_is_taken_as_it_is_at_the_point(folder: Path) -> None:
+    """The tick does nothing here, so that its new value need not be defined."""
+    assert_close(rparm.linearize(made(folder, LIMITED), at={"x": 0.5}).A, block_diag(np.exp(-1), 1))
+
+
+def test_what_has_no_discrete_model_says_what_to_do(folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="has samplers: linearize it in model exchange"):
+        study(Request(made(folder, DEADBEAT), kind=CO_SIMULATION))
+    with pytest.raises(UserError, match="can be: set sample_time to 0$"):
+        rparm.linearize("RPSensor", at={"q1": 1})
+    path = tmp_path / "One.ssp"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("SystemStructure.ssd", SYSTEM)
+        archive.write(made(folder, DEADBEAT), "resources/Deadbeat.fmu")
+    with pytest.raises(UserError, match="'loop' is sampled by feedback, which [^:]*: take it as"):
+        rparm.linearize(path)
+
+
+def test_files_and_page_say_that_it_is_sampled(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    saved = tmp_path / "m.csv"
+    options = ["--save", str(saved), "--output", str(tmp_path), "--json", "--at", "x1=0.5"]
+    assert cli.main(["linearize", str(made(folder, DEADBEAT)), *options]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["dt"] == 1.0 and found["poles"] == [[0, 0]] * 3
+    rows = [row[0] for row in csv.reader(saved.open(newline=""))]
+    assert rows == ["", "next(x1)", "next(x2)", "next(u)", "x1", "x2", "u"]
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    for text in ("Sampled every 1000 ms by feedback", "feedback changes u by -0.5", "unit circle"):
+        assert text in page
+    for name in ("bode", "steps", "poles"):
+        assert (tmp_path / f"{name}.png").stat().st_size > 5000
