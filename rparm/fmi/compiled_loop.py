@@ -19,6 +19,7 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 from llvmlite import ir
 from numba import njit, types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 from rparm.errors import UserError
@@ -35,10 +36,9 @@ FUNCTIONS = {
     ),
 }  # fmt: skip
 SET_REAL, GET_REAL, SET_BOOLEAN, GET_BOOLEAN, DO_STEP, DERIVATIVE, GET_INTEGER = range(7)
-_POINTER = ir.IntType(8).as_pointer()
-_SIZE = ir.IntType(64)
-_STATUS = ir.IntType(32)
-_REAL = ir.DoubleType()
+POINTER, SIZE, REAL, STATUS = types.voidptr, types.uintp, types.float64, types.int32
+BOOLEAN_3 = types.uint8  # of FMI 3.0
+FINAL = np.int32(1)  # no step is ever undone
 COLUMNS = 8  # component and addresses of its functions
 
 
@@ -57,53 +57,24 @@ def function_addresses(instance: Instance) -> list[int]:
     ]
 
 
-def _call(builder: ir.IRBuilder, kinds: list[ir.Type], arguments: list[ir.Value]) -> ir.Value:
-    """Call the function at the address `arguments`[0]; integers become pointers where asked."""
-    function = builder.inttoptr(arguments[0], ir.FunctionType(_STATUS, kinds).as_pointer())
-    given = [
-        builder.inttoptr(value, kind) if isinstance(kind, ir.PointerType) else value
-        for kind, value in zip(kinds, arguments[1:], strict=True)
-    ]
-    return builder.call(function, given)
-
-
 @intrinsic
-def move_values(_context, function, component, references, count, values):
-    """Call fmi2SetReal, fmi2GetReal, fmi2SetBoolean, fmi2GetBoolean or fmi2GetInteger."""
-    signature = types.int32(types.int64, types.int64, types.int64, types.int64, types.int64)
+def call(_context, function, arguments):
+    """Call a function by its address; its status. The types of the arguments are its prototype."""
+    kinds = [POINTER if isinstance(kind, types.ArrayCTypes) else kind for kind in arguments]
+    assert {*kinds} <= {POINTER, SIZE, types.int64, REAL, STATUS, BOOLEAN_3}
 
-    def generate(_context, builder, _signature, arguments):
-        return _call(builder, [_POINTER, _POINTER, _SIZE, _POINTER], arguments)
+    def generate(_context, builder, _signature, given):
+        function, packed = given
+        values = cgutils.unpack_tuple(builder, packed)
+        kinds = [value.type for value in values]
+        prototype = ir.FunctionType(ir.IntType(32), kinds).as_pointer()
+        is_pointer = isinstance(function.type, ir.PointerType)
+        convert = builder.bitcast if is_pointer else builder.inttoptr
+        # as C extends a bool
+        extended = {i: ("zeroext",) for i, kind in enumerate(kinds) if kind == ir.IntType(8)}
+        return builder.call(convert(function, prototype), values, arg_attrs=extended)
 
-    return signature, generate
-
-
-@intrinsic
-def do_step(_context, function, component, time, length):
-    """Call fmi2DoStep for a step that is never undone."""
-    signature = types.int32(types.int64, types.int64, types.float64, types.float64)
-
-    def generate(_context, builder, _signature, arguments):
-        final = ir.Constant(_STATUS, 1)
-        return _call(builder, [_POINTER, _REAL, _REAL, _STATUS], [*arguments, final])
-
-    return signature, generate
-
-
-@intrinsic
-def directional_derivative(
-    _context, function, component, unknowns, knowns, count, direction, result
-):
-    """Call fmi2GetDirectionalDerivative with as many knowns as unknowns."""
-    signature = types.int32(*[types.int64] * 7)
-
-    def generate(_context, builder, _signature, arguments):
-        function, component, unknowns, knowns, count, direction, result = arguments
-        kinds = [_POINTER, _POINTER, _SIZE, _POINTER, _SIZE, _POINTER, _POINTER]
-        given = [function, component, unknowns, count, knowns, count, direction, result]
-        return _call(builder, kinds, given)
-
-    return signature, generate
+    return STATUS(function, types.BaseTuple.from_types(kinds)), generate
 
 
 # ---- Values --------------------------------------------------------------------------------------
@@ -204,12 +175,10 @@ def _set(calls, wires, component, function, always):
         to_set[i] = value
     if begin == end or not changed:
         return 0
-    return move_values(
-        calls[component, 1 + function],
-        calls[component, 0],
-        inputs.ctypes.data + begin * inputs.itemsize,
-        end - begin,
-        to_set.ctypes.data + begin * to_set.itemsize,
+    references = inputs.ctypes.data + begin * inputs.itemsize
+    place = to_set.ctypes.data + begin * to_set.itemsize
+    return call(
+        calls[component, 1 + function], (calls[component, 0], references, end - begin, place)
     )
 
 
@@ -220,13 +189,10 @@ def _read(calls, wires, component, function):
     begin, end = first[component], first[component + 1]
     if begin == end:
         return 0
-    first_value = len(values) - len(outputs) + begin
-    return move_values(
-        calls[component, 1 + function],
-        calls[component, 0],
-        outputs.ctypes.data + begin * outputs.itemsize,
-        end - begin,
-        values.ctypes.data + first_value * values.itemsize,
+    references = outputs.ctypes.data + begin * outputs.itemsize
+    place = values.ctypes.data + (len(values) - len(outputs) + begin) * values.itemsize
+    return call(
+        calls[component, 1 + function], (calls[component, 0], references, end - begin, place)
     )
 
 
@@ -259,15 +225,9 @@ def read_outputs(calls, reals, switches):
 @njit(cache=True, nogil=True)
 def _deviation_rate(calls, derivatives, states, deviation, rate):
     """Write the rate of a deviation of the first component's states; return the FMU's status."""
-    return directional_derivative(
-        calls[0, 1 + DERIVATIVE],
-        calls[0, 0],
-        derivatives.ctypes.data,
-        states.ctypes.data,
-        len(states),
-        deviation.ctypes.data,
-        rate.ctypes.data,
-    )
+    unknowns, knowns, count = derivatives.ctypes.data, states.ctypes.data, len(states)
+    given = calls[0, 0], unknowns, count, knowns, count, deviation.ctypes.data, rate.ctypes.data
+    return call(calls[0, 1 + DERIVATIVE], given)
 
 
 @njit(cache=True, nogil=True)
@@ -276,13 +236,8 @@ def _changes(calls, references, function, values, before):
     if len(references) == 0:
         return 0, False
     before[:] = values
-    status = move_values(
-        calls[0, 1 + function],
-        calls[0, 0],
-        references.ctypes.data,
-        len(references),
-        values.ctypes.data,
-    )
+    given = calls[0, 0], references.ctypes.data, len(references), values.ctypes.data
+    status = call(calls[0, 1 + function], given)
     return status, np.any(before != values)
 
 
@@ -347,7 +302,7 @@ def advance(
             if status >= DISCARD:
                 return status, DERIVATIVE, 0, i
         for c in range(len(calls)):
-            status = do_step(calls[c, 1 + DO_STEP], calls[c, 0], times[i], length)
+            status = call(calls[c, 1 + DO_STEP], (calls[c, 0], times[i], length, FINAL))
             if status >= DISCARD:
                 return status, DO_STEP, c, i
         is_read = row < len(points) and points[row] == i + 1
