@@ -10,7 +10,7 @@ from numba import carray, cfunc, njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from rparm.fmi.compiled_loop import BOOLEAN_3, POINTER, REAL, SIZE, STATUS, call
+from rparm.fmi.compiled_call import BOOLEAN_3, POINTER, REAL, SIZE, STATUS, call
 from rparm.fmi.fmi_instance import DISCARD, TERMINATED
 
 INSTANCE, SET_FLOAT64, GET_FLOAT64, SET_BOOLEAN, GET_BOOLEAN, DO_STEP, DERIVATIVE = range(7)

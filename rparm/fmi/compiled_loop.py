@@ -17,12 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
-from llvmlite import ir
-from numba import njit, types
-from numba.core import cgutils
-from numba.extending import intrinsic
+from numba import njit
 
 from rparm.errors import UserError
+from rparm.fmi.compiled_call import call
 from rparm.fmi.fmi_instance import DISCARD, TERMINATED, Instance
 
 FUNCTIONS = {
@@ -36,8 +34,6 @@ FUNCTIONS = {
     ),
 }  # fmt: skip
 SET_REAL, GET_REAL, SET_BOOLEAN, GET_BOOLEAN, DO_STEP, DERIVATIVE, GET_INTEGER = range(7)
-POINTER, SIZE, REAL, STATUS = types.voidptr, types.uintp, types.float64, types.int32
-BOOLEAN_3 = types.uint8  # of FMI 3.0
 FINAL = np.int32(1)  # no step is ever undone
 COLUMNS = 8  # component and addresses of its functions
 
@@ -55,26 +51,6 @@ def function_addresses(instance: Instance) -> list[int]:
         cast(getattr(library, name), c_void_p).value or 0 if hasattr(library, name) else 0
         for name in function_names(instance)
     ]
-
-
-@intrinsic
-def call(_context, function, arguments):
-    """Call a function by its address; its status. The types of the arguments are its prototype."""
-    kinds = [POINTER if isinstance(kind, types.ArrayCTypes) else kind for kind in arguments]
-    assert {*kinds} <= {POINTER, SIZE, types.int64, REAL, STATUS, BOOLEAN_3}
-
-    def generate(_context, builder, _signature, given):
-        function, packed = given
-        values = cgutils.unpack_tuple(builder, packed)
-        kinds = [value.type for value in values]
-        prototype = ir.FunctionType(ir.IntType(32), kinds).as_pointer()
-        is_pointer = isinstance(function.type, ir.PointerType)
-        convert = builder.bitcast if is_pointer else builder.inttoptr
-        # as C extends a bool
-        extended = {i: ("zeroext",) for i, kind in enumerate(kinds) if kind == ir.IntType(8)}
-        return builder.call(convert(function, prototype), values, arg_attrs=extended)
-
-    return STATUS(function, types.BaseTuple.from_types(kinds)), generate
 
 
 # ---- Values --------------------------------------------------------------------------------------
