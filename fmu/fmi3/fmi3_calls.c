@@ -20,8 +20,8 @@
 #define EVENT_KINDS               (MODEL_EXCHANGE | CO_SIMULATION_WITH_EVENTS)
 #define ANY_KIND                  (MODEL_EXCHANGE | CO_SIMULATION)
 
-#define FMI3_CALL_RULE(name, kinds, states) [CALL_##name] = {#name, kinds, states},
-const struct call_rule fmi3_call_rules[FMI3_CALL_COUNT] = {FMI3_CALL_LIST(FMI3_CALL_RULE)};
+#define FMI3_CALL_RULE(name, kinds, states) [CALL_fmi3##name] = {"fmi3" #name, kinds, states},
+const struct call_rule fmi3_call_rules[FMI3_CALL_COUNT] = {FMI3_FUNCTION_LIST(FMI3_CALL_RULE)};
 
 /* ---- Checks --------------------------------------------------------------------------------- */
 

@@ -10,32 +10,14 @@ from numba import carray, cfunc, njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from rparm.fmi.compiled_call import BOOLEAN_3, POINTER, REAL, SIZE, STATUS, call
 from rparm.fmi.fmi_instance import DISCARD, TERMINATED
 
 INSTANCE, SET_FLOAT64, GET_FLOAT64, SET_BOOLEAN, GET_BOOLEAN, DO_STEP, DERIVATIVE = range(7)
 GET_INT32 = 7
-POINTER, SIZE, REAL, STATUS = types.voidptr, types.uintp, types.float64, types.int32
 ROW = types.CPointer(POINTER)
-BOOLEAN_2, BOOLEAN_3 = types.int32, types.uint8
+BOOLEAN_2 = types.int32
 _move = cfunc(STATUS(ROW, POINTER, SIZE, POINTER), cache=True)
-
-
-@intrinsic
-def _call(_context, function, arguments):
-    """Call a function; its status. The types of the arguments, a tuple, are its prototype."""
-    kinds = [POINTER if isinstance(kind, types.ArrayCTypes) else kind for kind in arguments]
-    assert set(kinds) <= {POINTER, SIZE, REAL, BOOLEAN_3}
-
-    def generate(_context, builder, _signature, given):
-        function, packed = given
-        values = cgutils.unpack_tuple(builder, packed)
-        kinds = [value.type for value in values]
-        prototype = ir.FunctionType(ir.IntType(32), kinds).as_pointer()
-        # as C extends a bool
-        extended = {i: ("zeroext",) for i, kind in enumerate(kinds) if kind == ir.IntType(8)}
-        return builder.call(builder.bitcast(function, prototype), values, arg_attrs=extended)
-
-    return STATUS(function, types.BaseTuple.from_types(kinds)), generate
 
 
 @intrinsic
@@ -57,7 +39,7 @@ def _move_booleans(row, function, references, count, values):
     truths = np.empty(count, np.bool_)
     for i in range(count):
         truths[i] = ints[i] != 0
-    status = _call(row[function], (row[INSTANCE], references, count, truths.ctypes, count))
+    status = call(row[function], (row[INSTANCE], references, count, truths.ctypes, count))
     for i in range(count):
         ints[i] = truths[i]
     return status
@@ -65,17 +47,17 @@ def _move_booleans(row, function, references, count, values):
 
 @_move
 def _set_real(row, references, count, values):
-    return _call(row[SET_FLOAT64], (row[INSTANCE], references, count, values, count))
+    return call(row[SET_FLOAT64], (row[INSTANCE], references, count, values, count))
 
 
 @_move
 def _get_real(row, references, count, values):
-    return _call(row[GET_FLOAT64], (row[INSTANCE], references, count, values, count))
+    return call(row[GET_FLOAT64], (row[INSTANCE], references, count, values, count))
 
 
 @_move
 def _get_integer(row, references, count, values):
-    return _call(row[GET_INT32], (row[INSTANCE], references, count, values, count))
+    return call(row[GET_INT32], (row[INSTANCE], references, count, values, count))
 
 
 @_move
@@ -94,7 +76,7 @@ def _do_step(row, time, length, final):
     """Step an instance without event mode and early return."""
     event, terminates, early, reached = _place(), _place(), _place(), _place()
     results = event, terminates, early, reached
-    status = _call(row[DO_STEP], (row[INSTANCE], time, length, BOOLEAN_3(final), *results))
+    status = call(row[DO_STEP], (row[INSTANCE], time, length, BOOLEAN_3(final), *results))
     if status < DISCARD and carray(terminates, 1, np.bool_)[0]:
         return TERMINATED
     return status
@@ -104,7 +86,7 @@ def _do_step(row, time, length, final):
 def _derivative(row, unknowns, unknown_count, knowns, known_count, direction, result):
     given = unknowns, unknown_count, knowns, known_count
     further = direction, known_count, result, unknown_count
-    return _call(row[DERIVATIVE], (row[INSTANCE], *given, *further))
+    return call(row[DERIVATIVE], (row[INSTANCE], *given, *further))
 
 
 ADAPTERS = (

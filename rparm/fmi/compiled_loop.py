@@ -17,11 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
-from llvmlite import ir
-from numba import njit, types
-from numba.extending import intrinsic
+from numba import njit
 
 from rparm.errors import UserError
+from rparm.fmi.compiled_call import call
 from rparm.fmi.fmi_instance import DISCARD, TERMINATED, Instance
 
 FUNCTIONS = {
@@ -35,10 +34,7 @@ FUNCTIONS = {
     ),
 }  # fmt: skip
 SET_REAL, GET_REAL, SET_BOOLEAN, GET_BOOLEAN, DO_STEP, DERIVATIVE, GET_INTEGER = range(7)
-_POINTER = ir.IntType(8).as_pointer()
-_SIZE = ir.IntType(64)
-_STATUS = ir.IntType(32)
-_REAL = ir.DoubleType()
+FINAL = np.int32(1)  # no step is ever undone
 COLUMNS = 8  # component and addresses of its functions
 
 
@@ -55,55 +51,6 @@ def function_addresses(instance: Instance) -> list[int]:
         cast(getattr(library, name), c_void_p).value or 0 if hasattr(library, name) else 0
         for name in function_names(instance)
     ]
-
-
-def _call(builder: ir.IRBuilder, kinds: list[ir.Type], arguments: list[ir.Value]) -> ir.Value:
-    """Call the function at the address `arguments`[0]; integers become pointers where asked."""
-    function = builder.inttoptr(arguments[0], ir.FunctionType(_STATUS, kinds).as_pointer())
-    given = [
-        builder.inttoptr(value, kind) if isinstance(kind, ir.PointerType) else value
-        for kind, value in zip(kinds, arguments[1:], strict=True)
-    ]
-    return builder.call(function, given)
-
-
-@intrinsic
-def move_values(_context, function, component, references, count, values):
-    """Call fmi2SetReal, fmi2GetReal, fmi2SetBoolean, fmi2GetBoolean or fmi2GetInteger."""
-    signature = types.int32(types.int64, types.int64, types.int64, types.int64, types.int64)
-
-    def generate(_context, builder, _signature, arguments):
-        return _call(builder, [_POINTER, _POINTER, _SIZE, _POINTER], arguments)
-
-    return signature, generate
-
-
-@intrinsic
-def do_step(_context, function, component, time, length):
-    """Call fmi2DoStep for a step that is never undone."""
-    signature = types.int32(types.int64, types.int64, types.float64, types.float64)
-
-    def generate(_context, builder, _signature, arguments):
-        final = ir.Constant(_STATUS, 1)
-        return _call(builder, [_POINTER, _REAL, _REAL, _STATUS], [*arguments, final])
-
-    return signature, generate
-
-
-@intrinsic
-def directional_derivative(
-    _context, function, component, unknowns, knowns, count, direction, result
-):
-    """Call fmi2GetDirectionalDerivative with as many knowns as unknowns."""
-    signature = types.int32(*[types.int64] * 7)
-
-    def generate(_context, builder, _signature, arguments):
-        function, component, unknowns, knowns, count, direction, result = arguments
-        kinds = [_POINTER, _POINTER, _SIZE, _POINTER, _SIZE, _POINTER, _POINTER]
-        given = [function, component, unknowns, count, knowns, count, direction, result]
-        return _call(builder, kinds, given)
-
-    return signature, generate
 
 
 # ---- Values --------------------------------------------------------------------------------------
@@ -204,12 +151,10 @@ def _set(calls, wires, component, function, always):
         to_set[i] = value
     if begin == end or not changed:
         return 0
-    return move_values(
-        calls[component, 1 + function],
-        calls[component, 0],
-        inputs.ctypes.data + begin * inputs.itemsize,
-        end - begin,
-        to_set.ctypes.data + begin * to_set.itemsize,
+    references = inputs.ctypes.data + begin * inputs.itemsize
+    place = to_set.ctypes.data + begin * to_set.itemsize
+    return call(
+        calls[component, 1 + function], (calls[component, 0], references, end - begin, place)
     )
 
 
@@ -220,13 +165,10 @@ def _read(calls, wires, component, function):
     begin, end = first[component], first[component + 1]
     if begin == end:
         return 0
-    first_value = len(values) - len(outputs) + begin
-    return move_values(
-        calls[component, 1 + function],
-        calls[component, 0],
-        outputs.ctypes.data + begin * outputs.itemsize,
-        end - begin,
-        values.ctypes.data + first_value * values.itemsize,
+    references = outputs.ctypes.data + begin * outputs.itemsize
+    place = values.ctypes.data + (len(values) - len(outputs) + begin) * values.itemsize
+    return call(
+        calls[component, 1 + function], (calls[component, 0], references, end - begin, place)
     )
 
 
@@ -259,15 +201,9 @@ def read_outputs(calls, reals, switches):
 @njit(cache=True, nogil=True)
 def _deviation_rate(calls, derivatives, states, deviation, rate):
     """Write the rate of a deviation of the first component's states; return the FMU's status."""
-    return directional_derivative(
-        calls[0, 1 + DERIVATIVE],
-        calls[0, 0],
-        derivatives.ctypes.data,
-        states.ctypes.data,
-        len(states),
-        deviation.ctypes.data,
-        rate.ctypes.data,
-    )
+    unknowns, knowns, count = derivatives.ctypes.data, states.ctypes.data, len(states)
+    given = calls[0, 0], unknowns, count, knowns, count, deviation.ctypes.data, rate.ctypes.data
+    return call(calls[0, 1 + DERIVATIVE], given)
 
 
 @njit(cache=True, nogil=True)
@@ -276,13 +212,8 @@ def _changes(calls, references, function, values, before):
     if len(references) == 0:
         return 0, False
     before[:] = values
-    status = move_values(
-        calls[0, 1 + function],
-        calls[0, 0],
-        references.ctypes.data,
-        len(references),
-        values.ctypes.data,
-    )
+    given = calls[0, 0], references.ctypes.data, len(references), values.ctypes.data
+    status = call(calls[0, 1 + function], given)
     return status, np.any(before != values)
 
 
@@ -347,7 +278,7 @@ def advance(
             if status >= DISCARD:
                 return status, DERIVATIVE, 0, i
         for c in range(len(calls)):
-            status = do_step(calls[c, 1 + DO_STEP], calls[c, 0], times[i], length)
+            status = call(calls[c, 1 + DO_STEP], (calls[c, 0], times[i], length, FINAL))
             if status >= DISCARD:
                 return status, DO_STEP, c, i
         is_read = row < len(points) and points[row] == i + 1

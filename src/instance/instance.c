@@ -6,7 +6,6 @@
 #include "snapshot.h"
 #include "state.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

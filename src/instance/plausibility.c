@@ -4,7 +4,6 @@
 #include "settings.h"
 #include "state.h"
 
-#include <limits.h>
 #include <math.h>
 #include <string.h>
 

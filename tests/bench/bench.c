@@ -48,48 +48,46 @@ double median(double values[], int count) {
 #define COMPILER "gcc " __VERSION__
 #endif
 
-void report_open(struct report *report, int repeats) {
-    report->has_rows = false;
+static bool has_rows;
+
+void report_open(int repeats) {
     printf("{\"machine\": {\"compiler\": \"%s\", \"sundials\": \"%s\", \"MuJoCo\": \"%s\"},\n",
            COMPILER, SUNDIALS_VERSION, mujoco_version());
     printf("\"repeats\": %d, \"rows\": [", repeats);
 }
 
-void report_close(struct report *report) {
-    (void)report;
+void report_close(void) {
     printf("\n]}\n");
     require(fflush(stdout) == 0, "the figures cannot be written");
 }
 
-void report_row(struct report *report, const char *group, const char *work, const char *run) {
-    printf("%s\n{\"group\": \"%s\", \"work\": \"%s\", \"run\": \"%s\"", report->has_rows ? "," : "",
-           group, work, run);
-    report->has_rows = true;
+void report_row(const char *group, const char *work, const char *run) {
+    printf("%s\n{\"group\": \"%s\", \"work\": \"%s\", \"run\": \"%s\"", has_rows ? "," : "", group,
+           work, run);
+    has_rows = true;
 }
 
-void report_number(struct report *report, const char *name, double value) {
-    (void)report;
+void report_number(const char *name, double value) {
     require(isfinite(value), "a figure is not finite");
     printf(", \"%s\": %.17g", name, value);
 }
 
-void report_row_end(struct report *report) {
-    (void)report;
+void report_row_end(void) {
     putchar('}');
 }
 
-void report_judged(struct report *report, const char *name, double value, double most) {
-    report_number(report, name, value);
+void report_judged(const char *name, double value, double most) {
+    report_number(name, value);
     if (most > 0.0) {
         printf(", \"judged\": \"%s\"", name);
-        report_number(report, "limit", most);
+        report_number("limit", most);
     }
 }
 
 /* ---- Program --------------------------------------------------------------------------------- */
 
 static const char usage[] =
-    "usage: bench RPManipulator.so RPManipulator.so-of-FMI-3.0 RPPlant.so [--repeats N] [--quick] "
+    "usage: bench RPManipulator.so RPManipulator.so-of-FMI-3.0 RPPlant.so [--repeats N] "
     "[--only GROUP[,GROUP...]]";
 
 static const struct {
@@ -123,9 +121,7 @@ int main(int count, char **arguments) {
     require(count >= 4, usage);
     for (int i = 4; i < count; i++) {
         const bool has_value = i + 1 < count;
-        if (strcmp(arguments[i], "--quick") == 0) {
-            bench.quick = true;
-        } else if (strcmp(arguments[i], "--repeats") == 0 && has_value) {
+        if (strcmp(arguments[i], "--repeats") == 0 && has_value) {
             bench.repeats = (int)strtol(arguments[++i], NULL, 10);
         } else if (strcmp(arguments[i], "--only") == 0 && has_value) {
             choose(arguments[++i], chosen);
@@ -140,12 +136,12 @@ int main(int count, char **arguments) {
             "the FMU of FMI 3.0 cannot be loaded");
     require(fmu_library_open(arguments[3], &bench.plant) != NULL, "RPPlant cannot be loaded");
 
-    report_open(&bench.report, bench.repeats);
+    report_open(bench.repeats);
     for (size_t i = 0; i < GROUPS; i++) {
         if (all || chosen[i]) {
             groups[i].measure(&bench);
         }
     }
-    report_close(&bench.report);
+    report_close();
     return 0;
 }

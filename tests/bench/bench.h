@@ -6,21 +6,17 @@
 
 /* ---- bench.c: a JSON object on stdout */
 
-struct report {
-    bool has_rows;
-};
-
 /* The object begins with compiler and libraries, and the repeats. */
-void report_open(struct report *report, int repeats);
-void report_close(struct report *report);
+void report_open(int repeats);
+void report_close(void);
 
 /* A row: which measurement, of what work, done by whom. Its numbers follow; they must be finite. */
-void report_row(struct report *report, const char *group, const char *work, const char *run);
-void report_number(struct report *report, const char *name, double value);
-void report_row_end(struct report *report);
+void report_row(const char *group, const char *work, const char *run);
+void report_number(const char *name, double value);
+void report_row_end(void);
 
 /* Writes a number and its target: the largest value it may have, or 0 if it has none. */
-void report_judged(struct report *report, const char *name, double value, double most);
+void report_judged(const char *name, double value, double most);
 
 /* ---- race.c: several solvers do the same work in turns, again and again */
 
@@ -57,13 +53,12 @@ void race_add_usual(struct race *race, const struct fmu_functions *fmu, double t
 void race_run(struct race *race, const struct fmu_functions *fmu, const struct problem *problem,
               int repeats);
 
-/* Medians over the repeats: time of a communication step, and its ratio to another run's. */
+/* Median over the repeats: us of a communication step. */
 double race_us(const struct race *race, int run);
-double race_ratio(const struct race *race, int run, int peer);
 
 /* Writes a row for each run. */
-void race_report(const struct race *race, struct report *report, const char *group,
-                 const char *work, const struct problem *problem);
+void race_report(const struct race *race, const char *group, const char *work,
+                 const struct problem *problem);
 
 /* The largest tolerance, in quarter decades from 1e-3 down, such that no error from there to a
  * ten-thousandth of the bound, or 1e-14, is above the bound. MuJoCo: sets the substeps instead. */
@@ -76,9 +71,7 @@ struct bench {
     struct fmu_functions fmu;
     struct fmu3_functions fmu3;
     struct fmu_functions plant; /* RPPlant */
-    struct report report;
     int repeats;
-    bool quick; /* little of everything: shows that it works, the figures mean nothing */
 };
 
 /* steps.c: communication steps against the plain loop and MuJoCo; free motion at equal errors */

@@ -295,7 +295,6 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5, help="of bench and heyoka")
     parser.add_argument("--repeats", type=int, default=11, help="within bench")
     parser.add_argument("--readme", action="store_true", help="put the ratios into the page")
-    parser.add_argument("--quick", action="store_true", help="little of everything, to try it")
     options = parser.parse_args()
     needed = [options.build / "tests/bench/bench", *libraries(options.build)]
     output = options.output or options.build / "report/benchmark"
@@ -307,13 +306,12 @@ def main() -> None:
     output.mkdir(parents=True, exist_ok=True)
     about = machine()  # with the load before
     program = [str(path) for path in needed]
-    small = ["--quick"] if options.quick else []
 
     first = run_bench(program, "--only", "steps,free-motion", "--repeats", "1")
     peers = make_peers(first["rows"])
     rows = take_rounds(program, peers, options.rounds, min(3, options.repeats))
     print("an instance, friction and stops", file=sys.stderr)
-    rest = run_bench(program, *small, "--only", "life,plant", "--repeats", str(options.repeats))
+    rest = run_bench(program, "--only", "life,plant", "--repeats", str(options.repeats))
     result = {
         "machine": about | first["machine"],
         "rounds": options.rounds,

@@ -167,16 +167,6 @@ static const struct work {
      {[CVODE_ADAMS] = 1.5, [CVODE_BDF] = 1.5, [ERK] = 2.0, [TAYLOR] = 2.0}},
 };
 
-static void report_plant(struct report *report, const struct work *work, enum method method,
-                         double us, double ratio, int events) {
-    const double most = work->most[method];
-    report_row(report, "plant", work->name, method_names[method]);
-    report_number(report, "us", us);
-    report_number(report, "events", events);
-    report_judged(report, "ratio", ratio, most);
-    report_row_end(report);
-}
-
 static void measure_work(struct bench *bench, const struct work *work, enum method method) {
     const struct motion motion = work->motion();
     const struct motion peer = work->peer == NULL ? motion : work->peer();
@@ -189,8 +179,11 @@ static void measure_work(struct bench *bench, const struct work *work, enum meth
         seconds[i] = run(&bench->plant, true, &motion, method, &events);
         ratios[i] = seconds[i] / run(other, work->peer != NULL, &peer, method, &none);
     }
-    report_plant(&bench->report, work, method, 1e6 * median(seconds, bench->repeats),
-                 median(ratios, bench->repeats), events);
+    report_row("plant", work->name, method_names[method]);
+    report_number("us", 1e6 * median(seconds, bench->repeats));
+    report_number("events", events);
+    report_judged("ratio", median(ratios, bench->repeats), work->most[method]);
+    report_row_end();
 }
 
 void measure_plant(struct bench *bench) {

@@ -77,38 +77,30 @@ double race_us(const struct race *race, int run) {
     return 1e6 * median(seconds, race->repeats);
 }
 
-double race_ratio(const struct race *race, int run, int peer) {
-    double ratios[MOST_REPEATS];
-    for (int repeat = 0; repeat < race->repeats; repeat++) {
-        ratios[repeat] = race->seconds[run][repeat] / race->seconds[peer][repeat];
-    }
-    return median(ratios, race->repeats);
-}
-
-void race_report(const struct race *race, struct report *report, const char *group,
-                 const char *work, const struct problem *problem) {
+void race_report(const struct race *race, const char *group, const char *work,
+                 const struct problem *problem) {
     static const char *const ends[4] = {"end_q1", "end_q2", "end_dq1", "end_dq2"};
     for (int i = 0; i < race->count; i++) {
         const struct run *run = &race->runs[i];
-        report_row(report, group, work, run->name);
-        report_number(report, "step", problem->step);
-        report_number(report, "steps", problem->steps);
-        report_number(report, "us", race_us(race, i));
-        report_number(report, "error", race->error[i]);
+        report_row(group, work, run->name);
+        report_number("step", problem->step);
+        report_number("steps", problem->steps);
+        report_number("us", race_us(race, i));
+        report_number("error", race->error[i]);
         for (int j = 0; j < 4; j++) { // of the reference, for other references to compare with
-            report_number(report, ends[j], problem->reference[problem->steps - 1][j]);
+            report_number(ends[j], problem->reference[problem->steps - 1][j]);
         }
         if (run->solver == MUJOCO) {
-            report_number(report, "substeps", run->substeps);
+            report_number("substeps", run->substeps);
         } else {
-            report_number(report, "tolerance", run->tolerance);
+            report_number("tolerance", run->tolerance);
         }
         if (run->solver == FMU || run->solver == FMU3) {
-            report_number(report, "effective_tolerance", race->counts[i].effective_tolerance);
-            report_number(report, "internal_steps", race->counts[i].internal_steps);
-            report_number(report, "evaluations", race->counts[i].evaluations);
+            report_number("effective_tolerance", race->counts[i].effective_tolerance);
+            report_number("internal_steps", race->counts[i].internal_steps);
+            report_number("evaluations", race->counts[i].evaluations);
         }
-        report_row_end(report);
+        report_row_end();
     }
 }
 

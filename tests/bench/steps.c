@@ -67,7 +67,7 @@ static void measure_work(struct bench *bench, const struct work *work) {
         add_fmi3(&race, &bench->fmu3, work->tolerance);
     }
     race_run(&race, &bench->fmu, problem, bench->repeats);
-    race_report(&race, &bench->report, "steps", work->name, problem);
+    race_report(&race, "steps", work->name, problem);
     problem_destroy(problem);
 }
 
@@ -79,7 +79,7 @@ static void measure_with_error(struct bench *bench, struct race *race, const cha
         race_tune(&race->runs[run], &bench->fmu, problem, bound);
     }
     race_run(race, &bench->fmu, problem, bench->repeats);
-    race_report(race, &bench->report, "steps", work, problem);
+    race_report(race, "steps", work, problem);
     problem_destroy(problem);
 }
 
@@ -124,13 +124,12 @@ void measure_life(struct bench *bench) {
         const double kib = (double)(mallinfo2().uordblks - before) / 1024.0;
         bench->fmu.FreeInstance(c);
         const double life = median(us[method], bench->repeats);
-        report_row(&bench->report, "life", "instantiate to free", method_names[method]);
-        report_judged(&bench->report, "us", life, 30.0);
-        report_row_end(&bench->report);
-        report_row(&bench->report, "life", "memory of an instance after a step",
-                   method_names[method]);
-        report_judged(&bench->report, "kib", kib, 32.0);
-        report_row_end(&bench->report);
+        report_row("life", "instantiate to free", method_names[method]);
+        report_judged("us", life, 30.0);
+        report_row_end();
+        report_row("life", "memory of an instance after a step", method_names[method]);
+        report_judged("kib", kib, 32.0);
+        report_row_end();
     }
     problem_destroy(problem);
 }

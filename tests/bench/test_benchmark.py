@@ -26,7 +26,7 @@ FREE = Work("one step of 2 s, free motion", 2.0, 1, "zero")
 @pytest.fixture(scope="module")
 def result() -> dict:
     """Everything that bench measures, in short."""
-    found = compare.run_bench(BENCH, "--quick", "--repeats", "1")
+    found = compare.run_bench(BENCH, "--repeats", "1")
     return found | {"rows": compare.judge(compare.compared(found["rows"]))}
 
 

@@ -11,6 +11,8 @@ from rparm.errors import UserError
 from tests.campaign.files import ARM, HEAD, campaign, write
 from tests.support.rparm_project import FMUS, Console
 
+GRID, M2 = [("sobol", "grid"), ("runs = 40\n", "")], "[1.0, 3.0]"
+Q1 = "normal = [-2.0, 0.2]"
 MISTAKES = [
     ([("seed = 3", "seed = ")], "not valid TOML"),
     ([("seed = 3", "sead = 3")], "unknown key 'sead', did you mean 'seed'?"),
@@ -32,11 +34,8 @@ MISTAKES = [
     ([("runs = 40", "runs = 2000000000")], "runs: makes 2e+09, expected at most"),
     ([("block = 8", "block = 0")], "block: expected greater than or equal"),
     ([("[1.0, 3.0]", "[1.0, 3.0]\npoints = 3")], "goes with a grid only"),
-    ([("sobol", "grid"), ("runs = 40\n", "")], "[parameters.m2] points: is missing, for a grid"),
-    (
-        [("sobol", "grid"), ("runs = 40\n", ""), ("[1.0, 3.0]", "[1.0, 3.0]\npoints = 0")],
-        "parameters.m2.points: expected greater than 0, got 0",
-    ),
+    (GRID, "[parameters.m2] points: is missing, for a grid"),
+    ([*GRID, (M2, f"{M2}\npoints = 0")], "parameters.m2.points: expected greater than 0, got 0"),
     ([("sobol", "indices")], "runs: expected a power of 2"),
     ([(ARM[ARM.index("final") :], "")], "[keep]: keeps nothing of a run"),
     ([('"q1", "q2"', '"q3"')], "[keep] final: the model has no variable 'q3'"),
@@ -49,24 +48,19 @@ MISTAKES = [
         "[keep] maximum: 'solver_steps' is not a Real variable",
     ),
     (
-        [("sobol", "grid"), ("runs = 40\n", ""), ("[1.0, 3.0]", "[1.0, 3.0]\npoints = 3000000000")]
-        + [("normal = [-2.0, 0.2]", "values = [-2.0]")],
+        [*GRID, (M2, f"{M2}\npoints = 3000000000"), (Q1, "values = [-2.0]")],
         "runs: makes 3e+09, expected at most 1000000000",
     ),
     (
-        [("sobol", "grid"), ("runs = 40\n", ""), ("[1.0, 3.0]", f"[1.0, 3.0]\npoints = {2**62}")]
-        + [("normal = [-2.0, 0.2]", f"uniform = [-2.0, 0.2]\npoints = {2**62}")],
+        [*GRID, (M2, f"{M2}\npoints = {2**62}"), (Q1, f"uniform = [-2.0, 0.2]\npoints = {2**62}")],
         "runs: makes 2.127e+37, expected at most 1000000000",
     ),
     ([('["q1", "q2"]', '"q1"')], "keep.final: expected a list, got 'q1'"),
     (
-        [("uniform = [1.0, 3.0]", "")] + [("[parameters.m2]", "[parameters]\nm2 = 1.0")],
+        [(f"uniform = {M2}", ""), ("[parameters.m2]", "[parameters]\nm2 = 1.0")],
         "parameters.m2: expected a table, got 1.0",
     ),
-    (
-        [("uniform = [1.0, 3.0]", "values = []")],
-        "parameters.m2.values: expected a longer list, got []",
-    ),
+    ([(f"uniform = {M2}", "values = []")], "parameters.m2.values: expected a longer list, got []"),
     ([('"Test"', '"\\u001b[2J"')], "title: expected one line of text"),
     ([("[keep]", '[derived]\ndq1 = "1 / 0"\n[keep]')], "[derived] dq1: has no value: "),
     ([("[3, 17]", "[3, 40]")], "trajectories: expected runs from 0 to 39, got 40"),
@@ -162,6 +156,5 @@ def test_blocks_cover_all_runs(tmp_path: Path) -> None:
 
 def test_a_run_is_counted_by_the_sampling(tmp_path: Path) -> None:
     assert campaign(tmp_path, changes=[("sobol", "indices"), ("40", "32")]).count == 32 * 4
-    grid = [("sobol", "grid"), ("runs = 40\n", ""), ("[1.0, 3.0]", "[1.0, 3.0]\npoints = 20")]
-    grid += [("normal = [-2.0, 0.2]", "values = [1.0, 2.0]")]
+    grid = [*GRID, (M2, f"{M2}\npoints = 20"), (Q1, "values = [1.0, 2.0]")]
     assert campaign(tmp_path, changes=grid).count == 40

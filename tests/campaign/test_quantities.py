@@ -62,36 +62,30 @@ def test_the_points_of_a_grid(tmp_path: Path) -> None:
     assert (angles[0], angles[3]) == (-math.pi, math.pi / 2)
 
 
+SETTLING = '[keep.settling.s]\nvariable = "q1"\ntarget = 1\nband = "-1 deg"\n[keep]'
+CROSSINGS = '[keep.crossings.c]\nvariable = "q7"\nlevel = "1 deg"\n[keep]'
+Q1, SPREAD = "normal = [-2.0, 0.2]", "[parameters.spread]\nuniform = [0, '1 deg']"
 MISTAKES = {
-    "[parameters.q1] normal: unknown unit 'mm' (known: rad, deg, mrad)": (
-        "[-2.0, 0.2]",
-        '["2 mm", 1]',
-    ),
+    "[parameters.q1] normal: unknown unit 'mm' (known: rad, deg, mrad)": ("-2.0", '"2 mm"'),
     "[parameters.q1] uniform: unknown unit 'degs', did you mean 'deg'?": (
-        "normal = [-2.0, 0.2]",
+        Q1,
         'uniform = [0, "2 degs"]',
     ),
     "parameters.q1: uniform: expected a lower and an upper limit, got [1.5707963267948966, 0.0]": (
-        "normal = [-2.0, 0.2]",
+        Q1,
         'uniform = ["90 deg", 0]',
     ),
     "[parameters.spread] uniform: without a variable no unit: the model has no variable": (
-        "[parameters.q1]\nnormal = [-2.0, 0.2]",
-        "[parameters.spread]\nuniform = [0, '1 deg']",
+        f"[parameters.q1]\n{Q1}",
+        SPREAD,
     ),
     "[parameters.q1] normal: expected a finite number, got '1e400 deg'": ("-2.0", '"1e400 deg"'),
     "[set] q2: unknown unit 'deg' (known: m, mm, cm, km)": ("[keep]", "[set]\nq2='1 deg'\n[keep]"),
     "[set] q2: expected a number, or a number and its unit": ("[keep]", "[set]\nq2 = ''\n[keep]"),
     "time.stop: unknown unit 'm', did you mean 'ms'? (known: s, ms, cs, ks)": ("1.0", "'1 m'"),
     "time.step: expected greater than 0, got ": ("stop = 1.0", "step = '0 s'"),
-    "keep.settling.s.band: expected greater than 0": (
-        "[keep]",
-        '[keep.settling.s]\nvariable = "q1"\ntarget = 1\nband = "-1 deg"\n[keep]',
-    ),
-    "[keep.crossings.c] level: without a variable no unit": (
-        "[keep]",
-        '[keep.crossings.c]\nvariable = "q7"\nlevel = "1 deg"\n[keep]',
-    ),
+    "keep.settling.s.band: expected greater than 0": ("[keep]", SETTLING),
+    "[keep.crossings.c] level: without a variable no unit": ("[keep]", CROSSINGS),
 }
 
 

@@ -192,153 +192,73 @@ NOMINAL_ARM = "resources/arm_nominal.ssv"
 TOLERANCE = '<ssv:Parameter name="relative_tolerance"><ssv:Real value="1e-11" unit="1"/>'
 
 
-def structure(old: str, new: str, count: int = 1) -> dict[str, Edit]:
-    return {STRUCTURE: replace(old, new, count)}
-
-
-def values(new: str) -> dict[str, Edit]:
-    """Another parameter in place of the arm's nominal one."""
-    return {NOMINAL_ARM: replace(TOLERANCE, new)}
-
-
-BAD: list[tuple[dict[str, Edit], list[str]]] = [
+CONTROLLER, GAINS = "resources/RPController.fmu", "resources/controller_nominal.ssv"
+ARM, IN_CONTROLLER = "component 'arm'", "component 'controller'"
+OLD_FMU = edited_fmu({"modelDescription.xml": replace('fmiVersion="2.0"', 'fmiVersion="1.0"')})
+ITEM = '<ssv:Parameter name="mode"><ssv:Enumeration value="pd"/>'
+# edits of files in the SSP; parts of the message, with | between them
+FILES: list[tuple[str, Edit, str]] = [
+    (CONTROLLER, lambda _: None, f"{IN_CONTROLLER}|{CONTROLLER} is missing"),
+    (CONTROLLER, lambda content: content[: len(content) // 2], f"{IN_CONTROLLER}|not an FMU"),
+    (CONTROLLER, OLD_FMU, f"{IN_CONTROLLER}|{CONTROLLER}"),
+    (GAINS, replace(TOLERANCE, ITEM), f"{IN_CONTROLLER}|'mode'|Integer"),
+    (NOMINAL_ARM, replace('name="nominal"', 'name="nominl"'), "has no parameter set 'nominl'"),
+    (NOMINAL_ARM, lambda _: None, f"{NOMINAL_ARM}: is missing in the SSP"),
+    (NOMINAL_ARM, lambda content: content[:-20], f"{NOMINAL_ARM}|not valid XML"),
+    (STRUCTURE, lambda _: None, f"{STRUCTURE}: is missing in the SSP"),
+    (STRUCTURE, lambda content: content[:-200], f"{STRUCTURE}|not valid XML"),
+    (STRUCTURE, replace("ssd:Elements>", "ssd:Elemente>", -1), f"{STRUCTURE}|line |Elemente"),
+]
+INPUT = '<ssd:Connector name="tau1" kind="input">'
+TAU, F2 = "controller.tau1 -> arm.", " -> arm.f2"
+FROM, TO = 'startElement="controller"', 'endElement="arm" endConnector="tau1"'
+BACKWARD = F2_CONNECTION.replace("arm", "x").replace("controller", "arm").replace("x", "controller")
+SCALED = F2_CONNECTION[:-2] + '><ssc:LinearTransformation factor="2"/></ssd:Connection>'
+# texts of the structure, and others in their places
+STRUCTURES = [
+    (CONTROLLER, "../RPController.fmu", f"{IN_CONTROLLER}|../RPController.fmu"),
+    (CONTROLLER, "..\\RPController.fmu", f"{IN_CONTROLLER}|is no path in the SSP"),
+    (FROM, 'startElement="contoller"', "contoller.tau1 -> arm.tau1|did you mean 'controller'?"),
+    (TO, TO.replace("1", "3"), f"{TAU}tau3|'arm' has no connector 'tau3'|did you mean 'tau1'?"),
+    (TO, TO.replace("tau1", "f2"), f"{TAU}f2|units differ, 'N.m' and 'N'"),
+    (F2_CONNECTION, BACKWARD, "arm.f2 -> controller.f2|'f2' is no output"),
+    (F2_CONNECTION, 2 * F2_CONNECTION, f"controller.f2{F2}|the input has a connection already"),
+    (F2_CONNECTION, SCALED, f"controller.f2{F2}|transformation"),
+    (f'{FROM} startConnector="f2"', 'startConnector="f2"', f".f2{F2}|the system's own connectors"),
+    ('"dq2" kind="output"', '"ddq22" kind="output"', f"{ARM}|'ddq22'|did you mean 'ddq2'?"),
+    (INPUT, INPUT.replace("input", "output"), f"{ARM}|'tau1' is an output, in its FMU an input"),
+    (TAU1, TAU1.replace("N.m", "N"), f"{ARM}|'tau1' is in 'N', in its FMU 'N.m'"),
+    (TAU1, f"{INPUT}<ssc:Integer/>", f"{ARM}|'tau1' is of type Integer, in its FMU Real"),
+    ('<ssd:Component name="trajectory"', '<ssd:Component name="arm"', f"{ARM} is there twice"),
+    ('stopTime="6"', 'stopTime="-6"', f"{STRUCTURE}|stop -6.0 s"),
+    ('baseStepSize="0.001"', 'baseStepSize="0"', f"{STRUCTURE}|step 0.0 s"),
+]
+PARAMETER = '<ssv:Parameter name="'
+SET = f"parameter set 'nominal'|{ARM}"
+# parameters in place of the arm's nominal one
+PARAMETERS = [
+    ('mm2"><ssv:Real value="1"/>', f"{SET}|'mm2'|did you mean"),
+    ('m1"><ssv:Real value="1" unit="m"/>', f"{SET}|'m1' is in 'm', in its FMU 'kg'"),
+    ('m1"><ssv:Integer value="1"/>', f"{SET}|'m1' is of type Integer, in its FMU Real"),
+    ('m1"><ssv:Real value="-1"/>', f"{SET}|'m1' is -1.0, expected 0 to inf"),
+    ('m1"><ssv:Real value="NaN"/>', f"{NOMINAL_ARM}|{ARM}|'m1'|expected a finite number"),
+    ('ddq1"><ssv:Real value="1"/>', f"{SET}|'ddq1' is an output and cannot be set"),
     (
-        {"resources/RPController.fmu": lambda _: None},
-        ["component 'controller'", "resources/RPController.fmu is missing"],
+        TOLERANCE[len(PARAMETER) :] + f"</ssv:Parameter>{TOLERANCE}",
+        f"{NOMINAL_ARM}|{ARM}|'relative_tolerance' is there twice",
     ),
-    (
-        {"resources/RPController.fmu": lambda content: content[: len(content) // 2]},
-        ["component 'controller'", "not an FMU"],
-    ),
-    (
-        {
-            "resources/RPController.fmu": edited_fmu(
-                {"modelDescription.xml": replace('fmiVersion="2.0"', 'fmiVersion="1.0"')}
-            )
-        },
-        ["component 'controller'", "resources/RPController.fmu"],
-    ),
-    (
-        structure("resources/RPController.fmu", "../RPController.fmu"),
-        ["component 'controller'", "../RPController.fmu"],
-    ),
-    (
-        structure("resources/RPController.fmu", "..\\RPController.fmu"),
-        ["component 'controller'", "is no path in the SSP"],
-    ),
-    (
-        structure('startElement="controller"', 'startElement="contoller"'),
-        ["contoller.tau1 -> arm.tau1", "did you mean 'controller'?"],
-    ),
-    (
-        structure('endElement="arm" endConnector="tau1"', 'endElement="arm" endConnector="tau3"'),
-        ["controller.tau1 -> arm.tau3", "'arm' has no connector 'tau3'", "did you mean 'tau1'?"],
-    ),
-    (
-        structure(
-            F2_CONNECTION,
-            '<ssd:Connection startElement="arm" startConnector="f2" endElement="controller" '
-            'endConnector="f2"/>',
-        ),
-        ["arm.f2 -> controller.f2", "'f2' is no output"],
-    ),
-    (
-        structure('name="dq2" kind="output"', 'name="ddq22" kind="output"'),
-        ["component 'arm'", "'ddq22'", "did you mean 'ddq2'?"],
-    ),
-    (
-        structure(
-            '<ssd:Connector name="tau1" kind="input">', '<ssd:Connector name="tau1" kind="output">'
-        ),
-        ["component 'arm'", "'tau1' is an output, in its FMU an input"],
-    ),
-    (
-        structure(TAU1, TAU1.replace("N.m", "N")),
-        ["component 'arm'", "'tau1' is in 'N', in its FMU 'N.m'"],
-    ),
-    (
-        structure('endElement="arm" endConnector="tau1"', 'endElement="arm" endConnector="f2"'),
-        ["controller.tau1 -> arm.f2", "units differ, 'N.m' and 'N'"],
-    ),
-    (
-        structure(TAU1, '<ssd:Connector name="tau1" kind="input"><ssc:Integer/>'),
-        ["component 'arm'", "'tau1' is of type Integer, in its FMU Real"],
-    ),
-    (
-        structure(F2_CONNECTION, F2_CONNECTION + F2_CONNECTION),
-        ["controller.f2 -> arm.f2", "the input has a connection already"],
-    ),
-    (
-        structure(
-            F2_CONNECTION,
-            F2_CONNECTION[:-2] + '><ssc:LinearTransformation factor="2"/></ssd:Connection>',
-        ),
-        ["controller.f2 -> arm.f2", "transformation"],
-    ),
-    (
-        structure('startElement="controller" startConnector="f2"', 'startConnector="f2"'),
-        [".f2 -> arm.f2", "the system's own connectors"],
-    ),
-    (
-        structure('<ssd:Component name="trajectory"', '<ssd:Component name="arm"'),
-        ["component 'arm' is there twice"],
-    ),
-    (
-        values('<ssv:Parameter name="mm2"><ssv:Real value="1"/>'),
-        ["parameter set 'nominal'", "component 'arm'", "'mm2'", "did you mean"],
-    ),
-    (
-        values('<ssv:Parameter name="m1"><ssv:Real value="1" unit="m"/>'),
-        ["parameter set 'nominal'", "component 'arm'", "'m1' is in 'm', in its FMU 'kg'"],
-    ),
-    (
-        values('<ssv:Parameter name="m1"><ssv:Integer value="1"/>'),
-        ["parameter set 'nominal'", "component 'arm'", "'m1' is of type Integer, in its FMU Real"],
-    ),
-    (
-        values('<ssv:Parameter name="m1"><ssv:Real value="-1"/>'),
-        ["parameter set 'nominal'", "component 'arm'", "'m1' is -1.0, expected 0 to inf"],
-    ),
-    (
-        values('<ssv:Parameter name="m1"><ssv:Real value="NaN"/>'),
-        [NOMINAL_ARM, "component 'arm'", "'m1'", "expected a finite number"],
-    ),
-    (
-        values('<ssv:Parameter name="ddq1"><ssv:Real value="1"/>'),
-        ["parameter set 'nominal'", "component 'arm'", "'ddq1' is an output and cannot be set"],
-    ),
-    (
-        values(f"{TOLERANCE}</ssv:Parameter>{TOLERANCE}"),
-        [NOMINAL_ARM, "component 'arm'", "'relative_tolerance' is there twice"],
-    ),
-    (
-        {
-            "resources/controller_nominal.ssv": replace(
-                TOLERANCE, '<ssv:Parameter name="mode"><ssv:Enumeration value="pd"/>'
-            )
-        },
-        ["component 'controller'", "'mode'", "Integer"],
-    ),
-    ({NOMINAL_ARM: replace('name="nominal"', 'name="nominl"')}, ["has no parameter set 'nominl'"]),
-    ({NOMINAL_ARM: lambda _: None}, [f"{NOMINAL_ARM}: is missing in the SSP"]),
-    ({STRUCTURE: lambda _: None}, [f"{STRUCTURE}: is missing in the SSP"]),
-    ({STRUCTURE: lambda content: content[:-200]}, [STRUCTURE, "not valid XML"]),
-    ({NOMINAL_ARM: lambda content: content[:-20]}, [NOMINAL_ARM, "not valid XML"]),
-    (
-        {STRUCTURE: lambda content: content.replace(b"ssd:Elements>", b"ssd:Elemente>")},
-        [STRUCTURE, "line ", "Elemente"],
-    ),
-    (structure('stopTime="6"', 'stopTime="-6"'), [STRUCTURE, "stop -6.0 s"]),
-    (structure('baseStepSize="0.001"', 'baseStepSize="0"'), [STRUCTURE, "step 0.0 s"]),
+]
+WRONG = [
+    *FILES,
+    *((STRUCTURE, replace(old, new), said) for old, new, said in STRUCTURES),
+    *((NOMINAL_ARM, replace(TOLERANCE, PARAMETER + new), said) for new, said in PARAMETERS),
 ]
 
 
-@pytest.mark.parametrize(("edits", "expected"), BAD)
-def test_a_wrong_ssp_is_refused(
-    edits: dict[str, Edit], expected: list[str], tmp_path: Path
-) -> None:
-    text = refused(edited(SSP, tmp_path / "wrong.ssp", edits))
-    for part in expected:
+@pytest.mark.parametrize(("file", "edit", "said"), WRONG)
+def test_a_wrong_ssp_is_refused(file: str, edit: Edit, said: str, tmp_path: Path) -> None:
+    text = refused(edited(SSP, tmp_path / "wrong.ssp", {file: edit}))
+    for part in said.split("|"):
         assert part in text
 
 
@@ -359,7 +279,7 @@ def test_a_damaged_archive_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_command_line_explains_in_one_line(tmp_path: Path, console: Console) -> None:
-    path = edited(SSP, tmp_path / "wrong.ssp", structure(TAU1, TAU1.replace("N.m", "N")))
+    path = edited(SSP, tmp_path / "wrong.ssp", {STRUCTURE: replace(TAU1, TAU1.replace("N.m", "N"))})
     error = console.refused("system", "--ssp", path, "--report", tmp_path / "report")
     wrong = "component 'arm': connector 'tau1' is in 'N', in its FMU 'N.m'"
     assert error == f"error: {path}: {wrong}\n"

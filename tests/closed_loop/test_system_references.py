@@ -218,12 +218,15 @@ def test_rows_are_read_before_or_after_inputs_are_set() -> None:
         coordinate = name.removesuffix("_error")
         exact = after[f"trajectory.{coordinate}_ref"] - after[f"arm.{coordinate}"]
         assert np.array_equal(known, exact)
-    for column, effort in ((before, slice(None, -1)), (after, slice(1, None))):
-        power = sum(
-            before[f"controller.{n}"][effort] * column[f"arm.{v}"][1:]
-            for n, v in (("tau1", "dq1"), ("f2", "dq2"))
-        )
-        assert np.max(np.abs(column["arm.actuator_power"][1:] - power)) < 1e-17
+    assert_power_is_of(before, before, slice(None, -1))
+    assert_power_is_of(after, before, slice(1, None))
+
+
+def assert_power_is_of(column: Columns, commands: Columns, efforts: slice) -> None:
+    """Whether the arm's power is that of these rows of the controller's efforts."""
+    pairs = ("tau1", "dq1"), ("f2", "dq2")
+    power = sum(commands[f"controller.{n}"][efforts] * column[f"arm.{v}"][1:] for n, v in pairs)
+    assert np.max(np.abs(column["arm.actuator_power"][1:] - power)) < 1e-17
 
 
 @pytest.mark.parametrize(("order", "newest"), [("gauss_seidel", 0), ("gauss_seidel_arm_first", 1)])
@@ -236,12 +239,7 @@ def test_gauss_seidel_gives_the_newest_outputs(order: str, newest: int) -> None:
     for name in ("q1", "q2", "dq1", "dq2"):
         error = column[f"trajectory.{name}_ref"][1:] - column[f"arm.{name}"][measured]
         assert np.array_equal(column[f"controller.{name}_error"][1:], error)
-    efforts = slice(None, -1) if newest else slice(1, None)
-    power = sum(
-        column[f"controller.{n}"][efforts] * column[f"arm.{v}"][1:]
-        for n, v in (("tau1", "dq1"), ("f2", "dq2"))
-    )
-    assert np.max(np.abs(column["arm.actuator_power"][1:] - power)) < 1e-17
+    assert_power_is_of(column, column, slice(None, -1) if newest else slice(1, None))
 
 
 # -- files --

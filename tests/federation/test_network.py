@@ -3,7 +3,7 @@
 import socket
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, contextmanager, suppress
 
 import numpy as np
 import pytest
@@ -21,50 +21,44 @@ def pool() -> Iterator[ThreadPoolExecutor]:
         yield made
 
 
-def joined(address: str) -> tuple[Federate, Federate]:
-    both = Federate("one", address, ["two"]), Federate("two", address, ["one"])
-    for federate in both:
-        federate.join()
-    return both
-
-
 def at_once(pool: ThreadPoolExecutor, *calls) -> None:
     for call in [pool.submit(call) for call in calls]:
         call.result(timeout=LIMIT)
 
 
-def begun(pool: ThreadPoolExecutor, one: Federate, two: Federate) -> None:
-    at_once(pool, one.enter_initialization, two.enter_initialization)
-    one.publish(np.array([0.5]))
-    at_once(pool, one.begin, two.begin)
+@contextmanager
+def begun(pool: ThreadPoolExecutor, address: str = "") -> Iterator[tuple[Federate, Federate]]:
+    """Two federates at their first exchange, which leave at the end."""
+    address = address or network.free_address()
+    with Broker(2, address):
+        one, two = Federate("one", address, ["two"]), Federate("two", address, ["one"])
+        one.join()
+        two.join()
+        at_once(pool, one.enter_initialization, two.enter_initialization)
+        one.publish(np.array([0.5]))
+        at_once(pool, one.begin, two.begin)
+        yield one, two
+        at_once(pool, one.leave, two.leave)
 
 
 def test_a_vector_is_read_after_the_next_exchange(pool: ThreadPoolExecutor) -> None:
-    address = network.free_address()
-    with Broker(2, address):
-        one, two = joined(address)
-        begun(pool, one, two)
+    with begun(pool) as (one, two):
         assert two.read() == {"one": [0.5]}
         one.publish(np.array([0.1, -0.2]))
         assert two.read() == {"one": [0.5]}
         at_once(pool, lambda: one.go_to(1), lambda: two.go_to(1))
         assert two.read() == {"one": [0.1, -0.2]}
-        at_once(pool, one.leave, two.leave)
 
 
 def test_values_of_another_exchange_are_no_values(pool: ThreadPoolExecutor) -> None:
     """`one` publishes nothing before the exchange, which looks like a message that is late."""
-    address = network.free_address()
-    with Broker(2, address):
-        one, two = joined(address)
-        begun(pool, one, two)
+    with begun(pool) as (one, two):
         at_once(pool, lambda: one.go_to(1), lambda: two.go_to(1))
         words = "after exchange 2 the federation ended: HELICS has not passed on to two what one"
         with pytest.raises(UserError, match=words):
             two.read()
         with pytest.raises(UserError, match="what two published"):  # never anything
             one.read()
-        at_once(pool, one.leave, two.leave)
 
 
 def test_one_port_is_enough(pool: ThreadPoolExecutor) -> None:
@@ -74,10 +68,7 @@ def test_one_port_is_enough(pool: ThreadPoolExecutor) -> None:
         for other in range(port + 1, port + 20):
             with suppress(OSError, OverflowError):  # in use already, or no port
                 stack.enter_context(socket.create_server(("", other)))
-        stack.enter_context(Broker(2, address))
-        one, two = joined(address)
-        begun(pool, one, two)
-        at_once(pool, one.leave, two.leave)
+        stack.enter_context(begun(pool, address))
 
 
 def test_what_is_stepped_is_waited_for(pool: ThreadPoolExecutor) -> None:

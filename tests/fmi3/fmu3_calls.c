@@ -170,8 +170,8 @@ CALL_WITH_STATE(SerializeFMUState)
 CALL_WITH_STATE(DeserializeFMUState)
 
 fmi3Status fmu3_call(enum fmu3_function function, fmi3Instance c, double now) {
-#define CALL_OF(name) call_##name,
-    static fmi3Status (*const calls[])(fmi3Instance c, double now) = {FMU3_FUNCTION_LIST(CALL_OF)};
+#define CALL_OF(name, kinds, states) call_##name,
+    static fmi3Status (*const calls[])(fmi3Instance c, double now) = {FMI3_FUNCTION_LIST(CALL_OF)};
 #undef CALL_OF
     return calls[function](c, now);
 }

@@ -102,7 +102,7 @@ static const struct run *run_of_fresh(fmi2Type kind, unsigned variety, unsigned 
     static struct run runs[2][FUZZ_VARIETIES][FUZZ_RUN_VARIANTS];
     struct run *run = &runs[kind == fmi2CoSimulation][variety][variant];
     if (!run->is_known) {
-        struct fuzz_instance *fresh = fuzz_instance_create_variety(kind, variety, false, false);
+        struct fuzz_instance *fresh = fuzz_instance_create(kind, variety, false, false);
         make_run(fresh, variant, run);
         fuzz_instance_free(fresh);
         run->is_known = true;

@@ -65,12 +65,8 @@ static void choose(unsigned variety) {
     }
 }
 
-struct fuzz_instance *fuzz_instance_create(fmi2Type kind, bool has_logger, bool logging_on) {
-    return fuzz_instance_create_variety(kind, 0, has_logger, logging_on);
-}
-
-struct fuzz_instance *fuzz_instance_create_variety(fmi2Type kind, unsigned variety, bool has_logger,
-                                                   bool logging_on) {
+struct fuzz_instance *fuzz_instance_create(fmi2Type kind, unsigned variety, bool has_logger,
+                                           bool logging_on) {
     struct fuzz_instance *instance = fuzz_array(1, sizeof *instance);
     fmi2CallbackFunctions *callbacks = fuzz_array(1, sizeof *callbacks);
     *callbacks = fuzz_callbacks(instance, has_logger);

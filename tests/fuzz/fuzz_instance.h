@@ -38,9 +38,8 @@ struct fuzz_instance {
 
 /* NULL and false where has_logger is false: logging_on then means nothing. Freed by
  * fuzz_instance_free. */
-struct fuzz_instance *fuzz_instance_create(fmi2Type kind, bool has_logger, bool logging_on);
-struct fuzz_instance *fuzz_instance_create_variety(fmi2Type kind, unsigned variety, bool has_logger,
-                                                   bool logging_on);
+struct fuzz_instance *fuzz_instance_create(fmi2Type kind, unsigned variety, bool has_logger,
+                                           bool logging_on);
 void fuzz_instance_free(struct fuzz_instance *instance);
 
 /* Callbacks whose environment is the instance. */

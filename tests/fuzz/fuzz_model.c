@@ -257,8 +257,8 @@ static void move_state(struct fuzz_input *input, struct fuzz_instance *instance)
     static struct fuzz_bytes bytes;
     static struct fuzz_bytes again;
     const bool is_forged = fuzz_below(input, 2) == 0;
-    struct fuzz_instance *other = fuzz_instance_create_variety(
-        instance->kind, is_forged ? 0 : instance->variety, true, false);
+    struct fuzz_instance *other =
+        fuzz_instance_create(instance->kind, is_forged ? 0 : instance->variety, true, false);
     fmi2FMUstate state = NULL;
     fuzz_serialize(instance, &bytes);
     if (is_forged) {
@@ -329,9 +329,8 @@ void fuzz_target_run(struct fuzz_input *input) {
     const bool is_exchange = selector % 4 == 3;
     struct subject subject = {
         .input = input,
-        .instance = is_exchange
-                        ? fuzz_instance_create(fmi2ModelExchange, true, false)
-                        : fuzz_instance_create_variety(fmi2CoSimulation, variety, true, false),
+        .instance = fuzz_instance_create(is_exchange ? fmi2ModelExchange : fmi2CoSimulation,
+                                         is_exchange ? 0 : variety, true, false),
     };
     if (initialize(&subject)) {
         is_exchange ? fuzz_model_exchange(&subject) : run_co_simulation(&subject);

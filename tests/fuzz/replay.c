@@ -1,15 +1,11 @@
 /* Stands in for libFuzzer where the compiler has none: runs each file named, and each file of each
- * archive (.tar) named, once. */
+ * folder named, once. */
 #include "fuzz.h"
 
+#include <dirent.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-// A tar archive: for each file a block with its name, size and kind, then its bytes in whole
-// blocks.
-enum { BLOCK = 512, SIZE_AT = 124, SIZE_DIGITS = 11, KIND_AT = 156 };
-static const char file_kind = '0';
 
 static unsigned long file_count;
 
@@ -23,28 +19,6 @@ static void replay_input(const char *name, const uint8_t *bytes, size_t size) {
         file_count++;
     }
     free(input);
-}
-
-static bool replay_archive(const char *path, const uint8_t *bytes, size_t size) {
-    for (size_t at = 0; size - at >= BLOCK;) {
-        const char *header = (const char *)&bytes[at];
-        if (header[0] == '\0') {
-            return true; // an empty block is its end
-        }
-        char digits[SIZE_DIGITS + 1] = {0};
-        memcpy(digits, header + SIZE_AT, SIZE_DIGITS);
-        const size_t length = strtoul(digits, NULL, 8);
-        const size_t blocks = BLOCK + (length + BLOCK - 1) / BLOCK * BLOCK;
-        if (blocks > size - at) {
-            break;
-        }
-        if (header[KIND_AT] == file_kind) {
-            replay_input(header, &bytes[at + BLOCK], length);
-        }
-        at += blocks;
-    }
-    fprintf(stderr, "%s: is cut off, or no archive\n", path);
-    return false;
 }
 
 /* Content of a file, to be freed; NULL if it cannot be read. */
@@ -64,21 +38,36 @@ static uint8_t *read_file(const char *path, size_t *size) {
     return bytes;
 }
 
-static bool replay(const char *path) {
+static bool replay_file(const char *path) {
     size_t size = 0;
     uint8_t *bytes = read_file(path, &size);
     if (bytes == NULL) {
         perror(path);
         return false;
     }
-    const char *ending = strrchr(path, '.');
-    bool done = true;
-    if (ending != NULL && strcmp(ending, ".tar") == 0) {
-        done = replay_archive(path, bytes, size);
-    } else {
-        replay_input(path, bytes, size);
-    }
+    replay_input(path, bytes, size);
     free(bytes);
+    return true;
+}
+
+static int is_visible(const struct dirent *entry) {
+    return entry->d_name[0] != '.';
+}
+
+static bool replay(const char *path) {
+    struct dirent **entries;
+    const int count = scandir(path, &entries, is_visible, alphasort);
+    if (count < 0) {
+        return replay_file(path);
+    }
+    bool done = true;
+    for (int i = 0; i < count; i++) {
+        char file[4096];
+        snprintf(file, sizeof file, "%s/%s", path, entries[i]->d_name);
+        done = replay_file(file) && done;
+        free(entries[i]);
+    }
+    free(entries);
     return done;
 }
 
@@ -88,7 +77,7 @@ int main(int argc, char **argv) {
         done = replay(argv[i]) && done;
     }
     if (file_count == 0) {
-        fprintf(stderr, "usage: %s FILE_OR_ARCHIVE...; no input was found\n", argv[0]);
+        fprintf(stderr, "usage: %s FILE_OR_FOLDER...; no input was found\n", argv[0]);
         return EXIT_FAILURE;
     }
     return done ? EXIT_SUCCESS : EXIT_FAILURE;

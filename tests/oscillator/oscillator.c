@@ -2,7 +2,6 @@
 
 #include "jet.h"
 
-#include <math.h>
 #include <stdio.h>
 
 static enum status right_hand_side(const void *values_pointer, double t, const double x[],

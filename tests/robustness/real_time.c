@@ -14,7 +14,6 @@
 #include "fmu_library.h"
 #include "value_references.h"
 
-#include <math.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -165,14 +165,6 @@ def restore(instance: Any, content: bytes) -> None:
     instance.fmi.freeFMUState(state)
 
 
-def hashed(content: bytes) -> bytes:
-    """A state with the checksum that fits: FNV-1a of all before the last 8 bytes."""
-    value = 0xCBF29CE484222325
-    for byte in content[:-8]:
-        value = (value ^ byte) * 0x100000001B3 % 2**64
-    return content[:-8] + value.to_bytes(8, "little")
-
-
 def status_of(call: Callable, *arguments: object) -> int:
     """Status of a call through fmpy, which raises where it is not OK."""
     try:

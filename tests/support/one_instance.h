@@ -43,10 +43,6 @@ static inline int get_int(unsigned reference) {
     return value;
 }
 
-static inline enum status try_set(unsigned reference, double value) {
-    return instance_set_real(instance, &reference, 1, &value);
-}
-
 static inline void set_of(struct instance *to, unsigned reference, double value) {
     ASSERT_OK(instance_set_real(to, &reference, 1, &value));
 }

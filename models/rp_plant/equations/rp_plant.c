@@ -1,7 +1,5 @@
 #include "rp_plant_equations.h"
 
-#include <stddef.h>
-
 static const double at_rest[2] = {0.0, 0.0};
 
 static bool is_attached(const struct rp_plant_modes *modes) {

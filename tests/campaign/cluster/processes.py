@@ -8,8 +8,10 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+
+import psutil
 
 from tests.support.hosts import LOOPBACK, Host
 from tests.support.paths import ROOT
@@ -84,28 +86,12 @@ def blocks(output: Path) -> int:
     return len(list(output.glob("blocks/block_*.parquet")))
 
 
-def children(pid: int) -> list[int]:
-    """Processes that a process has started."""
-    try:
-        return [
-            int(child)
-            for task in Path(f"/proc/{pid}/task").iterdir()
-            for child in (task / "children").read_text().split()
-        ]
-    except OSError:
-        return []
-
-
 def workers(process: subprocess.Popen) -> list[int]:
     """Workers of a local cluster."""
     found = []
-    for child in children(process.pid):
-        try:
-            command = Path(f"/proc/{child}/cmdline").read_bytes()
-        except OSError:
-            continue
-        if b"spawn_main" in command:
-            found.append(child)
+    for child in psutil.Process(process.pid).children():
+        with suppress(psutil.NoSuchProcess):
+            found += [child.pid] * any("spawn_main" in word for word in child.cmdline())
     return found
 
 

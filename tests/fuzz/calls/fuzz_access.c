@@ -8,14 +8,14 @@
 /* ---- Values ---------------------------------------------------------------------------------- */
 
 void fuzz_call_GetReal(struct fuzz_session *session, struct fuzz_instance *instance) {
-    const struct fuzz_references some = fuzz_get_any(session->input, VARIABLE_FLOAT64);
+    const struct fuzz_references some = fuzz_any(session->input, VARIABLE_FLOAT64, false);
     double *values = fuzz_unwritten(some.count);
     const fmi2Status status = FUZZ_CHECKED(instance, GetReal, some.at, some.count, values);
     fuzz_assert_written(status, values, some.count, "fmi2GetReal");
 }
 
 void fuzz_call_SetReal(struct fuzz_session *session, struct fuzz_instance *instance) {
-    const struct fuzz_references some = fuzz_set_any(session->input, VARIABLE_FLOAT64);
+    const struct fuzz_references some = fuzz_any(session->input, VARIABLE_FLOAT64, true);
     const double *values = fuzz_any_reals(session->input, some.count);
     const fmi2Status status = FUZZ_CHECKED(instance, SetReal, some.at, some.count, values);
     for (size_t i = 0; i < some.count && status == fmi2OK; i++) {
@@ -27,7 +27,7 @@ void fuzz_call_SetReal(struct fuzz_session *session, struct fuzz_instance *insta
 
 #define GETTER_OF_VALUES(type, variables)                                                          \
     void fuzz_call_Get##type(struct fuzz_session *session, struct fuzz_instance *instance) {       \
-        const struct fuzz_references some = fuzz_get_any(session->input, variables);               \
+        const struct fuzz_references some = fuzz_any(session->input, variables, false);            \
         fmi2##type *values = fuzz_argument(some.count, sizeof *values);                            \
         FUZZ_CHECKED(instance, Get##type, some.at, some.count, values);                            \
     }
@@ -36,7 +36,7 @@ GETTER_OF_VALUES(Boolean, VARIABLE_FLOAT64)
 GETTER_OF_VALUES(String, VARIABLE_FLOAT64)
 
 void fuzz_call_SetInteger(struct fuzz_session *session, struct fuzz_instance *instance) {
-    const struct fuzz_references some = fuzz_set_any(session->input, VARIABLE_INT32);
+    const struct fuzz_references some = fuzz_any(session->input, VARIABLE_INT32, true);
     fmi2Integer *values = fuzz_any_integers(session->input, some.count);
     for (size_t i = 0; i < some.count; i++) {
         if (some.at[i] == RP_MANIPULATOR_max_internal_steps &&
@@ -50,13 +50,13 @@ void fuzz_call_SetInteger(struct fuzz_session *session, struct fuzz_instance *in
 }
 
 void fuzz_call_SetBoolean(struct fuzz_session *session, struct fuzz_instance *instance) {
-    const struct fuzz_references some = fuzz_set_any(session->input, VARIABLE_FLOAT64);
+    const struct fuzz_references some = fuzz_any(session->input, VARIABLE_FLOAT64, true);
     const fmi2Boolean *values = fuzz_any_integers(session->input, some.count);
     FUZZ_CHECKED(instance, SetBoolean, some.at, some.count, values);
 }
 
 void fuzz_call_SetString(struct fuzz_session *session, struct fuzz_instance *instance) {
-    const struct fuzz_references some = fuzz_set_any(session->input, VARIABLE_FLOAT64);
+    const struct fuzz_references some = fuzz_any(session->input, VARIABLE_FLOAT64, true);
     fmi2String *values = fuzz_argument(some.count, sizeof *values);
     for (size_t i = 0; i < some.count; i++) {
         values[i] = "%s%n";
@@ -106,7 +106,7 @@ GETTER_OF_STATES(GetNominalsOfContinuousStates)
 
 void fuzz_call_SetRealInputDerivatives(struct fuzz_session *session,
                                        struct fuzz_instance *instance) {
-    const struct fuzz_references some = fuzz_set_any(session->input, VARIABLE_FLOAT64);
+    const struct fuzz_references some = fuzz_any(session->input, VARIABLE_FLOAT64, true);
     if (some.count > 0 && fuzz_below(session->input, 4) != 0) {
         some.at[0] = RP_MANIPULATOR_tau1;
     }
@@ -117,7 +117,7 @@ void fuzz_call_SetRealInputDerivatives(struct fuzz_session *session,
 
 void fuzz_call_GetRealOutputDerivatives(struct fuzz_session *session,
                                         struct fuzz_instance *instance) {
-    const struct fuzz_references some = fuzz_get_any(session->input, VARIABLE_FLOAT64);
+    const struct fuzz_references some = fuzz_any(session->input, VARIABLE_FLOAT64, false);
     const fmi2Integer *orders = fuzz_any_orders(session->input, some.count);
     double *values = fuzz_unwritten(some.count);
     const fmi2Status status =

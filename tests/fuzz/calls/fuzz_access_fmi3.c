@@ -98,7 +98,7 @@ void fuzz3_call_GetAdjointDerivative(struct fuzz_session *session, struct fuzz_i
 /* ---- Refused --------------------------------------------------------------------------------- */
 
 /* Room for all that the calls may have to say of clocks. */
-enum { CLOCKS = 7 }; /* the most of fuzz_get_any */
+enum { CLOCKS = 7 }; /* the most of fuzz_any */
 static fmi3Clock active[CLOCKS];
 static double times[CLOCKS];
 static fmi3UInt64 counters[CLOCKS];
@@ -108,7 +108,7 @@ static fmi3IntervalQualifier qualifiers[CLOCKS];
 /* Of clocks that are none. */
 #define CLOCK_CALL(name, ...)                                                                      \
     void fuzz3_call_##name(struct fuzz_session *session, struct fuzz_instance *instance) {         \
-        const struct fuzz_references clocks = fuzz_get_any(session->input, VARIABLE_FLOAT64);      \
+        const struct fuzz_references clocks = fuzz_any(session->input, VARIABLE_FLOAT64, false);   \
         require_refusal(FUZZ_FMI3_CHECKED(instance, name, clocks.at, clocks.count, __VA_ARGS__),   \
                         "fmi3" #name);                                                             \
     }

@@ -59,15 +59,9 @@ static void choose(struct fuzz_input *input, struct fuzz_references *some, enum 
     }
 }
 
-struct fuzz_references fuzz_get_any(struct fuzz_input *input, enum variable_type type) {
+struct fuzz_references fuzz_any(struct fuzz_input *input, enum variable_type type, bool sets) {
     struct fuzz_references some = {.count = any_count(input)};
-    choose(input, &some, type, false);
-    return some;
-}
-
-struct fuzz_references fuzz_set_any(struct fuzz_input *input, enum variable_type type) {
-    struct fuzz_references some = {.count = any_count(input)};
-    choose(input, &some, type, true);
+    choose(input, &some, type, sets);
     return some;
 }
 

@@ -18,9 +18,7 @@ struct fuzz_references {
 
 /* Mostly of variables of this type, to be read, or to be set: of those that can be set between
  * steps. */
-struct fuzz_references fuzz_get_any(struct fuzz_input *input, enum variable_type type);
-struct fuzz_references fuzz_set_any(struct fuzz_input *input, enum variable_type type);
-
+struct fuzz_references fuzz_any(struct fuzz_input *input, enum variable_type type, bool sets);
 struct fuzz_references fuzz_any_sized(struct fuzz_input *input, enum variable_type type, bool sets);
 
 /* Of a derivative. */

@@ -321,8 +321,8 @@ SAME(GetNominalsOfContinuousStates, GetNominalsOfContinuousStates)
 SAME(GetOutputDerivatives, GetRealOutputDerivatives)
 
 /* A function of the standard that is missing does not link. */
-#define CALL_OF(name) fuzz3_call_##name,
-static fuzz_operation *const calls[] = {FMU3_FUNCTION_LIST(CALL_OF)};
+#define CALL_OF(name, kinds, states) fuzz3_call_##name,
+static fuzz_operation *const calls[] = {FMI3_FUNCTION_LIST(CALL_OF)};
 
 void fuzz_target_run(struct fuzz_input *input) {
     fuzz_choose_variety = choose_variety;

@@ -12,7 +12,7 @@ struct fuzz_instance *fuzz_session_instance(struct fuzz_session *session) {
         const fmi2Type kind = selector & 0x80 ? fmi2ModelExchange : fmi2CoSimulation;
         const bool has_varieties = kind == fmi2CoSimulation && fuzz_choose_variety != NULL;
         const unsigned variety = has_varieties ? selector / 4 % FUZZ_VARIETIES : 0;
-        *instance = fuzz_instance_create_variety(kind, variety, selector & 0x40, selector & 0x20);
+        *instance = fuzz_instance_create(kind, variety, selector & 0x40, selector & 0x20);
         fuzz_limit_steps(*instance, FUZZ_MAX_INTERNAL_STEPS);
     }
     return *instance;

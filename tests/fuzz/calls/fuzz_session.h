@@ -45,8 +45,8 @@ FMI2_FUNCTION_LIST(FUZZ_OPERATION)
 #undef FUZZ_OPERATION
 
 /* Those of FMI 3.0: fuzz_access_fmi3.c, fuzz_calls_fmi3.c. */
-#define FUZZ3_OPERATION(name) fuzz_operation fuzz3_call_##name;
-FMU3_FUNCTION_LIST(FUZZ3_OPERATION)
+#define FUZZ3_OPERATION(name, kinds, states) fuzz_operation fuzz3_call_##name;
+FMI3_FUNCTION_LIST(FUZZ3_OPERATION)
 #undef FUZZ3_OPERATION
 
 /* A run of a target: these calls, and sequences of calls that lead further. */
