@@ -196,6 +196,7 @@ READ = {
     "name": _expect("a letter, then letters, digits, _", str, NAME.fullmatch),
     "modes": _modes,
     "arguments": LIST,
+    "file": TEXT,
 }  # how values of keys are read; others are expressions
 
 
