@@ -7,11 +7,13 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any
 
 from rparm import project
 from rparm.building import NEEDED
 from rparm.errors import UserError, one_line
+from rparm.files import write_text, written
 from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS
 from rparm.runs import scenario
 from rparm.runs.inputs import BESIDE, CONSTANT, FILE, MEASURED, SINE, SINES, TABLE
@@ -27,6 +29,13 @@ QUANTITY = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": WITH_UNI
 def text(kind: str) -> str:
     """Return the schema of a kind of files, one of `KINDS`; UserError if packages are missing."""
     return f"{json.dumps(KINDS[kind](), indent=2)}\n"
+
+
+def write(file: Path, schema: str) -> Path:
+    """Write a schema's text, in place of an older one; UserError if that fails."""
+    with written(file):
+        write_text(file, schema)
+    return file
 
 
 def _of_models() -> Schema:

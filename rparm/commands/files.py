@@ -7,7 +7,7 @@ import shlex
 from importlib.util import find_spec
 from pathlib import Path
 
-from rparm import console, files, project, schemas
+from rparm import console, project, schemas
 from rparm.building import NEEDED
 from rparm.command_line import Ended, add_document, add_flag, add_fmi, add_output
 from rparm.errors import UserError
@@ -143,12 +143,8 @@ def do_schema(options: argparse.Namespace) -> Ended:
     text = schemas.text(options.kind)
     if options.output is None:
         return Ended(0, text.rstrip(), {"schema": json.loads(text)})
-    file = options.output / f"{options.kind}.schema.json"
-    with written(file):
-        files.write_text(file, text)
-    return Ended(
-        0, f"{file}: written", {"schema": json.loads(text), "file": file.absolute()}, page=file
-    )
+    file = schemas.write(options.output / f"{options.kind}.schema.json", text)
+    return Ended(0, f"{file}: written", {"file": file.absolute()}, page=file)
 
 
 def add_build_options(parser: argparse.ArgumentParser) -> None:
