@@ -213,6 +213,7 @@ READ = {
     "modes": _modes,
     "arguments": _arguments,
     "code": _expect("a C file such as crane.c", str, CODE.fullmatch),
+    "file": TEXT,
 }  # how values of keys are read; others are expressions
 
 

@@ -49,15 +49,25 @@ def _seconds(given: Any) -> Any:
         raise ValueError(str(error)) from None
 
 
-Seconds = Annotated[FiniteFloat, BeforeValidator(_seconds)]
+Seconds = Annotated[FiniteFloat, BeforeValidator(_seconds, json_schema_input_type=Quantity)]
 
 
 class _Table(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
+def _one_of(*keys: str) -> ConfigDict:
+    """Say in a table's schema that it has exactly one of the keys; a validator says it to users."""
+    return ConfigDict(json_schema_extra={"oneOf": [{"required": [key]} for key in keys]})
+
+
+KINDS = ("uniform", "log_uniform", "normal", "values")
+
+
 class Distribution(_Table):
     """Values of a parameter: exactly one of the distributions."""
+
+    model_config = _one_of(*KINDS)
 
     uniform: Pair | None = None  # lower and upper limit
     log_uniform: Pair | None = None  # the same, both positive
@@ -95,9 +105,6 @@ class Distribution(_Table):
         elif self.kind == "normal" and numbers[1] <= 0:
             raise ValueError(f"normal: expected a positive standard deviation, got {numbers[1]!r}")
         return self
-
-
-KINDS = ("uniform", "log_uniform", "normal", "values")
 
 
 class Settling(_Table):
@@ -157,6 +164,7 @@ class Time(_Table):
 
 
 class Campaign(_Table):
+    model_config = _one_of("scenario", "system")
     title: Title
     description: Text
     scenario: Name | None = None  # or a file FILE.toml, beside this one

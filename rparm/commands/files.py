@@ -1,11 +1,14 @@
-"""`new`, `new-model`, `build`, `fmu`, `list`, `playground`: write or name files."""
+"""`new`, `new-model`, `build`, `schema`, `fmu`, `list`, `playground`: write or name files."""
 
 import argparse
+import json
 import re
 import shlex
+from importlib.util import find_spec
 from pathlib import Path
 
-from rparm import console, project
+from rparm import console, project, schemas
+from rparm.building import NEEDED
 from rparm.command_line import Ended, add_document, add_flag, add_fmi, add_output
 from rparm.errors import UserError
 from rparm.files import check_for_windows, copied, create, from_folder, from_here, written
@@ -100,7 +103,7 @@ def _usual_model() -> Path:
 def add_new_model_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         f"Writes NAME.toml, a model of one's own with comments: {project.PROGRAM} build NAME.toml "
-        "makes FMUs of it."
+        "makes FMUs of it. Beside it model.schema.json lets editors complete and check such files."
     )
     parser.add_argument("name", metavar="NAME", help="of the FMU: letters, digits and _")
     add_output(parser, "folder for the file (default: the current one)")
@@ -112,11 +115,36 @@ def do_new_model(options: argparse.Namespace) -> Ended:
         raise UserError(f"{wrong}: a letter, then letters, digits, _")
     check_for_windows(options.name)
     path = (options.output or Path()) / f"{options.name}.toml"
+    of_schema = path.with_name("model.schema.json")
+    # the packages that make it come with the compiler of `build`: without them there is none
+    text = schemas.text("model") if all(map(find_spec, NEEDED)) else ""
     with written(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-    create(path, MODEL_FILE.format(name=options.name))
+    first = f"#:schema ./{of_schema.name}\n" if text else ""
+    create(path, first + MODEL_FILE.format(name=options.name))
+    if text and not of_schema.exists():
+        create(of_schema, text)
     verdict = f"{path}: written; {project.PROGRAM} build {shlex.quote(str(path))} makes FMUs of it"
     return Ended(0, verdict, {"file": path.absolute()}, page=path.absolute())
+
+
+def add_schema_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Prints the JSON Schema of files with equations, or of others. An editor that knows TOML "
+        "(VS Code with Even Better TOML) completes and checks a file whose first line is "
+        "#:schema ./model.schema.json, as new-model writes it."
+    )
+    kinds = {"nargs": "?", "choices": list(schemas.KINDS), "default": "model"}
+    parser.add_argument("kind", **kinds, help="of what files (default: model)")
+    add_output(parser, "write KIND.schema.json into this folder, in place of an older one")
+
+
+def do_schema(options: argparse.Namespace) -> Ended:
+    text = schemas.text(options.kind)
+    if options.output is None:
+        return Ended(0, text.rstrip(), {"schema": json.loads(text)})
+    file = schemas.write(options.output / f"{options.kind}.schema.json", text)
+    return Ended(0, f"{file}: written", {"file": file.absolute()}, page=file)
 
 
 def add_build_options(parser: argparse.ArgumentParser) -> None:

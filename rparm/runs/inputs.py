@@ -32,6 +32,7 @@ MOST_TRIED = 100  # rows, to choose the delimiter by
 LONGEST_STEP = 10 * (1 + 1e-9)  # usual steps: a longer one is a gap
 MEASURED = "measured"  # section of a scenario
 CONSTANT, SINES, TABLE, FILE = "constant", "sines", "table", "file"  # shapes of an input
+SINE = ("amplitude", "frequency"), ("phase",)  # its keys, needed and not
 # keys beside a shape, and which one takes them
 BESIDE = {"offset": SINES} | dict.fromkeys(("column", "time", "begin", "scale", "hold"), FILE)
 
@@ -439,7 +440,7 @@ class InputReader:
         terms = []
         for i, sine in enumerate(reader.array(table[SINES], f"{where} {SINES}", "tables")):
             key = f"{where} {SINES}[{i}]"
-            reader.keys(reader.table(sine, key), key, ("amplitude", "frequency"), ("phase",))
+            reader.keys(reader.table(sine, key), key, *SINE)
             amplitude = reader.quantity(sine["amplitude"], f"{key} amplitude", known, True)
             frequency = reader.quantity(sine["frequency"], f"{key} frequency", HERTZ)
             phase = reader.quantity(sine.get("phase", 0.0), f"{key} phase", RADIANS)

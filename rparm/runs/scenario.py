@@ -23,6 +23,9 @@ from rparm.runs.inputs import MEASURED, InputReader, Logged, Reader, Signal
 from rparm.units import SECONDS
 
 MODEL, FMU = "model", "fmu"  # keys of a file that is in no model's folder: one of them
+REQUIRED = ("title", "description", "tolerance", "time")
+OPTIONAL = (MODEL, FMU, "reference_every", "panels", PARAMETERS, INITIAL, INPUTS, MEASURED)
+TIMES = ("start", "stop", "step")
 MAX_STEPS = 10_000_000
 MAX_PATTERN = 1000  # step lengths in a pattern
 SLIVER = 1e-9  # a last step shorter than this fraction of its full length joins the one before
@@ -167,8 +170,7 @@ def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> 
     content = read_toml(path)
     subject = subject_of(path)
     reader = _Reader(path)
-    optional = (MODEL, FMU, "reference_every", "panels", PARAMETERS, INITIAL, INPUTS, MEASURED)
-    reader.keys(content, "", ("title", "description", "tolerance", "time"), optional)
+    reader.keys(content, "", REQUIRED, OPTIONAL)
     tolerance = reader.number(content["tolerance"], "tolerance")
     if not 0 < tolerance < 1:
         reader.fail(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")
@@ -270,7 +272,7 @@ class _Reader(Reader):
 
     def time(self, content: Any) -> tuple[float, float, tuple[float, ...]]:
         table = self.table(content, "[time]")
-        self.keys(table, "[time]", required=("start", "stop", "step"))
+        self.keys(table, "[time]", required=TIMES)
         start = self.quantity(table["start"], "[time] start", SECONDS)
         stop = self.quantity(table["stop"], "[time] stop", SECONDS)
         if stop <= start or not math.isfinite(stop - start):

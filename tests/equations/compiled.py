@@ -15,11 +15,11 @@ sys.path.insert(0, str(ROOT / "fmu"))
 import building  # noqa: E402
 from equations import c_model, declaration, lock  # noqa: E402
 from equations.model_file import ModelFile, ModelFileError, read  # noqa: E402
-from equations_to_c import toml  # noqa: E402
+from equations_to_c import toml, value_of_toml  # noqa: E402
 
 __all__ = [
     "Model", "ModelFileError", "building", "c_model", "declaration", "declared", "lock", "read",
-    "read_text", "toml",
+    "read_text", "toml", "value_of_toml",
 ]  # fmt: skip
 
 BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).parent

@@ -199,6 +199,9 @@ MISTAKES = {
         HEAD + "[inputs]\n" + "".join(f"u{i} = {{}}\n" for i in range(1001)), "has more than 1000",
     ),
     "array": (STATE + '[where]\na = "x[1]"', "column 1: unknown name 'x[1]'"),
+    "number as a file": (
+        STATE + '[tables.T]\nfile = 3\nx = "a"\ny = "b"', "[tables.T]: file: expected a text of",
+    ),
     "array of starts": (
         HEAD + "[parameters]\np = { start = [1, 2] }", "start: expected a number, got [1, 2]",
     ),

@@ -82,6 +82,7 @@ def call(root: Path, *arguments: str, stderr: int = subprocess.PIPE) -> subproce
         (["playground", "--open"], "release playground no no -"),
         (["new", "x"], "- all no no -"),
         (["new-model", "x"], "- - no no -"),
+        (["schema"], "- - no no -"),
         (["completion", "bash"], "- - no no -"),
         (["help"], "- overview no no -"),
         (["--quiet", "--help"], "- overview yes no -"),

@@ -1,0 +1,154 @@
+"""The JSON Schemas by which editors complete and check users' files."""
+
+import copy
+import json
+import random
+import re
+import tomllib
+from collections.abc import Iterator
+from functools import cache, reduce
+from operator import getitem
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from rparm import schemas
+from tests.campaign.files import write
+from tests.campaign.test_campaign_file import MISTAKES as OF_CAMPAIGNS
+from tests.equations.compiled import ModelFileError, read_text, value_of_toml
+from tests.equations.test_model_file import EXAMPLES, MISTAKES
+from tests.rparm.test_scenario_mistakes import MISTAKES as OF_SCENARIOS
+from tests.support.paths import ROOT
+from tests.support.rparm_project import Console
+
+FILES = {
+    "model": [*EXAMPLES, ROOT / "models/rp_environment/rp_environment.toml"],
+    "scenario": sorted(ROOT.glob("models/*/scenarios/*.toml")),
+    "campaign": sorted(ROOT.glob("models/*/campaigns/*.toml")),
+}
+# a file with every section and most forms of their entries
+RICH = """
+name = "Rich"
+modes = { on = true, "lit[i]" = { for = "i = 1..2", start = [true, false] } }
+description = "All of it"
+experiment = { stop = 2.0, tolerance = 1e-6 }
+sizes = { n = 2 }
+units = { dyn = { kg = 1, m = 1, s = -2 } }
+tables.T = { x = [0, 1, 2], y = [1, 2, 4], interpolation = "pchip", unit = { x = "m", y = "N" } }
+tables.G = { x = [0, 1], y = [1, 2], z = [[1, 2], [3, 4]], outside = "extend" }
+functions.f = { arguments = ["a", "b"], value = "a * b" }
+parameters.p = { start = 1, min = 0, max = 2, unit = "mm", description = "Length" }
+parameters.q = { value = "p * 2", unit = "m" }
+parameters.drive = { type = ["slow", "fast"], start = "fast" }
+parameters.T1 = { start = 1, unit = "s" }
+parameters.b = { type = "Boolean", start = true }
+parameters.k = { type = "Integer", start = 2, min = 0, max = 3 }
+parameters."w[i]" = { for = "i = 1..n", start = [1.0, 2.0] }
+inputs.u = { unit = "m" }
+inputs.s = { type = "Boolean", start = false }
+states.x = { start = "p", unit = "m", nominal = 2, derivative = "0 if s else -rate" }
+states."y[i]" = { for = "i = 1..n", derivative = "(y[i-1] if i > 1 else w[2]) / T1" }
+discrete.d = { start = 1.5 }
+discrete.c = { type = "Integer", start = "k" }
+sampled.tick = { every = "T1", offset = "T1 / 2", while = "on", set = { d = "d + 1", c = "c + k" } }
+where.rate = "u / T1"
+where.h = { value = "f(2, 3)", description = "Six" }
+outputs.e = { value = "sum(i = 1..n, y[i]) + G(1, d)" }
+events.hit = { when = "x < -p and not on", reinit = { x = "p" }, set = { on = "true" } }
+[check]
+"p is small" = "q < 3"
+"w rises" = { for = "i = 1..n", value = "w[i] > 0" }
+"""
+VALUES = (0, -1, 1e999, 1.5, True, "", "x", "1", "a b", [], [1, 2], ["x"], {}, {"x": "1"})
+# those of the mistakes that show without the meaning of texts
+SHOWN = """Boolean in quotes|argument|argument that is a function|arguments twice|array of starts
+bad name|control|der|device|event|event key|experiment|finite|function|function twice
+function without value|key|key at the top|limits of a Boolean|limits of a discrete one|line
+line above|line of a deep table|line of an odd name|literal as a name|many|mode as a number
+mode twice|modes|name of it|no derivative|no expression|no name|no period|no start|no table
+nominal|nothing|number as a Boolean|number as a file|odd key at the top|power|residuals
+sampler key|sampler that sets nothing|sampler without effect|section|solver|start in quotes
+tables of an array|truth|type|type of a state|value and start"""
+# messages of those mistakes in other files
+SAID = re.compile(
+    "unknown key|missing key '(title|time|step|frequency)'|expected a (table|text|list|longer list)"
+    "|exactly one of|between 0 and 1,|from 1 on, got|more than 0 s|than 0, got|with sines only"
+)
+
+
+@cache
+def validator(kind: str) -> Draft202012Validator:
+    schema = json.loads(schemas.text(kind))
+    Draft202012Validator.check_schema(schema)
+    return Draft202012Validator(schema)
+
+
+def is_refused(kind: str, text: str) -> bool:
+    """Whether a text is TOML that the schema refuses."""
+    try:
+        return not validator(kind).is_valid(tomllib.loads(text))
+    except ValueError:
+        return False
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_files_of_the_project_are_valid(kind: str) -> None:
+    for path in FILES[kind]:
+        found = validator(kind).iter_errors(tomllib.loads(path.read_text(encoding="utf-8")))
+        assert [f"{path.name}: {error.json_path}: {error.message}" for error in found] == []
+
+
+def test_mistakes_that_show_without_meaning_are_refused(tmp_path: Path) -> None:
+    found = {name for name, (text, _) in MISTAKES.items() if is_refused("model", text)}
+    assert {*SHOWN.replace("\n", "|").split("|")} - found == set()
+    for kind, mistakes in (
+        ("scenario", {message: text for text, message in OF_SCENARIOS}),
+        ("campaign", {said: write(tmp_path, changes=c).read_text() for c, said in OF_CAMPAIGNS}),
+    ):
+        shown = [text for message, text in mistakes.items() if SAID.search(message)]
+        assert len(shown) > 8 and [text for text in shown if not is_refused(kind, text)] == []
+
+
+def places(value: object) -> Iterator[tuple[str | int, ...]]:
+    """The keys on the way to each value."""
+    pairs = value.items() if isinstance(value, dict) else ()
+    for key, inner in enumerate(value) if isinstance(value, list) else pairs:
+        yield (key,)
+        yield from ((key, *rest) for rest in places(inner))
+
+
+def test_what_the_reader_takes_is_valid(tmp_path: Path) -> None:
+    """Also with another value, or none, in any place."""
+    content, chance = tomllib.loads(RICH), random.Random(1)
+    taken = 0
+    for place in [(), *chance.choices([*places(content)], k=200)]:
+        changed: Any = copy.deepcopy(content)
+        if place:
+            *above, key = place
+            inner = reduce(getitem, above, changed)
+            inner[key] = chance.choice(VALUES)
+            if chance.random() < 0.2:
+                del inner[key]
+        text = "".join(f"{json.dumps(key)} = {value_of_toml(x)}\n" for key, x in changed.items())
+        try:
+            read_text(tmp_path, text)
+        except ModelFileError:
+            continue
+        assert not is_refused("model", text), text
+        taken += 1
+    assert 10 < taken < 60
+
+
+def test_the_command_writes_what_a_new_model_names(tmp_path: Path, console: Console) -> None:
+    assert console("new-model", "Spring", "--output", tmp_path)[0] == 0
+    first = (tmp_path / "Spring.toml").read_text().splitlines()[0]
+    written = tmp_path / first.removeprefix("#:schema ./")
+    assert written.read_text() == schemas.text("model") == console("schema")[1]
+    assert not is_refused("model", (tmp_path / "Spring.toml").read_text())
+    written.write_text("of another version")
+    assert console("new-model", "Other", "--output", tmp_path)[0] == 0
+    assert written.read_text() == "of another version"
+    assert console("schema", "model", "--output", tmp_path)[0] == 0
+    assert written.read_text() == schemas.text("model")
