@@ -23,6 +23,8 @@ RUNS = {
     "two_body_orbit": (40000.0, 50.0, {}, ["(x)", "y"]),
     "bouncing_ball": (3.0, 0.002, {}, ["h"]),
     "thermostat": (7200.0, 10.0, {}, ["room"]),
+    "drive": (0.5, 0.002, {}, ["phi", "seen"]),
+    "masses": (20.0, 0.05, {}, ["x[1]", "x[10]"]),
 }
 
 
@@ -35,7 +37,7 @@ def built(name: str, folder: Path) -> Path:
     return fmu
 
 
-figure, axes = plt.subplots(2, 4, figsize=(11, 4.5), layout="constrained")
+figure, axes = plt.subplots(2, 5, figsize=(13.5, 4.5), layout="constrained")
 with tempfile.TemporaryDirectory() as folder:
     for axis, (name, (stop, step, start, drawn)) in zip(axes.flat, RUNS.items(), strict=True):
         fmu = built(name, Path(folder))

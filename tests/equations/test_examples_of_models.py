@@ -6,6 +6,7 @@ import heyoka
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
@@ -123,3 +124,38 @@ def test_a_thousand_turns_keep_energy_and_momentum(folder: Path) -> None:
     )
     for name in ("energy", "momentum"):
         assert np.max(np.abs(run[name] / run[name][0] - 1)) < 1e-12
+
+
+@EACH_METHOD
+def test_twenty_masses_keep_their_mode(folder: Path, method: int) -> None:
+    start = {"solver_method": method}
+    run = simulated(example("masses", folder), 20.0, 0.5, start, relative_tolerance=1e-11)
+    frequency = 2 * np.sqrt(40.0 / 0.25) * np.sin(np.pi / 42)
+    for i in (1, 7, 20):
+        mode = 0.1 * np.sin(np.pi * i / 21) * np.cos(frequency * run["time"])
+        np.testing.assert_allclose(run[f"x[{i}]"], mode, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(run["energy"], run["energy"][0], rtol=1e-7)
+
+
+@EACH_METHOD
+def test_the_drive_is_that_of_a_loop_over_its_samples(folder: Path, method: int) -> None:
+    """The plant by scipy from sample to sample, with events where the curve has a knot."""
+    J, d, Kp, Ki, Kd, Ts, target = 0.02, 0.02, 8.0, 5.0, 0.6, 0.002, np.pi / 2
+    speeds = np.array([0, 1000, 3000, 4000]) * np.pi / 30
+
+    def motion(_: float, x: np.ndarray, u: float) -> list[float]:
+        most = np.interp(abs(x[1]), speeds, [2.5, 2.4, 1.0, 0.0])
+        return [x[1], (np.clip(u, -most, most) - d * x[1] - 0.1) / J]
+
+    x, total, exact = np.zeros(2), 0.0, []
+    for _ in range(150):
+        seen = np.floor(x[0] * 4000 / (2 * np.pi)) * 2 * np.pi / 4000
+        u, total = Kp * (target - seen) + total - Kd * x[1], total + Ki * Ts * (target - seen)
+        exact.append(x)
+        options = {"args": (u,), "rtol": 1e-11, "atol": 1e-12, "max_step": Ts / 20}
+        x = solve_ivp(motion, (0, Ts), x, method="DOP853", **options).y[:, -1]
+    start = {"load": 0.1, "solver_method": method}
+    run = simulated(example("drive", folder), 149 * Ts, Ts, start, relative_tolerance=1e-11)
+    found = np.array([run["phi"], run["omega"]]).T
+    assert np.max(np.abs(exact)) > 5.0
+    np.testing.assert_allclose(found, exact, rtol=0, atol=2e-6)
