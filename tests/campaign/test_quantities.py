@@ -1,6 +1,7 @@
 """Values with units in campaigns: the numbers in SI, or one line; logs as inputs of scenarios."""
 
 import math
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from rparm.errors import UserError
 from tests.campaign.files import ARM, HEAD, campaign, write
 from tests.campaign.runners import rows, runner
 from tests.support.rparm_project import BUILD, FMUS, Console, assert_one_line
+from tests.support.tables import tables
 
 RIGHT_ANGLE = repr(math.pi / 2)
 # with units, and the same in SI
@@ -62,38 +64,14 @@ def test_the_points_of_a_grid(tmp_path: Path) -> None:
     assert (angles[0], angles[3]) == (-math.pi, math.pi / 2)
 
 
-SETTLING = '[keep.settling.s]\nvariable = "q1"\ntarget = 1\nband = "-1 deg"\n[keep]'
-CROSSINGS = '[keep.crossings.c]\nvariable = "q7"\nlevel = "1 deg"\n[keep]'
-Q1, SPREAD = "normal = [-2.0, 0.2]", "[parameters.spread]\nuniform = [0, '1 deg']"
-MISTAKES = {
-    "[parameters.q1] normal: unknown unit 'mm' (known: rad, deg, mrad)": ("-2.0", '"2 mm"'),
-    "[parameters.q1] uniform: unknown unit 'degs', did you mean 'deg'?": (
-        Q1,
-        'uniform = [0, "2 degs"]',
-    ),
-    "parameters.q1: uniform: expected a lower and an upper limit, got [1.5707963267948966, 0.0]": (
-        Q1,
-        'uniform = ["90 deg", 0]',
-    ),
-    "[parameters.spread] uniform: without a variable no unit: the model has no variable": (
-        f"[parameters.q1]\n{Q1}",
-        SPREAD,
-    ),
-    "[parameters.q1] normal: expected a finite number, got '1e400 deg'": ("-2.0", '"1e400 deg"'),
-    "[set] q2: unknown unit 'deg' (known: m, mm, cm, km)": ("[keep]", "[set]\nq2='1 deg'\n[keep]"),
-    "[set] q2: expected a number, or a number and its unit": ("[keep]", "[set]\nq2 = ''\n[keep]"),
-    "time.stop: unknown unit 'm', did you mean 'ms'? (known: s, ms, cs, ks)": ("1.0", "'1 m'"),
-    "time.step: expected greater than 0, got ": ("stop = 1.0", "step = '0 s'"),
-    "keep.settling.s.band: expected greater than 0": ("[keep]", SETTLING),
-    "[keep.crossings.c] level: without a variable no unit": ("[keep]", CROSSINGS),
-}
+MISTAKES = tables(str(Path(__file__).with_name("mistakes")))["units"]
 
 
-@pytest.mark.parametrize(("message", "change"), MISTAKES.items(), ids=MISTAKES)
-def test_mistakes_get_one_line(message: str, change: tuple[str, str], tmp_path: Path) -> None:
+@pytest.mark.parametrize("mistake", MISTAKES, ids=itemgetter("message"))
+def test_mistakes_get_one_line(mistake: dict[str, str], tmp_path: Path) -> None:
     with pytest.raises(UserError) as caught:
-        converted(campaign(tmp_path, changes=[change]))
-    assert message in str(caught.value) and "\n" not in str(caught.value)
+        converted(campaign(tmp_path, changes=[(mistake["old"], mistake["new"])]))
+    assert mistake["message"] in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_a_system_takes_units_too(tmp_path: Path) -> None:

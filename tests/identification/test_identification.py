@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 import rparm
+from rparm.fmi.fmu_file import Fmu
 from rparm.identification import logs
-from tests.identification import ripple
 from tests.identification.synthetic import (
     ARM,
     INPUTS,
     MEASURED,
     PLANT,
+    STEP,
     Machine,
     efforts,
     identified,
@@ -228,8 +229,34 @@ def test_noise_of_the_efforts_widens_the_intervals(tmp_path: Path) -> None:
         assert abs(estimate.value - true) < estimate.high - estimate.low
 
 
+HEIGHT, PERIODS = 0.05, 12  # of a torque ripple: N.m, 1 a turn
+
+
+def rippled(path: Path, seed: int) -> Path:
+    """Write a log with white noise and a motor's cogging, a torque that the FMU does not have."""
+    random = np.random.default_rng(seed)
+    times = STEP * np.arange(round(ARM.duration / STEP) + 1)
+    told = efforts(times, random)
+    seen = np.empty((len(times), 2))
+    with Fmu(ARM.fmu) as fmu, fmu.instance("arm") as instance:
+        instance.set_up(0.0, None, 1e-8)
+        for name, value in {**ARM.true, "q1": -1.2, "q2": 0.1}.items():
+            instance.set(name, value)
+        instance.enter_initialization()
+        instance.exit_initialization()
+        inputs, outputs = instance.reals(["tau1", "f2"]), instance.reals(MEASURED)
+        for row, (start, given) in enumerate(zip(times, told, strict=True)):
+            outputs.get()
+            seen[row] = outputs.view
+            inputs.view[:] = given + [HEIGHT * np.sin(PERIODS * outputs.view[0]), 0.0]
+            inputs.set()
+            instance.do_step(start, STEP)
+    save(path, times, told, seen + random.normal(size=seen.shape) * ARM.noise)
+    return path
+
+
 def test_a_torque_ripple_is_not_white(tmp_path: Path) -> None:
-    found = identified(ARM, ripple.write(tmp_path / "log.csv", 15), 15)
+    found = identified(ARM, rippled(tmp_path / "log.csv", 15), 15)
     assert found.whiteness["q1"].p < 1e-6
     assert any("not white" in text for text in found.warnings)
 

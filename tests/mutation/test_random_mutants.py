@@ -2,6 +2,7 @@
 
 import sys
 from dataclasses import replace
+from operator import itemgetter
 from pathlib import Path
 
 import pytest
@@ -10,29 +11,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from samples import order
 from sites import REMOVED, Mutant, mutants_of, mutated, sources
 
-ROOT = Path(__file__).resolve().parents[2]
-SOURCE = """\
-#define LIMIT (1 + 2)
-/* a + b */
-_Static_assert(sizeof(int) == 4, "1 + 1");
-static const double scale = 0.5;
-enum { COUNT = 3 };
-struct slave {
-    double x[2];
-};
+from tests.support.tables import tables
 
-static double slave_sum(const struct slave *slave, const int *n) {
-    double sum[4];
-    sum[0] = slave->x[0] - slave->x[1]; // n < 1
-    if (*n < COUNT && !is_set("a - b")) {
-        return -sum[0];
-    }
-    for (int i = 0; i < *n; i++) {
-        slave_note(slave, sum);
-    }
-    return (struct pair){.a = 1.0 * scale}.a;
-}
-"""
+ROOT = Path(__file__).resolve().parents[2]
+TABLES = tables(__file__)
+SOURCE = TABLES["source"]
 
 
 def told() -> set[tuple[str, str, str]]:
@@ -52,17 +35,7 @@ def mutant_of(before: str, after: str) -> Mutant:
 @pytest.mark.parametrize(
     ("function", "before", "after"),
     [
-        ("", "0.5", "(-0.5)"),
-        ("", "3", "(3 + 1)"),
-        ("slave_sum", "-", "+"),
-        ("slave_sum", "-", ""),
-        ("slave_sum", "<", "<="),
-        ("slave_sum", "<", ">="),
-        ("slave_sum", "&&", "||"),
-        ("slave_sum", "!", ""),
-        ("slave_sum", "if", "if not"),
-        ("slave_sum", "*", "/"),
-        ("slave_sum", "1.0", "0.0"),
+        *map(itemgetter("function", "before", "after"), TABLES["mutant"]),
         ("slave_sum", "slave_note(slave, sum)", REMOVED),
         ("slave_sum", "sum[0] = slave->x[0] - slave->x[1]", REMOVED),
     ],

@@ -1,6 +1,8 @@
 """Scenarios with Boolean inputs: how they are read, and runs of the wheel of tests/wheel."""
 
 from collections.abc import Callable, Iterator
+from operator import itemgetter
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from rparm.runs import scenario, simulation
 from rparm.systems.master import Master
 from rparm.systems.ssp import Connection
 from tests.support.rparm_project import BUILD, fmi3_fmu
+from tests.support.tables import tables
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, timed, toy
 
 SWITCHED = toy(
@@ -52,32 +55,17 @@ def test_rounding_of_times_does_not_delay_a_switch(write) -> None:
         assert values.tolist() == [False] * n + [True] * (11 - n)
 
 
-MISTAKES = [
-    ("constant = 1", "[inputs.brake] constant: expected true or false, got 1"),
-    ("constant = 'on'", "[inputs.brake] constant: expected true or false, got 'on'"),
-    ("table = [[0, true], [1, 0.5]]", "[inputs.brake] table[1]: expected true or false, got 0.5"),
-    ("table = [[false, true]]", "table[0]: expected a number, got false"),
-    (
-        "table = [[1, true], [1, false]]",
-        "[inputs.brake] table[1]: expected a time after 1.0 s, got [1, False]",
-    ),
-    ("table = [[1]]", "[inputs.brake] table[0]: expected [time, value], got [1]"),
-    ("sines = []", "[inputs.brake]: unknown key 'sines' (known: constant, table, file, column, "),
-    (
-        "constant = true\ntable = [[0, true]]",
-        "[inputs.brake]: expected exactly one of constant, table, file, got 2",
-    ),
-    ("", "[inputs.brake]: expected exactly one of constant, table, file, got 0"),
-]
-
-
-@pytest.mark.parametrize(("text", "message"), MISTAKES)
-def test_mistakes_are_explained(write, text: str, message: str) -> None:
-    path = write(f"{HEAD}{TIME}[inputs.brake]\n{text}\n")
+@pytest.mark.parametrize(
+    "mistake",
+    tables(str(Path(__file__).with_name("mistakes")))["scenario_with_brake"],
+    ids=itemgetter("text"),
+)
+def test_mistakes_are_explained(write, mistake: dict[str, str]) -> None:
+    path = write(f"{HEAD}{TIME}[inputs.brake]\n{mistake['text']}\n")
     with pytest.raises(UserError) as caught:
         scenario.load(path, SWITCHED)
     said = str(caught.value)
-    assert said.startswith(f"{path}: ") and message in said and "\n" not in said
+    assert said.startswith(f"{path}: ") and mistake["message"] in said and "\n" not in said
 
 
 def test_other_types_and_other_shapes_are_refused(write) -> None:

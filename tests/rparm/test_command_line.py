@@ -21,6 +21,7 @@ from tests.support.rparm_project import (
     reference_file,
     repacked,
 )
+from tests.support.tables import tables
 
 ARM = FMUS["rp_manipulator"]
 
@@ -73,21 +74,12 @@ def test_run_with_a_worse_reference_fails(project: Path, fmu: Path, console: Con
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (["run", "constant_efort"], "did you mean 'constant_effort'"),
-        (["run", "--fmu", "/nowhere/X.fmu"], "/nowhere/X.fmu: no such file"),
-        (["run", "--fmu", "/"], "is a folder"),
-        (["run"], "build: has no FMU of rp_manipulator: ./run.sh builds it"),
-        (["run", "--tolerance", "0"], "between 0 and 1"),
-        (["run", "--tolerance", "tight"], "between 0 and 1"),
-        (["run", "--fmux", "a"], "--fmux"),
-        (["simulate"], "no scenario or command 'simulate' (./run.sh --list names"),
-        (["run", "--fmi", "4"], "argument --fmi: expected 2 or 3, got '4'"),
-        (["system", "--fmi", "three"], "argument --fmi: expected 2 or 3, got 'three'"),
-        (["coupling", "--fmi", ""], "argument --fmi: expected 2 or 3, got ''"),
-        (["system", "--fmi", "3", "--ssp", "x.ssp"], "not allowed with argument --fmi"),
+        *(
+            (mistake["arguments"], mistake["message"])
+            for mistake in tables(str(Path(__file__).with_name("mistakes")))["command"]
+        ),
         (["run", "--fmi", "2", "--fmu", fmi3_fmu(ARM)], "is an FMU of FMI 3.0, --fmi wants 2.0"),
         (["run", "--fmi", "3", "--fmu", ARM], "is an FMU of FMI 2.0, --fmi wants 3.0"),
-        (["run", "--fmi", "3"], "build/fmi3: has no FMU of rp_manipulator: ./run.sh builds it, "),
     ],
 )
 def test_mistakes_of_the_user(

@@ -24,6 +24,7 @@ from rparm.units import seconds, short, shortened
 from tests.support.paths import ROOT
 from tests.support.rparm_project import FMUS, LONG, SHORT, Console, load
 from tests.support.ssp_files import SSP
+from tests.support.tables import tables
 
 RANDOM = random.Random(5)
 ERRORS = (0.0, 1e-300, 9.96e-10, 0.99999, 1e22, math.inf, math.nan)
@@ -251,25 +252,8 @@ def test_without_a_command_there_is_help(console: Console) -> None:
 @pytest.mark.parametrize(
     ("arguments", "guess"),
     [
-        (["help", "sytem"], "no command 'sytem', did you mean 'system'?"),
-        (["sytem"], "no scenario or command 'sytem', did you mean 'system'?"),
-        (["sine"], "did you mean 'sine_efforts'?"),
-        (["run", "sine_effort"], "did you mean 'sine_efforts'?"),
-        (["run", "list"], "no scenario 'list': the command list goes first, ./run.sh list"),
-        (["my_scenario"], "no scenario 'my_scenario', did you mean the file 'my_scenario.toml'?"),
-        (["my_scenari"], "did you mean 'my_scenario.toml'?"),
-        (["my_scenari.toml"], "no such file, did you mean 'my_scenario.toml'?"),
-        (["campaign", "my_scenari.toml"], "no such file, did you mean 'my_scenario.toml'?"),
-        (["run", "below/othr.toml"], "no such file, did you mean 'other.toml'?"),
-        (["below/other"], "did you mean the file 'below/other.toml'?"),
-        (["nothing like it"], "no scenario or command 'nothing like it' (./run.sh --list"),
-        (["system", "nominl"], "no variant 'nominl', did you mean 'nominal'?"),
-        (["system", "nominal", "pick_and_plaze"], "did you mean 'pick_and_place'?"),
-        (["run", "--tolerence", "1e-8"], "did you mean '--tolerance'?"),
-        (["system", "--jsn"], "did you mean '--json'?"),
-        (["system", "--jso"], "unrecognized arguments: --jso, did you mean '--json'?"),
-        (["run", "--tol=1e-8"], "did you mean '--tolerance'?"),
-        (["hlep"], "did you mean 'help'?"),
+        (miss["arguments"], miss["message"])
+        for miss in tables(str(Path(__file__).with_name("mistakes")))["word"]
     ],
 )
 def test_guesses(

@@ -15,6 +15,7 @@ from rparm.runs import inputs, scenario
 from rparm.runs.scenario import Scenario
 from tests.rparm.test_boolean_inputs import SWITCHED
 from tests.support.rparm_project import FMUS, Console
+from tests.support.tables import tables
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, TOY, toy
 
 LOG = "time,force\n0.5,1\n1.5,3\n2.25,4.5\n"  # 2 t; the run is from 1 to 2
@@ -160,40 +161,13 @@ def test_a_log_may_begin_elsewhere_than_the_run(write: Write) -> None:
 
 # ---- mistakes ------------------------------------------------------------------------------------
 
-KNOWN = "(known: time, force)"
 MISTAKES = [
     # log, further keys, message
-    ("", "", "log.csv: expected names of columns in its first line"),
-    ("\n\n", "", "log.csv: expected names of columns in its first line"),
-    ("time\n1\n", "", "log.csv: expected names of columns in its first line"),
-    ("time,force\n", "", "log.csv: has no rows below the names of its columns"),
-    (LOG, "column = 'forse'\n", f"column 'forse' is not there, did you mean 'force'? {KNOWN}"),
-    (LOG, "time = 't'\n", f"column 't' is not there {KNOWN}"),
-    ("time,force,force\n1,2,3\n", "", "column 'force' is there twice (known: time, force, force)"),
-    ("1,2\n2,3\n", "", "column 'time' is not there (known: 1, 2)"),
-    ("time,force\n1,1\n3,1\n2,1\n", "", "log.csv, line 4: expected a time after 3.0, found 2.0"),
-    ("time,force\n1,1\n1,2\n", "", "log.csv, line 3: expected a time after 1.0, found 1.0"),
-    ("time,force\n1,nan\n2,1\n", "", "line 2: column 'force': expected a finite number, found 'n"),
-    ("time,force\ninf,1\n2,1\n", "", "line 2: column 'time': expected a finite number, found 'i"),
-    ("time,force\n1,1\n2,\n", "", "line 3: column 'force': expected a number with a decimal point"),
-    ("time,force\n1,1_0\n", "", "line 2: column 'force': expected a number with a decimal point"),
-    ("time;force\n1;0,5\n2;1\n", "", "line 2: column 'force': expected a number with a decimal"),
-    ("time,force\n1,1\n2\n", "", "log.csv, line 3: expected 2 values, found 1"),
-    ("time,force\n1,1,5\n", "", "log.csv, line 2: expected 2 values, found 3"),
+    *(
+        (mistake.get("log", LOG), mistake.get("keys", ""), mistake["message"])
+        for mistake in tables(str(Path(__file__).with_name("mistakes")))["log"]
+    ),
     ('time,force\n1,"' + "x" * 200_000, "", "log.csv, line 2: field larger than field limit"),
-    ('time,force\n1,"1\n2,2\n', "", "line 3: column 'force': expected a number with a decimal"),
-    ("time,force\n1,1\n1.5,1\n", "", "log.csv: ends at 1.5 s, the run needs it from 1.0 to 1.75 s"),
-    ("time,force\n1.1,1\n2,1\n", "", "log.csv: begins at 1.1 s, the run needs it from 1.0 to 1."),
-    ("time,force\n1,1\n2,-11\n", "", "[inputs.force]: expected at least -10.0, got -11.0"),
-    (LOG, "scale = 1e308\n", "[inputs.force]: expected finite values, got an overflow"),
-    (LOG, "scale = 0\n", "[inputs.force] scale: expected another number than 0"),
-    (LOG, "scale = -0.0\n", "[inputs.force] scale: expected another number than 0"),
-    (LOG, "scale = 'x'\n", "[inputs.force] scale: expected a number, got 'x'"),
-    (LOG, "hold = 1\n", "[inputs.force] hold: expected true or false, got 1"),
-    (LOG, "column = 2\n", "[inputs.force] column: expected a text, got 2"),
-    (LOG, "offset = 2\n", "[inputs.force] offset: goes with sines only"),
-    (LOG, "constant = 2\n", "[inputs.force]: expected exactly one of constant, sines, table, file"),
-    (LOG, "colum = 'x'\n", "[inputs.force]: unknown key 'colum', did you mean 'column'?"),
     (b"time,force\n1,\xb0\n", "", "log.csv: not UTF-8 text, at byte 13"),
     (LOG.encode("utf-16"), "", "log.csv: not UTF-8 text, at byte 0"),
     ("time,force\n1,\0\n", "", "line 2: column 'force': expected a number"),

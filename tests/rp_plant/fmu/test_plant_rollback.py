@@ -7,13 +7,13 @@ import random
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import accumulate
 from pathlib import Path
 
 import pytest
 
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
-from tests.fmi2.rollback_sequences import times
 from tests.rp_plant.fmu.plant_runs import (
     AT_REST,
     BOUNCY_STOPS,
@@ -93,6 +93,11 @@ class Move:
 
     length: float  # s
     values: dict[str, float | bool]
+
+
+def times(moves: list[Move]) -> list[float]:
+    """Communication points of a master that adds up its steps."""
+    return list(accumulate((move.length for move in moves), initial=0.0))
 
 
 def sequence(length: int, chance: random.Random) -> list[Move]:
