@@ -10,56 +10,9 @@ from fmpy.fmi2 import FMU2Model
 
 import rparm
 from rparm.errors import UserError
-from tests.equations.examples import METHODS, initializing, made
+from tests.equations.examples import METHODS, MODELS, initializing, made
 
 START, STEP = 10.0, 0.3  # s
-FAILING = """
-name = "Failing"
-[parameters]
-fall = { start = 0 }
-p = { start = 1 }
-gravity = { start = 0 }
-stiffness = { start = 1 }
-gain = { start = 1 }
-divisor = { start = 1 }
-limit = { start = -1 }
-pull = { start = 0 }
-first = { value = "p" }
-[states]
-x = { start = 1, derivative = "-fall" }
-v = { derivative = "half + gap" }
-h = { start = 1, derivative = "w" }
-w = { derivative = "-gravity" }
-y = { derivative = "stiffness * (cos(time) - y)" }
-s = { start = 0.1, derivative = "0.5 * pull - pull * sign(s)" }
-m = { start = "first / p", derivative = "0" }
-[discrete]
-u = { start = 2 }
-count = {}
-[where]
-gap = "(1 if x > 0 else log(x)) + half * p / divisor"
-half = "0.5 * x"
-ratio = "u / gain"
-[outputs]
-rate = { value = "der(v) / divisor" }
-[events.impact]
-when = "h < 0"
-reinit = { h = "0", w = "-0.7 * w" }
-[events.late]
-when = "time >= 10.7"
-set = { u = "ratio - x" }
-[events.up]
-when = "m <= limit"
-reinit = { m = "limit + 1" }
-[events.down]
-when = "m > limit"
-while = "limit > -1"
-reinit = { m = "limit" }
-[sampled.counter]
-every = "0.1"
-while = "time > 10.9"
-set = { count = "count + sqrt(p)" }
-"""
 NUMBER = r"(-?[0-9.]+(?:e-?[0-9]+)?)"
 # parameters, the message, and its numbers
 CASES = {
@@ -108,7 +61,7 @@ CASES = {
 
 @pytest.fixture(scope="module")
 def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return made(tmp_path_factory.mktemp("messages"), FAILING)
+    return made(tmp_path_factory.mktemp("messages"), MODELS["messages"]["FAILING"])
 
 
 def refusal(fmu: Path, stop: float, **start: float) -> str:

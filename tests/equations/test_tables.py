@@ -7,28 +7,12 @@ import pytest
 from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
 
 from tests.equations.compiled import Model, ModelFileError, read_text
-from tests.equations.examples import METHODS, build, made, simulated
+from tests.equations.examples import METHODS, MODELS, build, made, simulated
 
+TEXTS = MODELS["tables"]
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 X, Y = [0.0, 10.0, 20.0, 40.0], [3.0, 2.5, 1.0, 0.25]
 LISTS = f"x = {X}\ny = {Y}\n"
-MOTOR = """
-name = "Motor"
-[tables.T]
-x = [0, 10, 20, 40]
-y = [3.0, 2.5, 1.0, 0.25]
-outside = "OUTSIDE"
-unit = { x = "rad/s", y = "N.m" }
-[parameters]
-J = { start = 0.05, unit = "kg.m2" }
-d = { start = 0.02, unit = "N.m.s" }
-[inputs]
-load = { unit = "N.m" }
-[states]
-w = { start = -5, unit = "rad/s", derivative = "(T(w) - d * w - load) / J" }
-[outputs]
-torque = { value = "T(w)", unit = "N.m" }
-"""
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +56,7 @@ def speed(times: np.ndarray, outside: str, load: float) -> np.ndarray:
 def test_a_motor_runs_up_along_its_curve(
     folder: Path, method: int, outside: str, load: float
 ) -> None:
-    fmu = made(folder, MOTOR.replace("OUTSIDE", outside))
+    fmu = made(folder, TEXTS["MOTOR"].replace("OUTSIDE", outside))
     start = {"solver_method": method, "load": load}
     run = simulated(fmu, 3.0, 0.01, start, relative_tolerance=1e-11, also=["event_count"])
     exact = speed(run["time"], outside, load)
@@ -81,37 +65,13 @@ def test_a_motor_runs_up_along_its_curve(
     assert run["event_count"][-1] == np.sum((exact.min() < knots) & (knots < exact.max()))
 
 
-SIGNALS = """
-name = "Signals"
-[tables.line]
-x = [0.5, 1.0, 1.7, 3.0]
-y = [1.0, -2.0, 0.5, 4.0]
-[tables.stair]
-x = [0.5, 1.0, 1.7, 3.0]
-y = [1.0, -2.0, 0.5, 4.0]
-interpolation = "previous"
-[tables.curve]
-x = [0.5, 1.0, 1.7, 3.0]
-y = [1.0, -2.0, 0.5, 4.0]
-interpolation = "pchip"
-outside = "extend"
-[inputs]
-u = {}
-[states]
-a = { derivative = "line(time)" }
-b = { derivative = "stair(time)" }
-c = { derivative = "curve(u) * 0 + curve(time)" }
-[outputs]
-now = { value = "line(u)" }
-"""
 ROWS = np.array([0.5, 1.0, 1.7, 3.0]), np.array([1.0, -2.0, 0.5, 4.0])
 
 
 @EACH_METHOD
 def test_integrals_over_tables_of_the_time_are_exact(folder: Path, method: int) -> None:
-    run = simulated(
-        made(folder, SIGNALS), 4.0, 0.1, {"solver_method": method}, relative_tolerance=1e-11
-    )
+    fmu = made(folder, TEXTS["SIGNALS"])
+    run = simulated(fmu, 4.0, 0.1, {"solver_method": method}, relative_tolerance=1e-11)
     x, y = ROWS
     grid = np.unique(np.concatenate([x, run["time"]]))
     middle = (grid[1:] + grid[:-1]) / 2
@@ -129,7 +89,7 @@ def test_a_table_of_an_input_follows_at_once(folder: Path) -> None:
     times = np.array([0.0, 0.4, 0.4, 1.0, 3.0])
     u = np.array([0.0, 0.9, 2.9, 1.2, 5.0])
     signal = np.array(list(zip(times, u, strict=True)), [("time", "f8"), ("u", "f8")])
-    run = simulated(made(folder, SIGNALS), 3.0, 0.05, {}, input=signal)
+    run = simulated(made(folder, TEXTS["SIGNALS"]), 3.0, 0.05, {}, input=signal)
     # a step holds the input of its begin
     exact = np.interp(np.interp(run["time"] - 0.05, times[2:], u[2:]), *ROWS)
     rows = run["time"] > 0.46
@@ -173,27 +133,13 @@ def test_a_table_of_two_arguments_is_bilinear(tmp_path: Path) -> None:
         assert values[model.names.index("v")] == pytest.approx(float(held), rel=1e-13)
 
 
-LONG = """
-name = "Long"
-[tables.road]
-file = "road.csv"
-x = "way"
-y = "height"
-[states]
-s = { derivative = "20 + 10 * sin(time)" }
-h = { derivative = "road(s) - h" }
-[outputs]
-height = { value = "road(s)" }
-"""
-
-
 def test_a_hundred_thousand_rows_of_a_file(tmp_path: Path) -> None:
     """A road of 1 mm rows, driven over at 30 m/s: a hundred rows in 3 ms."""
     way = np.arange(100_000) * 0.001
     height = np.sin(way) + 0.001 * np.random.default_rng(1).normal(size=len(way))
     rows = "".join(f"{a!r}, {b!r}\n" for a, b in zip(way.tolist(), height.tolist(), strict=True))
     (tmp_path / "road.csv").write_text("way, height\n" + rows)
-    (tmp_path / "Long.toml").write_text(LONG)
+    (tmp_path / "Long.toml").write_text(TEXTS["LONG"])
     fmu = build(tmp_path / "Long.toml", tmp_path)
     run = simulated(fmu, 0.5, 0.1, {"max_events": 10**6}, also=["event_count"])
     t = run["time"]
