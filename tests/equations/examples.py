@@ -18,8 +18,9 @@ from tests.support.paths import ROOT
 from tests.support.tables import tables
 
 FOLDER = ROOT / "examples" / "models"
-# texts of models, by test module and name
+# by test module and name
 MODELS: dict[str, dict[str, str]] = tables(str(Path(__file__).with_name("models")))
+MISTAKES = tables(str(Path(__file__).with_name("mistakes")))
 METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3, "taylor": 4}
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
 
 from tests.equations.compiled import Model, ModelFileError, read_text
-from tests.equations.examples import METHODS, MODELS, build, made, simulated
+from tests.equations.examples import METHODS, MISTAKES, MODELS, build, made, simulated
 
 TEXTS = MODELS["tables"]
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
@@ -148,45 +148,13 @@ def test_a_hundred_thousand_rows_of_a_file(tmp_path: Path) -> None:
     assert abs(run["event_count"][-1] - np.floor(s[-1] / 0.001)) <= 1
 
 
-MISTAKES = {
-    "one row": ("x = [1]\ny = [2]", "[tables.T]: x: has 1 rows, expected two at least"),
-    "order": ("x = [1, 3, 2]\ny = [0, 0, 0]", "x: row 3: expected more than 3.0, got 2.0"),
-    "twice": ("x = [1, 1]\ny = [0, 0]", "x: row 2: expected more than 1.0, got 1.0"),
-    "nan": ("x = [1, nan]\ny = [0, 0]", "x: row 2: expected a finite number"),
-    "text": ('x = [1, "2"]\ny = [0, 0]', "x: row 2: expected a number"),
-    "lengths": ("x = [1, 2]\ny = [0]", "y: has 1 values, expected 2, as x has"),
-    "no y": ("x = [1, 2]", "y: expected a list of numbers"),
-    "kind": ('x = [1, 2]\ny = [0, 0]\ninterpolation = "cubic"', "expected one of linear, previous"),
-    "outside": ('x = [1, 2]\ny = [0, 0]\noutside = "wrap"', "outside: expected one of hold, ext"),
-    "key": ("x = [1, 2]\ny = [0, 0]\nw = 1", "unknown key 'w', expected one of x, y, z, file"),
-    "rows of z": ("x = [1, 2]\ny = [0, 1]\nz = [[1, 2]]", "z: expected 2 rows, one for each x"),
-    "row of z": ("x = [1, 2]\ny = [0, 1]\nz = [[1, 2], [3]]", "z: row 2: has 1 values, expected 2"),
-    "no file": ('x = "a"\ny = "b"\nfile = "none.csv"', "file: none.csv: no such file"),
-    "folder": ('x = "a"\ny = "b"\nfile = "."', "no such file"),
-    "column": ('x = "c"\ny = "b"\nfile = "f.csv"', "x: f.csv has no column 'c' (has: a, b, b)"),
-    "columns": ('x = "a"\ny = "b"\nfile = "f.csv"', "y: f.csv has no column 'b'"),
-    "cell": ('x = "a"\ny = "d"\nfile = "g.csv"', "y: g.csv: line 3: expected a finite number, got"),
-    "bytes": ('x = "a"\ny = "d"\nfile = "h.csv"', "file: h.csv: is no CSV in UTF-8"),
-    "names": ('x = 1\ny = "d"\nfile = "g.csv"', "x: expected the name of a column of g.csv"),
-    "unit": ("x = [1, 2]\ny = [0, 0]\nunit = { x = 'm2/q' }", "'q' is no SI symbol"),
-    "unit key": ("x = [1, 2]\ny = [0, 0]\nunit = { z = 'm' }", "unit: unknown key 'z', expected x"),
-    "unit of x": (
-        "x = [1, 2]\ny = [0, 0]\nunit = { x = 'm' }\n[inputs]\nu = { unit = 's' }\n"
-        "[where]\na = 'T(u)'",
-        "[where]: a: column 1: T takes unit m, got s",
-    ),
-    "arguments": ("x = [1, 2]\ny = [0, 0]\n[where]\na = 'T(1, 2)'", "T: expected 1 argument, got"),
-}
-
-
-@pytest.mark.parametrize("name", MISTAKES)
+@pytest.mark.parametrize("name", MISTAKES["tables"])
 def test_a_mistake_in_a_table_is_one_line(name: str, tmp_path: Path) -> None:
     (tmp_path / "f.csv").write_text("a,b,b\n1,2,3\n")
     (tmp_path / "g.csv").write_text("a,d\n1,2\n2,inf\n")
     (tmp_path / "h.csv").write_bytes(b"a,d\n\xff\xfe\n")
-    content, expected = MISTAKES[name]
-    text = f'name = "M"\n[tables.T]\n{content}\n'
+    mistake = MISTAKES["tables"][name]
     with pytest.raises(ModelFileError) as refused:
-        read_text(tmp_path, text if "[where]" in content else text + "[inputs]\nv = {}\n")
+        read_text(tmp_path, mistake["text"])
     message = str(refused.value)
-    assert expected in message and "\n" not in message and len(message) < 500
+    assert mistake["expected"] in message and "\n" not in message and len(message) < 500
