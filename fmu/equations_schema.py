@@ -17,7 +17,7 @@ from equations_arrays import FOR
 from equations_content import BOOLEAN, FOLLOWS, INTEGER, SWITCHES
 from equations_tables import INTERPOLATIONS, OUTSIDE
 
-from rparm.expressions.expression import FURTHER, LONGEST
+from rparm.expressions.expression import LONGEST
 from rparm.expressions.units import ANGLE, BASE
 
 Schema = dict[str, Any]
@@ -70,7 +70,9 @@ def schema() -> Schema:
     ]
     dialect = "https://json-schema.org/draft/2020-12/schema"
     head = {"$schema": dialect, "title": "File with equations", "$defs": DEFINITIONS}
-    return head | _table(found, "name") | {"anyOf": some}
+    with_value = {"functions": {"additionalProperties": {"required": ["value"]}}}
+    only_in_c = {"if": {"not": {"required": ["code"]}}, "then": {"properties": with_value}}
+    return head | _table(found, "name") | {"anyOf": some} | only_in_c
 
 
 def _further(named: Schema) -> dict[str, Schema]:
@@ -82,9 +84,11 @@ def _further(named: Schema) -> dict[str, Schema]:
     modes = {"anyOf": [TRUTH, _table({"start": _start(TRUTH), FOR: EXPRESSION}, "start")]}
     unit = _table(dict.fromkeys((*BASE, ANGLE), {"type": "integer", "minimum": -99, "maximum": 99}))
     size = {"type": "integer", "minimum": 0, "maximum": reader.MOST_SIZE}
-    of_functions = {"not": {"enum": sorted({*reader.RESERVED, *FURTHER, *reader.LATER})}}
+    of_functions = {"not": {"enum": sorted(reader.TAKEN)}}
     arguments = ITEMS | {"items": WORD | {"not": {"enum": sorted(reader.RESERVED)}}}
-    function = _table({"arguments": arguments, "value": EXPRESSION}, "arguments", "value")
+    with_units = {"type": "object", "additionalProperties": TEXT}
+    of_function = {"arguments": {"anyOf": [arguments, with_units]}, "unit": TEXT}
+    function = _table(of_function | {"value": EXPRESSION})
     check = {"propertyNames": {"maxLength": reader.LONGEST_MESSAGE, "pattern": PLAIN}}
     check["additionalProperties"] = {"anyOf": [EXPRESSION, _keys(["value"], "value")]}
     return {
@@ -94,6 +98,7 @@ def _further(named: Schema) -> dict[str, Schema]:
         "modes": {
             "anyOf": [_by_name(modes, named), {"type": "array", "items": mode, "uniqueItems": True}]
         },
+        "code": TEXT | {"pattern": f"^{reader.CODE.pattern}$"},
         "sizes": _by_name(size, named, has_indexes=False),
         "units": {"type": "object", "additionalProperties": unit},
         "tables": _by_name(_data(), of_functions, has_indexes=False),

@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from tests.importers.by_fmpy import instance
 from tests.support.generator import change, copied
-from tests.support.instances import STATES, LoadedFmu
+from tests.support.instances import STATES, instantiated
 from tests.support.paths import CARRIED, FOLDERS, ROOT
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
@@ -135,9 +134,7 @@ def test_parameter_sets_follow_the_schema_and_the_variables(carried: Carried) ->
 
 
 @pytest.mark.parametrize("scenario", MODELS["RPManipulator"][1])
-def test_an_fmu_can_be_checked_by_what_it_carries(
-    folder: Path, scenario: str, tmp_path: Path
-) -> None:
+def test_an_fmu_can_be_checked_by_what_it_carries(folder: Path, scenario: str) -> None:
     carried = Carried(folder / "RPManipulator.fmu")
     inputs, expected = carried.table(scenario, "other"), carried.table(scenario, "result")
     options = carried.options(scenario)
@@ -147,13 +144,22 @@ def test_an_fmu_can_be_checked_by_what_it_carries(
 
     times, names = inputs["time"], [n for n in inputs.dtype.names if n != "time"]
     held = [{name: float(row[name]) for name in names} for row in inputs]
-    with instance(LoadedFmu(carried.path, tmp_path)) as arm:
-        arm.initialize(start=options["StartTime"], **values, **held[0])
-        rows = [arm.get(*STATES)]
+    with instantiated(carried.path, "CoSimulation") as (arm, description):
+        references = {v.name: v.valueReference for v in description.modelVariables}
+        is_fmi2, begin = description.fmiVersion == "2.0", {"startTime": options["StartTime"]}
+        put, get = (arm.setReal, arm.getReal) if is_fmi2 else (arm.setFloat64, arm.getFloat64)
+        states = [references[name] for name in STATES]
+        if is_fmi2:
+            arm.setupExperiment(**begin)
+        for given in (values, held[0]):
+            put([references[name] for name in given], [*given.values()])
+        arm.enterInitializationMode(**({} if is_fmi2 else begin))
+        arm.exitInitializationMode()
+        rows = [get(states)]
         for i in range(len(times) - 1):
-            arm.set(**held[i])
-            arm.step(times[i], times[i + 1] - times[i])
-            rows.append(arm.get(*STATES))
+            put([references[name] for name in names], [*held[i].values()])
+            arm.doStep(times[i], times[i + 1] - times[i])
+            rows.append(get(states))
     for name, reached in zip(STATES, np.transpose(rows), strict=True):
         error = np.abs(reached - expected[name]).max() / np.abs(expected[name]).max()
         assert error <= ERROR, name

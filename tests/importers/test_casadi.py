@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fmpy import fmi2
 
-from tests.importers.by_fmpy import instance
+from tests.importers.by_fmpy import co_simulation
 from tests.importers.test_importers import OPTIMIZER, SCRIPTS, VERSIONS, folder_of, start
 from tests.support.instances import Instance, LoadedFmu
 
@@ -94,13 +94,18 @@ def test_its_optimal_control_swings_the_arm_up(fmu: Path, version: str, tmp_path
     found = ask("control", path, tmp_path, **plan)
     assert found["status"] == "Solve_Succeeded"
     names = ("q1", "q2", "dq1", "dq2")
-    loaded = LoadedFmu(path, tmp_path / "unpacked")
-    with instance(loaded) as arm:
-        arm.initialize(**dict(zip(names, begin, strict=True)), relative_tolerance=1e-10)
-        for k, (tau1, f2) in enumerate(found["u"]):
-            arm.set(tau1=tau1, f2=f2)
-            arm.step(k / intervals, 1 / intervals)
-            np.testing.assert_allclose(arm.get(*names), found["x"][k + 1], rtol=0, atol=1e-5)
-        error = np.abs(np.subtract(arm.get(*names), end)).max()
+    efforts = zip(("tau1", "f2"), np.transpose(found["u"]), strict=True)
+    run = {
+        "start": 0.0,
+        "step": 1 / intervals,
+        "steps": intervals,
+        "parameters": {"relative_tolerance": 1e-10},
+        "initial": dict(zip(names, begin, strict=True)),
+        "inputs": {name: [*values, values[-1]] for name, values in efforts},
+        "outputs": names,
+    }
+    rows = co_simulation(LoadedFmu(path, tmp_path / "unpacked"), run)
+    np.testing.assert_allclose(rows[1:], found["x"][1:], rtol=0, atol=1e-5)
+    error = np.abs(rows[-1] - end).max()
     print(f"casadi {version}: optimal control ends {error:.1e} beside its end")
     assert error <= 1e-5
