@@ -15,8 +15,12 @@ from fmpy.fmi2 import FMU2Slave
 
 from tests.support.instances import Instance, LoadedFmu
 from tests.support.paths import ROOT
+from tests.support.tables import tables
 
 FOLDER = ROOT / "examples" / "models"
+# by test module and name
+MODELS: dict[str, dict[str, str]] = tables(str(Path(__file__).with_name("models")))
+MISTAKES = tables(str(Path(__file__).with_name("mistakes")))
 METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3, "taylor": 4}
 
 

@@ -9,33 +9,15 @@ from fmpy.fmi1 import FMICallException
 from scipy.linalg import expm
 
 from tests.equations.compiled import c_model, read_text
-from tests.equations.examples import METHODS, initializing, made, simulated
+from tests.equations.examples import METHODS, MODELS, initializing, made, simulated
 
+TEXTS = MODELS["arrays"]
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
-CHAIN = """
-name = "Chain"
-[sizes]
-n = {n}
-[parameters]
-"m[i]" = {{ for = "i = 1..n", start = {masses} }}
-k = {{ start = 40.0 }}
-[inputs]
-F = {{ start = 0.3 }}
-[states]
-"x[i]" = {{ for = "i = 1..n", start = "0.1 * i * (-1)**i", derivative = "v[i]" }}
-"v[i]" = {{ for = "i = 1..n", derivative = "((F if i == 1 else f[i-1]) - (0 if i == n else f[i])) / m[i]" }}
-[where]
-"f[i]" = {{ for = "i = 1..n-1", value = "k * (x[i] - x[i+1]) * (1 + (x[i] - x[i+1])**2)" }}
-[outputs]
-energy = {{ value = "sum(i = 1..n, m[i] * v[i]**2) / 2 + sum(i = 1..n-1, sin(f[i]) * i)" }}
-[check]
-"masses must be positive" = {{ for = "i = 1..n", value = "m[i] > 0" }}
-"""  # noqa: E501
 COUNT = 60
 
 
 def chain(n: int) -> str:
-    return CHAIN.format(n=n, masses=[1.0 + 0.01 * i for i in range(n)])
+    return TEXTS["CHAIN"].format(n=n, masses=[1.0 + 0.01 * i for i in range(n)])
 
 
 def written_out(n: int) -> str:
@@ -102,30 +84,11 @@ def test_a_check_holds_for_each_element(folder: Path) -> None:
     assert "masses must be positive" in instance.messages[-1].text
 
 
-HEAT = """
-name = "Heat"
-[sizes]
-n = 100
-[parameters]
-"flow[i]" = { for = "i = 1..2", start = [0.0, 0.5] }
-d = { value = "1 / (n + 1)" }
-[states]
-"T[i]" = { for = "i = 1..n", start = "sin(pi * i * d)", derivative = "((flow[1] if i == 1 else T[i-1]) - 2 * T[i] + (flow[2] if i == n else T[i+1])) / d**2" }
-"""  # noqa: E501
-PLATE = """
-name = "Plate"
-[sizes]
-n = 6
-[states]
-"T[i,j]" = { for = "i = 1..n, j = 1..n", start = "i * j", derivative = "(T[i-1,j] if i > 1 else 0) + (T[i+1,j] if i < n else 0) + (T[i,j-1] if j > 1 else 0) + (T[i,j+1] if j < n else 0) - 4 * T[i,j]" }
-"""  # noqa: E501
-
-
 @EACH_METHOD
 def test_a_rod_follows_its_series(method: int, folder: Path) -> None:
     """Cells against the modes of the cells, and both against the series of the continuous rod."""
     n, d, t = 100, 1 / 101, 0.05
-    run = simulated(made(folder, HEAT), t, t, {"solver_method": method})
+    run = simulated(made(folder, TEXTS["HEAT"]), t, t, {"solver_method": method})
     found = np.array([run[f"T[{i}]"][-1] for i in range(1, n + 1)])
     at = np.arange(1, n + 1) * d
     modes = np.array([np.sin(np.pi * k * at) for k in range(1, n + 1)])
@@ -143,46 +106,20 @@ def test_a_rod_follows_its_series(method: int, folder: Path) -> None:
 
 def test_a_plate_has_two_indexes(folder: Path) -> None:
     n = 6
-    run = simulated(made(folder, PLATE), 1.0, 1.0, {"solver_method": 4})
+    run = simulated(made(folder, TEXTS["PLATE"]), 1.0, 1.0, {"solver_method": 4})
     line = np.diag(-2.0 * np.ones(n)) + np.diag(np.ones(n - 1), 1) + np.diag(np.ones(n - 1), -1)
     matrix = np.kron(line, np.eye(n)) + np.kron(np.eye(n), line)
     exact = expm(matrix) @ np.outer(np.arange(1, n + 1), np.arange(1, n + 1)).ravel()
     names = [f"T[{i},{j}]" for i in range(1, n + 1) for j in range(1, n + 1)]
     assert [run[name][-1] for name in names] == pytest.approx(exact, abs=1e-10)
-    description = fmpy.read_model_description(made(folder, PLATE))
+    description = fmpy.read_model_description(made(folder, TEXTS["PLATE"]))
     assert description.variableNamingConvention == "structured"
     assert {"T[6,6]", "der_T[6,6]"} <= {v.name for v in description.modelVariables}
 
 
-BALLS = """
-name = "Balls"
-modes = { "rest[i]" = { for = "i = 1..n", start = false } }
-[sizes]
-n = 3
-[parameters]
-g = { start = 9.81 }
-"e[i]" = { for = "i = 1..n", start = [0.5, 0.6, 0.7] }
-[states]
-"h[i]" = { for = "i = 1..n", start = "i", derivative = "v[i]" }
-"v[i]" = { for = "i = 1..n", derivative = "0 if rest[i] else -g" }
-[discrete]
-"hits[i]" = { for = "i = 1..n", type = "Integer" }
-[events."impact[i]"]
-for = "i = 1..n"
-when = "h[i] < 0"
-while = "not rest[i]"
-reinit = { "h[i]" = "0", "v[i]" = "-e[i] * v[i] if -e[i] * v[i] > 0.1 else 0" }
-set = { "rest[i]" = "-e[i] * v[i] <= 0.1", "hits[i]" = "hits[i] + 1" }
-[outputs]
-saw = { value = "mod(time, 0.25)" }
-near = { value = "round(h[1] * 10)" }
-above = { value = "ceil(-h[2] * 3)" }
-"""
-
-
 @EACH_METHOD
 def test_each_ball_bounces_by_itself(method: int, folder: Path) -> None:
-    run = simulated(made(folder, BALLS), 6.0, 0.01, {"solver_method": method})
+    run = simulated(made(folder, TEXTS["BALLS"]), 6.0, 0.01, {"solver_method": method})
     for i, e in enumerate((0.5, 0.6, 0.7), 1):
         impacts, time, speed = 0, np.sqrt(2 * i / 9.81), e * np.sqrt(2 * i * 9.81)
         while time <= 6.0:
@@ -197,32 +134,8 @@ def test_each_ball_bounces_by_itself(method: int, folder: Path) -> None:
     assert run["saw"][~jumps] == pytest.approx(run["time"][~jumps] % 0.25, abs=1e-12)
 
 
-MACHINE = """
-name = "Machine"
-[parameters]
-drive = { type = ["slow", "fast"], start = "fast" }
-gain = { type = "Integer", start = 3, min = 0, max = 2000000000 }
-way = { start = 300, unit = "mm", min = -1, max = 1000 }
-heat = { start = 20, unit = "degC" }
-turn = { start = 90, unit = "deg" }
-speed = { start = 60, unit = "rpm" }
-period = { start = 0.1, unit = "s" }
-[discrete]
-count = { type = "Integer", start = "gain - 3" }
-state = { type = ["idle", "busy", "broken"], start = "busy" }
-is_odd = { type = "Boolean", start = true }
-[sampled.tick]
-every = "period"
-set = { count = "count + gain", is_odd = "not is_odd", state = '"broken" if count > 5 and drive == "fast" else "idle"' }
-[outputs]
-name = { value = '1 if state == "idle" else 2 if state != "broken" else 3' }
-same = { value = "1 if is_odd == (count == 3) else 0" }
-x = { value = "way", unit = "m" }
-"""  # noqa: E501
-
-
 def test_numbers_of_other_units_are_declared_in_si(folder: Path) -> None:
-    description = fmpy.read_model_description(made(folder, MACHINE))
+    description = fmpy.read_model_description(made(folder, TEXTS["MACHINE"]))
     shown = {v.name: (v.unit, v.displayUnit, float(v.start)) for v in description.modelVariables
              if v.displayUnit and v.causality == "parameter"}  # fmt: skip
     assert shown == {
@@ -243,7 +156,7 @@ def test_numbers_of_other_units_are_declared_in_si(folder: Path) -> None:
 
 @pytest.mark.parametrize("drive", [1, 2])
 def test_what_is_counted_and_named_changes_at_ticks(drive: int, folder: Path) -> None:
-    fmu = made(folder, MACHINE)
+    fmu = made(folder, TEXTS["MACHINE"])
     run = simulated(fmu, 0.6, 0.1, {"drive": drive})
     ticks = np.arange(len(run["time"]))
     assert np.array_equal(run["count"], 3 * (ticks + 1))
@@ -255,7 +168,7 @@ def test_what_is_counted_and_named_changes_at_ticks(drive: int, folder: Path) ->
 
 
 def test_a_count_that_no_integer_holds_is_named(folder: Path) -> None:
-    instance = initializing(made(folder, MACHINE))
+    instance = initializing(made(folder, TEXTS["MACHINE"]))
     by_name = {v.name: v.valueReference for v in instance.loaded.description.modelVariables}
     instance.fmi.setInteger([by_name["gain"]], [2_000_000_000])  # a tick at the start adds it
     with pytest.raises(FMICallException):

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import sympy
 
+from tests.equations.examples import MODELS
 from tests.support.paths import ROOT
 
 sys.path.insert(0, str(ROOT / "fmu"))
@@ -66,18 +67,18 @@ def body(*lines: str) -> str:
         (body("for (int i = 0; i < 2; i++) { break; }", "return x;"), 2, "use a loop"),
         (body("for (int i = 0; i < 2; i++) { continue; }", "return x;"), 2, "use if"),
         (body("return (double)1;"), 2, "casts"),
-        (body("static double kept;", "return x;"), 2, "keeps a value"),
+        (body("static double kept;", "return x;"), 2, "between calls: leave out static"),
         (body("float y = 1.0;", "return x;"), 2, "use double"),
         (body("unsigned n = 1;", "return x;"), 2, "only int"),
-        (body("return f(x);"), 2, "calls itself"),
-        (body("return lgamma(x);"), 2, "lgamma is not known"),
+        (body("return f(x);"), 2, "f calls itself: write a loop"),
+        (body("return lgamma(x);"), 2, "lgamma is not known: besides functions of the text"),
         (body("return y;"), 2, "y is not declared"),
         (body("double y;", "return y;"), 3, "y has no value"),
         (body("double y;", "if (x > 0.0) y = 1.0;", "return y;"), 4, "y has no value"),
         (body("double y[2] = {1.0, 2.0};", "return y[2];"), 3, "outside"),
         (body("double y[2] = {1.0, 2.0, 3.0};", "return y[0];"), 2, "3 initializers"),
-        (body("for (int i = 0; i < x; i++) { }", "return x;"), 2, "not fixed"),
-        (body("for (;;) { }", "return x;"), 2, "no end"),
+        (body("for (int i = 0; i < x; i++) { }", "return x;"), 2, "number of rounds is not fixed"),
+        (body("for (;;) { }", "return x;"), 2, "this loop has no end: use for"),
         (body("for (int i = 0; i < 1; ) { }", "return x;"), 2, "rounds"),
         (body("int n = x;", "return n;"), 2, "becomes a whole one"),
         (body("if (x) return 1.0;", "return x;"), 2, "compare it with 0.0"),
@@ -97,8 +98,8 @@ def body(*lines: str) -> str:
         ("#include <stdio.h>\n", 1, "<math.h>"),
         ('#include "nowhere.h"\n', 1, "nowhere.h is not there"),
         ("static double kept = 1.0;\n", 1, "write const"),
-        ("double kept;\n", 1, "keeps a value"),
-        ("double f(double (*g)(double)) { return g(1.0); }\n", 1, "pointers to functions"),
+        ("double kept;\n", 1, "kept keeps a value between calls: pass it as an"),
+        ("double f(double (*g)(double)) { return g(1.0); }\n", 1, "pointers to functions are"),
         ("double f(struct s *p) { return p->x; }\n", 1, "struct s is not defined"),
         (REAL + body("real y = x;", "double z = sin(y);", "return z;").replace("double f(double",
          "real f(real"), 4, "loses its derivatives"),
@@ -207,132 +208,31 @@ def pointer(x: np.ndarray) -> ctypes.c_void_p:
 
 Formula = Callable[[list, int], list]
 
-# five from textbooks, and one that has all that the rules allow
-TEXTS: dict[str, tuple[str, int, Formula]] = {
-    "pendulum on a cart": (
-        """static inline void f(const real x[N], int m, real y[2]) {
-    const real s = sin(x[0]), c = cos(x[0]);
-    const real mass = 1.0 + 0.5 * s * s;
-    y[0] = (x[3] + 0.5 * s * (x[1] * x[1] + 9.81 * c)) / mass;
-    y[1] = (-x[3] * c - 0.5 * x[1] * x[1] * c * s - 1.5 * 9.81 * s) / (2.0 * mass);
-}
-""",
-        4,
-        lambda x, m: [
-            (x[3] + sympy.sin(x[0]) * (x[1] ** 2 + 9.81 * sympy.cos(x[0])) / 2)
-            / (1 + sympy.sin(x[0]) ** 2 / 2),
-            (-x[3] * sympy.cos(x[0]) - x[1] ** 2 * sympy.cos(x[0]) * sympy.sin(x[0]) / 2
-             - 1.5 * 9.81 * sympy.sin(x[0])) / (2 + sympy.sin(x[0]) ** 2),
-        ],
-    ),
-    "Van der Pol and Duffing": (
-        """static inline void f(const real x[N], int m, real y[2]) {
-    const real x3 = x[0] * x[0] * x[0];
-    y[0] = m == 1 ? (1.0 - x[0] * x[0]) * x[1] - x[0] : x[0] - x3 - 0.2 * x[1];
-    y[1] = x[1];
-}
-""",
-        2,
-        lambda x, m: [
-            (1 - x[0] ** 2) * x[1] - x[0] if m == 1 else x[0] - x[0] ** 3 - x[1] / 5, x[1],
-        ],
-    ),
-    "Arrhenius and Monod": (
-        """struct tank { real c, T; };
-static real rate(struct tank tank) { return 3.0 * exp(-2.0 / tank.T) * tank.c; }
-static inline void f(const real x[N], int m, real y[2]) {
-    const struct tank tank = {.T = x[1], .c = x[0]};
-    y[0] = rate(tank);
-    y[1] = tank.c / (0.5 + tank.c) * sqrt(tank.T) + log(tank.T) * atan2(tank.c, tank.T);
-}
-""",
-        2,
-        lambda x, m: [
-            3 * sympy.exp(-2 / x[1]) * x[0],
-            x[0] / (sympy.Rational(1, 2) + x[0]) * sympy.sqrt(x[1])
-            + sympy.log(x[1]) * sympy.atan2(x[0], x[1]),
-        ],
-    ),
-    "two link arm": (
-        """static void mass_matrix(const real q[2], real D[2][2]) {
-    D[0][0] = 3.0 + 2.0 * cos(q[1]);
-    D[0][1] = D[1][0] = 1.0 + cos(q[1]);
-    D[1][1] = 1.0;
-}
-static inline void f(const real x[N], int m, real y[2]) {
-    real D[2][2];
-    mass_matrix(x, D);
-    const real det = D[0][0] * D[1][1] - D[0][1] * D[1][0];
-    const real *tau = x + 2;
-    for (int i = 0; i < 2; i++) {
-        y[i] = 0.0;
-        for (int j = 0; j < 2; ++j) {
-            const real sign = i == j ? 1.0 : -1.0;
-            y[i] += sign * D[1 - i][1 - j] * tau[j] / det;
-        }
-    }
-}
-""",
-        4,
-        lambda x, m: list(
-            sympy.Matrix([[3 + 2 * sympy.cos(x[1]), 1 + sympy.cos(x[1])],
-                          [1 + sympy.cos(x[1]), 1]]).inv() * sympy.Matrix(x[2:4])
-        ),
-    ),
-    "drag and pow": (
-        """static inline void f(const real x[N], int m, real y[2]) {
-    const real speed = sqrt(x[0] * x[0] + x[1] * x[1]);
-    y[0] = -0.3 * speed * x[0] + tanh(x[1]) * fabs(x[0]);
-    y[1] = pow(speed, 1.7) - acos(0.3 * x[0]) * cosh(x[1]);
-}
-""",
-        2,
-        lambda x, m: [
-            -0.3 * sympy.sqrt(x[0] ** 2 + x[1] ** 2) * x[0] + sympy.tanh(x[1]) * x[0],
-            sympy.sqrt(x[0] ** 2 + x[1] ** 2) ** 1.7 - sympy.acos(0.3 * x[0]) * sympy.cosh(x[1]),
-        ],
-    ),
-    "all that is read": (
-        """struct inner { real a[2]; int side; };
-struct outer { struct inner in[2]; real sum; };
-static const double weight[2] = {0.5, 2.0};
-static real early(const real x[N], int m) {
-    if (m == 0) {
-        return x[0] * x[1];
-    }
-    for (int i = 0; i < 2; i++) {
-        if (m == i + 1) {
-            return x[i] / (1.0 + x[2] * x[2]);
-        }
-    }
-    return 0.0;
-}
-static struct outer made(const real x[N], int m) {
-    struct outer o = {.sum = 0.0};
-    for (int i = 0; i < 2; i++) {
-        o.in[i] = (struct inner){{x[i], x[i + 1]}, m > 0 ? i : 1 - i};
-        o.sum += weight[o.in[i].side] * o.in[i].a[0];
-    }
-    return o;
-}
-static inline void f(const real x[N], int m, real y[2]) {
-    const struct outer o = made(x, m);
-    real z[3] = {1.0, 1.0, 1.0};
-    z[m > 1 ? 2 : 0] = o.sum * x[2];
-    const bool is_mixed = m != 1 && !(m > 1);
-    y[0] = z[0] + 3.0 * z[2] + early(x, m) * value_of(x[0]);
-    y[1] = moving_as(x[1], x[0] * x[0]);
-    y[1] *= m;
-    if (is_mixed) {
-        y[1] -= o.in[1].a[1];
-    } else {
-        y[1] += sin(o.in[0].a[1]);
-    }
-}
-""",
-        3,
-        lambda x, m: all_that_is_read(x, m),
-    ),
+# length of x, and the exact y
+FORMULAS: dict[str, tuple[int, Formula]] = {
+    "pendulum on a cart": (4, lambda x, m: [
+        (x[3] + sympy.sin(x[0]) * (x[1] ** 2 + 9.81 * sympy.cos(x[0])) / 2)
+        / (1 + sympy.sin(x[0]) ** 2 / 2),
+        (-x[3] * sympy.cos(x[0]) - x[1] ** 2 * sympy.cos(x[0]) * sympy.sin(x[0]) / 2
+         - 1.5 * 9.81 * sympy.sin(x[0])) / (2 + sympy.sin(x[0]) ** 2),
+    ]),
+    "Van der Pol and Duffing": (2, lambda x, m: [
+        (1 - x[0] ** 2) * x[1] - x[0] if m == 1 else x[0] - x[0] ** 3 - x[1] / 5, x[1],
+    ]),
+    "Arrhenius and Monod": (2, lambda x, m: [
+        3 * sympy.exp(-2 / x[1]) * x[0],
+        x[0] / (sympy.Rational(1, 2) + x[0]) * sympy.sqrt(x[1])
+        + sympy.log(x[1]) * sympy.atan2(x[0], x[1]),
+    ]),
+    "two link arm": (4, lambda x, m: list(
+        sympy.Matrix([[3 + 2 * sympy.cos(x[1]), 1 + sympy.cos(x[1])],
+                      [1 + sympy.cos(x[1]), 1]]).inv() * sympy.Matrix(x[2:4])
+    )),
+    "drag and pow": (2, lambda x, m: [
+        -0.3 * sympy.sqrt(x[0] ** 2 + x[1] ** 2) * x[0] + sympy.tanh(x[1]) * x[0],
+        sympy.sqrt(x[0] ** 2 + x[1] ** 2) ** 1.7 - sympy.acos(0.3 * x[0]) * sympy.cosh(x[1]),
+    ]),
+    "all that is read": (3, lambda x, m: all_that_is_read(x, m)),
 }  # fmt: skip
 
 
@@ -348,12 +248,12 @@ def all_that_is_read(x: list, m: int) -> list:
     return [z[0] + 3 * z[2] + early * held, m * (x[0] ** 2 + shift) + last]
 
 
-@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("name", FORMULAS)
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_derivatives_are_those_of_sympy(tmp_path: Path, name: str, compiler: str) -> None:
-    text, n, formula = TEXTS[name]
+    n, formula = FORMULAS[name]
     try:
-        compiled = Compiled(tmp_path, text, n, compiler)
+        compiled = Compiled(tmp_path, MODELS["c_code"][name], n, compiler)
     except FileNotFoundError:
         pytest.skip(f"{compiler} is not there")
     symbols = list(sympy.symbols(f"x:{n}"))

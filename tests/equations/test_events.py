@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import _FMU2, FMU2Model, FMU2Slave
 
-from tests.equations.examples import METHODS, build, example, simulated
+from tests.equations.examples import METHODS, MODELS, build, example, simulated
 
+TEXTS = MODELS["events"]
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 G, E, V_MIN = 9.81, 0.7, 0.1
 
@@ -80,20 +81,11 @@ def made(folder: Path, text: str) -> Path:
     return build(folder / "model.toml", folder)
 
 
-SPRING = """
-[states]
-x = { start = 1, derivative = "v" }
-v = { derivative = "-max(0, 100 * x) - x" }
-[outputs]
-size = { value = "abs(x)" }
-"""
-
-
 @EACH_METHOD
 def test_a_one_sided_spring_swings_in_two_halves(folder: Path, method: int) -> None:
     """On one side with sqrt(101) rad/s, on the other with 1 rad/s."""
     run = simulated(
-        made(folder / "spring", SPRING), 12.0, 0.05, {"solver_method": method},
+        made(folder / "spring", TEXTS["SPRING"]), 12.0, 0.05, {"solver_method": method},
         relative_tolerance=1e-12, also=["event_count"],
     )  # fmt: skip
     stiff = np.sqrt(101.0)
@@ -108,24 +100,12 @@ def test_a_one_sided_spring_swings_in_two_halves(folder: Path, method: int) -> N
     assert run["event_count"][-1] == crossings
 
 
-TANKS = """
-[parameters]
-pump = { start = 0 }
-[states]
-a = { start = 1, derivative = "-0.1 * sqrt(a) - pump if a > 0 else 0" }
-b = { start = 1, derivative = "-0.1 * sqrt(max(b, 0)) - (pump if b > 0 else 0)" }
-c = { start = 1, derivative = "0 if c <= 0 else -0.1 * (c**0.5 if c > 0.25 else sqrt(c)) - pump" }
-[outputs]
-speed = { value = "sqrt(a) if a > 0 else 0" }
-"""
-
-
 @pytest.mark.parametrize("pump", [0.0, 0.05])
 @EACH_METHOD
 def test_tanks_run_empty(folder: Path, method: int, pump: float) -> None:
     """By Torricelli's law, whose root ends where the guard does; s is the root of the height."""
     run = simulated(
-        made(folder / "tanks", TANKS), 24.0, 0.7, {"solver_method": method, "pump": pump},
+        made(folder / "tanks", TEXTS["TANKS"]), 24.0, 0.7, {"solver_method": method, "pump": pump},
         relative_tolerance=1e-9, also=["event_count", "last_event_time"],
     )  # fmt: skip
     s = np.linspace(1, 0, 100001)
@@ -140,25 +120,6 @@ def test_tanks_run_empty(folder: Path, method: int, pump: float) -> None:
         assert run["last_event_time"][-1] == pytest.approx(times[-1], abs=1e-7)
 
 
-UNDEFINED = """
-[parameters]
-p = { start = 1 }
-[states]
-x = { start = 1, derivative = "1" }
-[where]
-root = "sqrt(x - 2)"
-[outputs]
-small = { value = "min(sqrt(-1), 2)" }
-sign = { value = "1 if sqrt(-1) > 0 else 0" }
-large = { value = "max(3, root)" }
-both = { value = "1 if x > 0 and not root > 5 else 2" }
-guarded = { value = "1 if x > 2 and root > 0.5 else 2" }
-either = { value = "1 if x <= 2 or root < 0.5 else 2" }
-[check]
-"p has a root of 0 at least" = "not sqrt(p) < 0"
-"""
-
-
 @pytest.mark.parametrize(
     ("x", "defined"),
     [
@@ -170,7 +131,7 @@ def test_what_follows_from_an_undefined_relation_is_not_finite(
     folder: Path, tmp_path: Path, x: float, defined: dict[str, float]
 ) -> None:
     """A relation that is not looked at need not be defined."""
-    fmu = made(folder / "undefined", UNDEFINED)
+    fmu = made(folder / "undefined", TEXTS["UNDEFINED"])
     unit = opened(fmu, tmp_path)
     unit.setReal([reference(fmu, "x")], [x])
     unit.exitInitializationMode()
@@ -184,7 +145,7 @@ def test_what_follows_from_an_undefined_relation_is_not_finite(
 
 
 def test_a_check_that_is_not_defined_is_broken(folder: Path, tmp_path: Path) -> None:
-    fmu = made(folder / "undefined", UNDEFINED)
+    fmu = made(folder / "undefined", TEXTS["UNDEFINED"])
     unit = opened(fmu, tmp_path)
     unit.setReal([reference(fmu, "p")], [-1.0])
     with pytest.raises(fmpy.fmi1.FMICallException, match="error"):
@@ -192,19 +153,9 @@ def test_a_check_that_is_not_defined_is_broken(folder: Path, tmp_path: Path) -> 
     unit.freeInstance()
 
 
-BRANCHES = """
-[parameters]
-p = { start = 1 }
-[states]
-x = { start = 1, derivative = "v" }
-v = { derivative = "-x if p > 0 else -max(0, x)" }
-y = { derivative = "1 if v < 5 else min(0.5, abs(x))" }
-"""
-
-
 @EACH_METHOD
 def test_relations_in_branches_that_are_not_taken_make_no_events(folder: Path, method: int) -> None:
-    fmu = made(folder / "branches", BRANCHES)
+    fmu = made(folder / "branches", TEXTS["BRANCHES"])
     run = simulated(
         fmu, 12.0, 0.5, {"solver_method": method}, relative_tolerance=1e-10, also=["event_count"]
     )
@@ -213,22 +164,9 @@ def test_relations_in_branches_that_are_not_taken_make_no_events(folder: Path, m
     np.testing.assert_allclose(run["y"], run["time"], rtol=0, atol=1e-12)
 
 
-PULSE = """
-[parameters]
-T = { start = 0.73 }
-[inputs]
-u = {}
-[states]
-x = { derivative = "1 if time >= T and not time > 2 * T else 0" }
-y = { derivative = "2 if u > 0.5 else sin(time)" }
-[outputs]
-above = { value = "1 if u > 0.5 else 0" }
-"""
-
-
 @EACH_METHOD
 def test_a_relation_of_time_switches_at_its_time(folder: Path, method: int) -> None:
-    fmu = made(folder / "pulse", PULSE)
+    fmu = made(folder / "pulse", TEXTS["PULSE"])
     run = simulated(fmu, 2.0, 0.2, {"solver_method": method}, relative_tolerance=1e-8)
     expected = np.clip(run["time"] - 0.73, 0.0, 0.73)
     np.testing.assert_allclose(run["x"], expected, rtol=0, atol=1e-14)
@@ -236,7 +174,7 @@ def test_a_relation_of_time_switches_at_its_time(folder: Path, method: int) -> N
 
 
 def test_a_relation_of_inputs_switches_where_they_are_set(folder: Path, tmp_path: Path) -> None:
-    fmu = made(folder / "pulse", PULSE)
+    fmu = made(folder / "pulse", TEXTS["PULSE"])
     unit = opened(fmu, tmp_path)
     unit.exitInitializationMode()
     u, above, y = (reference(fmu, name) for name in ("u", "above", "y"))
@@ -282,30 +220,11 @@ def reference(fmu: Path, name: str) -> int:
     return next(v.valueReference for v in variables if v.name == name)
 
 
-CHAIN = """
-modes = ["a", "b"]
-[parameters]
-limit = { start = 0 }
-[states]
-x = { start = 1, derivative = "-1" }
-n = { derivative = "0" }
-[events.first]
-when = "x <= limit"
-reinit = { n = "10 * n + 1" }
-set = { a = "not a" }
-[events.second]
-when = "x <= limit"
-while = "a"
-reinit = { n = "10 * n + 2", x = "x + 1" }
-set = { b = "a" }
-"""
-
-
 @EACH_METHOD
 def test_events_at_one_instant_run_in_order_and_see_what_the_others_left(
     folder: Path, method: int
 ) -> None:
-    fmu = made(folder / "chain", CHAIN)
+    fmu = made(folder / "chain", TEXTS["CHAIN"])
     run = simulated(fmu, 2.4, 0.3, {"solver_method": method}, also=["a", "b"])
     # at 1 both; at 2 the first clears a, so that the second does not run
     np.testing.assert_array_equal(run["n"], [0, 0, 0, 0, 12, 12, 12, 121, 121])

@@ -7,36 +7,14 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from rparm import api
-from tests.equations.examples import METHODS, build, initializing, simulated
+from tests.equations.examples import METHODS, MODELS, build, initializing, simulated
 from tests.support.rparm_project import Console
-
-TEXT = """
-name = "Spring"
-[parameters]
-m = { start = 2.0, unit = "kg", min = 1e-6 }
-l0 = { start = 1.5, unit = "m" }
-phi0 = { start = 0.3, unit = "rad" }
-g = { start = 9.81, unit = "m/s2" }
-k = { value = "weight / l0", unit = "N/m", description = "Stiffness" }
-weight = { value = "m * g", unit = "N" }
-[states]
-x = { start = "l0 * cos(phi0)", unit = "m", derivative = "v" }
-v = { unit = "m/s", derivative = "-k * x / m" }
-[outputs]
-energy = { value = "m * v**2 / 2 + k * x**2 / 2", unit = "J" }
-[discrete]
-largest = { start = "2 * l0", unit = "m" }
-[sampled.watch]
-every = "0.25"
-offset = "0.25"
-set = { largest = "max(largest, abs(x))" }
-"""
 
 
 @pytest.fixture(scope="module")
 def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("following")
-    (folder / "Spring.toml").write_text(TEXT)
+    (folder / "Spring.toml").write_text(MODELS["following_values"]["SPRING"])
     return build(folder / "Spring.toml", folder)
 
 

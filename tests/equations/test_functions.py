@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from tests.equations.compiled import Model
-from tests.equations.examples import METHODS, made, simulated
+from tests.equations.examples import METHODS, MODELS, made, simulated
 
+TEXTS = MODELS["functions"]
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 
 
@@ -17,28 +18,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("functions")
 
 
-VALUES = """
-name = "Values"
-[functions]
-hill = { arguments = ["c", "p"], value = "c**p / (1 + c**p)" }
-twice = { arguments = ["y"], value = "hill(y, 2) + hill(y, 2)" }
-[inputs]
-a = { start = 0.7 }
-b = { start = -1.9 }
-hypot = { start = 3.0 }
-[outputs]
-sign_b = { value = "sign(b) + sign(a) / 4 + sign(a - a)" }
-length = { value = "hypot(a, b)" }
-decades = { value = "log10(a)" }
-root = { value = "cbrt(b) + cbrt(a)" }
-share = { value = "hill(a * 2, 3)" }
-both = { value = "twice(a)" }
-own = { value = "hypot + hypot(3, 4)" }
-"""
-
-
 def test_functions_have_their_values_and_derivatives(tmp_path: Path) -> None:
-    model = Model(tmp_path, VALUES)
+    model = Model(tmp_path, TEXTS["VALUES"])
     a, b = 0.7, -1.9
     values = model.values(a=a, b=b, hypot=3.0)
     model.outputs(values, 0.0)
@@ -63,25 +44,10 @@ def test_functions_have_their_values_and_derivatives(tmp_path: Path) -> None:
     assert slopes["both"] == pytest.approx(4 * a / (1 + a * a) ** 2, rel=1e-14)
 
 
-FRICTION = """
-name = "Friction"
-[parameters]
-F = { start = 2.0, unit = "N" }
-m = { start = 0.5, unit = "kg" }
-k = { start = 3.0, unit = "N/m" }
-[states]
-x = { start = 1.9, unit = "m", derivative = "v" }
-v = { unit = "m/s", derivative = "-(k * x + F * sign(v)) / m" }
-[outputs]
-force = { value = "m * der(v)", unit = "N" }
-power = { value = "m * der(v) * der(x)", unit = "W" }
-"""
-
-
 @EACH_METHOD
 def test_sign_of_a_velocity_switches_where_it_turns(folder: Path, method: int) -> None:
     """Half a swing about k x = F after the other, each shorter by 4 F / k in its range."""
-    fmu = made(folder, FRICTION.replace("start = 2.0", "start = 0.3"))
+    fmu = made(folder, TEXTS["FRICTION"].replace("start = 2.0", "start = 0.3"))
     run = simulated(fmu, 6.0, 0.01, {"solver_method": method}, relative_tolerance=1e-11)
     w, center, half = np.sqrt(3.0 / 0.5), 0.1, np.pi / np.sqrt(3.0 / 0.5)
     n = np.floor(run["time"] / half)
@@ -91,29 +57,12 @@ def test_sign_of_a_velocity_switches_where_it_turns(folder: Path, method: int) -
     assert np.max(np.abs(run["power"] - run["force"] * run["v"])) < 1e-12
 
 
-GATE = """
-name = "Gate"
-modes = { open = true, armed = false }
-[states]
-x = { derivative = "cos(time)" }
-n = { derivative = "0" }
-[discrete]
-passed = {}
-[events.arm]
-when = "x > 0.5 and x < 0.9 and not armed and open"
-set = { armed = "true" }
-[events.leave]
-when = "(x < -0.5 or x > 0.95) and armed"
-set = { armed = "false", passed = "passed + 1" }
-"""
-
-
 @EACH_METHOD
 def test_an_event_of_several_relations_happens_when_the_whole_comes_true(
     folder: Path, method: int
 ) -> None:
     """x = sin t: armed above 0.5, left above 0.95; armed again below 0.9, left below -0.5."""
-    fmu = made(folder, GATE)
+    fmu = made(folder, TEXTS["GATE"])
     run = simulated(fmu, 12.0, 0.01, {"solver_method": method}, also=["armed", "open"])
     assert np.all(run["open"])
     t = run["time"]
@@ -126,28 +75,6 @@ def test_an_event_of_several_relations_happens_when_the_whole_comes_true(
         passed += 1.0 * (t > top + turn) + (t > low + turn)
     assert np.array_equal(run["armed"] != 0, armed)
     assert np.array_equal(run["passed"], passed)
-
-
-ROOM = """
-name = "Room"
-modes = ["heating"]
-[parameters]
-low = { start = 19.0 }
-high = { start = 21.0 }
-enabled = { type = "Boolean", start = true }
-[inputs]
-open = { type = "Boolean", description = "The window is open" }
-[states]
-T = { start = 18.0, derivative = "(30 * heat - (4 if open else 1) * (T - 5)) / 50" }
-[where]
-heat = "1 if heating and enabled and not open else 0"
-[events.cold]
-when = "T < low and not open"
-set = { heating = "true" }
-[events.warm]
-when = "T > high or open"
-set = { heating = "false" }
-"""
 
 
 def room(stop: float, is_enabled: bool) -> np.ndarray:
@@ -177,7 +104,7 @@ def room(stop: float, is_enabled: bool) -> np.ndarray:
 @EACH_METHOD
 @pytest.mark.parametrize("is_enabled", [True, False])
 def test_a_thermostat_sees_an_open_window(folder: Path, method: int, is_enabled: bool) -> None:
-    fmu = made(folder, ROOM)
+    fmu = made(folder, TEXTS["ROOM"])
     times = [(0.0, 0), (30.0, 0), (30.0, 1), (40.0, 1), (40.0, 0), (100.0, 0)]
     run = simulated(
         fmu, 100.0, 1.0, {"solver_method": method, "enabled": is_enabled},

@@ -11,70 +11,10 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave
 from scipy.linalg import expm
 
 from tests.equations.compiled import Model
-from tests.equations.examples import METHODS, initializing, made, simulated
+from tests.equations.examples import METHODS, MODELS, initializing, made, simulated
 
+TEXTS = MODELS["sampled"]
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
-COUNTERS = """
-name = "Counters"
-[parameters]
-T = { start = 0.1, unit = "s" }
-[discrete]
-a = {}
-b = {}
-c = { start = 5 }
-[sampled.fast]
-every = "T"
-set = { a = "a + 1" }
-[sampled.slow]
-every = "3 * T"
-set = { b = "a" }
-[sampled.late]
-every = "T"
-offset = "T / 2"
-while = "a > 2"
-set = { c = "c + 1" }
-"""
-PID = """
-name = "Pid"
-[parameters]
-m = { start = 1.3, unit = "kg", min = 1e-6 }
-Kp = { start = 20.0, unit = "N/m" }
-Kd = { start = 6.0, unit = "N.s/m" }
-Ki = { start = 10.0, unit = "N/(m.s)" }
-Ts = { start = 0.01, unit = "s", min = 1e-6 }
-target = { start = 1.0, unit = "m" }
-[states]
-x = { unit = "m", derivative = "v" }
-v = { unit = "m/s", derivative = "u / m" }
-[where]
-error = "target - x"
-[discrete]
-u = { unit = "N", description = "Force of the drive" }
-sum = { unit = "N" }
-last = { unit = "m" }
-[sampled.control]
-every = "Ts"
-set = { u = "Kp * error + sum - Kd * (x - last) / Ts", sum = "sum + Ki * Ts * error", last = "x" }
-"""
-PWM = """
-name = "Pwm"
-modes = ["on"]
-[parameters]
-R = { start = 2.0, unit = "Ohm" }
-L = { start = 5e-3, unit = "H" }
-V = { start = 24.0, unit = "V" }
-T = { start = 1e-3, unit = "s" }
-duty = { start = 0.3, min = 0, max = 0.999 }
-[states]
-i = { unit = "A", derivative = "((V if on else 0) - R * i) / L" }
-[sampled.begin]
-every = "T"
-set = { on = "true" }
-[sampled.end]
-every = "T"
-offset = "duty * T"
-set = { on = "false" }
-"""
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +24,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_samplers_of_one_instant_run_in_the_order_of_the_file(folder: Path) -> None:
     """3 * 0.1 and 1 * 0.3 are two doubles and one instant; the first tick is at the start."""
-    run = simulated(made(folder, COUNTERS), 30.0, 0.1, {})
+    run = simulated(made(folder, TEXTS["COUNTERS"]), 30.0, 0.1, {})
     k = np.arange(len(run))
     assert np.array_equal(run["a"], k + 1)
     assert np.array_equal(run["b"], k // 3 * 3 + 1)
@@ -93,7 +33,7 @@ def test_samplers_of_one_instant_run_in_the_order_of_the_file(folder: Path) -> N
 
 def test_ticks_do_not_drift_in_a_thousand_million(tmp_path: Path) -> None:
     """Time of the next tick: start + (offset + k every), rounded three times."""
-    model = Model(tmp_path, COUNTERS)
+    model = Model(tmp_path, TEXTS["COUNTERS"])
     for start, every, k in ((0.0, 0.1, 10**9), (3.7, 1 / 3, 123456789), (1.7e9, 0.01, 10**6)):
         given = {"T": every, "start": start, "ticks_fast": k, "ticks_slow": 1e12}
         values = model.values(**given, ticks_late=1e12)
@@ -118,7 +58,7 @@ def pid(stop: float, m: float = 1.3, period: float = 0.01) -> np.ndarray:
 @pytest.mark.parametrize("step", [0.01, 0.1, 0.025])
 def test_a_sampled_pid_controller_moves_a_mass(folder: Path, method: int, step: float) -> None:
     run = simulated(
-        made(folder, PID), 4.0, step, {"solver_method": method}, relative_tolerance=1e-10
+        made(folder, TEXTS["PID"]), 4.0, step, {"solver_method": method}, relative_tolerance=1e-10
     )
     rows = np.round(run["time"] / 0.01, 6)
     exact = pid(4.0)[rows[rows == np.round(rows)].astype(int)]
@@ -142,38 +82,16 @@ def current(t: float, duty: float, R: float = 2.0, L: float = 5e-3) -> float:
 def test_a_pwm_drive_charges_a_coil(folder: Path, method: int, duty: float) -> None:
     """At a duty of 0 both samplers tick at one instant: the second one has the last word."""
     run = simulated(
-        made(folder, PWM), 0.02, 3.7e-4, {"solver_method": method, "duty": duty},
+        made(folder, TEXTS["PWM"]), 0.02, 3.7e-4, {"solver_method": method, "duty": duty},
         relative_tolerance=1e-11,
     )  # fmt: skip
     exact = [current(t, duty) for t in run["time"]]
     assert np.max(np.abs(run["i"] - exact)) < 1e-9
 
 
-TIMER = """
-name = "Timer"
-[parameters]
-e = { start = 0.8 }
-[states]
-h = { start = 1.0, derivative = "v" }
-v = { derivative = "-10" }
-[discrete]
-next = { start = 0.25 }
-alarms = {}
-bounces = {}
-fastest = {}
-[events.alarm]
-when = "time >= next"
-set = { next = "next + 0.25 * (1 + alarms)", alarms = "alarms + 1" }
-[events.bounce]
-when = "h < 0"
-reinit = { h = "0", v = "-e * v" }
-set = { bounces = "bounces + 1", fastest = "max(fastest, -v)" }
-"""
-
-
 @EACH_METHOD
 def test_events_set_discrete_variables_and_their_own_next_time(folder: Path, method: int) -> None:
-    run = simulated(made(folder, TIMER), 2.0, 0.01, {"solver_method": method})
+    run = simulated(made(folder, TEXTS["TIMER"]), 2.0, 0.01, {"solver_method": method})
     t = run["time"]
     times = 0.25 * np.cumsum([1, 1, 2, 3, 4, 5, 6])  # the alarm sets the time of the next one
     assert np.array_equal(run["alarms"], np.sum(t[:, None] >= times, axis=1))
@@ -185,24 +103,9 @@ def test_events_set_discrete_variables_and_their_own_next_time(folder: Path, met
     assert run["fastest"][-1] == pytest.approx(np.sqrt(20.0), abs=1e-9)
 
 
-FILTER = """
-name = "Filter"
-[parameters]
-a = { start = 0.2 }
-[inputs]
-u = {}
-[discrete]
-y = { start = 1.0 }
-z = {}
-[sampled.tick]
-every = "0.1"
-set = { y = "y + a * (u - y)", z = "y" }
-"""
-
-
 def test_a_digital_filter_has_no_states(folder: Path) -> None:
     """A tick at the end of a step sees the input of the step."""
-    fmu = made(folder, FILTER)
+    fmu = made(folder, TEXTS["FILTER"])
     signal = np.array(
         [(0.0, 1.0), (0.45, 1.0), (0.45, 3.0), (2.0, 3.0)], [("time", "f8"), ("u", "f8")]
     )
@@ -218,7 +121,7 @@ def test_a_digital_filter_has_no_states(folder: Path) -> None:
 
 def test_an_importer_that_moves_the_mass_itself_gets_all_ticks(folder: Path) -> None:
     """Model Exchange: tick k is due at k Ts, and the force follows from the states set there."""
-    begun, rows = initializing(made(folder, PID), FMU2Model), pid(1.0)
+    begun, rows = initializing(made(folder, TEXTS["PID"]), FMU2Model), pid(1.0)
     instance, reference = begun.fmi, begun.loaded.references["u"]
     instance.exitInitializationMode()
     for k, (_, _, force) in enumerate(rows[:-1]):
@@ -236,7 +139,7 @@ def test_an_importer_that_moves_the_mass_itself_gets_all_ticks(folder: Path) -> 
 
 
 def test_ticks_survive_a_rollback_and_a_move_to_another_instance(folder: Path) -> None:
-    fmu = made(folder, PID)
+    fmu = made(folder, TEXTS["PID"])
     begun = initializing(fmu), initializing(fmu)
     first, second = (instance.fmi for instance in begun)
     names = begun[0].loaded.references
@@ -263,7 +166,7 @@ def test_ticks_survive_a_rollback_and_a_move_to_another_instance(folder: Path) -
 
 
 def test_start_values_of_discrete_variables_and_periods_can_be_set(folder: Path) -> None:
-    run = simulated(made(folder, COUNTERS), 1.0, 0.1, {"a": 10.0, "T": 0.2})
+    run = simulated(made(folder, TEXTS["COUNTERS"]), 1.0, 0.1, {"a": 10.0, "T": 0.2})
     assert run["a"][-1] == 16.0 and run["c"][0] == 5.0 and run["c"][-1] == 10.0
 
 
@@ -275,7 +178,7 @@ def test_start_values_of_discrete_variables_and_periods_can_be_set(folder: Path)
     ],
 )
 def test_a_sampler_that_fails_is_named(folder: Path, start: dict[str, float], message: str) -> None:
-    fmu, logged = made(folder, PID), []
+    fmu, logged = made(folder, TEXTS["PID"]), []
     options = {"start_time": start.pop("time", 0.0)}
     with pytest.raises(FMICallException):
         fmpy.simulate_fmu(

@@ -18,6 +18,7 @@ from rparm import schemas
 from tests.campaign.files import write
 from tests.campaign.test_campaign_file import MISTAKES as OF_CAMPAIGNS
 from tests.equations.compiled import ModelFileError, read_text, value_of_toml
+from tests.equations.examples import MODELS
 from tests.equations.test_model_file import EXAMPLES, MISTAKES
 from tests.rparm.test_scenario_mistakes import MISTAKES as OF_SCENARIOS
 from tests.support.paths import ROOT
@@ -28,39 +29,6 @@ FILES = {
     "scenario": sorted(ROOT.glob("models/*/scenarios/*.toml")),
     "campaign": sorted(ROOT.glob("models/*/campaigns/*.toml")),
 }
-# a file with every section and most forms of their entries
-RICH = """
-name = "Rich"
-modes = { on = true, "lit[i]" = { for = "i = 1..2", start = [true, false] } }
-description = "All of it"
-experiment = { stop = 2.0, tolerance = 1e-6 }
-sizes = { n = 2 }
-units = { dyn = { kg = 1, m = 1, s = -2 } }
-tables.T = { x = [0, 1, 2], y = [1, 2, 4], interpolation = "pchip", unit = { x = "m", y = "N" } }
-tables.G = { x = [0, 1], y = [1, 2], z = [[1, 2], [3, 4]], outside = "extend" }
-functions.f = { arguments = ["a", "b"], value = "a * b" }
-parameters.p = { start = 1, min = 0, max = 2, unit = "mm", description = "Length" }
-parameters.q = { value = "p * 2", unit = "m" }
-parameters.drive = { type = ["slow", "fast"], start = "fast" }
-parameters.T1 = { start = 1, unit = "s" }
-parameters.b = { type = "Boolean", start = true }
-parameters.k = { type = "Integer", start = 2, min = 0, max = 3 }
-parameters."w[i]" = { for = "i = 1..n", start = [1.0, 2.0] }
-inputs.u = { unit = "m" }
-inputs.s = { type = "Boolean", start = false }
-states.x = { start = "p", unit = "m", nominal = 2, derivative = "0 if s else -rate" }
-states."y[i]" = { for = "i = 1..n", derivative = "(y[i-1] if i > 1 else w[2]) / T1" }
-discrete.d = { start = 1.5 }
-discrete.c = { type = "Integer", start = "k" }
-sampled.tick = { every = "T1", offset = "T1 / 2", while = "on", set = { d = "d + 1", c = "c + k" } }
-where.rate = "u / T1"
-where.h = { value = "f(2, 3)", description = "Six" }
-outputs.e = { value = "sum(i = 1..n, y[i]) + G(1, d)" }
-events.hit = { when = "x < -p and not on", reinit = { x = "p" }, set = { on = "true" } }
-[check]
-"p is small" = "q < 3"
-"w rises" = { for = "i = 1..n", value = "w[i] > 0" }
-"""
 VALUES = (0, -1, 1e999, 1.5, True, "", "x", "1", "a b", [], [1, 2], ["x"], {}, {"x": "1"})
 # those of the mistakes that show without the meaning of texts
 SHOWN = """Boolean in quotes|argument|argument that is a function|arguments twice|array of starts
@@ -121,7 +89,7 @@ def places(value: object) -> Iterator[tuple[str | int, ...]]:
 
 def test_what_the_reader_takes_is_valid(tmp_path: Path) -> None:
     """Also with another value, or none, in any place."""
-    content, chance = tomllib.loads(RICH), random.Random(1)
+    content, chance = tomllib.loads(MODELS["schema"]["RICH"]), random.Random(1)
     taken = 0
     for place in [(), *chance.choices([*places(content)], k=200)]:
         changed: Any = copy.deepcopy(content)

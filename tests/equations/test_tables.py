@@ -7,28 +7,12 @@ import pytest
 from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
 
 from tests.equations.compiled import Model, ModelFileError, read_text
-from tests.equations.examples import METHODS, build, made, simulated
+from tests.equations.examples import METHODS, MISTAKES, MODELS, build, made, simulated
 
+TEXTS = MODELS["tables"]
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 X, Y = [0.0, 10.0, 20.0, 40.0], [3.0, 2.5, 1.0, 0.25]
 LISTS = f"x = {X}\ny = {Y}\n"
-MOTOR = """
-name = "Motor"
-[tables.T]
-x = [0, 10, 20, 40]
-y = [3.0, 2.5, 1.0, 0.25]
-outside = "OUTSIDE"
-unit = { x = "rad/s", y = "N.m" }
-[parameters]
-J = { start = 0.05, unit = "kg.m2" }
-d = { start = 0.02, unit = "N.m.s" }
-[inputs]
-load = { unit = "N.m" }
-[states]
-w = { start = -5, unit = "rad/s", derivative = "(T(w) - d * w - load) / J" }
-[outputs]
-torque = { value = "T(w)", unit = "N.m" }
-"""
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +56,7 @@ def speed(times: np.ndarray, outside: str, load: float) -> np.ndarray:
 def test_a_motor_runs_up_along_its_curve(
     folder: Path, method: int, outside: str, load: float
 ) -> None:
-    fmu = made(folder, MOTOR.replace("OUTSIDE", outside))
+    fmu = made(folder, TEXTS["MOTOR"].replace("OUTSIDE", outside))
     start = {"solver_method": method, "load": load}
     run = simulated(fmu, 3.0, 0.01, start, relative_tolerance=1e-11, also=["event_count"])
     exact = speed(run["time"], outside, load)
@@ -81,37 +65,13 @@ def test_a_motor_runs_up_along_its_curve(
     assert run["event_count"][-1] == np.sum((exact.min() < knots) & (knots < exact.max()))
 
 
-SIGNALS = """
-name = "Signals"
-[tables.line]
-x = [0.5, 1.0, 1.7, 3.0]
-y = [1.0, -2.0, 0.5, 4.0]
-[tables.stair]
-x = [0.5, 1.0, 1.7, 3.0]
-y = [1.0, -2.0, 0.5, 4.0]
-interpolation = "previous"
-[tables.curve]
-x = [0.5, 1.0, 1.7, 3.0]
-y = [1.0, -2.0, 0.5, 4.0]
-interpolation = "pchip"
-outside = "extend"
-[inputs]
-u = {}
-[states]
-a = { derivative = "line(time)" }
-b = { derivative = "stair(time)" }
-c = { derivative = "curve(u) * 0 + curve(time)" }
-[outputs]
-now = { value = "line(u)" }
-"""
 ROWS = np.array([0.5, 1.0, 1.7, 3.0]), np.array([1.0, -2.0, 0.5, 4.0])
 
 
 @EACH_METHOD
 def test_integrals_over_tables_of_the_time_are_exact(folder: Path, method: int) -> None:
-    run = simulated(
-        made(folder, SIGNALS), 4.0, 0.1, {"solver_method": method}, relative_tolerance=1e-11
-    )
+    fmu = made(folder, TEXTS["SIGNALS"])
+    run = simulated(fmu, 4.0, 0.1, {"solver_method": method}, relative_tolerance=1e-11)
     x, y = ROWS
     grid = np.unique(np.concatenate([x, run["time"]]))
     middle = (grid[1:] + grid[:-1]) / 2
@@ -129,7 +89,7 @@ def test_a_table_of_an_input_follows_at_once(folder: Path) -> None:
     times = np.array([0.0, 0.4, 0.4, 1.0, 3.0])
     u = np.array([0.0, 0.9, 2.9, 1.2, 5.0])
     signal = np.array(list(zip(times, u, strict=True)), [("time", "f8"), ("u", "f8")])
-    run = simulated(made(folder, SIGNALS), 3.0, 0.05, {}, input=signal)
+    run = simulated(made(folder, TEXTS["SIGNALS"]), 3.0, 0.05, {}, input=signal)
     # a step holds the input of its begin
     exact = np.interp(np.interp(run["time"] - 0.05, times[2:], u[2:]), *ROWS)
     rows = run["time"] > 0.46
@@ -173,27 +133,13 @@ def test_a_table_of_two_arguments_is_bilinear(tmp_path: Path) -> None:
         assert values[model.names.index("v")] == pytest.approx(float(held), rel=1e-13)
 
 
-LONG = """
-name = "Long"
-[tables.road]
-file = "road.csv"
-x = "way"
-y = "height"
-[states]
-s = { derivative = "20 + 10 * sin(time)" }
-h = { derivative = "road(s) - h" }
-[outputs]
-height = { value = "road(s)" }
-"""
-
-
 def test_a_hundred_thousand_rows_of_a_file(tmp_path: Path) -> None:
     """A road of 1 mm rows, driven over at 30 m/s: a hundred rows in 3 ms."""
     way = np.arange(100_000) * 0.001
     height = np.sin(way) + 0.001 * np.random.default_rng(1).normal(size=len(way))
     rows = "".join(f"{a!r}, {b!r}\n" for a, b in zip(way.tolist(), height.tolist(), strict=True))
     (tmp_path / "road.csv").write_text("way, height\n" + rows)
-    (tmp_path / "Long.toml").write_text(LONG)
+    (tmp_path / "Long.toml").write_text(TEXTS["LONG"])
     fmu = build(tmp_path / "Long.toml", tmp_path)
     run = simulated(fmu, 0.5, 0.1, {"max_events": 10**6}, also=["event_count"])
     t = run["time"]
@@ -202,45 +148,13 @@ def test_a_hundred_thousand_rows_of_a_file(tmp_path: Path) -> None:
     assert abs(run["event_count"][-1] - np.floor(s[-1] / 0.001)) <= 1
 
 
-MISTAKES = {
-    "one row": ("x = [1]\ny = [2]", "[tables.T]: x: has 1 rows, expected two at least"),
-    "order": ("x = [1, 3, 2]\ny = [0, 0, 0]", "x: row 3: expected more than 3.0, got 2.0"),
-    "twice": ("x = [1, 1]\ny = [0, 0]", "x: row 2: expected more than 1.0, got 1.0"),
-    "nan": ("x = [1, nan]\ny = [0, 0]", "x: row 2: expected a finite number"),
-    "text": ('x = [1, "2"]\ny = [0, 0]', "x: row 2: expected a number"),
-    "lengths": ("x = [1, 2]\ny = [0]", "y: has 1 values, expected 2, as x has"),
-    "no y": ("x = [1, 2]", "y: expected a list of numbers"),
-    "kind": ('x = [1, 2]\ny = [0, 0]\ninterpolation = "cubic"', "expected one of linear, previous"),
-    "outside": ('x = [1, 2]\ny = [0, 0]\noutside = "wrap"', "outside: expected one of hold, ext"),
-    "key": ("x = [1, 2]\ny = [0, 0]\nw = 1", "unknown key 'w', expected one of x, y, z, file"),
-    "rows of z": ("x = [1, 2]\ny = [0, 1]\nz = [[1, 2]]", "z: expected 2 rows, one for each x"),
-    "row of z": ("x = [1, 2]\ny = [0, 1]\nz = [[1, 2], [3]]", "z: row 2: has 1 values, expected 2"),
-    "no file": ('x = "a"\ny = "b"\nfile = "none.csv"', "file: none.csv: no such file"),
-    "folder": ('x = "a"\ny = "b"\nfile = "."', "no such file"),
-    "column": ('x = "c"\ny = "b"\nfile = "f.csv"', "x: f.csv has no column 'c' (has: a, b, b)"),
-    "columns": ('x = "a"\ny = "b"\nfile = "f.csv"', "y: f.csv has no column 'b'"),
-    "cell": ('x = "a"\ny = "d"\nfile = "g.csv"', "y: g.csv: line 3: expected a finite number, got"),
-    "bytes": ('x = "a"\ny = "d"\nfile = "h.csv"', "file: h.csv: is no CSV in UTF-8"),
-    "names": ('x = 1\ny = "d"\nfile = "g.csv"', "x: expected the name of a column of g.csv"),
-    "unit": ("x = [1, 2]\ny = [0, 0]\nunit = { x = 'm2/q' }", "'q' is no SI symbol"),
-    "unit key": ("x = [1, 2]\ny = [0, 0]\nunit = { z = 'm' }", "unit: unknown key 'z', expected x"),
-    "unit of x": (
-        "x = [1, 2]\ny = [0, 0]\nunit = { x = 'm' }\n[inputs]\nu = { unit = 's' }\n"
-        "[where]\na = 'T(u)'",
-        "[where]: a: column 1: T takes unit m, got s",
-    ),
-    "arguments": ("x = [1, 2]\ny = [0, 0]\n[where]\na = 'T(1, 2)'", "T: expected 1 argument, got"),
-}
-
-
-@pytest.mark.parametrize("name", MISTAKES)
+@pytest.mark.parametrize("name", MISTAKES["tables"])
 def test_a_mistake_in_a_table_is_one_line(name: str, tmp_path: Path) -> None:
     (tmp_path / "f.csv").write_text("a,b,b\n1,2,3\n")
     (tmp_path / "g.csv").write_text("a,d\n1,2\n2,inf\n")
     (tmp_path / "h.csv").write_bytes(b"a,d\n\xff\xfe\n")
-    content, expected = MISTAKES[name]
-    text = f'name = "M"\n[tables.T]\n{content}\n'
+    mistake = MISTAKES["tables"][name]
     with pytest.raises(ModelFileError) as refused:
-        read_text(tmp_path, text if "[where]" in content else text + "[inputs]\nv = {}\n")
+        read_text(tmp_path, mistake["text"])
     message = str(refused.value)
-    assert expected in message and "\n" not in message and len(message) < 500
+    assert mistake["expected"] in message and "\n" not in message and len(message) < 500

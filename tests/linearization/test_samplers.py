@@ -15,76 +15,9 @@ from rparm.errors import UserError
 from rparm.fmi.fmu_file import CO_SIMULATION
 from rparm.linearization.responses import frequency_response
 from rparm.linearization.study import Request, study
-from tests.equations.examples import made
-from tests.equations.test_sampled import COUNTERS, FILTER, PID, PWM
+from tests.equations.examples import MODELS, made
 
-# Astrom and Wittenmark, Computer-Controlled Systems: the double integrator, and deadbeat control
-DEADBEAT = """name = "Deadbeat"
-parameters.h.start = 1
-inputs.r = {}
-states = { x1 = { derivative = "x2" }, x2 = { derivative = "u" } }
-discrete.u = {}
-sampled.feedback = { every = "h", set = { u = "(r - x1) / h**2 - 1.5 * x2 / h" } }
-"""
-# two instants a period; `second` sees the u of `first`; `never` does not tick; `extra` rests
-CRANE = """name = "Crane"
-modes = ["broken"]
-inputs.r.start = 0.1
-discrete = { u = { start = 0.1 }, e = {}, extra = { start = 7 } }
-[parameters]
-h = { start = 0.2 }
-begin = { start = 0 }
-skipped = { start = 0 }
-p0 = { start = 0.3 }
-[states]
-phi = { start = "p0", derivative = "w" }
-w = { start = 0.2, derivative = "-sin(phi) - 0.3 * w**3 + u * cos(phi)" }
-[sampled]
-late = { every = "h", offset = "begin + 0.3 * h", reinit = { w = "0.9 * w + 0.05 * tanh(e)" } }
-[sampled.first]
-every = "2 * h / 2"
-offset = "begin + skipped * h"
-set = { u = "tan(r) - sin(phi) * cos(phi) - 0.4 * w", e = "e / 2 + max(phi**2, -1) - r" }
-[sampled.second]
-every = "h"
-offset = "begin"
-set = { e = "e + u * phi", broken = "phi > 3" }
-[sampled.never]
-every = "h"
-offset = "begin"
-while = "broken or phi > 4"
-set = { u = "99" }
-"""
-# each mass has its sampler
-TWO = """name = "Two"
-sizes.n = 2
-[states]
-"x[i]" = { for = "i = 1..n", derivative = "u[i] - x[i]" }
-[discrete]
-"u[i]" = { for = "i = 1..n" }
-on = { type = "Boolean", start = true }
-level = { type = "Integer", start = 3 }
-[sampled."s[i]"]
-for = "i = 1..n"
-every = "0.1"
-offset = "0.08 - 0.02 * i"
-set = { "u[i]" = "level * sum(j = 1..n, x[j])", on = "x[i] < 1", level = "4 if x[i] > 1 else 3" }
-"""
-LIMITED = """name = "Limited"
-parameters.T.start = 1
-states.x.derivative = "1 / T - x"
-discrete.u = {}
-sampled.s = { every = "T", offset = "T", set = { u = "sqrt(x - 2)" }, while = "x > 1" }
-"""
-BRAKE = """name = "Brake"
-inputs.f = {}
-discrete.u = {}
-sampled.s = { every = "0.5", set = { u = "f" }, reinit = { w = "0.5 * w + f" } }
-[states]
-v = { derivative = "0 if abs(v) < 1 else f" }
-w = { derivative = "0 if abs(w) < 1 else f" }
-x = { derivative = "u - x" }
-"""
+TEXTS = MODELS["samplers"] | MODELS["sampled"]
 SYSTEM = """<SystemStructureDescription version="1.0" name="One"
   xmlns="http://ssp-standard.org/SSP1/SystemStructureDescription">
   <System name="One"><Elements><Component name="loop" source="resources/Deadbeat.fmu">
@@ -102,7 +35,7 @@ def assert_close(found: np.ndarray, exact: np.ndarray) -> None:
 
 
 def test_deadbeat_control_of_a_double_integrator_settles_in_two_samples(folder: Path) -> None:
-    found = rparm.linearize(made(folder, DEADBEAT))
+    found = rparm.linearize(made(folder, TEXTS["DEADBEAT"]))
     plant, input_ = np.array([[1, 1], [0, 1]]), np.array([[0.5], [1]])
     gain = np.array([[1, 1.5]])
     assert_close(found.A, np.block([[plant - input_ @ gain, np.zeros((2, 1))], [-gain, 0]]))
@@ -114,7 +47,7 @@ def test_deadbeat_control_of_a_double_integrator_settles_in_two_samples(folder: 
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_a_sampled_pid_controller_of_a_mass(folder: Path, fmi: int) -> None:
-    path, h, m, Kp, Kd, Ki = made(folder, PID), 0.08, 0.7, 11.0, 2.0, 4.0
+    path, h, m, Kp, Kd, Ki = made(folder, TEXTS["PID"]), 0.08, 0.7, 11.0, 2.0, 4.0
     at = {"Ts": h, "m": m, "Kp": Kp, "Kd": Kd, "Ki": Ki, "target": 0.2}
     path = path if fmi == 2 else path.parent / "fmi3" / path.name
     found = rparm.linearize(path, at=at, trim=["x", "u", "sum", "last"])
@@ -147,7 +80,7 @@ def test_samplers_with_offsets_compose_in_the_order_of_time(
 ) -> None:
     """A shift of all offsets, or of one by periods, changes nothing: the first tick begins."""
     point = {"phi": 0.5, "w": -0.1, "u": 0.2, "e": 0.3}  # phi follows from p0
-    found = rparm.linearize(made(folder, CRANE), at=point | shift | {"r": 0.4, "h": 0.5})
+    found = rparm.linearize(made(folder, TEXTS["CRANE"]), at=point | shift | {"r": 0.4, "h": 0.5})
     assert found.states == tuple(point) and found.left_out == ("extra",)
     assert_close(np.hstack([found.A, found.B]), crane(np.array([*point.values()]), 0.5, 0.4))
     assert found.x.tolist() == [*point.values()]
@@ -156,7 +89,7 @@ def test_samplers_with_offsets_compose_in_the_order_of_time(
 
 
 def test_samplers_with_indexes_have_names_with_indexes(folder: Path) -> None:
-    found = rparm.linearize(made(folder, TWO))
+    found = rparm.linearize(made(folder, TEXTS["TWO"]))
     assert found.states == ("x[1]", "x[2]", "u[1]", "u[2]") and found.outputs == found.states
     first, second = np.eye(4), np.eye(4)
     first[3] = second[2] = [3, 3, 0, 0]
@@ -167,7 +100,7 @@ def test_samplers_with_indexes_have_names_with_indexes(folder: Path) -> None:
 
 def test_a_run_follows_the_linear_model_to_first_order(folder: Path) -> None:
     """The difference falls as the square of the deviation, over 20 periods of two instants."""
-    fmu = made(folder, CRANE)
+    fmu = made(folder, TEXTS["CRANE"])
     found = rparm.linearize(fmu, at=dict.fromkeys(("phi", "w", "u", "e", "r"), 0.0))
     trimmed = rparm.linearize(fmu, at={"r": 0.0}, trim=found.states)
     assert trimmed.x == pytest.approx(np.zeros(4), abs=1e-9)
@@ -189,7 +122,7 @@ def test_a_run_follows_the_linear_model_to_first_order(folder: Path) -> None:
 
 
 def test_a_filter_is_discrete_without_continuous_states(folder: Path) -> None:
-    found = rparm.linearize(made(folder, FILTER), at={"a": 0.25})
+    found = rparm.linearize(made(folder, TEXTS["FILTER"]), at={"a": 0.25})
     whole = np.hstack([found.A, found.B])
     assert_close(whole, np.array([[0.75, 0, 0.25], [1, 0, 0]]))
     assert_close(np.hstack([found.C, found.D]), whole)
@@ -201,45 +134,46 @@ def test_a_filter_is_discrete_without_continuous_states(folder: Path) -> None:
 
 def test_a_state_that_no_tick_moves_is_held(folder: Path) -> None:
     """A brake holds both masses, but a tick moves one."""
-    found = rparm.linearize(made(folder, BRAKE))
+    found = rparm.linearize(made(folder, TEXTS["BRAKE"]))
     assert found.held == ("v",) and found.states == ("w", "x", "u")
     assert_close(np.diag(found.A), np.array([0.5, np.exp(-0.5), 0.0]))
 
 
 RATES = "fast every 0.1 s, slow every 0.3 s, late every 0.1 s"
 REFUSED = {
-    "several rates": (COUNTERS, {}, f"Counters.fmu: samples at several rates, .* {RATES}$"),
-    "modes": (PWM, {}, "sampler end changes on at this point, expected a point at which"),
-    "condition": (TWO, {"at": {"x[1]": 2.0}}, r"sampler s\[1\] changes on, level at this point"),
-    "no value": (LIMITED, {"at": {"x": 1.5}}, "sampler s: the new value of u is not finite"),
-    "no fixed point": (PID, {"trim": ["x", "u"]}, "found by x, u: sampler control changes sum by"),
-    "it moves": (DEADBEAT, {"at": {"r": 1}, "trim": ["x2", "u"]}, "the derivative of x1 stays at"),
-    "sampled twice": (DEADBEAT, {}, "step: the model is sampled already, every 1 s"),
+    "several rates": ("COUNTERS", {}, f"Counters.fmu: samples at several rates, .* {RATES}$"),
+    "modes": ("PWM", {}, "sampler end changes on at this point, expected a point at which"),
+    "condition": ("TWO", {"at": {"x[1]": 2.0}}, r"sampler s\[1\] changes on, level at this point"),
+    "no value": ("LIMITED", {"at": {"x": 1.5}}, "sampler s: the new value of u is not finite"),
+    "no point": ("PID", {"trim": ["x", "u"]}, "found by x, u: sampler control changes sum by"),
+    "moving": ("DEADBEAT", {"at": {"r": 1}, "trim": ["x2", "u"]}, "the derivative of x1 stays at"),
+    "sampled twice": ("DEADBEAT", {}, "step: the model is sampled already, every 1 s"),
 }
 
 
 @pytest.mark.parametrize("case", REFUSED)
 def test_no_linear_model_is_made(folder: Path, case: str) -> None:
-    text, options, message = REFUSED[case]
+    name, options, message = REFUSED[case]
     with pytest.raises(UserError, match=message) as raised:
-        rparm.linearize(made(folder, text), **options).zoh(0.1)
+        rparm.linearize(made(folder, TEXTS[name]), **options).zoh(0.1)
     assert "\n" not in str(raised.value)
 
 
 def test_a_condition_is_taken_as_it_is_at_the_point(folder: Path) -> None:
     """The tick does nothing here, so that its new value need not be defined."""
-    assert_close(rparm.linearize(made(folder, LIMITED), at={"x": 0.5}).A, block_diag(np.exp(-1), 1))
+    found = rparm.linearize(made(folder, TEXTS["LIMITED"]), at={"x": 0.5})
+    assert_close(found.A, block_diag(np.exp(-1), 1))
 
 
 def test_what_has_no_discrete_model_says_what_to_do(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(UserError, match="has samplers: linearize it in model exchange"):
-        study(Request(made(folder, DEADBEAT), kind=CO_SIMULATION))
+        study(Request(made(folder, TEXTS["DEADBEAT"]), kind=CO_SIMULATION))
     with pytest.raises(UserError, match="can be: set sample_time to 0$"):
         rparm.linearize("RPSensor", at={"q1": 1})
     path = tmp_path / "One.ssp"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("SystemStructure.ssd", SYSTEM)
-        archive.write(made(folder, DEADBEAT), "resources/Deadbeat.fmu")
+        archive.write(made(folder, TEXTS["DEADBEAT"]), "resources/Deadbeat.fmu")
     with pytest.raises(UserError, match="'loop' is sampled by feedback, which [^:]*: take it as"):
         rparm.linearize(path)
 
@@ -249,7 +183,7 @@ def test_files_and_page_say_that_it_is_sampled(
 ) -> None:
     saved = tmp_path / "m.csv"
     options = ["--save", str(saved), "--output", str(tmp_path), "--json", "--at", "x1=0.5"]
-    assert cli.main(["linearize", str(made(folder, DEADBEAT)), *options]) == 0
+    assert cli.main(["linearize", str(made(folder, TEXTS["DEADBEAT"])), *options]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["dt"] == 1.0 and found["poles"] == [[0, 0]] * 3
     rows = [row[0] for row in csv.reader(saved.open(newline=""))]
