@@ -291,6 +291,9 @@ class Enumeration(Discrete):
     def check_items(cls, items: dict[str, Item]) -> dict[str, Item]:
         if not items:
             raise ValueError("must have one item at least")
+        without = [name for name, item in items.items() if item.constant is None]
+        if without and len(without) < len(items):
+            raise ValueError(f"have an item {without[0]}, where constant is missing")
         return items
 
     @field_validator("start_item", mode="before")

@@ -134,6 +134,8 @@ def written(root: Node) -> str:
                 text = "true" if node.value else "false"
             case "name":
                 text = node.name
+            case "unit":
+                text, own = given[0]
             case "negative" | "not":
                 text = f"{'-' if node.op == 'negative' else 'not '}{inner[0]}"
             case "if":
@@ -141,7 +143,7 @@ def written(root: Node) -> str:
             case op if op in BINDING:
                 text = f" {op} ".join(inner)
             case op:
-                text = f"{node.name if op == 'table' else op}({', '.join(texts)})"
+                text = f"{node.name if op in ('table', 'call') else op}({', '.join(texts)})"
         found[node] = text, own
     return found[root][0]
 
