@@ -170,7 +170,7 @@ def test_it_names_all_sections_and_functions(tmp_path: Path) -> None:
     named = "sampled.NAME events.NAME tables.NAME"
     assert all(f"`[{section}]`" in PAGE for section in f"{sections} {named}".split())
     line = re.search(r"`(sin cos .*?)`", PAGE)[1]
-    calls = " + ".join(f"{f}(p, p)" if f in ("atan2", "hypot", "min", "max") else f"{f}(p)"
+    calls = " + ".join(f"{f}(p, p)" if f in ("atan2", "hypot", "min", "max", "mod") else f"{f}(p)"
                        for f in line.split())  # fmt: skip
     Model(tmp_path, f'name = "M"\n[parameters]\np = {{ start = 1 }}\n[where]\na = "{calls}"\n')
     unit = re.search(r'`("dyn" = .*?)`', PAGE)[1]

@@ -71,9 +71,13 @@ def test_files_of_the_project_are_valid(kind: str) -> None:
 def test_mistakes_that_show_without_meaning_are_refused(tmp_path: Path) -> None:
     found = {name for name, (text, _) in MISTAKES.items() if is_refused("model", text)}
     assert {*SHOWN.replace("\n", "|").split("|")} - found == set()
+    of_campaigns = {}
+    for mistake in OF_CAMPAIGNS["arm"]:
+        changes = [(c["old"], c["new"]) for c in mistake.get("changes", [mistake])]
+        of_campaigns[mistake["message"]] = write(tmp_path, changes=changes).read_text()
     for kind, mistakes in (
         ("scenario", {message: text for text, message in OF_SCENARIOS}),
-        ("campaign", {said: write(tmp_path, changes=c).read_text() for c, said in OF_CAMPAIGNS}),
+        ("campaign", of_campaigns),
     ):
         shown = [text for message, text in mistakes.items() if SAID.search(message)]
         assert len(shown) > 8 and [text for text in shown if not is_refused(kind, text)] == []
