@@ -1,5 +1,7 @@
 """The examples with equations: against closed forms, conservation laws and heyoka."""
 
+import re
+import tomllib
 from pathlib import Path
 
 import heyoka
@@ -10,6 +12,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
+from rparm.fmi.fmu_file import read_model
+from rparm.runs import scenario
 from tests.equations.examples import FOLDER, METHODS, example, simulated
 
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
@@ -159,3 +163,9 @@ def test_the_drive_is_that_of_a_loop_over_its_samples(folder: Path, method: int)
     found = np.array([run["phi"], run["omega"]]).T
     assert np.max(np.abs(exact)) > 5.0
     np.testing.assert_allclose(found, exact, rtol=0, atol=2e-6)
+
+
+def test_a_new_scenario_can_set_elements(folder: Path) -> None:
+    text = scenario.template("a", "fmu", "Masses.fmu", read_model(example("masses", folder)))
+    given = tomllib.loads(re.sub(r"^# (?=\S+ = [0-9.e-]+(  #|$))", "", text, flags=re.MULTILINE))
+    assert given["parameters"]["d[20]"] == 0.0 and given["parameters"]["m"] == 0.25
