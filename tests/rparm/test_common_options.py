@@ -11,20 +11,11 @@ from rparm.command_line import COMMANDS
 from rparm.commands.completion import SCRIPT, SHELLS
 from rparm.systems import comparison
 from tests.support.paths import ROOT
-from tests.support.rparm_project import Console
+from tests.support.rparm_project import MISTAKES, Console
 from tests.support.ssp_files import SSP, edited, replace
 
 # what each command cannot do without
-NEEDED = {
-    "new": ["x"],
-    "build": ["x.toml"],
-    "new-model": ["x"],
-    "linearize": ["x"],
-    "campaign": ["x.toml"],
-    "federate": ["x.ssp", "variant", "component", "--broker", "tcp://127.0.0.1:1"],
-    "fmu": ["x"],
-    "completion": ["bash"],
-}
+NEEDED = MISTAKES["needed"]
 COMMON = ["--json", "--quiet", "--output", "here", "--open"]
 
 
