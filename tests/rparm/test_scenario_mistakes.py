@@ -50,17 +50,7 @@ def test_bytes_that_are_not_text(write) -> None:
         scenario.load(path, TOY)
 
 
-@pytest.mark.parametrize(
-    ("keys", "message"),
-    [
-        ("", "missing key 'model', the name of what the scenario is of .*, or 'fmu', the file"),
-        ('fmu = "Toy.fmu"\nmodel = "toy"', "has both 'model' and 'fmu': expected one of them"),
-        ("fmu = 3", "fmu: expected a text, got 3"),
-        ('fmu = "Toi.fmu"', "fmu: 'Toi.fmu': no such file, did you mean 'Toy.fmu'"),
-        ('fmu = "folder"', "fmu: 'folder': "),
-        ('fmu = "a\\u0000b"', "fmu: 'a.x00b': "),
-    ],
-)
+@pytest.mark.parametrize(("keys", "message"), MISTAKES["elsewhere"]["rows"])
 def test_what_a_scenario_elsewhere_is_of(tmp_path: Path, keys: str, message: str) -> None:
     path = tmp_path / "run.toml"
     path.write_text(f"{keys}\n{HEAD}{TIME}")
