@@ -8,32 +8,12 @@ from pathlib import Path
 
 from rparm.campaign import campaign_file
 from rparm.campaign.campaign_file import Campaign
+from tests.support.tables import tables
 
-HEAD = """title = "Test"
-description = "Of a test."
-"""
-ARM = (
-    HEAD
-    + """scenario = "hanging_swing"
-sampling = "sobol"
-seed = 3
-runs = 40
-block = 8
-time = { stop = 1.0 }
-
-[parameters.m2]
-uniform = [1.0, 3.0]
-
-[parameters.q1]
-normal = [-2.0, 0.2]
-
-[keep]
-final = ["q1", "q2"]
-maximum = ["dq1"]
-integral = ["actuator_power"]
-trajectories = [3, 17]
-"""
-)
+MISTAKES = tables(str(Path(__file__).with_name("mistakes")))
+FILES = MISTAKES["files"]
+HEAD = FILES["HEAD"]
+ARM = HEAD + FILES["ARM"]
 
 
 def write(folder: Path, text: str = ARM, changes: Sequence[tuple[str, str]] = ()) -> Path:

@@ -10,13 +10,11 @@ import pytest
 
 from rparm.campaign import bases, planning
 from rparm.errors import UserError
-from tests.campaign.files import HEAD, campaign, write
+from tests.campaign.files import FILES, HEAD, MISTAKES, campaign, write
 from tests.support.rparm_project import FMUS, Console
-from tests.support.tables import tables
 
 GRID, M2 = [("sobol", "grid"), ("runs = 40\n", "")], "[1.0, 3.0]"
 Q1 = "normal = [-2.0, 0.2]"
-MISTAKES = tables(str(Path(__file__).with_name("mistakes")))
 
 
 @pytest.mark.parametrize("mistake", MISTAKES["arm"], ids=itemgetter("message"))
@@ -37,18 +35,7 @@ def test_the_file_that_the_mistakes_are_made_in_is_right(tmp_path: Path) -> None
     assert [m.column for m in job.measures][:2] == ["final(q1)", "final(q2)"]
 
 
-SYSTEM = (
-    HEAD
-    + """system = "closed_loop"
-variant = "nominal"
-sampling = "random"
-runs = 2
-[parameters."arm.m2"]
-uniform = [0.9, 1.1]
-[keep]
-final = ["arm.q1"]
-"""
-)
+SYSTEM = HEAD + FILES["SYSTEM"]
 
 
 @pytest.mark.parametrize("mistake", MISTAKES["system"], ids=itemgetter("message"))

@@ -11,10 +11,9 @@ from rparm.campaign import bases
 from rparm.campaign.campaign_file import Campaign
 from rparm.campaign.planning import Points
 from rparm.errors import UserError
-from tests.campaign.files import ARM, HEAD, campaign, write
+from tests.campaign.files import ARM, HEAD, MISTAKES, campaign, write
 from tests.campaign.runners import rows, runner
 from tests.support.rparm_project import BUILD, FMUS, Console, assert_one_line
-from tests.support.tables import tables
 
 RIGHT_ANGLE = repr(math.pi / 2)
 # with units, and the same in SI
@@ -64,10 +63,7 @@ def test_the_points_of_a_grid(tmp_path: Path) -> None:
     assert (angles[0], angles[3]) == (-math.pi, math.pi / 2)
 
 
-MISTAKES = tables(str(Path(__file__).with_name("mistakes")))["units"]
-
-
-@pytest.mark.parametrize("mistake", MISTAKES, ids=itemgetter("message"))
+@pytest.mark.parametrize("mistake", MISTAKES["units"], ids=itemgetter("message"))
 def test_mistakes_get_one_line(mistake: dict[str, str], tmp_path: Path) -> None:
     with pytest.raises(UserError) as caught:
         converted(campaign(tmp_path, changes=[(mistake["old"], mistake["new"])]))

@@ -13,7 +13,7 @@ from rparm.fmi.fmu_file import Fmu
 from rparm.runs.simulation import simulate
 from rparm.systems import ssp
 from rparm.systems.master import Master
-from tests.campaign.files import ARM, HEAD, campaign
+from tests.campaign.files import ARM, FILES, HEAD, campaign
 from tests.campaign.runners import rows, runner
 from tests.support.paths import ROOT
 from tests.support.rparm_project import BUILD, FMUS, fmi3_fmu, load
@@ -242,33 +242,7 @@ def test_the_exponent_is_the_growth_of_a_small_deviation(tmp_path: Path) -> None
     assert found.measures[0, -1] == pytest.approx(np.log(growth) / 2.0, abs=1e-5)
 
 
-# no friction; the slide swings between springs, or strikes a rigid stop
-PLANT = (
-    HEAD
-    + """scenario = "rubber_buffers"
-sampling = "random"
-runs = 1
-time = { start = 0.0, stop = 0.5, step = 0.0005 }
-[set]
-relative_tolerance = 5e-12
-f2 = 0.0
-damping1 = 0.0
-coulomb_friction1 = 0.0
-breakaway_friction1 = 0.0
-stops1 = "none"
-coulomb_friction2 = 0.0
-breakaway_friction2 = 0.0
-lower2 = -0.01
-upper2 = 0.01
-stop_stiffness2 = 300.0
-stop_damping2 = 2.0
-[parameters.q1]
-values = [0.4]
-[keep]
-lyapunov = true
-final = ["q1", "q2", "dq1", "dq2", "event_count"]
-"""
-)
+PLANT = HEAD + FILES["PLANT"]
 
 
 def test_the_exponent_passes_springs_and_has_no_value_where_a_deviation_jumps(

@@ -13,7 +13,7 @@ import rparm
 from rparm.errors import UserError
 from rparm.systems import ssp
 from rparm.systems.ssp import Connector
-from tests.support.rparm_project import Console
+from tests.support.rparm_project import MISTAKES, Console
 from tests.support.ssp_files import (
     ALGORITHM,
     EXPERIMENT,
@@ -186,14 +186,10 @@ def test_the_step_is_the_smallest_of_the_fmus(
 # ---- what is refused -----------------------------------------------------------------------------
 
 TAU1 = '<ssd:Connector name="tau1" kind="input"><ssc:Real unit="N.m"/>'
-F2_CONNECTION = """      <ssd:Connection startElement="controller" startConnector="f2"
-          endElement="arm" endConnector="f2"/>"""
 NOMINAL_ARM = "resources/arm_nominal.ssv"
 TOLERANCE = '<ssv:Parameter name="relative_tolerance"><ssv:Real value="1e-11" unit="1"/>'
-
-
 CONTROLLER, GAINS = "resources/RPController.fmu", "resources/controller_nominal.ssv"
-ARM, IN_CONTROLLER = "component 'arm'", "component 'controller'"
+IN_CONTROLLER = "component 'controller'"
 OLD_FMU = edited_fmu({"modelDescription.xml": replace('fmiVersion="2.0"', 'fmiVersion="1.0"')})
 ITEM = '<ssv:Parameter name="mode"><ssv:Enumeration value="pd"/>'
 # edits of files in the SSP; parts of the message, with | between them
@@ -209,49 +205,13 @@ FILES: list[tuple[str, Edit, str]] = [
     (STRUCTURE, lambda content: content[:-200], f"{STRUCTURE}|not valid XML"),
     (STRUCTURE, replace("ssd:Elements>", "ssd:Elemente>", -1), f"{STRUCTURE}|line |Elemente"),
 ]
-INPUT = '<ssd:Connector name="tau1" kind="input">'
-TAU, F2 = "controller.tau1 -> arm.", " -> arm.f2"
-FROM, TO = 'startElement="controller"', 'endElement="arm" endConnector="tau1"'
-BACKWARD = F2_CONNECTION.replace("arm", "x").replace("controller", "arm").replace("x", "controller")
-SCALED = F2_CONNECTION[:-2] + '><ssc:LinearTransformation factor="2"/></ssd:Connection>'
-# texts of the structure, and others in their places
-STRUCTURES = [
-    (CONTROLLER, "../RPController.fmu", f"{IN_CONTROLLER}|../RPController.fmu"),
-    (CONTROLLER, "..\\RPController.fmu", f"{IN_CONTROLLER}|is no path in the SSP"),
-    (FROM, 'startElement="contoller"', "contoller.tau1 -> arm.tau1|did you mean 'controller'?"),
-    (TO, TO.replace("1", "3"), f"{TAU}tau3|'arm' has no connector 'tau3'|did you mean 'tau1'?"),
-    (TO, TO.replace("tau1", "f2"), f"{TAU}f2|units differ, 'N.m' and 'N'"),
-    (F2_CONNECTION, BACKWARD, "arm.f2 -> controller.f2|'f2' is no output"),
-    (F2_CONNECTION, 2 * F2_CONNECTION, f"controller.f2{F2}|the input has a connection already"),
-    (F2_CONNECTION, SCALED, f"controller.f2{F2}|transformation"),
-    (f'{FROM} startConnector="f2"', 'startConnector="f2"', f".f2{F2}|the system's own connectors"),
-    ('"dq2" kind="output"', '"ddq22" kind="output"', f"{ARM}|'ddq22'|did you mean 'ddq2'?"),
-    (INPUT, INPUT.replace("input", "output"), f"{ARM}|'tau1' is an output, in its FMU an input"),
-    (TAU1, TAU1.replace("N.m", "N"), f"{ARM}|'tau1' is in 'N', in its FMU 'N.m'"),
-    (TAU1, f"{INPUT}<ssc:Integer/>", f"{ARM}|'tau1' is of type Integer, in its FMU Real"),
-    ('<ssd:Component name="trajectory"', '<ssd:Component name="arm"', f"{ARM} is there twice"),
-    ('stopTime="6"', 'stopTime="-6"', f"{STRUCTURE}|stop -6.0 s"),
-    ('baseStepSize="0.001"', 'baseStepSize="0"', f"{STRUCTURE}|step 0.0 s"),
-]
-PARAMETER = '<ssv:Parameter name="'
-SET = f"parameter set 'nominal'|{ARM}"
-# parameters in place of the arm's nominal one
-PARAMETERS = [
-    ('mm2"><ssv:Real value="1"/>', f"{SET}|'mm2'|did you mean"),
-    ('m1"><ssv:Real value="1" unit="m"/>', f"{SET}|'m1' is in 'm', in its FMU 'kg'"),
-    ('m1"><ssv:Integer value="1"/>', f"{SET}|'m1' is of type Integer, in its FMU Real"),
-    ('m1"><ssv:Real value="-1"/>', f"{SET}|'m1' is -1.0, expected 0 to inf"),
-    ('m1"><ssv:Real value="NaN"/>', f"{NOMINAL_ARM}|{ARM}|'m1'|expected a finite number"),
-    ('ddq1"><ssv:Real value="1"/>', f"{SET}|'ddq1' is an output and cannot be set"),
-    (
-        TOLERANCE[len(PARAMETER) :] + f"</ssv:Parameter>{TOLERANCE}",
-        f"{NOMINAL_ARM}|{ARM}|'relative_tolerance' is there twice",
-    ),
-]
 WRONG = [
     *FILES,
-    *((STRUCTURE, replace(old, new), said) for old, new, said in STRUCTURES),
-    *((NOMINAL_ARM, replace(TOLERANCE, PARAMETER + new), said) for new, said in PARAMETERS),
+    *((STRUCTURE, replace(x["old"], x["new"]), x["message"]) for x in MISTAKES["structure"]),
+    *(
+        (NOMINAL_ARM, replace(TOLERANCE, f'<ssv:Parameter name="{new}'), said)
+        for new, said in MISTAKES["parameter_set"]["rows"]
+    ),
 ]
 
 

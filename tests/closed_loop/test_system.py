@@ -11,7 +11,7 @@ from rparm.errors import UserError
 from rparm.report import overview
 from rparm.systems import comparison, ssp
 from tests.support.paths import ROOT
-from tests.support.rparm_project import Console
+from tests.support.rparm_project import MISTAKES, Console
 from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, not_a_number, read_csv, replace
 from tests.support.systems import CLOSED_LOOP
 
@@ -116,18 +116,7 @@ def fails(path: Path, variant: str, folder: Path, console: Console, ran: bool = 
     return err
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ('baseStepSize="0.001"', 'baseStepSize="0.002"', ["0.002 s", "references are for"]),
-        ('stopTime="6"', 'stopTime="3"', ["3.0 s", "references are for"]),
-        (
-            'source="resources/RPManipulator.fmu"',
-            'source="resources/None.fmu"',
-            ["arm", "None.fmu"],
-        ),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "words"), MISTAKES["not_compared"]["rows"])
 def test_a_system_that_cannot_be_compared_is_refused(
     tmp_path: Path, console: Console, old: str, new: str, words: list[str]
 ) -> None:

@@ -19,7 +19,7 @@ from tests.support.tables import tables
 
 FOLDER = ROOT / "examples" / "models"
 # by test module and name
-MODELS: dict[str, dict[str, str]] = tables(str(Path(__file__).with_name("models")))
+MODELS = tables(str(Path(__file__).with_name("models")))
 MISTAKES = tables(str(Path(__file__).with_name("mistakes")))
 METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3, "taylor": 4}
 

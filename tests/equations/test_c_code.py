@@ -11,12 +11,13 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import sympy
 
-from tests.equations.examples import MODELS
+from tests.equations.examples import MISTAKES, MODELS
 from tests.support.paths import ROOT
 
 sys.path.insert(0, str(ROOT / "fmu"))
@@ -57,59 +58,12 @@ def body(*lines: str) -> str:
     return "double f(double x) {\n" + "\n".join(lines) + "\n}\n"
 
 
-@pytest.mark.parametrize(
-    ("text", "line", "says"),
-    [
-        (body("while (x > 0.0) x -= 1.0;", "return x;"), 2, "use for"),
-        (body("do x -= 1.0; while (x > 0.0);", "return x;"), 2, "use for"),
-        (body("goto end;", "end: return x;"), 2, "early return"),
-        (body("switch (1) { default: return x; }"), 2, "use if"),
-        (body("for (int i = 0; i < 2; i++) { break; }", "return x;"), 2, "use a loop"),
-        (body("for (int i = 0; i < 2; i++) { continue; }", "return x;"), 2, "use if"),
-        (body("return (double)1;"), 2, "casts"),
-        (body("static double kept;", "return x;"), 2, "between calls: leave out static"),
-        (body("float y = 1.0;", "return x;"), 2, "use double"),
-        (body("unsigned n = 1;", "return x;"), 2, "only int"),
-        (body("return f(x);"), 2, "f calls itself: write a loop"),
-        (body("return lgamma(x);"), 2, "lgamma is not known: besides functions of the text"),
-        (body("return y;"), 2, "y is not declared"),
-        (body("double y;", "return y;"), 3, "y has no value"),
-        (body("double y;", "if (x > 0.0) y = 1.0;", "return y;"), 4, "y has no value"),
-        (body("double y[2] = {1.0, 2.0};", "return y[2];"), 3, "outside"),
-        (body("double y[2] = {1.0, 2.0, 3.0};", "return y[0];"), 2, "3 initializers"),
-        (body("for (int i = 0; i < x; i++) { }", "return x;"), 2, "number of rounds is not fixed"),
-        (body("for (;;) { }", "return x;"), 2, "this loop has no end: use for"),
-        (body("for (int i = 0; i < 1; ) { }", "return x;"), 2, "rounds"),
-        (body("int n = x;", "return n;"), 2, "becomes a whole one"),
-        (body("if (x) return 1.0;", "return x;"), 2, "compare it with 0.0"),
-        (body("return sin(x, x);"), 2, "sin has 1 arguments, not 2"),
-        (body("return x % 2.0;"), 2, "whole numbers"),
-        (body("return 1 & 2;"), 2, "&&"),
-        (body("return 1 / 0;"), 2, "division by 0"),
-        (body("return 1.0f;"), 2, "without the last letter"),
-        (body("return abs(x);"), 2, "use fabs"),
-        (body("double *y = &x;", "return y[1];"), 3, "not to an array"),
-        (body("return sizeof(x);"), 2, "sizeof"),
-        (body("if (x > 0.0) { return x; }"), 1, "on every path"),
-        (body("return x"), 3, "a ; is missing before it"),
-        ("double f(double x) {\nreturn x;\n", 2, "the file ends too early"),
-        ("#define N 3\ndouble f(double x) { return x; }\n", 1, "write an enum"),
-        ("#if 1\n#endif\n", 1, "only include guards"),
-        ("#include <stdio.h>\n", 1, "<math.h>"),
-        ('#include "nowhere.h"\n', 1, "nowhere.h is not there"),
-        ("static double kept = 1.0;\n", 1, "write const"),
-        ("double kept;\n", 1, "kept keeps a value between calls: pass it as an"),
-        ("double f(double (*g)(double)) { return g(1.0); }\n", 1, "pointers to functions are"),
-        ("double f(struct s *p) { return p->x; }\n", 1, "struct s is not defined"),
-        (REAL + body("real y = x;", "double z = sin(y);", "return z;").replace("double f(double",
-         "real f(real"), 4, "loses its derivatives"),
-    ],
-)  # fmt: skip
-def test_what_is_refused(tmp_path: Path, text: str, line: int, says: str) -> None:
-    message = refusal(tmp_path, text)
+@pytest.mark.parametrize("case", MISTAKES["c_code"])
+def test_what_is_refused(tmp_path: Path, case: dict[str, Any]) -> None:
+    message = refusal(tmp_path, case["text"])
     assert "\n" not in message
-    assert message.startswith(f"text.h:{line}: "), message
-    assert says in message
+    assert message.startswith(f"text.h:{case['line']}: "), message
+    assert case["expected"] in message
 
 
 def test_deep_nesting_is_refused_in_a_line(tmp_path: Path) -> None:
@@ -283,12 +237,7 @@ def numbers(matrix: sympy.Matrix, at: dict) -> np.ndarray:
 
 def test_only_the_branch_of_a_mode_is_calculated(tmp_path: Path) -> None:
     """A root that is not defined in another mode is not taken there."""
-    text = """static inline void f(const real x[N], int m, real y[2]) {
-    y[0] = m == 2 ? sqrt(x[0]) * exp(x[1]) * sin(x[1]) : x[0];
-    y[1] = m == 2 ? sqrt(x[0]) * exp(x[1]) * cos(x[1]) : x[1];
-}
-"""
-    compiled = Compiled(tmp_path, text, 2)
+    compiled = Compiled(tmp_path, MODELS["c_code"]["a root of a mode"], 2)
     source = (tmp_path / "derived.c").read_text(encoding="utf-8")
     first = source[source.index("f_derivatives_first") : source.index("f_derivatives_second")]
     assert first.count("if (") == 1
@@ -299,13 +248,7 @@ def test_only_the_branch_of_a_mode_is_calculated(tmp_path: Path) -> None:
 
 
 def test_names_and_order_are_those_of_the_source(tmp_path: Path) -> None:
-    text = """static inline void f(const real x[N], int m, real y[2]) {
-    const real inertia = 1.0 + x[0] * x[0];
-    y[0] = x[1] / inertia;
-    y[1] = x[1] * inertia;
-}
-"""
-    Compiled(tmp_path, text, 2)
+    Compiled(tmp_path, MODELS["c_code"]["names"], 2)
     source = (tmp_path / "derived.c").read_text(encoding="utf-8")
     assert "const double inertia = 1.0 + x_0 * x_0;" in source
     assert "inertia_by_x0" in source

@@ -236,10 +236,7 @@ def test_events_at_one_instant_run_in_order_and_see_what_the_others_left(
 
 
 def test_right_sides_of_an_event_see_the_values_before_it(folder: Path) -> None:
-    text = 'modes = ["a", "b"]\n[states]\nx = { start = 1, derivative = "0" }\n'
-    text += 'y = { start = 2, derivative = "0" }\n[events.e]\nwhen = "time >= 0.25"\n'
-    text += 'reinit = { x = "y", y = "x" }\nset = { a = "not b", b = "a" }\n'
-    run = simulated(made(folder / "swap", text), 0.5, 0.5, {}, also=["a", "b"])
+    run = simulated(made(folder / "swap", TEXTS["SWAP"]), 0.5, 0.5, {}, also=["a", "b"])
     assert [run[name][-1] for name in ("x", "y", "a", "b")] == [2.0, 1.0, True, False]
 
 
@@ -258,16 +255,12 @@ def test_events_follow_each_other_max_events_times(folder: Path, most: int) -> N
 
 
 def test_events_without_end_are_an_error(folder: Path) -> None:
-    text = '[states]\nx = { start = 1, derivative = "0" }\n[events.e]\nwhen = "x > 0"\n'
-    text += 'reinit = { x = "-x" }\n[events.f]\nwhen = "x < 0"\nreinit = { x = "-x" }\n'
     with pytest.raises(fmpy.fmi1.FMICallException):
-        simulated(made(folder / "endless", text), 1.0, 0.1, {})
+        simulated(made(folder / "endless", TEXTS["ENDLESS"]), 1.0, 0.1, {})
 
 
 def test_a_model_without_states_has_modes(folder: Path, tmp_path: Path) -> None:
-    text = 'modes = ["on"]\n[inputs]\nu = {}\n[outputs]\ny = { value = "2 * u if on else 0" }\n'
-    text += '[events.latch]\nwhen = "u > 1"\nset = { on = "not on" }\n'
-    fmu = made(folder / "latch", text)
+    fmu = made(folder / "latch", TEXTS["LATCH"])
     unit = opened(fmu, tmp_path)
     unit.exitInitializationMode()
     found = []

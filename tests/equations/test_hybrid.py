@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.equations.examples import MODELS
 from tests.equations.hybrid import failures
 from tests.equations.hybrid_models import FORMS, KINDS, Polynomial, hybrid
 from tests.equations.hybrid_runs import (
@@ -23,6 +24,7 @@ from tests.equations.hybrid_runs import (
     model_exchange,
 )
 
+TEXTS = MODELS["hybrid"]
 COUNT = int(os.environ.get("HYBRID_MODELS", "15"))
 G = 9.81
 EACH_METHOD = pytest.mark.parametrize("method", METHODS)
@@ -70,27 +72,6 @@ def unit(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Unit]:
     return find
 
 
-RISING = """name = "Rising"
-[inputs]
-f = {{}}
-[states]
-h = {{ start = 1.0, derivative = "v" }}
-v = {{ derivative = "-9.81" }}
-g = {{ derivative = "0.1" }}
-[events.hit]
-when = "h < {floor}"
-reinit = {{ h = "{floor}", v = "0.2 - v" }}
-"""
-
-
-BOUNCING = """name = "Ball"
-[states]
-h = {{ start = {unit!r}, derivative = "v", nominal = {unit!r} }}
-v = {{ derivative = "{g!r}", nominal = {unit!r} }}
-[events.impact]
-when = "{when}"
-reinit = {{ {reinit} }}
-"""
 IMPACTS = pytest.mark.parametrize(
     ("when", "reinit"),
     [(when, reinit + 'v = "-v"') for when in ("h < 0", "0 >= h") for reinit in ('h = "0", ', "")],
@@ -99,7 +80,7 @@ IMPACTS = pytest.mark.parametrize(
 
 def ball(size: float = 1.0, when: str = "h < 0", reinit: str = 'h = "0", v = "-v"') -> str:
     """The file of a ball that falls from this height."""
-    return BOUNCING.format(unit=size, g=-G * size, when=when, reinit=reinit)
+    return TEXTS["BOUNCING"].format(unit=size, g=-G * size, when=when, reinit=reinit)
 
 
 def bounces(run: Run, size: float = 1.0) -> None:
@@ -169,37 +150,14 @@ def stays_above(run: Run) -> None:
     assert run.failure or run.counts[-1] > 10
 
 
-TOUCH = """name = "Touch"
-[states]
-h = {{ start = 1.0, derivative = "v" }}
-v = {{ start = -2.0, derivative = "2" }}
-n = {{ derivative = "0" }}
-[events.touch]
-when = "{when}"
-reinit = {{ n = "n + 1" }}
-"""
-
-
 @pytest.mark.parametrize("when", ["h < 0", "0 > h", "h <= 0", "0 >= h"])
 @EACH_METHOD
 def test_a_touch_is_no_event(unit: Callable, method: str, when: str) -> None:
     """h = (t - 1)**2 is 0 at 1 s, up to errors that decide what is below 0."""
-    run = co_simulation(unit(TOUCH.format(when=when)), method, 1e-8, 0.125, 16, {})
+    run = co_simulation(unit(TEXTS["TOUCH"].format(when=when)), method, 1e-8, 0.125, 16, {})
     assert not run.failure
     assert run.x[7][0] == pytest.approx(0.0, abs=1e-9)
     assert run.x[-1][2] == 0.0
-
-
-INPUT = """name = "Input"
-[inputs]
-f = { start = 99 }
-[states]
-x = { start = 100, derivative = "0" }
-n = { derivative = "0" }
-[events.above]
-when = "x < f"
-reinit = { n = "n + 1" }
-"""
 
 
 class Sine(Polynomial):
@@ -218,28 +176,9 @@ def test_an_input_that_moves_makes_an_event_a_period(
     unit: Callable, kind: str, size: float
 ) -> None:
     inputs = {"f": Sine(size, 0.0, 0.0)}
-    run = run_of(unit(INPUT), kind, 0.01, 500, inputs, 1e-5)
+    run = run_of(unit(TEXTS["INPUT"]), kind, 0.01, 500, inputs, 1e-5)
     assert not run.failure
     assert run.x[-1][1] == 5.0
-
-
-TURNS = """name = "Turns"
-modes = ["positive"]
-[states]
-x = {{ start = 1.0, derivative = "v" }}
-v = {{ derivative = "{rate}" }}
-n = {{ derivative = "0" }}
-[events.up]
-when = "x > {limit}"
-while = "not positive"
-reinit = {{ n = "n + 1"{reinit} }}
-set = {{ positive = "not positive" }}
-[events.down]
-when = "x < {limit}"
-while = "positive"
-reinit = {{ n = "n + 1"{reinit} }}
-set = {{ positive = "not positive" }}
-"""
 
 
 @pytest.mark.parametrize("step", [0.01, 0.003])
@@ -249,7 +188,7 @@ def test_two_events_at_one_limit_fire_in_turn(
     unit: Callable, kind: str, limit: str, step: float
 ) -> None:
     """Of the two, only one's mode is on: x = cos t passes the limit once in pi."""
-    turns = unit(TURNS.format(rate="-x", limit=limit, reinit=""))
+    turns = unit(TEXTS["TURNS"].format(rate="-x", limit=limit, reinit=""))
     run = run_of(turns, kind, step, round(20 / step))
     first = np.pi / 2 if limit == "0" else np.pi / 2 + np.arctan(0.1)  # cos t = -0.1 sin t
     assert not run.failure
@@ -260,7 +199,7 @@ def test_two_events_at_one_limit_fire_in_turn(
 def test_a_rocking_block_loses_speed_once_an_impact(unit: Callable, kind: str) -> None:
     """It turns back at 1 m/s2 on either side and keeps half its speed at each impact."""
     rate, reinit = "-1 if positive else 1", ', v = "0.5 * v"'
-    run = run_of(unit(TURNS.format(rate=rate, limit="0", reinit=reinit)), kind, 0.01, 400)
+    run = run_of(unit(TEXTS["TURNS"].format(rate=rate, limit="0", reinit=reinit)), kind, 0.01, 400)
     speed = np.sqrt(2)
     impacts = [speed + 2 * speed * (1 - 0.5**k) for k in range(4)]  # then 2 v until the next
     assert not run.failure
@@ -269,20 +208,11 @@ def test_a_rocking_block_loses_speed_once_an_impact(unit: Callable, kind: str) -
     assert run.x[-1][0] == pytest.approx(v * flown - flown**2 / 2, abs=1e-6)
 
 
-GUARDS = """name = "Guards"
-[states]
-s = { start = -1.0, derivative = "1" }
-z = { derivative = "(1 if sqrt(s) > 0.5 else 0) if s > 0 else 0" }
-w = { derivative = "max(sqrt(s), 0.7) if s > 0 else 0" }
-y = { derivative = "1 if s > 0 and log(s) > -1 else 0" }
-"""
-
-
 @pytest.mark.parametrize("step", [0.25, 0.1, 0.05])
 @EACH_KIND
 def test_conditions_behind_a_guard_switch(unit: Callable, kind: str, step: float) -> None:
     """At the end of the guard, s = 0, log(s) is infinite and the slope of the root, too."""
-    run = run_of(unit(GUARDS), kind, step, round(3 / step))
+    run = run_of(unit(TEXTS["GUARDS"]), kind, step, round(3 / step))
     assert not run.failure
     w = 0.7 * 0.49 + (2**1.5 - 0.7**3) / 1.5
     assert run.x[-1] == pytest.approx([2.0, 1.75, w, 2 - np.exp(-1)], abs=1e-5)
@@ -292,7 +222,7 @@ def test_what_a_motion_is(tmp_path: Path) -> None:
     """The event loop itself, against the closed form of the rising floor."""
     from tests.equations.event_loop import EventLoop
 
-    motion = EventLoop(RISING.format(floor="g")).run(np.linspace(0.0, 3.0, 31))
+    motion = EventLoop(TEXTS["RISING"].format(floor="g")).run(np.linspace(0.0, 3.0, 31))
     speed = np.sqrt(0.1**2 + 2 * G)
     impacts = [(speed - 0.1) / G + 2 * speed / G * k for k in range(3)]
     assert [i.t for i in motion.impacts] == pytest.approx(impacts, abs=1e-11)

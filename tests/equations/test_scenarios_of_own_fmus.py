@@ -11,31 +11,10 @@ import pytest
 import rparm
 from rparm.fmi.fmu_file import read_model
 from rparm.runs import scenario as scenarios
-from tests.equations.examples import example
+from tests.equations.examples import MODELS, example
 from tests.support.rparm_project import assert_one_line, call, repacked
 
-SCENARIO = """fmu = "{fmu}"
-title = "Decay"
-description = "Of a quantity"
-tolerance = 1e-10
-[time]
-start = 0.0
-stop = 2.0
-step = 0.1
-[parameters]
-k = 1.5
-[initial]
-x = 2.0
-"""
-CAMPAIGN = """title = "Decays"
-description = "By rate"
-scenario = "{scenario}"
-sampling = "grid"
-[parameters.k]
-values = [0.5, 1.0]
-[keep]
-final = ["x"]
-"""
+TEXTS = MODELS["scenarios_of_own_fmus"]
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +24,7 @@ def scenario(tmp_path_factory: pytest.TempPathFactory) -> Path:
     fmu = example("dahlquist", folder)
     path = folder / "runs" / "decay.toml"
     path.parent.mkdir()
-    path.write_text(SCENARIO.format(fmu=f"../{fmu.relative_to(folder).as_posix()}"))
+    path.write_text(TEXTS["SCENARIO"].format(fmu=f"../{fmu.relative_to(folder).as_posix()}"))
     return path
 
 
@@ -58,26 +37,7 @@ def with_experiment(fmu: Path, path: Path, attributes: str) -> Path:
     return repacked(fmu, path, changed)
 
 
-@pytest.mark.parametrize(
-    ("attributes", "expected"),
-    [
-        (
-            'startTime="3" stopTime="5" stepSize="0.25" tolerance="1e-6"',
-            {"start": 3.0, "stop": 5.0, "step": 0.25, "tolerance": 1e-6},
-        ),
-        ('stopTime="40"', {"start": 0.0, "stop": 40.0, "step": 0.2, "tolerance": 1e-8}),
-        ('startTime="-1"', {"start": -1.0, "stop": 1.0, "step": 0.01, "tolerance": 1e-8}),
-        ("", {"start": 0.0, "stop": 2.0, "step": 0.01, "tolerance": 1e-8}),
-        # what no scenario can have
-        (
-            'startTime="1" stopTime="1" tolerance="1"',
-            {"start": 1.0, "stop": 3.0, "tolerance": 1e-8},
-        ),
-        ('stopTime="1e9" stepSize="1e-9"', {"stop": 1e9, "step": 5e6}),
-        ('startTime="1e300" stopTime="INF" stepSize="NaN"', {"start": 0.0, "stop": 2.0}),
-        ('stopTime="-1" stepSize="-1" tolerance="1e-14"', {"stop": 2.0, "tolerance": 5e-12}),
-    ],
-)
+@pytest.mark.parametrize(("attributes", "expected"), TEXTS["EXPERIMENTS"])
 @pytest.mark.parametrize("version", ["", "fmi3"])
 def test_a_new_scenario_has_the_default_experiment(
     scenario: Path,
@@ -121,7 +81,9 @@ def test_it_runs_from_any_folder(
 
 def test_one_of_fmi_3_gives_the_same_bits(scenario: Path, tmp_path: Path) -> None:
     path = tmp_path / "decay.toml"
-    path.write_text(SCENARIO.format(fmu=fmu_of(scenario).parent / "fmi3" / "Dahlquist.fmu"))
+    path.write_text(
+        TEXTS["SCENARIO"].format(fmu=fmu_of(scenario).parent / "fmi3" / "Dahlquist.fmu")
+    )
     one, other = (rparm.Scenario(file).run() for file in (scenario, path))
     assert one["x"].tobytes() == other["x"].tobytes()
 
@@ -136,7 +98,7 @@ def test_an_fmu_of_another_version_is_refused(
 
 def test_a_campaign_names_its_file(scenario: Path) -> None:
     file = scenario.parent / "decays.toml"
-    file.write_text(CAMPAIGN.format(scenario=scenario.name))
+    file.write_text(TEXTS["CAMPAIGN"].format(scenario=scenario.name))
     table = rparm.run_campaign(file, output=scenario.parent / "results", workers=1)
     np.testing.assert_allclose(table["final(x)"], 2.0 * np.exp(-2.0 * table["k"]), rtol=1e-8)
 

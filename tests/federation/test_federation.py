@@ -21,7 +21,7 @@ from rparm.systems.master import Master
 from rparm.systems.ssp import Ssp
 from tests.federation.processes import Start
 from tests.support.paths import ROOT
-from tests.support.rparm_project import Console
+from tests.support.rparm_project import MISTAKES, Console
 from tests.support.ssp_files import SSP, edited, replace
 
 STRUCTURE = "SystemStructure.ssd"
@@ -109,22 +109,7 @@ def test_it_is_a_document(short: Ssp) -> None:
     assert done.stderr.endswith("passed: 1 variant\n")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["nominall"], "no variant 'nominall', did you mean 'nominal'?"),
-        (["nominal", "--elsewhere", "arn"], "no component 'arn', did you mean 'arm'?"),
-        (["--elsewhere", "arm"], "--elsewhere: name one variant"),
-        (["nominal", "--listen", "tcp://192.0.2.1:23404"], "192.0.2.1 is no address of this"),
-        (["nominal", "--listen", "192.168.0.1:23404"], "expected an address as tcp://"),
-        (["nominal", "--listen", "tcp://127.0.0.1:65536"], "expected an address as tcp://"),
-        (["nominal", "--listen", "tcp://[::1]:23404"], "expected an address as tcp://"),
-        (["nominal", "--listen", "tcp://*:23404"], "expected an address as tcp://"),
-        (["nominal", "--listen", "tcp://0.0.0.0:23404"], "expected an address as tcp://"),
-        (["nominal", "--listen", ""], "expected an address as tcp://"),
-        (["nominal", "--silence", "0"], "expected 1 s or more: a number, or one with s, ms"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "words"), MISTAKES["federation"]["rows"])
 def test_wrong_use(arguments: list[str], words: str, console: Console) -> None:
     assert words in console.refused("federation", "--ssp", SSP, *arguments)
 

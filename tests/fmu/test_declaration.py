@@ -22,7 +22,7 @@ MODELS = {  # by table of mistakes
     "enumerations": "rp_trajectory",
     "discrete_variables": "wheel",
 }
-MISTAKES = tables(__file__)
+MISTAKES = tables(str(Path(__file__).with_name("mistakes")))
 MISTAKES["variables"]["start_huge"] = {
     "old": "start = 2.0",
     "new": "start = 1" + "0" * 400,

@@ -16,6 +16,8 @@ import pytest
 from markdown_it import MarkdownIt
 from mdit_py_plugins.dollarmath import dollarmath_plugin
 
+from tests.support.tables import tables
+
 ROOT = Path(__file__).resolve().parents[2]
 MODEL = ROOT / "models" / "rp_manipulator"
 PAGES = (MODEL / "README.md", MODEL / "derivation.md")
@@ -176,41 +178,16 @@ def test_only_links_that_work_in_the_fmu_are_kept(model_description: Path, tmp_p
     assert "code site up" in page.text_content()
 
 
-NAMELESS = (
-    '<fmiModelDescription fmiVersion="2.0"><ModelVariables><ScalarVariable/></ModelVariables>'
-    "</fmiModelDescription>"
-)
-
-
-@pytest.mark.parametrize(
-    ("readme", "xml", "message"),
-    [
-        (None, None, "README.md: cannot be read: No such file or directory"),
-        ("text", None, "modelDescription.xml: cannot be read: No such file or directory"),
-        ("text", "<fmi", "modelDescription.xml: is not valid XML: "),
-        ("text", "<html/>", "modelDescription.xml: is not a model description of FMI 2.0"),
-        ("text", NAMELESS, "modelDescription.xml: a ScalarVariable lacks name"),
-        (r"at $\nosuch x$", "<html/>", r"README.md: formula $\nosuch x$ does not convert: "),
-        (
-            "$$\nx +\n\\frac{1}\n$$",
-            "<html/>",
-            r"README.md: formula $x + \frac{1}$ does not convert",
-        ),
-        ("![](absent.svg)", "<html/>", "README.md: the image absent.svg does not exist"),
-    ],
-)
-def test_bad_input_is_named_in_one_line(
-    readme: str | None, xml: str | None, message: str, tmp_path: Path
-) -> None:
-    if readme is not None:
-        (tmp_path / "README.md").write_text(readme, encoding="utf-8")
-    if xml is not None:
-        (tmp_path / "modelDescription.xml").write_text(xml, encoding="utf-8")
+@pytest.mark.parametrize("wrong", tables(str(Path(__file__).with_name("mistakes")))["document"])
+def test_bad_input_is_named_in_one_line(wrong: dict[str, str], tmp_path: Path) -> None:
+    for key, name in (("readme", "README.md"), ("xml", "modelDescription.xml")):
+        if key in wrong:
+            (tmp_path / name).write_text(wrong[key], encoding="utf-8")
     done = run_document(
         [tmp_path / "README.md"], tmp_path / "modelDescription.xml", tmp_path / "out"
     )
     assert done.returncode == 2
-    assert message in done.stderr
+    assert wrong["message"] in done.stderr
     assert done.stderr.startswith("document.py: ")
     assert done.stderr.count("\n") == 1
     assert not (tmp_path / "out").exists()

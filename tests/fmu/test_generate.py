@@ -23,23 +23,9 @@ from tests.support.generator import (
     unknowns,
 )
 from tests.support.paths import NAMES, ROOT
+from tests.support.tables import tables
 
-# the table of variables that users rely on: name -> (value reference, causality, unit)
-PUBLISHED = """
-time 0 independent s; m1 1 parameter kg; m2 2 parameter kg; I1z 3 parameter kg.m2;
-I2z 4 parameter kg.m2; l1 5 parameter m; lc1 6 parameter m; a 7 parameter m; g 8 parameter m/s2;
-q1 10 output rad; q2 11 output m; dq1 12 output rad/s; dq2 13 output m/s; ddq1 14 output rad/s2;
-ddq2 15 output m/s2; tau1 20 input N.m; f2 21 input N; ee_x 30 output m; ee_y 31 output m;
-ee_vx 32 output m/s; ee_vy 33 output m/s; kinetic_energy 40 output J; potential_energy 41 output J;
-total_energy 42 output J; actuator_power 43 output W; D11 50 local kg.m2; D12 51 local kg.m;
-D22 52 local kg; coriolis1 53 local N.m; coriolis2 54 local N; gravity1 55 local N.m;
-gravity2 56 local N; f1_x 60 local N; f1_z 61 local N; tau1_y 62 local N.m; f2_x 63 local N;
-f2_z 64 local N; tau2_y 65 local N.m; solver_steps 80 local -; solver_rhs_evaluations 81 local -;
-relative_tolerance 82 parameter 1; max_internal_steps 83 parameter -;
-effective_relative_tolerance 84 local 1; solver_restarts 85 local -; solver_last_step 86 local s;
-solver_last_order 87 local -; solver_failed_steps 88 local -; solver_method 90 parameter -;
-max_step 91 parameter s
-"""
+TABLES = tables(str(Path(__file__).with_name("mistakes")))["generate"]
 
 
 @pytest.fixture(scope="module")
@@ -61,48 +47,25 @@ def trajectory(tmp_path: Path) -> Path:
 
 
 def test_the_published_interface_stays(description: ET.Element) -> None:
-    published = {}
-    for entry in PUBLISHED.split(";"):
-        name, reference, causality, unit = entry.split()
-        published[name] = (reference, causality, unit)
     found = {
-        name: (v.get("valueReference"), v.get("causality"), v[0].get("unit", "-"))
+        name: [v.get("valueReference"), v.get("causality"), v[0].get("unit", "-")]
         for name, v in scalars(description).items()
     }
-    assert published.items() <= found.items()
+    assert found | TABLES["published"] == found
 
 
 def test_start_values_and_bounds(description: ET.Element) -> None:
     variables = scalars(description)
     starts = {name: v[0].get("start") for name, v in variables.items()}
-    defaults = {"m1": 2, "m2": 1, "I1z": 0.1, "I2z": 0.05, "l1": 0.5, "lc1": 0.25, "a": 0.1}
-    defaults |= {"g": 9.81, "q1": 0, "q2": 0, "dq1": 0, "dq2": 0, "tau1": 0, "f2": 0}
-    defaults |= {"relative_tolerance": 0, "max_internal_steps": 100000}
-    defaults |= {"solver_method": 1, "max_step": 0}
-    assert {name: float(s) for name, s in starts.items() if s is not None} == defaults
+    assert {name: float(s) for name, s in starts.items() if s is not None} == TABLES["starts"]
     minima = {n: float(v[0].get("min")) for n, v in variables.items() if v[0].get("min")}
-    assert minima == {"m1": 0, "m2": 1e-9, "I1z": 0, "I2z": 0, "l1": 0, "lc1": 0} | {
-        "relative_tolerance": 0,
-        "max_internal_steps": 1,
-        "solver_method": 1,
-        "max_step": 0,
-    }
+    assert minima == TABLES["minima"]
 
 
 def test_flags_are_those_that_work(description: ET.Element) -> None:
-    shared = {
-        "modelIdentifier": "RPManipulator",
-        "canNotUseMemoryManagementFunctions": "true",
-        "canGetAndSetFMUstate": "true",
-        "canSerializeFMUstate": "true",
-        "providesDirectionalDerivative": "true",
-    }
-    assert description.find("ModelExchange").attrib == shared
-    assert description.find("CoSimulation").attrib == shared | {
-        "canHandleVariableCommunicationStepSize": "true",
-        "canInterpolateInputs": "true",
-        "maxOutputDerivativeOrder": "2",
-    }
+    flags = TABLES["flags"]
+    assert description.find("ModelExchange").attrib == flags["of_both"]
+    assert description.find("CoSimulation").attrib == flags["of_both"] | flags["of_co_simulation"]
 
 
 def test_derivatives_point_at_their_states(description: ET.Element) -> None:

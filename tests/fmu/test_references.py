@@ -16,6 +16,7 @@ from lxml import etree
 from tests.support.generator import change, copied
 from tests.support.instances import STATES, instantiated
 from tests.support.paths import CARRIED, FOLDERS, ROOT
+from tests.support.tables import tables
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 MANIFEST = "fmi-ls-manifest.xml"
@@ -197,18 +198,7 @@ def test_a_copy_is_collected(controller: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
-    [
-        ("Kp1 = 90.0", "Kp9 = 90.0", "'Kp9' is not declared"),
-        ("Kp1 = 90.0", 'Kp1 = "stiff"', "Kp1 = 'stiff' is not a value of type float64"),
-        ("Kp1 = 90.0", "Kp1 = true", "Kp1 = True is not a value of type float64"),
-        ("Kp1 = 90.0", "solver_steps = true", "solver_steps = True is not a value of type int32"),
-        ("Kp1 = 90.0", "solver_steps = 1.5", "solver_steps = 1.5 is not a value of type int32"),
-        ('"pd_gravity"', '"pid"', "mode = 'pid' is not one of pd, pd_gravity, computed_torque"),
-        ('"pd_gravity"', "[1]", "mode = [1] is not one of pd, pd_gravity, computed_torque"),
-        ("title =", "name =", "title is missing or not a text"),
-        ("[parameters]", "[[parameters]]", "parameters and initial must be tables"),
-        ("[parameters]", "[parameters", "is not valid TOML"),
-    ],
+    tables(str(Path(__file__).with_name("mistakes")))["references"]["rows"],
 )
 def test_a_wrong_scenario_is_named(
     controller: Path, tmp_path: Path, old: str, new: str, words: str

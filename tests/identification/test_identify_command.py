@@ -12,7 +12,7 @@ import pytest
 from lxml import etree
 
 from tests.identification.synthetic import ARM, save, write
-from tests.support.rparm_project import FMUS, assert_one_line, call
+from tests.support.rparm_project import FMUS, MISTAKES, assert_one_line, call
 
 GIVEN = ("--inputs", "tau1", "f2", "--measured", "q1", "q2")
 KNOWN = ("--set", "I1z=0.12", "a=110mm", "l1=0.55")
@@ -169,52 +169,14 @@ def test_swallowed_rows_are_said(identify, log: Path, tmp_path: Path) -> None:
 # ---- mistakes ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--parameters", "m7"], "no variable 'm7'"),
-        (["--parameters", "q1"], "'q1' is not a parameter"),
-        (["--parameters", "solver_method"], "solver_method is of type Enumeration"),
-        (["--parameters", "m2", "m2"], "'m2' is there twice"),
-        ([], "at least one of parameters"),
-        (["--parameters", "m2", "--set", "m2=1"], "m2 is estimated"),
-        (["--parameters", "m2", "--set", "m1=2ft"], "unknown unit 'ft'"),
-        (["--parameters", "m2", "--set", "m1"], "expected NAME=VALUE, got 'm1'"),
-        (["--parameters", "m2", "--start", "m2=-1"], "m2: expected at least 1e-09 kg, got -1.0"),
-        (["--parameters", "m2", "--start", "m2=1e-9"], "expected a start above its limit 1e-09"),
-        (["--parameters", "m2", "--start", "m2=nan"], "expected a finite number"),
-        (["--parameters", "m2", "--columns", "q7=x"], "'q7' is not used"),
-        (["--parameters", "m2", "--columns", "q1=encoder"], "column 'encoder' is not there"),
-        (["--parameters", "m2", "--units", "q1=lightyear"], "unknown unit 'lightyear'"),
-        (["--parameters", "m2", "--segment", "3"], "a segment needs 3 s"),
-        (["--parameters", "m2", "--segment", "-1"], "segment: expected a length above 0 s"),
-        (["--parameters", "m2", "--segment", "1ms"], "20 rows"),
-        (["--parameters", "m2", "--segment", "1m"], "--segment: unknown unit 'm'"),
-        (["--parameters", "m2>m9"], "no variable 'm9'"),
-        (["--parameters", "m2>"], "'m2>': expected another parameter after >"),
-        (["--parameters", "m2>m2"], "'m2>m2': expected another parameter after >"),
-        (["--parameters", "m2", "--start", "q1=1"], "'q1' is measured: the log says where"),
-        (["--parameters", "m2", "--units", "time=ms"], "units: the times of a log are in s"),
-        (["--parameters", "m2", "--validate", "/nowhere.csv"], "/nowhere.csv: no such file"),
-    ],
-)
+@pytest.mark.parametrize(("options", "message"), MISTAKES["identify"]["options"])
 def test_a_mistake_in_the_options_is_one_line(options: list[str], message: str, identify) -> None:
     code, _, error = identify(*options)
     assert code == 2 and message in error
     assert_one_line(error)
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        (("--inputs", "tau9", "--measured", "q1"), "no variable 'tau9', did you mean 'tau1'?"),
-        (("--inputs", "q1", "--measured", "q1"), "'q1' is not an input"),
-        (("--inputs", "tau1", "--measured", "q9"), "no variable 'q9' (known: q1, q2, "),
-        (("--inputs", "tau1", "--measured", "solver_steps"), "is no continuous output"),
-        (("--inputs", "tau1", "--measured", "tau1"), "is no continuous output"),
-        (("--inputs", "tau1", "tau1", "--measured", "q1"), "'tau1' is there twice"),
-    ],
-)
+@pytest.mark.parametrize(("given", "message"), MISTAKES["identify_variables"]["rows"])
 def test_a_wrong_variable_is_one_line(given: Sequence[str], message: str, identify) -> None:
     code, _, error = identify("--parameters", "m2", given=given)
     assert code == 2 and message in error
@@ -228,15 +190,7 @@ def test_a_discrete_output_is_refused(log: Path, capsys: pytest.CaptureFixture[s
     assert_one_line(error)
 
 
-@pytest.mark.parametrize(
-    ("row", "column", "text", "message"),
-    [
-        (100, 3, "nan", "line 101: column 'q1': expected a finite number"),
-        (100, 4, "1,5", "line 101: expected 5 values, found 6"),
-        (100, 1, "abc", "line 101: column 'tau1': expected a number with a decimal point"),
-        (100, 0, "0.05", "line 101: expected a time after 0.098"),
-    ],
-)
+@pytest.mark.parametrize(("row", "column", "text", "message"), MISTAKES["identify_log"]["rows"])
 def test_a_mistake_in_a_log_is_one_line(
     row: int, column: int, text: str, message: str, identify, log: Path, tmp_path: Path
 ) -> None:

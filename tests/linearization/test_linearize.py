@@ -14,6 +14,7 @@ import rparm
 from rparm import __main__ as cli
 from rparm.linearization.page import steps_figure
 from rparm.linearization.responses import frequency_response
+from tests.support.rparm_project import MISTAKES
 
 POSE = {"q1": "30 deg", "q2": "0.1 m"}
 H = 0.01
@@ -201,32 +202,7 @@ def test_at_gives_a_first_guess_of_what_is_trimmed(turns: float) -> None:
     assert found.at["q1"] == pytest.approx(exact, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    "command, message",
-    [
-        (["rp_plnt"], "rp_plnt: expected a file .fmu or .ssp, or a name, did you mean 'rp_plant'"),
-        (["nowhere.fmu"], "nowhere.fmu: no such file"),
-        (["RPPlant", "--at", "q1"], "--at: expected NAME=VALUE, got 'q1'"),
-        (["RPPlant", "--at", "q1=1", "q1=2"], "--at: q1 is given twice"),
-        (["RPPlant", "--at", "q1=1x"], "q1: unknown unit 'x'"),
-        (["RPPlant", "--at", "mode1=2"], "mode1: is"),
-        (["RPPlant", "--at", "ee_x=1"], "ee_x: is an output, which --trim leads to a value"),
-        (["RPPlant", "--trim", "q1", "q2"], "--at NAME=VALUE begins elsewhere"),
-        (["RPPlant", "--at", "stops1=rigid", "q1=3"], "q1 = 3 is refused: a start must be within"),
-        (["RPPlant", "--save", "nowhere/m.json"], "--save: nowhere/m.json: cannot be written"),
-        (["RPPlant", "--inputs", "tua1"], "inputs: no input 'tua1' to linearize, did you mean"),
-        (["RPPlant", "--outputs", "stop_impulse1"], "outputs: no output 'stop_impulse1'"),
-        (["RPPlant", "--break", "arm.tau1"], "--break: is for systems"),
-        (["RPPlant", "--outputs", "q1", "q1"], "outputs: q1 is given twice"),
-        (["RPPlant", "--trim", "tau1", "tau1"], "--trim: tau1 is given twice"),
-        (["RPPlant", "--step", "0"], "expected 1e-09 s or more, got '0'"),
-        (["RPPlant", "--step", "1e-300"], "expected 1e-09 s or more, got '1e-300'"),
-        (["RPPlant", "--step", "1e300"], "step: deviations overflow in 1e+300 s"),
-        (["RPPlant", "--save", "m.txt"], "--save: m.txt: expected a name that ends with .json"),
-        (["RPSensor", "--at", "q1=1"], "is sampled"),
-        (["machine"], "is sampled"),
-    ],
-)
+@pytest.mark.parametrize("command, message", MISTAKES["linearize"]["rows"])
 def test_mistakes_are_one_line(
     tmp_path: Path, command: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

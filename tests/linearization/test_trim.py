@@ -11,6 +11,7 @@ from rparm.errors import UserError
 from rparm.fmi.fmu_file import MODEL_EXCHANGE, Fmu
 from rparm.linearization.linear import FmuSubject, checked_point
 from rparm.linearization.trim import Trimmed, trim
+from tests.support.rparm_project import MISTAKES
 
 M1, M2, LC1, L1, A, G = 2.0, 1.0, 0.25, 0.5, 0.1, 9.81  # start values of the arm's parameters
 FRICTION = {
@@ -112,25 +113,7 @@ def test_a_touched_compliant_stop_gives_its_pair(plant: FmuSubject) -> None:
     assert sorted(poles.imag) == pytest.approx([-20.0, 20.0])
 
 
-@pytest.mark.parametrize(
-    "free, given, message",
-    [
-        (["f2"], {"q1": 0.3}, "no equilibrium found by f2: the derivative of dq1 stays"),
-        (["tau1", "f2", "q2"], {"q1": 0.0}, "; free at most 2 variables"),
-        (["tau1", "f2", "ee_mz"], {}, "leaves tau1, ee_mz open"),
-        (["tau1", "f2", "ee_fx"], {"q1": math.pi / 2, "a": 0.0}, "leaves tau1, ee_fx open"),
-        (["tau1", "f2"], {"ee_x": 9.0}, "ee_x stays"),
-        (["tau1", "mode1"], {}, "mode1 is no state and no input"),
-        (["tau1", "tua1"], {}, "did you mean 'tau1'?"),
-        (["tau1"], {"stop_impulse1": 0.0}, "stop_impulse1: is discrete"),
-        (["tau1"], {"D11": 0.5}, "D11: is calculated"),
-        (["tau1"], {"m2": "-1 kg"}, "m2: expected at least 1e-09 kg, got -1.0"),
-        (["tau1"], {"q1": "30 grad"}, "q1: unknown unit 'grad'"),
-        (["tau1"], {"q1": float("nan")}, "q1: expected a finite number"),
-        (["tau1"], {"q1": "nan"}, "q1: expected a number"),
-        (["tau1"], {"tau": 1.0}, "has no variable 'tau', did you mean 'tau1'?"),
-    ],
-)
+@pytest.mark.parametrize("free, given, message", MISTAKES["trim"]["rows"])
 def test_refused(
     plant: FmuSubject, free: list[str], given: dict[str, object], message: str
 ) -> None:

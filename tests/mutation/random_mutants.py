@@ -21,8 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
-from samples import order
-from sites import Mutant, sources
+from sites import Mutant, order, sources
 from workshop import Processes, Record, Workshop
 
 ROOT = Path(__file__).resolve().parents[2]

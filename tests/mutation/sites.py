@@ -1,8 +1,10 @@
-"""All places where random mutants break a C source, and how.
+"""All places where random mutants break a C source, and how; samples of them.
 
 A mutant is identified by the file, the function, the statement and the token that it replaces.
 """
 
+import random
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -245,3 +247,26 @@ def changed(mutant: Mutant, statement: Statement, text: str) -> str:
         condition = text[tokens[index + 1].start : tokens[end].end]
         return f"{text[: token.end]} (!{condition}){text[tokens[end].end :]}"
     return text[: token.start] + mutant.after + text[token.end :]
+
+
+def order(texts: dict[str, str], seed: int) -> list[Mutant]:
+    """One mutant of every place, in an order of which each beginning is a fair sample.
+
+    Each class of mutations in each of the folders has the share in a beginning that it has in all.
+    """
+    chance = random.Random(seed)
+    places: defaultdict[tuple[object, ...], list[Mutant]] = defaultdict(list)
+    for file, text in texts.items():
+        for mutant in mutants_of(file, text):
+            unlike = (mutant.file, mutant.function, mutant.statement, mutant.repeat)
+            places[(*unlike, mutant.before, mutant.nth)].append(mutant)
+    strata: defaultdict[tuple[str, str], list[Mutant]] = defaultdict(list)
+    for alternatives in places.values():
+        mutant = chance.choice(alternatives)
+        strata[mutant.file.partition("/")[0], mutant.kind].append(mutant)
+    ranked = []
+    for mutants in strata.values():
+        chance.shuffle(mutants)
+        offset = chance.random()
+        ranked += [((rank + offset) / len(mutants), each) for rank, each in enumerate(mutants)]
+    return [mutant for _, mutant in sorted(ranked, key=lambda pair: pair[0])]

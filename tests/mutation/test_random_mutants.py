@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from samples import order
-from sites import REMOVED, Mutant, mutants_of, mutated, sources
+from sites import REMOVED, Mutant, mutants_of, mutated, order, sources
 
 from tests.support.tables import tables
 

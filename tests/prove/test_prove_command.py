@@ -23,6 +23,7 @@ from rparm.fmi.fmu_file import Fmu
 from rparm.runs import comparison
 from rparm.runs import scenario as scenarios
 from rparm.units import rounded_up
+from tests.support.rparm_project import MISTAKES
 
 PROVER = proof.provers()["rp_manipulator"]
 STATES = {"q1", "q2", "dq1", "dq2"}
@@ -284,18 +285,7 @@ def test_where_the_proof_ends(own: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert 0 <= found["holds_up_to"] < 0.2
 
 
-@pytest.mark.parametrize(
-    ("arguments", "text"),
-    [
-        (["rubber_buffers"], "expected a model whose motion can be proven"),
-        (["sine_effort"], "no scenario 'sine_effort', did you mean 'sine_efforts'?"),
-        (["coasting", "--method", "euler"], "--method: no method 'euler'"),
-        (["coasting", "--within", "1 kg"], "--within: unknown unit 'kg'"),
-        (["coasting", "--within=-1"], "--within: expected 0 or more, got -1"),
-        (["--method", "taylor"], "--method: expected a scenario with it"),
-        (["--all", "coasting"], "--all: expected no scenario with it, got 'coasting'"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "text"), MISTAKES["prove"]["rows"])
 def test_mistakes(arguments: list[str], text: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["prove", *arguments]) == 2
     (line,) = capsys.readouterr().err.splitlines()

@@ -6,6 +6,7 @@ import pytest
 
 from rparm.__main__ import main
 from tests.support.browser import Browser
+from tests.support.rparm_project import MISTAKES
 
 SCENARIOS = ("thrown_against_stop", "actuator_torque_steps", "constant_effort_single_step")
 LATE = "late_start"  # at 1e6 s
@@ -13,25 +14,7 @@ VARIANT = "wall_contact"
 # what may stand in a file name and in a title, and means something in HTML or in an address
 STRANGE = "Bögen & <b>50%<b> #1?"
 
-CONTENT = """\
-model = "rp_manipulator"
-title = '</script><script>alert("1")</script> "Bögen" & <b>'
-description = "A <i>swing</i> with \\\\ and 'quotes'"
-tolerance = 1e-8
-panels = [["ee_x", "ee_y"], ["tau1"]]
-[time]
-start = 0.0
-stop = 1.0
-step = 0.01
-[parameters]
-solver_method = "erk"
-[initial]
-q1 = 0.3
-[inputs.tau1]
-sines = [{ amplitude = 1.0, frequency = 1.0 }]
-[inputs.f2]
-table = [[0.0, 9.0], [0.5, 10.0]]
-"""
+CONTENT = MISTAKES["report"]["SCENARIO"]
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,7 @@ from rparm.runs import scenario
 from rparm.runs.inputs import Table
 from tests.report.conftest import CONTENT, STRANGE, show
 from tests.support.browser import Browser
-from tests.support.rparm_project import FMUS, Console, declared
+from tests.support.rparm_project import FMUS, MISTAKES, Console, declared
 
 
 @pytest.fixture(autouse=True)
@@ -71,18 +71,7 @@ def test_a_file_that_exists_stays(console: Console) -> None:
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
-    [
-        (["no/such/folder/x"], "x.toml: cannot be written: No such file or directory"),
-        ([""], "is no name for a scenario"),
-        (["folder/"], "is no name for a scenario"),
-        (["a\nb"], "printable characters"),
-        (["--", "-x"], "begins with no hyphen"),
-        (["--", "--open.toml"], "begins with no hyphen"),
-        (["con"], "Windows keeps this name"),
-        (["CON.TOML"], "Windows keeps this name"),
-        (["x" * 300], "cannot be written: File name too long"),
-        (["x", "--model", "rp_manipulater"], "did you mean 'rp_manipulator'?"),
-    ],
+    [*MISTAKES["new"]["rows"], (["x" * 300], "cannot be written: File name too long")],
 )
 def test_what_cannot_be_written(
     console: Console, tmp_path: Path, arguments: list[str], words: str
@@ -94,18 +83,7 @@ def test_what_cannot_be_written(
 # ---- run FILE ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ('model = "rp_manipulator"\n', "", "missing key 'model'"),
-        ("rp_manipulator", "rp_manipulater", "no model 'rp_manipulater', did you mean"),
-        ('"rp_manipulator"', "3", "model: expected a text, got 3"),
-        ("q1 = 0.3", "q3 = 0.3", "'q3'"),
-        ("stop = 1.0", "stop = -1.0", "[time] stop"),
-        ('"erk"', '"euler"', "solver_method"),
-        ("tolerance = 1e-8", "tolerance =", "not valid TOML"),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "words"), MISTAKES["own_scenario"]["rows"])
 def test_a_wrong_file_is_refused(console: Console, old: str, new: str, words: str) -> None:
     assert old in CONTENT
     Path("wrong.toml").write_text(CONTENT.replace(old, new), encoding="utf-8")

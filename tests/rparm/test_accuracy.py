@@ -15,7 +15,7 @@ from rparm.report.writer import ReportWriter
 from rparm.runs import comparison, simulation
 from rparm.runs.comparison import Reference, Runs, Sweep
 from tests.support.paths import FOLDERS
-from tests.support.rparm_project import LONG, NAMES, SHORT, load
+from tests.support.rparm_project import LONG, MISTAKES, NAMES, SHORT, load
 
 # bytes of a report for all scenarios, studies, the overview, scripts and styles
 OF_SCENARIOS = 8_000_000
@@ -52,30 +52,9 @@ def measured(expected: dict[str, list[float]], got: dict[str, list[float]]) -> d
     return comparison.errors_against(result, table)
 
 
-@pytest.mark.parametrize(
-    ("expected", "got", "errors"),
-    [
-        ({"q1": [1.0, -4.0]}, {"q1": [1.5, -4.0]}, {"q1": 0.5 / 4.0}),
-        # small references count as a thousandth
-        (
-            {"q1": [0.0, 1e-5], "q2": [0.0, 0.0]},
-            {"q1": [0.0, 3e-5], "q2": [0.0, 2e-6]},
-            {"q1": 2e-5 / 1e-3, "q2": 2e-6 / 1e-3},
-        ),
-        # energies are relative to what is exchanged: |K| + |P| = 5, 7
-        (
-            {"kinetic_energy": [0.0, 6.0], "potential_energy": [5.0, -1.0], "total_energy": [0, 0]},
-            {"kinetic_energy": [0, 6.6], "potential_energy": [5.7, -1.0], "total_energy": [0, 1.4]},
-            {"kinetic_energy": 0.1, "potential_energy": 0.1, "total_energy": 0.2},
-        ),
-        # which needs both energies
-        ({"total_energy": [2.0, 2.0]}, {"total_energy": [2.0, 3.0]}, {"total_energy": 0.5}),
-    ],
-)
-def test_errors_are_relative(
-    expected: dict[str, list[float]], got: dict[str, list[float]], errors: dict[str, float]
-) -> None:
-    assert measured(expected, got) == pytest.approx(errors)
+@pytest.mark.parametrize("case", MISTAKES["errors"])
+def test_errors_are_relative(case: dict[str, dict[str, list[float]]]) -> None:
+    assert measured(case["expected"], case["got"]) == pytest.approx(case["errors"])
 
 
 def test_the_arms_energies_have_that_scale(runs: Runs) -> None:

@@ -16,6 +16,7 @@ from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.runs import scenario as scenarios
 from tests.support.paths import ROOT
+from tests.support.rparm_project import MISTAKES
 
 RUN = {"stop_time": 1.0, "step": 0.01}
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -108,30 +109,10 @@ def test_a_scenario_is_within_its_bound() -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"step": 0.3}, "whole number of steps"),
-        ({"step": 0.0}, "step > 0"),
-        ({"step": 3.0}, "expected 1 to"),
-        ({"step": 1e-9}, "expected 1 to"),
-        ({"stop_time": -1.0}, "stop_time"),
-        ({"stop_time": 0.0}, "start_time < stop_time"),
-        ({"stop_time": float("nan")}, "stop_time: expected a finite number"),
-        ({"stop_time": "1"}, "stop_time: expected a finite number"),
-        ({"start_time": -1.0}, "0 <= start_time"),
-        ({"tolerance": 0.0}, "tolerance: expected a number between"),
-        ({"tolerance": "1e-8"}, "tolerance: expected a number between"),
-        ({"outputs": ["q3"]}, "has no Real output 'q3' \\(known: q1"),
-        ({"inputs": {"tau": 1.0}}, "inputs: tau: the model has no variable 'tau', did you mean"),
-        ({"inputs": {"q1": 1.0}}, "inputs: q1: 'q1' is not an input"),
-        ({"inputs": {"tau1": [1.0, 2.0]}}, "tau1: expected 101 values"),
-        ({"inputs": {"tau1": np.nan}}, r"tau1: is nan at t = 0\.0 s"),
+        *MISTAKES["api"]["rows"],
         ({"inputs": {"tau1": lambda t: np.inf if t > 0.5 else 0.0}}, "tau1: is inf at t = 0.51"),
-        ({"inputs": {"tau1": "1.0"}}, "tau1: expected numbers: got the text"),
         ({"inputs": {"tau1": ((0.0, 0.0), (1.0, 2.0))}}, "times of a table increase"),
         ({"inputs": {"tau1": ((0.0,), (1.0, 2.0))}}, "have the same length"),
-        ({"start_values": {"m2": -1.0}}, "start_values: m2: expected at least"),
-        ({"start_values": {"q1": "30 degg"}}, "start_values: q1"),
-        ({"start_values": {"m3": 1.0}}, "start_values: m3: the model has no variable 'm3'"),
-        ({"start_values": {"tau1": 1.0}}, "start_values: tau1: 'tau1' is not a parameter"),
     ],
 )
 def test_a_mistake_is_one_line(arm: Path, change: dict[str, object], words: str) -> None:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from operator import itemgetter
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +11,7 @@ from rparm.fmi.fmu_file import CO_SIMULATION, INSTANCES, Fmu
 from rparm.runs import scenario, simulation
 from rparm.systems.master import Master
 from rparm.systems.ssp import Connection
-from tests.support.rparm_project import BUILD, fmi3_fmu
-from tests.support.tables import tables
+from tests.support.rparm_project import BUILD, MISTAKES, fmi3_fmu
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, timed, toy
 
 SWITCHED = toy(
@@ -57,7 +55,7 @@ def test_rounding_of_times_does_not_delay_a_switch(write) -> None:
 
 @pytest.mark.parametrize(
     "mistake",
-    tables(str(Path(__file__).with_name("mistakes")))["scenario_with_brake"],
+    MISTAKES["scenario_with_brake"],
     ids=itemgetter("text"),
 )
 def test_mistakes_are_explained(write, mistake: dict[str, str]) -> None:

@@ -13,6 +13,7 @@ from tests.support.paths import ROOT
 from tests.support.rparm_project import (
     FMUS,
     LONG,
+    MISTAKES,
     NAMES,
     SHORT,
     Console,
@@ -21,7 +22,6 @@ from tests.support.rparm_project import (
     reference_file,
     repacked,
 )
-from tests.support.tables import tables
 
 ARM = FMUS["rp_manipulator"]
 
@@ -74,10 +74,7 @@ def test_run_with_a_worse_reference_fails(project: Path, fmu: Path, console: Con
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        *(
-            (mistake["arguments"], mistake["message"])
-            for mistake in tables(str(Path(__file__).with_name("mistakes")))["command"]
-        ),
+        *((mistake["arguments"], mistake["message"]) for mistake in MISTAKES["command"]),
         (["run", "--fmi", "2", "--fmu", fmi3_fmu(ARM)], "is an FMU of FMI 3.0, --fmi wants 2.0"),
         (["run", "--fmi", "3", "--fmu", ARM], "is an FMU of FMI 2.0, --fmi wants 3.0"),
     ],

@@ -11,20 +11,11 @@ from rparm.command_line import COMMANDS
 from rparm.commands.completion import SCRIPT, SHELLS
 from rparm.systems import comparison
 from tests.support.paths import ROOT
-from tests.support.rparm_project import Console
+from tests.support.rparm_project import MISTAKES, Console
 from tests.support.ssp_files import SSP, edited, replace
 
 # what each command cannot do without
-NEEDED = {
-    "new": ["x"],
-    "build": ["x.toml"],
-    "new-model": ["x"],
-    "linearize": ["x"],
-    "campaign": ["x.toml"],
-    "federate": ["x.ssp", "variant", "component", "--broker", "tcp://127.0.0.1:1"],
-    "fmu": ["x"],
-    "completion": ["bash"],
-}
+NEEDED = MISTAKES["needed"]
 COMMON = ["--json", "--quiet", "--output", "here", "--open"]
 
 
@@ -146,21 +137,7 @@ def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize(
     ("words", "wanted"),
-    [
-        (["sys"], ["system"]),
-        (["run", "--tol"], ["--tolerance"]),
-        (["system", "--o"], ["--output", "--open"]),
-        (["run", "sine_eff"], ["sine_efforts"]),
-        (["run", "sine_efforts", "hanging_s"], ["hanging_swing"]),
-        (["run", "my_"], ["my_scenario.toml"]),
-        (["run", "--fmi", ""], ["2", "3"]),
-        (["run", "--output", "m"], ["my folder"]),
-        (["system", "pick_and_place_"], ["pick_and_place_untold"]),
-        (["fmu", "rp_pl"], ["rp_plant"]),
-        (["campaign", "toler"], ["tolerance"]),
-        (["completion", ""], list(SHELLS)),
-        (["help", "fed"], ["federation", "federate"]),
-    ],
+    [*MISTAKES["completes"]["rows"], (["completion", ""], list(SHELLS))],
 )
 def test_bash_completes(script: Path, tmp_path: Path, words: list[str], wanted: list[str]) -> None:
     (tmp_path / "my_scenario.toml").touch()

@@ -22,9 +22,8 @@ from rparm.result_tables import RunTable, SweepTable
 from rparm.runs.comparison import TOLERANCES, Run, Runs, Sweep
 from rparm.units import seconds, short, shortened
 from tests.support.paths import ROOT
-from tests.support.rparm_project import FMUS, LONG, SHORT, Console, load
+from tests.support.rparm_project import FMUS, LONG, MISTAKES, SHORT, Console, load
 from tests.support.ssp_files import SSP
-from tests.support.tables import tables
 
 RANDOM = random.Random(5)
 ERRORS = (0.0, 1e-300, 9.96e-10, 0.99999, 1e22, math.inf, math.nan)
@@ -125,27 +124,7 @@ def test_a_run_is_a_document(project: Path, fmu: Path, console: Console) -> None
     assert console(*arguments[:-1], "--quiet") == (0, "passed: 2 scenarios\n", "")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "key"),
-    [
-        (["help"], "help"),
-        (["help", "system"], "help"),
-        (["run", "--help"], "help"),
-        (["--version"], "version"),
-        (["completion", "zsh"], "script"),
-        (["list"], "scenarios"),
-        (["--json", "list"], "scenarios"),
-        (["system", "--list"], "systems"),
-        (["run", "unknown"], "error"),
-        (["run", "--tolerance", "2"], "error"),
-        (["system", "nominall"], "error"),
-        (["coupling", "--ssp", "/nowhere.ssp"], "error"),
-        (["campaign", "/nowhere.toml"], "error"),
-        (["federation", "nominall"], "error"),
-        (["new", ""], "error"),
-        (["federate"], "error"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "key"), MISTAKES["document"]["rows"])
 def test_every_command_prints_a_document(console: Console, arguments: list[str], key: str) -> None:
     """Also of a mistake, which is said on standard error as ever."""
     code, out, err = console(*arguments, "--json")
@@ -251,10 +230,7 @@ def test_without_a_command_there_is_help(console: Console) -> None:
 
 @pytest.mark.parametrize(
     ("arguments", "guess"),
-    [
-        (miss["arguments"], miss["message"])
-        for miss in tables(str(Path(__file__).with_name("mistakes")))["word"]
-    ],
+    [(miss["arguments"], miss["message"]) for miss in MISTAKES["word"]],
 )
 def test_guesses(
     tmp_path: Path,

@@ -14,8 +14,7 @@ from rparm.errors import UserError
 from rparm.runs import inputs, scenario
 from rparm.runs.scenario import Scenario
 from tests.rparm.test_boolean_inputs import SWITCHED
-from tests.support.rparm_project import FMUS, Console
-from tests.support.tables import tables
+from tests.support.rparm_project import FMUS, MISTAKES, Console
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, TOY, toy
 
 LOG = "time,force\n0.5,1\n1.5,3\n2.25,4.5\n"  # 2 t; the run is from 1 to 2
@@ -87,15 +86,7 @@ def test_a_log_may_lie_elsewhere_and_end_where_the_last_step_begins(write: Write
     assert list(run.logs) == ["../a log/ü.csv"]
 
 
-@pytest.mark.parametrize(
-    ("log", "names"),
-    [
-        ("time;force (N, filtered)\n1;2\n2;4\n", ["force (N, filtered)"]),
-        ("time\tforce; x, y\n1\t2\n2\t4\n", ["force; x, y"]),
-        ("time,force;N\n1,2\n2,4\n", ["force;N"]),
-        ("time;a, b;c, d, e\n1;2;0,5\n2;4;0,7\n", ["a, b"]),  # decimal commas, not in what is used
-    ],
-)
+@pytest.mark.parametrize(("log", "names"), MISTAKES["delimiters"]["rows"])
 def test_the_delimiter_is_that_of_the_rows(write: Write, log: str, names: list[str]) -> None:
     run = loaded(write, log, f"column = '{names[0]}'\n")
     assert run.inputs["force"].tolist() == [2.0, 2.5, 3.0, 3.5, 4.0] and run.questions == ()
@@ -113,15 +104,7 @@ def test_a_quotation_mark_that_swallows_rows_is_said(write: Write) -> None:
     assert ["lines 1 to 3 are one row" in text for text in header.questions] == [True]
 
 
-@pytest.mark.parametrize(
-    ("missing", "said"),
-    [
-        ([(130, 139)], ""),  # ten steps
-        ([(130, 140)], "line 132: a gap of 0.11 s before it, where rows are 0.01 s apart"),
-        ([(130, 140), (150, 165)], "line 142: 2 gaps, the longest of 0.16 s before it"),
-        ([(30, 90), (210, 290)], ""),  # before and after the run
-    ],
-)
+@pytest.mark.parametrize(("missing", "said"), MISTAKES["gaps"]["rows"])
 def test_gaps_above_ten_steps_are_said(
     write: Write, missing: list[tuple[int, int]], said: str
 ) -> None:
@@ -161,11 +144,11 @@ def test_a_log_may_begin_elsewhere_than_the_run(write: Write) -> None:
 
 # ---- mistakes ------------------------------------------------------------------------------------
 
-MISTAKES = [
+WRONG = [
     # log, further keys, message
     *(
         (mistake.get("log", LOG), mistake.get("keys", ""), mistake["message"])
-        for mistake in tables(str(Path(__file__).with_name("mistakes")))["log"]
+        for mistake in MISTAKES["log"]
     ),
     ('time,force\n1,"' + "x" * 200_000, "", "log.csv, line 2: field larger than field limit"),
     (b"time,force\n1,\xb0\n", "", "log.csv: not UTF-8 text, at byte 13"),
@@ -176,7 +159,7 @@ MISTAKES = [
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize(("log", "keys", "message"), MISTAKES)
+@pytest.mark.parametrize(("log", "keys", "message"), WRONG)
 @pytest.mark.parametrize("section", ["inputs", "measured"])
 def test_a_mistake_is_explained_in_one_line(
     write: Write, log: str | bytes, keys: str, message: str, section: str
@@ -201,15 +184,9 @@ def test_what_is_no_file(write: Write, section: str, monkeypatch: pytest.MonkeyP
     (folder / "big").write_bytes(b"time,force\n" + b"0" * 100)
     monkeypatch.setattr(inputs, "LARGEST_LOG", 100)
     for file, message in (
-        ("none.csv", "none.csv: no such file"),
-        ("bigg", "bigg: no such file, did you mean 'big'?"),
-        (".", "cannot be read: Is a directory"),
-        ("pipe", "is a device or a pipe"),
-        ("/dev/zero", "is a device or a pipe"),
-        ("x\\u0000y", "cannot be read"),
+        *MISTAKES["no_file"]["rows"],
         ("x" * 5000, "cannot be read: File name too long"),
         (" ", f"[{section}] file: expected a text"),
-        ("big", "is larger than 0.0001 MB"),
     ):
         path = write(f'{HEAD}{TIME}[{section}]\nfile = "{file}"\n')
         with pytest.raises(UserError) as caught:
@@ -228,33 +205,7 @@ def test_only_real_outputs_are_measured(write: Write) -> None:
 
 # ---- an example ----------------------------------------------------------------------------------
 
-EXAMPLE = """model = "rp_manipulator"
-title = "A slide that is pushed"
-description = "Force and position come from a log."
-tolerance = 1e-10
-[time]
-start = 0
-stop = "1 s"
-step = "10 ms"
-[parameters]
-g = 0
-a = 0
-[initial]
-q1 = "90 deg"
-q2 = "300 mm"
-[inputs.f2]
-file = "log.csv"
-column = "force"
-scale = "2 N"
-[measured.q2]
-file = "log.csv"
-column = "encoder"
-scale = "1 mm"
-[measured.ee_vy]
-file = "log.csv"
-column = "speed"
-time = "time"
-"""
+EXAMPLE = MISTAKES["logs"]["EXAMPLE"]
 
 
 def test_an_example_is_run_and_compared(

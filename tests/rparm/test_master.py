@@ -10,7 +10,7 @@ from rparm.fmi.fmu_file import Fmu
 from rparm.systems import step_control
 from rparm.systems.master import Master, Snapshot
 from rparm.systems.ssp import Connection
-from tests.support.rparm_project import BUILD, fmi3_fmu
+from tests.support.rparm_project import BUILD, MISTAKES, fmi3_fmu
 
 H, STEPS = 0.05, 40
 OMEGA = {"a": 2.0, "b": 3.0}
@@ -226,18 +226,7 @@ def test_wrong_connections_are_named(
         Master({"a": oscillator, "b": oscillator}, connections)
 
 
-@pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        ({"a": {"mass": 1.0}}, r"a: .* has no parameter 'mass'"),
-        ({"c": {"omega": 1.0}}, r"c: no such component"),
-        (
-            {"a": {"omega": 1e6}},
-            r"a: fmi(2SetReal|3SetFloat64) \(omega = 1000000\.0\) failed .*omega",
-        ),
-        ({"a": {"u": 1.0}}, r"a\.u: is fed by a connection"),
-    ],
-)
+@pytest.mark.parametrize(("parameters", "message"), MISTAKES["parameters_of_systems"]["rows"])
 def test_wrong_parameters_are_named(oscillator: Fmu, parameters: dict, message: str) -> None:
     with ring(oscillator) as master, pytest.raises(UserError, match=message):
         master.initialize(0.0, None, parameters)

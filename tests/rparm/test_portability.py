@@ -27,6 +27,7 @@ from tests.support.paths import ROOT, SYSTEMS
 from tests.support.rparm_project import (
     BUILD,
     FMUS,
+    MISTAKES,
     SHORT,
     Console,
     declared,
@@ -105,26 +106,7 @@ def test_sources_use_what_every_system_has(path: Path) -> None:
     assert list(not_portable(ast.parse(path.read_text(encoding="utf-8")))) == []
 
 
-@pytest.mark.parametrize(
-    ("line", "found"),
-    [
-        ("import fcntl", "fcntl"),
-        ("from resource import getrusage", "resource"),
-        ("os.killpg(1, 2)", "os.killpg"),
-        ("x = signal.SIGHUP", "signal.SIGHUP"),
-        ("run(preexec_fn=f)", "run(preexec_fn=)"),
-        ("run(process_group=0)", "run(process_group=)"),
-        ("run(x, text=True)", "run without encoding"),
-        ("ctypes.CDLL(None)", "ctypes.CDLL(None)"),
-        ("open(x)", "open without encoding"),
-        ("x.open()", "x.open without encoding"),
-        ("x.read_text()", "x.read_text without encoding"),
-        ("x.write_text(y, encoding=z)", "x.write_text without newline"),
-        ("x.open('w', encoding=z)", "x.open without newline"),
-        ("open(x, 'a', encoding=z)", "open without newline"),
-        ("if x:\n    os.fork()", "os.fork"),
-    ],
-)
+@pytest.mark.parametrize(("line", "found"), MISTAKES["portability"]["rows"])
 def test_what_not_every_system_has_is_noticed(line: str, found: str) -> None:
     assert list(not_portable(ast.parse(line))) == [found]
 

@@ -10,7 +10,7 @@ import pytest
 
 from rparm.errors import UserError
 from rparm.runs import comparison
-from tests.support.rparm_project import LONG, NAMES, declared, edit, load, reference_file
+from tests.support.rparm_project import LONG, MISTAKES, NAMES, declared, edit, load, reference_file
 
 Change = Callable[[list[str]], list[str]]  # of the lines of a file
 
@@ -89,16 +89,7 @@ def test_a_reference_of_an_installed_package_is_compressed(project: Path) -> Non
     assert "is damaged" in refused(project)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "reason"),
-    [
-        ('"time"', '"t"', "'time'"),
-        ('"ddq1"', '"ddq3"', "'ddq3'"),
-        ('"ddq1"', '"D11"', "has no column 'ddq1'"),
-        ('"ddq1"', '"q1"', "twice"),
-        ('"ddq1"', '"solver_steps"', "no Real variable 'solver_steps'"),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "reason"), MISTAKES["columns"]["rows"])
 def test_reference_with_wrong_columns(project: Path, old: str, new: str, reason: str) -> None:
     edit(reference_file(project, LONG), old, new)
     text = refused(project)

@@ -17,6 +17,7 @@ import pytest
 
 from rparm.needs import COMMANDS, overview, plan
 from tests.support.paths import ROOT
+from tests.support.rparm_project import MISTAKES
 
 SETUP = """#!/bin/sh
 echo "set up $*"
@@ -67,36 +68,7 @@ def call(root: Path, *arguments: str, stderr: int = subprocess.PIPE) -> subproce
     )
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ([], "- all no no run"),
-        (["--json"], "- all no yes run"),
-        (["--", "--help"], "- all no no run"),
-        (["--fmi", "3"], "- all no no -"),
-        (["power_off", "a b"], "- all no no -"),
-        (["My Scenario.TOML"], "- all no no -"),
-        (["system", "--json", "--", "--help", "--quiet"], "- all no yes -"),
-        (["--quiet", "campaign", "x"], "campaign all yes no -"),
-        (["federate", "a", "b"], "federation - no no -"),
-        (["playground", "--open"], "release playground no no -"),
-        (["new", "x"], "- all no no -"),
-        (["new-model", "x"], "- - no no -"),
-        (["schema"], "- - no no -"),
-        (["completion", "bash"], "- - no no -"),
-        (["help"], "- overview no no -"),
-        (["--quiet", "--help"], "- overview yes no -"),
-        (["--help", "--json"], "- - no yes -"),
-        (["help", "playground"], "- - no no -"),
-        (["linearize", "x", "-h"], "- - no no -"),
-        (["--version"], "- - no no -"),
-        (["--list"], "- - no no -"),
-        (["run", "--list"], "- - no no -"),
-        (["sytem"], "- - no no -"),  # no name of a scenario: refused at once
-        (["power_off*"], "- - no no -"),
-        (["my_scenario", "--quiet"], "- - yes no -"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "words"), MISTAKES["plan"]["rows"])
 def test_what_a_command_needs(arguments: list[str], words: str) -> None:
     assert " ".join(plan(arguments, ROOT / "models")) == words
 

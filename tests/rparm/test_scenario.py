@@ -10,6 +10,7 @@ import pytest
 from rparm import project
 from rparm.errors import UserError
 from rparm.runs import scenario
+from tests.support.rparm_project import MISTAKES
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, TOY, timed, toy
 
 
@@ -72,16 +73,7 @@ def test_an_enumeration_is_given_by_the_name_of_an_item(write, item: str, number
     assert run.parameters == {"gear": number}
 
 
-@pytest.mark.parametrize(
-    ("given", "shown"),
-    [
-        ('"fourth"', "'fourth'"),
-        ('"Third"', "'Third', did you mean 'third'?"),
-        ("2", "2"),
-        ("true", "true"),
-        ('["first"]', "['first']"),
-    ],
-)
+@pytest.mark.parametrize(("given", "shown"), MISTAKES["item"]["rows"])
 def test_what_is_no_item_is_refused_with_the_items(write, given: str, shown: str) -> None:
     with pytest.raises(UserError) as caught:
         scenario.load(write(f"{HEAD}{TIME}[parameters]\ngear = {given}\n"), TOY)

@@ -7,23 +7,23 @@ import pytest
 
 from rparm.errors import UserError
 from rparm.runs import scenario
-from tests.support.tables import tables
+from tests.support.rparm_project import MISTAKES
 from tests.support.toy_model import HEAD, TIME, TOY, timed
 
 # parts of the table: what stands above their texts
 ABOVE = {"whole": "", "below_head": HEAD, "below_time": f"{HEAD}{TIME}"} | {
     part: f"{HEAD}{TIME}[{part}]\n" for part in ("parameters", "initial", "inputs.force")
 }
-MISTAKES = [
+WRONG = [
     (ABOVE[part] + mistake["text"], mistake["message"])
-    for part, mistakes in tables(str(Path(__file__).with_name("mistakes")))["scenario"].items()
+    for part, mistakes in MISTAKES["scenario"].items()
     for mistake in mistakes
 ]
-MISTAKES.append((timed(0, "1" + "0" * 400, 0.1), "[time] stop: expected a finite number"))
+WRONG.append((timed(0, "1" + "0" * 400, 0.1), "[time] stop: expected a finite number"))
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize(("text", "message"), MISTAKES)
+@pytest.mark.parametrize(("text", "message"), WRONG)
 def test_mistake_is_explained_in_one_line(write, text: str, message: str) -> None:
     path = write(text)
     with pytest.raises(UserError) as caught:
@@ -50,17 +50,7 @@ def test_bytes_that_are_not_text(write) -> None:
         scenario.load(path, TOY)
 
 
-@pytest.mark.parametrize(
-    ("keys", "message"),
-    [
-        ("", "missing key 'model', the name of what the scenario is of .*, or 'fmu', the file"),
-        ('fmu = "Toy.fmu"\nmodel = "toy"', "has both 'model' and 'fmu': expected one of them"),
-        ("fmu = 3", "fmu: expected a text, got 3"),
-        ('fmu = "Toi.fmu"', "fmu: 'Toi.fmu': no such file, did you mean 'Toy.fmu'"),
-        ('fmu = "folder"', "fmu: 'folder': "),
-        ('fmu = "a\\u0000b"', "fmu: 'a.x00b': "),
-    ],
-)
+@pytest.mark.parametrize(("keys", "message"), MISTAKES["elsewhere"]["rows"])
 def test_what_a_scenario_elsewhere_is_of(tmp_path: Path, keys: str, message: str) -> None:
     path = tmp_path / "run.toml"
     path.write_text(f"{keys}\n{HEAD}{TIME}")

@@ -14,7 +14,7 @@ from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.runs import scenario as scenarios
 from rparm.runs import simulation
-from tests.support.rparm_project import LONG, SHORT, edit, fmi3_fmu, load, repacked
+from tests.support.rparm_project import LONG, MISTAKES, SHORT, edit, fmi3_fmu, load, repacked
 from tests.support.ssp_files import edited
 
 
@@ -65,21 +65,7 @@ def test_instances_are_freed_whatever_happens(opened: Fmu, monkeypatch: pytest.M
     assert calls == ["terminate", "freeInstance"] * 2
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "reason"),
-    [
-        (
-            "[parameters]",
-            "[parameters]\nmax_internal_steps = 3",
-            r"DoStep in the step from t = 0\.0 s failed \(discard\): .*3",
-        ),
-        (
-            "I2z = 0.1",
-            "I1z = 0.0\nI2z = 0.0\nm1 = 0.0",
-            r"ExitInitializationMode .* failed \(error\): .*m1",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "reason"), MISTAKES["failing_call"]["rows"])
 @pytest.mark.parametrize("version", [2, 3])
 def test_a_call_that_fails_is_explained(
     project: Path, fmu: Path, version: int, old: str, new: str, reason: str

@@ -13,7 +13,7 @@ from rparm import project
 from rparm.command_line import file_or_name, retyped
 from rparm.needs import NO_READER
 from tests.support.paths import ROOT
-from tests.support.rparm_project import BUILD, Console
+from tests.support.rparm_project import BUILD, MISTAKES, Console
 
 COMMAND = [sys.executable, "-P", "-m", "rparm"]
 
@@ -27,21 +27,7 @@ def started(*arguments: str, folder: Path = ROOT, **options: object) -> subproce
 
 # ---- Names ---------------------------------------------------------------------------------------
 
-REFUSED = {
-    "FMU to copy": (["fmu", "RPPlnt"], "no model 'RPPlnt', did you mean 'RPPlant'? (known: rp_"),
-    "FMU in small letters": (["fmu", "rpplnt"], "did you mean 'rp_plant'?"),
-    "FMU of a scenario": (["new", "x", "--model", "RPManipulater"], "mean 'RPManipulator'?"),
-    "FMU to identify": (["identify", "RPPlnt", "log.csv"], "did you mean 'RPPlant'?"),
-    "FMU to linearize": (["linearize", "RPPlnt"], "a name, did you mean 'RPPlant'? (known: rp_"),
-    "system to linearize": (["linearize", "ClosdLoop"], "did you mean 'ClosedLoop'?"),
-    "system": (["system", "ClosdLoop"], "did you mean 'closed_loop'?"),
-    "scenario": (["run", "Sine-Eforts"], "did you mean 'sine_efforts'?"),
-    "campaign": (["campaign", "tolerence"], "mean 'tolerance'? (./run.sh campaign --list names"),
-    "no campaign": (["campaign"], "expected the file of a campaign, or a name"),
-    "device": (["new", "Con.toml"], "'Con.toml': Windows keeps this name for a device"),
-    "device of a model": (["new-model", "lpt1"], "'lpt1': Windows keeps this name for a device"),
-    "superscript": (["new", "com\xb2"], "Windows keeps this name for a device"),
-}
+REFUSED = MISTAKES["name"]
 
 
 @pytest.mark.parametrize("what", REFUSED)

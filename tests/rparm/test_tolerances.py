@@ -13,25 +13,14 @@ from rparm.fmi.model import METHOD, SMALLEST_TOLERANCES, TOLERANCE
 from rparm.runs import scenario as scenarios
 from rparm.runs.comparison import Runs
 from rparm.runs.scenario import Scenario
-from tests.support.rparm_project import FMUS, SHORT, Console, declared, fmi3_fmu
+from tests.support.rparm_project import FMUS, MISTAKES, SHORT, Console, declared, fmi3_fmu
 from tests.support.ssp_files import SSP, edited, replace
 
-CONTENT = """\
-model = "rp_manipulator"
-title = "T"
-description = "D"
-tolerance = {tolerance}
-time = {{ start = 0.0, stop = 1.0, step = 0.1 }}
-[parameters]
-solver_method = "{method}"
-relative_tolerance = {parameter}
-[initial]
-q1 = 0.3
-"""
+SCENARIO = MISTAKES["tolerances"]["SCENARIO"]
 
 
 def loaded(folder: Path, method: str, tolerance: float, parameter: float = 0.0) -> Scenario:
-    text = CONTENT.format(tolerance=tolerance, method=method, parameter=parameter)
+    text = SCENARIO.format(tolerance=tolerance, method=method, parameter=parameter)
     path = folder / "x.toml"
     path.write_text(text, encoding="utf-8")
     return scenarios.load(path, declared("rp_manipulator"))
@@ -109,17 +98,7 @@ def test_systems_and_campaigns(tmp_path: Path, console: Console) -> None:
     assert "component 'arm': 'relative_tolerance': expected at" in error
 
 
-CAMPAIGN = """\
-title = "Test"
-description = "Of a test."
-scenario = "hanging_swing"
-sampling = "random"
-runs = 2
-[parameters.m2]
-uniform = [1.0, 3.0]
-[keep]
-final = ["q1"]
-"""
+CAMPAIGN = MISTAKES["tolerances"]["CAMPAIGN"]
 M2 = "[parameters.m2]\nuniform = [1.0, 3.0]\n"
 
 

@@ -13,8 +13,7 @@ from rparm.fmi.model import Variable
 from rparm.runs import scenario
 from rparm.runs.inputs import Sines, Table
 from rparm.units import SECONDS, typed_quantity
-from tests.support.rparm_project import FMUS, NAMES, declared, load
-from tests.support.tables import tables
+from tests.support.rparm_project import FMUS, MISTAKES, NAMES, declared, load
 from tests.support.toy_model import DESCRIPTION, TOY, toy
 
 PLANT = declared("rp_plant").variables
@@ -97,10 +96,7 @@ def test_a_variable_takes_its_own_unit_and_numbers_as_they_are(model: str) -> No
 
 NUMBER = "expected a number, or a number and its unit (known: m, mm, cm, km), got"
 WRONG = [
-    *(
-        (wrong["name"], wrong["given"], wrong["message"])
-        for wrong in tables(str(Path(__file__).with_name("mistakes")))["value"]
-    ),
+    *((wrong["name"], wrong["given"], wrong["message"]) for wrong in MISTAKES["value"]),
     *(
         ("q2", text, f"{NUMBER} {text!r}")
         for text in ("", "m", "nan m", "inf m", "-inf", "1,5 m", "1 000 m", "٣ m", "--1 m", "\n")
@@ -146,24 +142,7 @@ def test_an_angle_beyond_a_turn_is_asked_about() -> None:
 
 
 def test_a_scenario_takes_units_wherever_it_takes_values(tmp_path: Path) -> None:
-    text = """model = "rp_plant"
-title = "A"
-description = "B"
-tolerance = 1e-8
-[time]
-start = "500 ms"
-stop = {stop}
-step = ["100 ms", 0.2]
-[parameters]
-l1 = "50cm"
-[initial]
-q1 = "-45 deg"
-[inputs.tau1]
-sines = [{{ amplitude = "200 N.cm", frequency = "0.5 Hz", phase = "90 deg" }}]
-offset = "300 N.mm"
-[inputs.f2]
-table = [["0 ms", "1 kN"], [1, {force}]]
-"""
+    text = MISTAKES["units"]["text"]
     path = tmp_path / "units.toml"
     path.write_text(text.format(stop='"0.0012 ks"', force='"2000 mN"'), encoding="utf-8")
     run = scenario.load(path, declared("rp_plant"))

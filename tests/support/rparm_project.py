@@ -17,11 +17,13 @@ from rparm.fmi.model import Model
 from rparm.runs import scenario as scenarios
 from rparm.runs.scenario import Scenario
 from tests.support.paths import FOLDERS, ROOT
+from tests.support.tables import tables
 
 BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).absolute().parent
 FMUS = {folder: BUILD / f"{name}.fmu" for name, folder in FOLDERS.items()}
 FILES = project.scenario_files()
 NAMES = list(FILES)
+MISTAKES = tables(str(ROOT / "tests" / "rparm" / "mistakes"))
 SHORT, LONG = "constant_effort_single_step", "constant_effort"  # the same motion
 
 
