@@ -98,6 +98,25 @@ static void begin(double minus, struct motion *m) {
     m->c[0] = minus == majorant ? 1.0 : cos(at.q[0]);
 }
 
+/* Writes order k > 0 of s = sin x and c = cos x, from s' = c x' and c' = -s x'. */
+static void sine_cosine(const jet x, jet s, jet c, int k) {
+    s[k] = 0.0;
+    c[k] = 0.0;
+    for (int i = 1; i <= k; i++) {
+        s[k] += i * x[i] * c[k - i] / k;
+        c[k] -= i * x[i] * s[k - i] / k;
+    }
+}
+
+/* Returns order k of z = x / y, from x = z y. */
+static double quotient(const jet x, const jet y, const jet z, int k) {
+    double rest = x[k];
+    for (int i = 1; i <= k; i++) {
+        rest -= y[i] * z[k - i];
+    }
+    return rest / y[0];
+}
+
 /* What order k of q and q' follows from, and its functions; sinh and cosh are majorants. */
 static void next_order(double minus, int k, struct motion *m) {
     m->q1[k] = jet_integral(m->dq1, time_scale, k);
@@ -105,9 +124,9 @@ static void next_order(double minus, int k, struct motion *m) {
     m->dq1[k] = jet_integral(m->ddq1, time_scale, k);
     m->dq2[k] = jet_integral(m->ddq2, time_scale, k);
     m->L[k] = m->q2[k];
-    m->L_L[k] = jet_square(m->L, k);
+    m->L_L[k] = jet_product(m->L, m->L, k);
     m->J[k] = -minus * at.parameters.m2 * m->L_L[k];
-    jet_sine_cosine(m->q1, m->s, m->c, k);
+    sine_cosine(m->q1, m->s, m->c, k);
     m->c[k] *= -minus;
 }
 
@@ -136,7 +155,7 @@ static void expand_by_jets(double minus, int last, struct motion *m) {
         m->L_c[k] = jet_product(m->L, m->c, k);
         m->efforts[k] = tau1 + a * f2 + p->m2 * m->coriolis[k] +
                         minus * g * (p->m1 * p->lc1 * m->c[k] + p->m2 * m->L_c[k]);
-        m->ddq1[k] = jet_quotient(m->efforts, m->J, m->ddq1, k);
+        m->ddq1[k] = quotient(m->efforts, m->J, m->ddq1, k);
         m->ddq2[k] = f2 / p->m2 + m->L_dq1_dq1[k] + minus * g * m->s[k] + a * m->ddq1[k];
     }
 }
