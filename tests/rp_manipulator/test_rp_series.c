@@ -1,4 +1,4 @@
-/* The series of a motion against the equations of motion and the derivatives that the model has.
+/* The series of a motion against the equations of motion.
  *
  * Bounds: textbook() with all terms added up by their absolute values gives each coefficient and
  * each error of one a majorant, which epsilons are counted of. */
@@ -6,8 +6,8 @@
 #include "rp_series.h"
 
 #include "jet.h"
-#include "rp_calculated.h"
 #include "rp_equations.h"
+#include "rp_model.h"
 #include "rp_test_support.h"
 #include "unity.h"
 
@@ -174,39 +174,5 @@ static void test_coefficients_are_those_of_the_textbook_form(void) {
             ASSERT_CLOSE(expected.dq1[k], row[W][k], count * bound.dq1[k]);
             ASSERT_CLOSE(expected.dq2[k], row[V][k], count * bound.dq2[k]);
         }
-    }
-}
-
-/* ---- Derivatives that the model has --------------------------------------------------------- */
-
-static void assert_derivative(const double ddq[2], int order, double count) {
-    static struct motion bound;
-    expand_by_jets(majorant, order, &bound);
-    // coefficient k = order of q' is time_scale^k / k! times this derivative of q''
-    const double scale = pow(time_scale, order) / tgamma(order + 1.0);
-    ASSERT_CLOSE(ddq[0] * scale, row[W][order], count * EPS * bound.dq1[order]);
-    ASSERT_CLOSE(ddq[1] * scale, row[V][order], count * EPS * bound.dq2[order]);
-}
-
-static void test_derivatives_are_those_of_the_forward_dynamics(void) {
-    for (int n = 0; n < SAMPLES; n++) {
-        next_sample();
-        expand();
-        double ddq[2];
-        arm_accelerations(&at.parameters, at.q, at.dq, at.tau, ddq);
-        assert_derivative(ddq, 1, 16.0);
-
-        // along the motion
-        struct rp_values first = {.q = {at.dq[0], at.dq[1]}, .dq = {ddq[0], ddq[1]}};
-        struct rp_values second = {.q = {ddq[0], ddq[1]}};
-        for (int i = 0; i < 2; i++) {
-            first.tau[i] = inputs[i][1] / time_scale;
-            second.tau[i] = 2.0 * inputs[i][2] / (time_scale * time_scale);
-        }
-        rp_derivatives(&at, &first, NULL);
-        assert_derivative(first.ddq, 2, 32.0);
-        memcpy(second.dq, first.ddq, sizeof second.dq);
-        rp_derivatives(&at, &first, &second);
-        assert_derivative(second.ddq, 3, 64.0);
     }
 }
