@@ -474,12 +474,13 @@ def _line(text: str, message: str) -> str:
     if place and place[1]:
         head = re.sub(r"[\s\"']", "", place[1][1:-1])
         plain = [re.sub(r"[\s\"']", "", line.partition("#")[0]) for line in lines]
-        # the table itself, else one below it, else its line in the table above
+        # the table itself, else one below it, else its line in the table above or at the top
         heads = [i for i, line in enumerate(plain, 1) if line in (f"[{head}]", f"[[{head}]]")]
         heads = heads or [i for i, line in enumerate(plain, 1) if line.startswith(f"[{head}.")]
         if not heads:
             above, _, key = head.rpartition(".")
-            heads = [i for i, line in enumerate(plain, 1) if line == f"[{above}]"]
+            starts = (f"[{above}]", f"{head}=")
+            heads = [i for i, line in enumerate(plain, 1) if line.startswith(starts)]
             heads = heads if above else [0]
         begin = heads[0] if len(heads) == 1 else len(lines) + 1
     for i, line in enumerate(lines[begin:], begin + 1):
