@@ -1,4 +1,4 @@
-"""Reads a file with equations and checks it: its tables, and names, kinds and units in them.
+"""Reads a file with equations and checks it: names, kinds and units in its tables.
 
 Every mistake is a ModelFileError: file, line, section, name, column and what was expected, in one
 line.
@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import equations_code
+import equations_keys as keys
 import equations_tables
 from declaration.load import shown
 from equations_arrays import FOR, elements, every, target
@@ -22,8 +23,6 @@ from equations_content import (
     BOOLEAN,
     COUNTS,
     FOLLOWS,
-    INTEGER,
-    OPTIONS,
     SWITCHES,
     Element,
     Event,
@@ -32,7 +31,6 @@ from equations_content import (
     ModelFileError,
     Sampler,
     Variable,
-    instead_of,
     placed,
 )
 from equations_meaning import check
@@ -40,16 +38,11 @@ from equations_meaning import check
 from rparm.expressions.expression import (
     CONDITION,
     CONSTANTS,
-    FUNCTIONS,
-    FURTHER,
-    NO_NAMES,
     NUMBER,
     WHOLE,
     ExpressionError,
     Function,
-    Kind,
     Lookup,
-    finite_number,
     in_order,
     with_kinds,
 )
@@ -63,66 +56,12 @@ from rparm.expressions.units import (
 )
 
 LARGEST = 10**6  # bytes
-MOST_ENTRIES = 1000
 MOST_VARIABLES = 20_000
-MOST_SIZE = 20_000
-LONGEST_TEXT = 1000  # characters of a description
-LONGEST_MESSAGE = 500  # bytes: src/instance/settings.c has no room for more
-NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,99}", re.ASCII)
-# files that Windows cannot have, with any suffix
-CODE = re.compile(r'[^\x00-\x1f\\"]+\.c')
-DEVICE = re.compile("(?i:con|prn|aux|nul|com[1-9]|lpt[1-9])")
-CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
-LATER = ("sum", "der")
-RESERVED = {*FUNCTIONS, *NO_NAMES, "pi", "time", "GUID", "NAME", "TOKEN_FMI3"}
-TAKEN = {*RESERVED, *FURTHER, *LATER}  # no names of functions
-NUMBERS = ("start", "min", "max", "nominal")
-OF_ALL = ("start", "unit", "min", "max", "description")
-SECTIONS = {  # keys of their entries, and the one that each needs
-    "parameters": ((*OF_ALL, "type"), "start"),
-    "inputs": ((*OF_ALL, "type"), ""),
-    "states": ((*OF_ALL, "nominal", "derivative"), "derivative"),
-    "discrete": (("start", "unit", "description", "type"), ""),
-    "where": (("value", "unit", "description"), "value"),  # or expressions
-    "outputs": (("value", "unit", "description"), "value"),
-}
-OWN_KEYS = {
-    FOLLOWS: (("value", "unit", "description"), "value"),
-    OPTIONS: (("type", "start", "min", "max", "description"), "start"),
-    SWITCHES: (("type", "start", "description"), ""),
-    COUNTS: (("type", "start", "min", "max", "description"), ""),
-}
-NOT_REAL = {"parameters": OPTIONS, "inputs": SWITCHES, "discrete": COUNTS}
-HEAD = (
-    *("name", "description", "experiment", "modes", "code", "sizes", "units", "tables"),
-    *("functions", "sampled", "events", "check"),
-    *SECTIONS,
-)
-EXPERIMENT = {"stop": 10.0, "step": 0.01, "tolerance": 1e-8}
-TABLE = ("x", "y", "z", "file", "interpolation", "outside")
-EVENT = ("when", "while", "reinit", "set")
-SAMPLER = ("every", "offset", "while", "reinit", "set")
-LARGEST_INTEGER = 2**31 - 1
-TABLES = (
-    "experiment",
-    "sizes",
-    "units",
-    "tables",
-    "functions",
-    "sampled",
-    "events",
-    "check",
-    "reinit",
-    "set",
-    *SECTIONS,
-)
-QUOTES = r"[\s\"']"
-SECOND = unit_of_exponents({"s": 1})
 
 
 def _named(name: str) -> str:
     """Return a name as messages have it: in quotes if it is none."""
-    return name if re.fullmatch(rf"{NAME.pattern}(\[[^]]+\].*)?", name) else shown(name)
+    return name if re.fullmatch(rf"{keys.NAME.pattern}(\[[^]]+\].*)?", name) else shown(name)
 
 
 def tables_of(path: Path) -> tuple[str, dict[str, Any]]:
@@ -145,125 +84,28 @@ def tables_of(path: Path) -> tuple[str, dict[str, Any]]:
         raise ModelFileError("has a number or a table that is too long") from None
 
 
-def _expect(what: str, kind: type, fits: Callable[[Any], object] = bool) -> Callable[[Any], Any]:
-    """Return a function that refuses values unless they are of a kind and fit."""
-
-    def read(value: Any) -> Any:
-        if type(value) is not kind or not fits(value):
-            raise ValueError(f"expected {what}")
-        return value
-
-    return read
-
-
-def _text(value: object) -> str:
-    TEXT(value)
-    if CONTROL.search(value):
-        raise ModelFileError("has a control character")
-    return " ".join(value.split())
-
-
-TEXT = _expect(
-    f"a text of at most {LONGEST_TEXT} characters", str, lambda text: len(text) <= LONGEST_TEXT
-)
-
-
-LIST = _expect("a list of names", list, lambda names: all(type(name) is str for name in names))
-
-
-def _modes(value: Any) -> list[tuple[str, Any]]:
-    """Return the modes with their values at the start, or tables of their elements."""
-    if isinstance(value, dict) and all(type(start) in (bool, dict) for start in value.values()):
-        return [*value.items()]
-    try:
-        return [(name, False) for name in LIST(value)]
-    except ValueError:
-        raise ValueError("expected a list of names, or a table of true and false") from None
-
-
-def _type(value: Any) -> Kind:
-    """Return the kind of variables of a type."""
-    if value in (BOOLEAN, INTEGER):
-        return CONDITION if value == BOOLEAN else WHOLE
-    are_texts = isinstance(value, list) and value and all(type(item) is str for item in value)
-    if are_texts and len({*value}) == len(value) and all(map(NAME.fullmatch, value)):
-        return tuple(value)
-    raise ValueError(f'expected "{BOOLEAN}", "{INTEGER}" or a list of different names')
-
-
-def _arguments(value: Any) -> dict[str, str]:
-    """Return the arguments of a function with their units; of a list, these are empty."""
-    if isinstance(value, dict) and all(type(unit) is str and unit for unit in value.values()):
-        return value
-    if isinstance(value, list) and all(type(name) is str for name in value):
-        found = dict.fromkeys(value, "")
-        if len(found) == len(value):
-            return found
-    raise ValueError("expected a list of names, each once, or a table of their units")
-
-
-READ = {
-    **dict.fromkeys((*NUMBERS, *EXPERIMENT), finite_number),
-    "start": lambda given: given if type(given) in (bool, str) else finite_number(given),
-    "type": _type,
-    **dict.fromkeys(("unit", "description"), _text),
-    **dict.fromkeys(TABLES, _expect("a table", dict, lambda _: True)),
-    **dict.fromkeys((*BASE, ANGLE), _expect("a whole exponent", int, lambda e: abs(e) < 100)),
-    "name": _expect("a letter, then letters, digits, _", str, NAME.fullmatch),
-    "modes": _modes,
-    "arguments": _arguments,
-    "code": _expect("a C file such as crane.c", str, CODE.fullmatch),
-    "file": TEXT,
-}  # how values of keys are read; others are expressions
-
-
-def _entries(
-    table: object, known: Collection[str], needed: str = "", what: str = "key"
-) -> dict[str, Any]:
-    """Check a table with these keys, and return its values as they are used."""
-    if not isinstance(table, dict):
-        example = needed or next(iter(known))
-        raise ModelFileError(f"expected a table such as {{ {example} = ... }}, got {shown(table)}")
-    for key in table:
-        if key not in known:
-            place = f"[{key}]: " if what == "section" else ""
-            listed = f"unknown {what} {shown(key)}, expected one of {', '.join(known)}"
-            raise ModelFileError(place + listed + instead_of(key))
-    if needed and needed not in table:
-        raise ModelFileError(f"{needed} is missing")
-    return {key: _value(key, value, what) for key, value in table.items()}
-
-
-def _value(key: str, value: object, what: str) -> Any:
-    with placed(f"[{key}]" if what == "section" and key in TABLES else key):
-        try:
-            return READ[key](value) if key in READ else value
-        except ValueError as error:
-            raise ModelFileError(f"{error}, got {shown(value)}") from None
-
-
 def read_tables(
     path: Path, text: str, tables: dict[str, Any], solver_names: Iterable[str]
 ) -> ModelFile:
     """Read the tables, without the meaning of the expressions."""
-    head = _entries(tables, HEAD, "name", "section")
-    if DEVICE.fullmatch(head["name"]):
+    head = keys.entries(tables, keys.HEAD, "name", "section")
+    if keys.DEVICE.fullmatch(head["name"]):
         raise ModelFileError("name: Windows keeps this name for a device, choose another one")
     with placed("[experiment]"):
-        experiment = _experiment(_entries(head.get("experiment", {}), EXPERIMENT))
-    reserved = RESERVED | set(solver_names)
+        experiment = _experiment(keys.entries(head.get("experiment", {}), keys.EXPERIMENT))
+    reserved = keys.RESERVED | set(solver_names)
     file = ModelFile(head["name"], head.get("description", ""), experiment, path, text, reserved)
     for size, number in head.get("sizes", {}).items():
         with placed("[sizes]", _named(size)):
             _check_name(size, file)
-            if type(number) is not int or not 0 <= number <= MOST_SIZE:
+            if type(number) is not int or not 0 <= number <= keys.MOST_SIZE:
                 raise ModelFileError(
-                    f"expected a whole number from 0 to {MOST_SIZE}, got {shown(number)}"
+                    f"expected a whole number from 0 to {keys.MOST_SIZE}, got {shown(number)}"
                 )
         file.sizes[size] = number
     for symbol, given in head.get("units", {}).items():
         with placed("[units]", shown(symbol)):
-            known = _entries(given, (*BASE, ANGLE), what="base unit")
+            known = keys.entries(given, (*BASE, ANGLE), what="base unit")
             file.units[symbol] = Measure(known, base=symbol)
     for name, entry in head.get("tables", {}).items():
         _read_table(file, name, entry)
@@ -271,17 +113,19 @@ def read_tables(
         with placed("code"):
             file.code = equations_code.read(path.parent / head["code"])
             for name, function in file.code.functions.items():
-                if function.is_helper and name in TAKEN:
+                if function.is_helper and name in keys.TAKEN:
                     continue
                 with placed(f"{function.place}: {name}"):
                     _check_function_name(name, file)
                 file.functions[name] = function
     _read_functions(file, head.get("functions", {}))
     modes = head.get("modes", [])
-    entries = [*SECTIONS, "sampled", "events"]
-    if sum(len(head.get(section, {})) for section in entries) + len(modes) > MOST_ENTRIES:
-        raise ModelFileError(f"has more than {MOST_ENTRIES} variables, modes, samplers and events")
-    for section in SECTIONS:
+    entries = [*keys.SECTIONS, "sampled", "events"]
+    if sum(len(head.get(section, {})) for section in entries) + len(modes) > keys.MOST_ENTRIES:
+        raise ModelFileError(
+            f"has more than {keys.MOST_ENTRIES} variables, modes, samplers and events"
+        )
+    for section in keys.SECTIONS:
         for element in _elements(file, f"[{section}]", head.get(section, {}).items()):
             _read_variable(file, section, element)
     if not file.variables:
@@ -291,7 +135,7 @@ def read_tables(
             _check_name(element.name, file)
             start = element.entry
             if isinstance(start, dict):
-                start = _entries(start, ("start",), "start")["start"]
+                start = keys.entries(start, ("start",), "start")["start"]
             if type(start) is not bool:
                 raise ModelFileError(f"expected true or false, got {shown(start)}")
         file.modes[element.name] = start
@@ -318,10 +162,10 @@ def _read_check(file: ModelFile, message: str, entry: object) -> None:
     """Read a condition, which has to hold for all values of its indexes."""
     place = ("[check]", shown(message))
     with placed(*place):
-        text = _text(message)
-        if len(text.encode()) > LONGEST_MESSAGE:
-            raise ModelFileError(f"expected a message of at most {LONGEST_MESSAGE} bytes")
-        given = _entries(entry, ("value", FOR), "value") if isinstance(entry, dict) else {}
+        text = keys.plain_text(message)
+        if len(text.encode()) > keys.LONGEST_MESSAGE:
+            raise ModelFileError(f"expected a message of at most {keys.LONGEST_MESSAGE} bytes")
+        given = keys.entries(entry, ("value", FOR), "value") if isinstance(entry, dict) else {}
         found = every(file, given.get(FOR))
     for indexes in found:
         element = Element(text, text, given.get("value", entry), indexes)
@@ -334,25 +178,26 @@ def _read_table(file: ModelFile, name: str, entry: object) -> None:
         _check_function_name(name, file)
         given = dict(entry) if isinstance(entry, dict) else {}
         units = given.pop("unit", {})
-        given = _entries(given or entry, (*TABLE, "unit"), "x")
+        given = keys.entries(given or entry, (*keys.TABLE, "unit"), "x")
         arguments = ("x", "y") if "z" in given else ("x",)
-        keys = (*arguments, "z" if "z" in given else "y")
+        columns = (*arguments, "z" if "z" in given else "y")
         if not isinstance(units, dict) or not all(type(unit) is str for unit in units.values()):
             wanted = "unit: expected a table such as { x = 'm' }"
             raise ModelFileError(f"{wanted}, got {shown(units)}")
         measures = {}
         for key in units:
-            if key not in keys:
-                raise ModelFileError(f"unit: unknown key {shown(key)}, expected {', '.join(keys)}")
+            if key not in columns:
+                wanted = f"expected {', '.join(columns)}"
+                raise ModelFileError(f"unit: unknown key {shown(key)}, {wanted}")
             measures[key] = file.measured(units[key])
-            axis = "" if key == keys[-1] else keys.index(key)
+            axis = "" if key == columns[-1] else columns.index(key)
             file.table_units[table_unit(name, axis)] = measures[key].exponents
         file.tables[name] = equations_tables.read(name, given, file.path.parent, measures)
         file.functions[name] = Lookup(name, arguments)
 
 
 def _check_function_name(name: str, file: ModelFile) -> None:
-    if not NAME.fullmatch(name) or name in (*TAKEN, *file.functions):
+    if not keys.NAME.fullmatch(name) or name in (*keys.TAKEN, *file.functions):
         raise ModelFileError("expected a name that is no function already")
 
 
@@ -363,7 +208,7 @@ def _read_functions(file: ModelFile, entries: dict[str, object]) -> None:
     for name, entry in (of_c | entries).items():
         with placed("[functions]", _named(name)):
             needed = "" if name in in_c else "value"
-            given = _entries(entry, ("arguments", "value", "unit"), needed)
+            given = keys.entries(entry, ("arguments", "value", "unit"), needed)
             arguments, units = given.get("arguments", {}), {}
             order = (*arguments,) if "value" in given else in_c[name].arguments
             if {*order} != {*arguments}:
@@ -384,8 +229,8 @@ def _function(
 ) -> Function:
     """Return a function, whose arguments and value have units in the file, or take any."""
     _check_function_name(name, file)
-    taken = (*RESERVED, *file.sizes)
-    if not arguments or not all(NAME.fullmatch(a) and a not in taken for a in arguments):
+    taken = (*keys.RESERVED, *file.sizes)
+    if not arguments or not all(keys.NAME.fullmatch(a) and a not in taken for a in arguments):
         raise ModelFileError("arguments: expected names, each once and none reserved")
     value = file.expression(Element(name, name, text), ("value",), text)
     for node in in_order([value.tree]):
@@ -401,7 +246,7 @@ def _function(
 
 
 def _experiment(given: dict[str, float]) -> dict[str, float]:
-    found = EXPERIMENT | given
+    found = keys.EXPERIMENT | given
     if "step" not in given:
         found["step"] = min(found["step"], found["stop"] / 100)
     if not 0 < found["step"] <= found["stop"]:
@@ -418,7 +263,7 @@ def _read_variable(file: ModelFile, section: str, element: Element) -> None:
         entry = element.entry
         if section == "where" and not isinstance(entry, dict):
             entry = {"value": entry}
-        given = _entries(entry, *_keys(section, entry))
+        given = keys.entries(entry, *_keys(section, entry))
         section = _section(section, given)
         texts = {key: given.pop(key) for key in ("derivative", "value") if key in given}
         _set_start(section, given, texts)
@@ -439,10 +284,10 @@ def _read_variable(file: ModelFile, section: str, element: Element) -> None:
 def _keys(section: str, entry: object) -> tuple[tuple[str, ...], str]:
     """Return the keys that an entry may have, and the one that it needs."""
     if section == "parameters" and isinstance(entry, dict) and "value" in entry:
-        return OWN_KEYS[FOLLOWS]
-    if section in NOT_REAL and isinstance(entry, dict) and "type" in entry:
-        return OWN_KEYS[NOT_REAL[section]]
-    return SECTIONS[section]
+        return keys.OWN_KEYS[FOLLOWS]
+    if section in keys.NOT_REAL and isinstance(entry, dict) and "type" in entry:
+        return keys.OWN_KEYS[keys.NOT_REAL[section]]
+    return keys.SECTIONS[section]
 
 
 def _section(section: str, given: dict[str, Any]) -> str:
@@ -457,7 +302,7 @@ def _section(section: str, given: dict[str, Any]) -> str:
     if kind != WHOLE and {"min", "max"} & given.keys():
         raise ModelFileError("min and max are for numbers")
     given["kind"] = kind
-    return NOT_REAL[section]
+    return keys.NOT_REAL[section]
 
 
 def _set_start(section: str, given: dict[str, Any], texts: dict[str, Any]) -> None:
@@ -466,10 +311,11 @@ def _set_start(section: str, given: dict[str, Any], texts: dict[str, Any]) -> No
     if isinstance(kind, tuple) and (start is None or start in kind):
         given["start"] = kind.index(start or kind[0]) + 1
         return
+    wanted = "true or false" if kind == CONDITION else kind
+    if isinstance(kind, tuple):
+        wanted = f"one of {', '.join(map(shown, kind))}"
     if isinstance(start, str):
         if section not in ("states", "discrete", COUNTS):
-            wanted = f"one of {', '.join(map(shown, kind))}" if isinstance(kind, tuple) else kind
-            wanted = "true or false" if kind == CONDITION else wanted
             raise ModelFileError(f"start: expected {wanted}, got {shown(start)}")
         texts["start"] = given.pop("start")
     elif start is None and section in ("inputs", "states", "discrete", SWITCHES, COUNTS):
@@ -477,13 +323,12 @@ def _set_start(section: str, given: dict[str, Any], texts: dict[str, Any]) -> No
     if "start" in given:
         fits = type(given["start"]) is (bool if kind == CONDITION else float)
         if not fits or isinstance(kind, tuple):
-            wanted = "true or false" if kind == CONDITION else "a number"
-            wanted = f"one of {', '.join(map(shown, kind))}" if isinstance(kind, tuple) else wanted
+            wanted = NUMBER if kind == WHOLE else wanted
             raise ModelFileError(f"start: expected {wanted}, got {_literal(given['start'])}")
     for key in ("start", "min", "max"):
         if kind == WHOLE and key in given:
-            if not given[key].is_integer() or abs(given[key]) > LARGEST_INTEGER:
-                wanted = f"a whole number within +-{LARGEST_INTEGER}"
+            if not given[key].is_integer() or abs(given[key]) > keys.LARGEST_INTEGER:
+                wanted = f"a whole number within +-{keys.LARGEST_INTEGER}"
                 raise ModelFileError(f"{key}: expected {wanted}, got {given[key]:g}")
             given[key] = int(given[key])
 
@@ -504,7 +349,7 @@ def _set_unit(variable: Variable, file: ModelFile) -> None:
     # number = factor value + offset, as FMI has it
     variable.display = (variable.unit, float(1 / unit.factor), float(-unit.offset / unit.factor))
     variable.unit = unit.base
-    for key in NUMBERS:
+    for key in keys.NUMBERS:
         if (number := getattr(variable, key)) is not None:
             is_given = key != "start" or number != 0.0
             setattr(variable, key, unit.in_si(number, key == "nominal") if is_given else number)
@@ -512,7 +357,7 @@ def _set_unit(variable: Variable, file: ModelFile) -> None:
 
 def _check_name(name: str, file: ModelFile) -> None:
     base, *_ = name.partition("[")
-    if not NAME.fullmatch(base):
+    if not keys.NAME.fullmatch(base):
         raise ModelFileError("expected a name: a letter, then letters, digits, _")
     if base in file.reserved or name.startswith("der_"):
         raise ModelFileError("this name is reserved, choose another one")
@@ -547,13 +392,13 @@ def _check_range(variable: Variable) -> None:
 
 
 def _read_event(file: ModelFile, element: Element) -> None:
-    place, given = _change(file, "events", element, EVENT)
+    place, given = _change(file, "events", element, keys.EVENT)
     when = file.expression(element, (place, "when"), given["when"], CONDITION, event="when")
     file.events.append(Event(element.name, *_given(file, element, place, given, ""), when))
 
 
 def _read_sampler(file: ModelFile, element: Element) -> None:
-    place, given = _change(file, "sampled", element, SAMPLER)
+    place, given = _change(file, "sampled", element, keys.SAMPLER)
     every, offset = (
         file.expression(element, (place, key), given.get(key, "0"), NUMBER, "time")
         for key in ("every", "offset")
@@ -563,13 +408,13 @@ def _read_sampler(file: ModelFile, element: Element) -> None:
 
 
 def _change(
-    file: ModelFile, section: str, element: Element, keys: tuple[str, ...]
+    file: ModelFile, section: str, element: Element, known: tuple[str, ...]
 ) -> tuple[str, dict[str, Any]]:
     """Return the place of an event or sampler, and its entries; it needs the first of its keys."""
     place = f"[{section}.{_named(element.shown)}]"
     with placed(place):
         _check_name(element.name, file)
-        given = _entries(element.entry, keys, keys[0])
+        given = keys.entries(element.entry, known, known[0])
         if not (given.get("set") or given.get("reinit")):
             raise ModelFileError("expected set or reinit: what it does")
         return place, given
@@ -627,9 +472,9 @@ def _line(text: str, message: str) -> str:
     lines = text.split("\n")
     begin, key = 0, place and (place[2] or place[3])
     if place and place[1]:
-        head = re.sub(QUOTES, "", place[1][1:-1])
-        plain = [re.sub(QUOTES, "", line.partition("#")[0]) for line in lines]
-        # the table itself, else one below it, else its line in the table above
+        head = re.sub(r"[\s\"']", "", place[1][1:-1])
+        plain = [re.sub(r"[\s\"']", "", line.partition("#")[0]) for line in lines]
+        # the table itself, else one below it, else its line in the table above or at the top
         heads = [i for i, line in enumerate(plain, 1) if line in (f"[{head}]", f"[[{head}]]")]
         heads = heads or [i for i, line in enumerate(plain, 1) if line.startswith(f"[{head}.")]
         dotted = [i for i, line in enumerate(plain, 1) if line.startswith(f"{head}=")]
@@ -637,7 +482,8 @@ def _line(text: str, message: str) -> str:
             return f"line {dotted[0]}: "
         if not heads:
             above, _, key = head.rpartition(".")
-            heads = [i for i, line in enumerate(plain, 1) if line == f"[{above}]"]
+            starts = (f"[{above}]", f"{head}=")
+            heads = [i for i, line in enumerate(plain, 1) if line.startswith(starts)]
             heads = heads if above else [0]
         begin = heads[0] if len(heads) == 1 else len(lines) + 1
     for i, line in enumerate(lines[begin:], begin + 1):

@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
-import equations_file as reader
+import equations_keys as reader
 from equations import declaration
 from equations_arrays import FOR
 from equations_content import BOOLEAN, FOLLOWS, INTEGER, SWITCHES

@@ -8,7 +8,7 @@ from typing import Any
 from declaration.load import UNITS
 from declaration.load import read as read_declaration
 from equations_content import COUNTS, FOLLOWS, OPTIONS, SWITCHES, ModelFile, Variable, placed
-from equations_file import NUMBERS
+from equations_keys import NUMBERS
 
 from equations import c_events, c_model
 from equations.c_events import INDICATOR

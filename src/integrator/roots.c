@@ -458,31 +458,3 @@ double roots_search_first(const struct roots_polynomial *p) {
     }
     return sign > 0 && find(&rising, 1, 1, roots) > 0 ? roots[0].s : INFINITY;
 }
-
-/* True if |p(s)| is within its rounding and the rounding of s. */
-static bool is_zero_at(const struct roots_polynomial *p, double s) {
-    struct rising rising;
-    if (prepare(p, &rising) == 0) {
-        return false;
-    }
-    const struct horner_value at = horner(rising.c, rising.degree, s);
-    return fabs(at.value) <= at.rounding + 0x1p-52 * s * fabs(at.slope);
-}
-
-double roots_earliest(size_t count, const struct roots_polynomial p[], bool is_at_root[]) {
-    double earliest = INFINITY;
-    for (size_t i = 0; i < count; i++) {
-        const double s = roots_first(&p[i]);
-        is_at_root[i] = s <= earliest && s < INFINITY;
-        if (s < earliest) {
-            memset(is_at_root, 0, i * sizeof is_at_root[0]);
-            earliest = s;
-        }
-    }
-    if (earliest < INFINITY) {
-        for (size_t i = 0; i < count; i++) {
-            is_at_root[i] = is_at_root[i] || is_zero_at(&p[i], earliest);
-        }
-    }
-    return earliest;
-}

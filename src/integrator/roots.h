@@ -24,7 +24,6 @@
 
 #include <math.h>
 #include <stdbool.h>
-#include <stddef.h>
 
 /* ---- Values of a polynomial, with their rounding -------------------------------------------- */
 
@@ -140,8 +139,3 @@ NONNULL static inline bool roots_is_above(const struct roots_polynomial *p) {
 MUST_CHECK NONNULL static inline double roots_first(const struct roots_polynomial *p) {
     return roots_is_above(p) ? INFINITY : roots_search_first(p);
 }
-
-/* Returns the smallest roots_first of count polynomials. Writes which of them are 0 there: s is
- * their own roots_first, or |p| is within the rounding of its value and of s. */
-MUST_CHECK NONNULL double roots_earliest(size_t count, const struct roots_polynomial p[],
-                                         bool is_at_root[]);

@@ -82,7 +82,9 @@ static bool update_segment(const struct call *call, int i, bool is_exact) {
     } else if (!is_exact && !is_above && found >= before) {
         found = before - 1;
     }
-    *number = found < segment->first ? segment->first : found < segment->last ? found : segment->last;
+    *number = found < segment->first  ? segment->first
+              : found < segment->last ? found
+                                      : segment->last;
     call->holds[segment->low] = 1;
     call->holds[segment->high] = 0;
     return *number != before;

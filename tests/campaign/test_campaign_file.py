@@ -17,10 +17,14 @@ GRID, M2 = [("sobol", "grid"), ("runs = 40\n", "")], "[1.0, 3.0]"
 Q1 = "normal = [-2.0, 0.2]"
 
 
+def wrong(folder: Path, mistake: dict[str, Any]) -> Path:
+    changes = map(itemgetter("old", "new"), mistake.get("changes", [mistake]))
+    return write(folder, changes=list(changes))
+
+
 @pytest.mark.parametrize("mistake", MISTAKES["arm"], ids=itemgetter("message"))
 def test_a_mistake_is_refused(mistake: dict[str, Any], tmp_path: Path, console: Console) -> None:
-    changes = map(itemgetter("old", "new"), mistake.get("changes", [mistake]))
-    path, output = write(tmp_path, changes=list(changes)), tmp_path / "output"
+    path, output = wrong(tmp_path, mistake), tmp_path / "output"
     error = console.refused("campaign", path, "--output", output)
     assert str(path) in error and mistake["message"] in error
     assert not output.exists()

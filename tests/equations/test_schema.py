@@ -15,8 +15,8 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from rparm import schemas
-from tests.campaign.files import write
 from tests.campaign.test_campaign_file import MISTAKES as OF_CAMPAIGNS
+from tests.campaign.test_campaign_file import wrong
 from tests.equations.compiled import ModelFileError, read_text, value_of_toml
 from tests.equations.examples import MODELS
 from tests.equations.test_model_file import EXAMPLES, MISTAKES
@@ -71,13 +71,9 @@ def test_files_of_the_project_are_valid(kind: str) -> None:
 def test_mistakes_that_show_without_meaning_are_refused(tmp_path: Path) -> None:
     found = {name for name, (text, _) in MISTAKES.items() if is_refused("model", text)}
     assert {*SHOWN.replace("\n", "|").split("|")} - found == set()
-    of_campaigns = {}
-    for mistake in OF_CAMPAIGNS["arm"]:
-        changes = [(c["old"], c["new"]) for c in mistake.get("changes", [mistake])]
-        of_campaigns[mistake["message"]] = write(tmp_path, changes=changes).read_text()
     for kind, mistakes in (
         ("scenario", {message: text for text, message in OF_SCENARIOS}),
-        ("campaign", of_campaigns),
+        ("campaign", {m["message"]: wrong(tmp_path, m).read_text() for m in OF_CAMPAIGNS["arm"]}),
     ):
         shown = [text for message, text in mistakes.items() if SAID.search(message)]
         assert len(shown) > 8 and [text for text in shown if not is_refused(kind, text)] == []

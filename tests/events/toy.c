@@ -3,6 +3,18 @@
 #include <math.h>
 #include <string.h>
 
+/* A model whose first parameter, input and first state are these fields. */
+#define MODEL(toy, parameter, input, state)                                                        \
+    {                                                                                              \
+        .values_size = sizeof(struct toy##_values),                                                \
+        .parameters = {offsetof(struct toy##_values, parameter), sizeof(double[3])},               \
+        .inputs = {offsetof(struct toy##_values, input), sizeof(double)},                          \
+        .states = {offsetof(struct toy##_values, state), sizeof(double[2])},                       \
+        .derivatives = {offsetof(struct toy##_values, v), sizeof(double[2])},                      \
+        .right_hand_side = toy##_rhs, .jacobian = jacobian, .series = &toy##_series,               \
+        .outputs = toy##_outputs, .check_parameters = no_check, .events = &toy##_events,           \
+    }
+
 /* ---- Ball ----------------------------------------------------------------------------------- */
 
 static enum status ball_rhs(const void *values, double t, const double x[], const double u[],
@@ -130,19 +142,7 @@ static const struct model_events ball_events = {
     .update = ball_update,
 };
 
-static const struct model ball_model = {
-    .values_size = sizeof(struct ball_values),
-    .parameters = {offsetof(struct ball_values, g), sizeof(double[3])},
-    .inputs = {offsetof(struct ball_values, lift), sizeof(double)},
-    .states = {offsetof(struct ball_values, h), sizeof(double[2])},
-    .derivatives = {offsetof(struct ball_values, v), sizeof(double[2])},
-    .right_hand_side = ball_rhs,
-    .jacobian = jacobian,
-    .series = &ball_series,
-    .outputs = ball_outputs,
-    .check_parameters = no_check,
-    .events = &ball_events,
-};
+static const struct model ball_model = MODEL(ball, g, lift, h);
 
 /* ---- Block ---------------------------------------------------------------------------------- */
 
@@ -248,19 +248,7 @@ static const struct model_events block_events = {
     .update = block_update,
 };
 
-static const struct model block_model = {
-    .values_size = sizeof(struct block_values),
-    .parameters = {offsetof(struct block_values, m), sizeof(double[3])},
-    .inputs = {offsetof(struct block_values, f), sizeof(double)},
-    .states = {offsetof(struct block_values, x), sizeof(double[2])},
-    .derivatives = {offsetof(struct block_values, v), sizeof(double[2])},
-    .right_hand_side = block_rhs,
-    .jacobian = jacobian,
-    .series = &block_series,
-    .outputs = block_outputs,
-    .check_parameters = no_check,
-    .events = &block_events,
-};
+static const struct model block_model = MODEL(block, m, f, x);
 
 /* ---- Hammer --------------------------------------------------------------------------------- */
 
@@ -352,19 +340,7 @@ static const struct model_events hammer_events = {
     .update = hammer_update,
 };
 
-static const struct model hammer_model = {
-    .values_size = sizeof(struct hammer_values),
-    .parameters = {offsetof(struct hammer_values, period), sizeof(double[3])},
-    .inputs = {offsetof(struct hammer_values, f), sizeof(double)},
-    .states = {offsetof(struct hammer_values, x), sizeof(double[2])},
-    .derivatives = {offsetof(struct hammer_values, v), sizeof(double[2])},
-    .right_hand_side = hammer_rhs,
-    .jacobian = jacobian,
-    .series = &hammer_series,
-    .outputs = hammer_outputs,
-    .check_parameters = no_check,
-    .events = &hammer_events,
-};
+static const struct model hammer_model = MODEL(hammer, period, f, x);
 
 /* ---- Variables ------------------------------------------------------------------------------ */
 

@@ -2,6 +2,7 @@
 #include "roots.h"
 
 #include <float.h>
+#include <stdint.h>
 #include <string.h>
 #include <unity.h>
 
@@ -204,5 +205,57 @@ static void test_polynomials_without_roots(void) {
             TEST_ASSERT_EQUAL_INT(0, find(c, 3));
             TEST_ASSERT_TRUE(first(c, 3, 0.0) == INFINITY);
         }
+    }
+}
+
+/* The proof holds for what is well above 0, and for nothing that reaches it. */
+static void test_quick_proof(void) {
+    uint64_t state = 1;
+    int proven = 0;
+    for (int i = 0; i < 200000; i++) {
+        double c[ROOTS_LENGTH] = {0.0};
+        const int degree = i % ROOTS_LENGTH;
+        double size = 1.0;
+        for (int k = 0; k <= degree; k++) {
+            state = state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+            c[k] = size * ((double)(state >> 11) * 0x1p-52 - 1.0);
+            size *= i % 3 == 0 ? 1.0 : 0.5;
+        }
+        c[0] = i % 5 == 0 ? 0.0 : fabs(c[0]);
+        const struct roots_polynomial p = {c, degree, 0.0};
+        if (roots_is_above(&p)) {
+            TEST_ASSERT_TRUE(roots_search_first(&p) == INFINITY);
+            proven++;
+        } else if (degree >= 2 && c[0] > 0.0) {
+            double least = c[0];
+            for (int k = 1; k <= degree; k++) {
+                least -= fabs(c[k]);
+            }
+            TEST_ASSERT_TRUE(least < 1e-12);
+        }
+    }
+    TEST_ASSERT_TRUE(proven > 60000);
+}
+
+/* c0 + c1 s + d s^2 is 0 at one end, or at its lowest point; a little above, that is proven. */
+static void test_limits_of_the_quick_proof(void) {
+    const double at_limit[][5] = {
+        {1.0, -0.5, -0.25, 0.5, -0.25}, {1.0, 0.5, 0.5, -1.0, -1.0},
+        {0.25, -1.0, 1.0, 7.0, 0.0},    {0.0, 1.0, -0.5, -0.5, 0.25},
+        {1.0, -2.0, 1.0, 0.0, 3.0},     {0.25, -1.0, 2.0, -1.0, 1.0},
+        {1.0, -1.5, 0.5, 0.0, 0.0},     {0.0, 0.25, -1.0, 1.25, -0.25},
+    };
+    for (size_t i = 0; i < sizeof at_limit / sizeof at_limit[0]; i++) {
+        double c[5];
+        memcpy(c, at_limit[i], sizeof c);
+        const struct roots_polynomial p = {c, 4, 0.0};
+        double *const lowest = c[0] == 0.0 ? &c[1] : &c[0];
+        TEST_ASSERT_FALSE(roots_is_above(&p));
+        *lowest += 1e-15;
+        TEST_ASSERT_FALSE(roots_is_above(&p));
+        *lowest += 1e-12;
+        TEST_ASSERT_TRUE(roots_is_above(&p));
+        const struct roots_polynomial in_noise = {c, 4, 2.0};
+        TEST_ASSERT_FALSE(roots_is_above(&in_noise));
     }
 }

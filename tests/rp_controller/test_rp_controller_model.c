@@ -1,4 +1,4 @@
-/* The Jacobian of the controller, also where an effort is at its limit, and what is refused.
+/* The Jacobian of the controller where an effort is at its limit, and what is refused.
  * Derivatives are compared with sympy in test_controller.py. */
 #include "last_text.h"
 #include "model_test.h"
@@ -6,7 +6,6 @@
 #include "rp_controller_model.h"
 #include "rp_test_support.h"
 
-#include <float.h>
 #include <math.h>
 #include <string.h>
 #include <unity.h>
@@ -43,59 +42,28 @@ static void next_point(int mode) {
 
 /* ---- Jacobian ------------------------------------------------------------------------------- */
 
-enum { BELOW, AT, BEYOND, SIDES }; /* an effort and its limit */
-
-/* A law with integral parts at both joints, or only at joint 2; each joint's effort is below, at or
- * beyond its limit. */
-static void next_law(int mode, bool has_both, const int side[2], bool attached) {
-    next_point(mode);
-    at.v.payload_attached = attached;
-    struct rp_controller_parameters *p = &at.v.parameters;
-    p->Ki[0] = has_both ? 1.5 : 0.0;
-    double unlimited[2];
-    law_unlimited(p, at.v.payload_attached, &at.v.inputs, at.v.integral, unlimited);
-    for (int i = 0; i < 2; i++) {
-        static const double factors[SIDES] = {[BELOW] = 2.0, [AT] = 1.0, [BEYOND] = 0.5};
-        p->limit[i] = factors[side[i]] * fabs(unlimited[i]);
-    }
-}
-
-/* Column j at J[j]; the states and inputs in the values are not read. */
 static void jacobian(double J[2][2]) {
-    struct rp_controller_values parameters;
-    memset(&parameters, 0xff, sizeof parameters); // NaN
-    parameters.parameters = at.v.parameters;
-    parameters.payload_attached = at.v.payload_attached;
-    parameters.form = RP_CONTROLLER_CONTINUOUS;
     memset(J, 0xff, sizeof(double[2][2]));
-    ASSERT_OK(
-        rp_controller_model.jacobian(&parameters, 3.0, at.v.integral, at.v.inputs.q_ref, J[0]));
+    ASSERT_OK(rp_controller_model.jacobian(&at, 3.0, at.v.integral, at.v.inputs.q_ref, J[0]));
 }
 
-/* w' = Ki e - (u - limit) / (M Tt) at the limit and beyond, Ki e below it, 0 without Ki; u changes
- * with w by M, with computed torque by D. */
-static void test_jacobian_is_that_of_the_integral_rates(void) {
-    for (int n = 0; n < 3 * SIDES * SIDES * 2 * 8; n++) {
-        const int side[2] = {n / 3 % SIDES, n / 9 % SIDES};
-        const int mode = RP_CONTROLLER_PD + n % 3;
-        double J[2][2];
-        next_law(mode, n / 27 % 2 == 0, side, false);
-        jacobian(J);
-
-        const struct rp_controller_parameters *p = &at.v.parameters;
-        double D[2][2] = {{p->inertia[0], 0.0}, {0.0, p->inertia[1]}};
-        if (mode == RP_CONTROLLER_COMPUTED_TORQUE) {
-            const struct arm arm = arm_in_state(&p->arm, at.v.inputs.q, at.v.inputs.dq);
-            arm_mass_matrix(&arm, D);
-        }
+/* Efforts below their limits and beyond them: test_every_model.c. */
+static void test_an_effort_at_its_limit_counts_as_beyond(void) {
+    for (int n = 0; n < 24; n++) {
+        double J[2][2], beyond[2][2];
+        next_point(RP_CONTROLLER_PD + n % 3);
+        at.v.form = RP_CONTROLLER_CONTINUOUS;
+        double *limit = at.v.parameters.limit;
+        law_unlimited(&at.v.parameters, false, &at.v.inputs, at.v.integral, limit);
         for (int i = 0; i < 2; i++) {
-            const bool follows = p->Ki[i] > 0.0 && side[i] != BELOW;
-            for (int j = 0; j < 2; j++) {
-                const double expected =
-                    follows ? -D[i][j] / (p->inertia[i] * p->tracking_time) : 0.0;
-                ASSERT_CLOSE(expected, J[j][i], 16 * DBL_EPSILON * fabs(expected));
-            }
+            limit[i] = fabs(limit[i]);
         }
+        jacobian(J);
+        limit[0] *= 0.5;
+        limit[1] *= 0.5;
+        jacobian(beyond);
+        TEST_ASSERT_EQUAL_MEMORY(beyond, J, sizeof J);
+        TEST_ASSERT_TRUE(J[0][0] < 0.0 && J[1][1] < 0.0);
     }
 }
 

@@ -1,4 +1,4 @@
-/* The series of a motion against the equations of motion and the derivatives that the model has.
+/* The series of a motion against the equations of motion.
  *
  * Bounds: textbook() with all terms added up by their absolute values gives each coefficient and
  * each error of one a majorant, which epsilons are counted of. */
@@ -6,8 +6,8 @@
 #include "rp_series.h"
 
 #include "jet.h"
-#include "rp_calculated.h"
 #include "rp_equations.h"
+#include "rp_model.h"
 #include "rp_test_support.h"
 #include "unity.h"
 
@@ -98,6 +98,25 @@ static void begin(double minus, struct motion *m) {
     m->c[0] = minus == majorant ? 1.0 : cos(at.q[0]);
 }
 
+/* Writes order k > 0 of s = sin x and c = cos x, from s' = c x' and c' = -s x'. */
+static void sine_cosine(const jet x, jet s, jet c, int k) {
+    s[k] = 0.0;
+    c[k] = 0.0;
+    for (int i = 1; i <= k; i++) {
+        s[k] += i * x[i] * c[k - i] / k;
+        c[k] -= i * x[i] * s[k - i] / k;
+    }
+}
+
+/* Returns order k of z = x / y, from x = z y. */
+static double quotient(const jet x, const jet y, const jet z, int k) {
+    double rest = x[k];
+    for (int i = 1; i <= k; i++) {
+        rest -= y[i] * z[k - i];
+    }
+    return rest / y[0];
+}
+
 /* What order k of q and q' follows from, and its functions; sinh and cosh are majorants. */
 static void next_order(double minus, int k, struct motion *m) {
     m->q1[k] = jet_integral(m->dq1, time_scale, k);
@@ -105,9 +124,9 @@ static void next_order(double minus, int k, struct motion *m) {
     m->dq1[k] = jet_integral(m->ddq1, time_scale, k);
     m->dq2[k] = jet_integral(m->ddq2, time_scale, k);
     m->L[k] = m->q2[k];
-    m->L_L[k] = jet_square(m->L, k);
+    m->L_L[k] = jet_product(m->L, m->L, k);
     m->J[k] = -minus * at.parameters.m2 * m->L_L[k];
-    jet_sine_cosine(m->q1, m->s, m->c, k);
+    sine_cosine(m->q1, m->s, m->c, k);
     m->c[k] *= -minus;
 }
 
@@ -136,7 +155,7 @@ static void expand_by_jets(double minus, int last, struct motion *m) {
         m->L_c[k] = jet_product(m->L, m->c, k);
         m->efforts[k] = tau1 + a * f2 + p->m2 * m->coriolis[k] +
                         minus * g * (p->m1 * p->lc1 * m->c[k] + p->m2 * m->L_c[k]);
-        m->ddq1[k] = jet_quotient(m->efforts, m->J, m->ddq1, k);
+        m->ddq1[k] = quotient(m->efforts, m->J, m->ddq1, k);
         m->ddq2[k] = f2 / p->m2 + m->L_dq1_dq1[k] + minus * g * m->s[k] + a * m->ddq1[k];
     }
 }
@@ -155,39 +174,5 @@ static void test_coefficients_are_those_of_the_textbook_form(void) {
             ASSERT_CLOSE(expected.dq1[k], row[W][k], count * bound.dq1[k]);
             ASSERT_CLOSE(expected.dq2[k], row[V][k], count * bound.dq2[k]);
         }
-    }
-}
-
-/* ---- Derivatives that the model has --------------------------------------------------------- */
-
-static void assert_derivative(const double ddq[2], int order, double count) {
-    static struct motion bound;
-    expand_by_jets(majorant, order, &bound);
-    // coefficient k = order of q' is time_scale^k / k! times this derivative of q''
-    const double scale = pow(time_scale, order) / tgamma(order + 1.0);
-    ASSERT_CLOSE(ddq[0] * scale, row[W][order], count * EPS * bound.dq1[order]);
-    ASSERT_CLOSE(ddq[1] * scale, row[V][order], count * EPS * bound.dq2[order]);
-}
-
-static void test_derivatives_are_those_of_the_forward_dynamics(void) {
-    for (int n = 0; n < SAMPLES; n++) {
-        next_sample();
-        expand();
-        double ddq[2];
-        arm_accelerations(&at.parameters, at.q, at.dq, at.tau, ddq);
-        assert_derivative(ddq, 1, 16.0);
-
-        // along the motion
-        struct rp_values first = {.q = {at.dq[0], at.dq[1]}, .dq = {ddq[0], ddq[1]}};
-        struct rp_values second = {.q = {ddq[0], ddq[1]}};
-        for (int i = 0; i < 2; i++) {
-            first.tau[i] = inputs[i][1] / time_scale;
-            second.tau[i] = 2.0 * inputs[i][2] / (time_scale * time_scale);
-        }
-        rp_derivatives(&at, &first, NULL);
-        assert_derivative(first.ddq, 2, 32.0);
-        memcpy(second.dq, first.ddq, sizeof second.dq);
-        rp_derivatives(&at, &first, &second);
-        assert_derivative(second.ddq, 3, 64.0);
     }
 }

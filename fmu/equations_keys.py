@@ -1,0 +1,171 @@
+"""The keys of a file with equations: which there are, and how their values are read.
+
+Every mistake is a ModelFileError or a ValueError, in one line.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection
+from typing import Any
+
+from declaration.load import shown
+from equations_content import (
+    BOOLEAN,
+    COUNTS,
+    FOLLOWS,
+    INTEGER,
+    OPTIONS,
+    SWITCHES,
+    ModelFileError,
+    instead_of,
+    placed,
+)
+
+from rparm.expressions.expression import (
+    CONDITION,
+    FUNCTIONS,
+    FURTHER,
+    NO_NAMES,
+    WHOLE,
+    Kind,
+    finite_number,
+)
+from rparm.expressions.units import ANGLE, BASE
+
+MOST_ENTRIES = 1000
+MOST_SIZE = 20_000
+LONGEST_TEXT = 1000  # characters of a description
+LONGEST_MESSAGE = 500  # bytes: src/instance/settings.c has no room for more
+NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,99}", re.ASCII)
+CODE = re.compile(r'[^\x00-\x1f\\"]+\.c')
+# files that Windows cannot have, with any suffix
+DEVICE = re.compile("(?i:con|prn|aux|nul|com[1-9]|lpt[1-9])")
+CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
+RESERVED = {*FUNCTIONS, *NO_NAMES, "pi", "time", "GUID", "NAME", "TOKEN_FMI3"}
+TAKEN = {*RESERVED, *FURTHER, "sum", "der"}  # no names of functions
+NUMBERS = ("start", "min", "max", "nominal")
+OF_ALL = ("start", "unit", "min", "max", "description")
+SECTIONS = {  # keys of their entries, and the one that each needs
+    "parameters": ((*OF_ALL, "type"), "start"),
+    "inputs": ((*OF_ALL, "type"), ""),
+    "states": ((*OF_ALL, "nominal", "derivative"), "derivative"),
+    "discrete": (("start", "unit", "description", "type"), ""),
+    "where": (("value", "unit", "description"), "value"),  # or expressions
+    "outputs": (("value", "unit", "description"), "value"),
+}
+OWN_KEYS = {
+    FOLLOWS: (("value", "unit", "description"), "value"),
+    OPTIONS: (("type", "start", "min", "max", "description"), "start"),
+    SWITCHES: (("type", "start", "description"), ""),
+    COUNTS: (("type", "start", "min", "max", "description"), ""),
+}
+NOT_REAL = {"parameters": OPTIONS, "inputs": SWITCHES, "discrete": COUNTS}
+HEAD = (
+    *("name", "description", "experiment", "modes", "code", "sizes", "units", "tables"),
+    *("functions", "sampled", "events", "check"),
+    *SECTIONS,
+)
+EXPERIMENT = {"stop": 10.0, "step": 0.01, "tolerance": 1e-8}
+TABLE = ("x", "y", "z", "file", "interpolation", "outside")
+EVENT = ("when", "while", "reinit", "set")
+SAMPLER = ("every", "offset", "while", "reinit", "set")
+LARGEST_INTEGER = 2**31 - 1
+NO_TABLES = ("name", "description", "modes", "code")
+TABLES = ("reinit", "set", *(key for key in HEAD if key not in NO_TABLES))
+
+
+def _expect(what: str, kind: type, fits: Callable[[Any], object]) -> Callable[[Any], Any]:
+    """Return a function that refuses values unless they are of a kind and fit."""
+
+    def read(value: Any) -> Any:
+        if type(value) is not kind or not fits(value):
+            raise ValueError(f"expected {what}")
+        return value
+
+    return read
+
+
+def plain_text(value: object) -> str:
+    """Return a text in one line."""
+    TEXT(value)
+    if CONTROL.search(value):
+        raise ModelFileError("has a control character")
+    return " ".join(value.split())
+
+
+TEXT = _expect(
+    f"a text of at most {LONGEST_TEXT} characters", str, lambda text: len(text) <= LONGEST_TEXT
+)
+LIST = _expect("a list of names", list, lambda names: all(type(name) is str for name in names))
+
+
+def _modes(value: Any) -> list[tuple[str, Any]]:
+    """Return the modes with their values at the start, or tables of their elements."""
+    if isinstance(value, dict) and all(type(start) in (bool, dict) for start in value.values()):
+        return [*value.items()]
+    try:
+        return [(name, False) for name in LIST(value)]
+    except ValueError:
+        raise ValueError("expected a list of names, or a table of true and false") from None
+
+
+def _type(value: Any) -> Kind:
+    """Return the kind of variables of a type."""
+    if value in (BOOLEAN, INTEGER):
+        return CONDITION if value == BOOLEAN else WHOLE
+    are_texts = isinstance(value, list) and value and all(type(item) is str for item in value)
+    if are_texts and len({*value}) == len(value) and all(map(NAME.fullmatch, value)):
+        return tuple(value)
+    raise ValueError(f'expected "{BOOLEAN}", "{INTEGER}" or a list of different names')
+
+
+def _arguments(value: Any) -> dict[str, str]:
+    """Return the arguments of a function with their units; of a list, these are empty."""
+    if isinstance(value, dict) and all(type(unit) is str and unit for unit in value.values()):
+        return value
+    if isinstance(value, list) and all(type(name) is str for name in value):
+        found = dict.fromkeys(value, "")
+        if len(found) == len(value):
+            return found
+    raise ValueError("expected a list of names, each once, or a table of their units")
+
+
+READ = {
+    **dict.fromkeys((*NUMBERS, *EXPERIMENT), finite_number),
+    "start": lambda given: given if type(given) in (bool, str) else finite_number(given),
+    "type": _type,
+    **dict.fromkeys(("unit", "description"), plain_text),
+    **dict.fromkeys(TABLES, _expect("a table", dict, lambda _: True)),
+    **dict.fromkeys((*BASE, ANGLE), _expect("a whole exponent", int, lambda e: abs(e) < 100)),
+    "name": _expect("a letter, then letters, digits, _", str, NAME.fullmatch),
+    "modes": _modes,
+    "arguments": _arguments,
+    "code": _expect("a C file such as crane.c", str, CODE.fullmatch),
+    "file": TEXT,
+}  # how values of keys are read; others are expressions
+
+
+def entries(
+    table: object, known: Collection[str], needed: str = "", what: str = "key"
+) -> dict[str, Any]:
+    """Check a table with these keys, and return its values as they are used."""
+    if not isinstance(table, dict):
+        example = needed or next(iter(known))
+        raise ModelFileError(f"expected a table such as {{ {example} = ... }}, got {shown(table)}")
+    for key in table:
+        if key not in known:
+            place = f"[{key}]: " if what == "section" else ""
+            listed = f"unknown {what} {shown(key)}, expected one of {', '.join(known)}"
+            raise ModelFileError(place + listed + instead_of(key))
+    if needed and needed not in table:
+        raise ModelFileError(f"{needed} is missing")
+    return {key: _value(key, value, what) for key, value in table.items()}
+
+
+def _value(key: str, value: object, what: str) -> Any:
+    with placed(f"[{key}]" if what == "section" and key in TABLES else key):
+        try:
+            return READ[key](value) if key in READ else value
+        except ValueError as error:
+            raise ModelFileError(f"{error}, got {shown(value)}") from None
