@@ -477,9 +477,6 @@ def _line(text: str, message: str) -> str:
         # the table itself, else one below it, else its line in the table above or at the top
         heads = [i for i, line in enumerate(plain, 1) if line in (f"[{head}]", f"[[{head}]]")]
         heads = heads or [i for i, line in enumerate(plain, 1) if line.startswith(f"[{head}.")]
-        dotted = [i for i, line in enumerate(plain, 1) if line.startswith(f"{head}=")]
-        if dotted and not heads:
-            return f"line {dotted[0]}: "
         if not heads:
             above, _, key = head.rpartition(".")
             starts = (f"[{above}]", f"{head}=")
