@@ -56,7 +56,7 @@ KEYS: dict[str, Schema] = {  # start: by the type
 
 
 def schema() -> Schema:
-    """Return the schema, whose descriptions are those of the page."""
+    """Return the schema, with descriptions from the page."""
     names = "|".join(sorted({*reader.RESERVED, *declaration.solver_names()}))
     named = {"not": {"pattern": rf"^\s*({names})\s*(\[|$)|^der_"}}
     rows = re.findall(r"^\| `\[?(\w+)[^|]*\| (.*) \|$", PAGE.read_text("utf-8"), re.MULTILINE)

@@ -1,8 +1,8 @@
 """Statements that repeat with rising indexes as loops in C: compilers need more than linear time.
 
-A statement's numbers are those of its constants (n12) and the first in each bracket. Lines repeat
-if they are the same but for these numbers, which rise by the same steps from turn to turn. A
-constant that another turn reads is kept in an array.
+Lines repeat if they are the same but for some numbers, which rise by the same steps from turn to
+turn: the number of a constant (n12), and the first one in a bracket. A constant that another turn
+reads is kept in an array.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Loop:
-    """Turns of lines; the numbers are those of the first turn."""
+    """Turns of lines, with the numbers of the first turn."""
 
     lines: tuple[Line | Loop, ...]
     turns: int
