@@ -322,7 +322,8 @@ class Events:
 
     def _starts(self) -> list[str]:
         new = {v.name: v.initial.value for v in self.file.started}
-        counted = _counted(self.file).items()
+        counted, code = _counted(self.file).items(), Code(leaves(self.file))
+        assigned = self._assigned(code, new)
         return [
             "static void start(void *values_pointer) {",
             "    struct equations_values *values = values_pointer;",
@@ -330,7 +331,7 @@ class Events:
                 f"    values->{self.file.fields.count(name)} = {start};"
                 for name, (_, start) in counted
             ),
-            *indented(rolled(self._assigned(Code(leaves(self.file)), new))[0]),
+            *indented(rolled(code.lines + assigned)[0]),
             "}",
             "",
         ]
@@ -346,14 +347,13 @@ class Events:
         states = [state.name for state in self.file.of("states")]
         code = Code(leaves(self.file))
         lines = self._assigned(code, {name: e.value for name, e in change.given.items()})
-        code.lines, lines = lines[: -len(change.given)], lines[-len(change.given) :]
         lines += [f"tolerance[{states.index(name)}] = 0.0;" for name in change.reinit]
         if isinstance(change, Sampler) and change.during is not None:
             lines = [f"if ({code.of(change.during.value)}) {{", *indented(lines), "}"]
         return [f"if (event == {index}) {{", *indented(code.lines + lines), "}"]
 
     def _assigned(self, code: Code, new: Mapping[str, Value]) -> list[str]:
-        """Statements that give variables and modes their new values, all at the end."""
+        """Statements that give variables and modes the new values, which the code calculates."""
         counted, fields = _counted(self.file), {}
         for name, value in new.items():
             kind, _ = counted.get(name, ("", 0))
@@ -366,7 +366,7 @@ class Events:
                 )
             else:
                 fields[self.file.fields.value(name)] = code.constant(found)
-        return code.lines + [f"values->{field} = {value};" for field, value in fields.items()]
+        return [f"values->{field} = {value};" for field, value in fields.items()]
 
     def _counts(self) -> list[str]:
         """Rows of struct count: name, smallest and largest value."""
