@@ -351,8 +351,7 @@ def _set_unit(variable: Variable, file: ModelFile) -> None:
     variable.unit = unit.base
     for key in keys.NUMBERS:
         if (number := getattr(variable, key)) is not None:
-            is_given = key != "start" or number != 0.0
-            setattr(variable, key, unit.in_si(number, key == "nominal") if is_given else number)
+            setattr(variable, key, unit.in_si(number, key == "nominal"))
 
 
 def _check_name(name: str, file: ModelFile) -> None:

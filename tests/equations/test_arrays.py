@@ -141,6 +141,7 @@ def test_numbers_of_other_units_are_declared_in_si(folder: Path) -> None:
     assert shown == {
         "way": ("m", "mm", 0.3),
         "heat": ("K", "degC", 293.15),
+        "ice": ("K", "degC", 273.15),
         "turn": ("rad", "deg", np.pi / 2),
         "speed": ("rad/s", "rpm", 2 * np.pi),
     }
