@@ -92,8 +92,8 @@ struct component {
      * the step returns: until then nothing may free it. */
     bool has_failed_inside;
     bool is_logging; /* true while the importer's logger is running, inside another call */
-    const char *call_in_logger; /* a call from inside the logger; NULL if there is none */
     bool is_logged[LOG_CATEGORY_COUNT];
+    const char *call_in_logger; /* a call from inside the logger; NULL if there is none */
 };
 
 /* ---- Life ----------------------------------------------------------------------------------- */

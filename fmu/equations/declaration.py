@@ -272,7 +272,8 @@ def _initially(
 ) -> dict[str, list[str]]:
     """What it follows from at the end of the initialization, when events may happen."""
     found = _reached(leaves, file, ["state", "mode", "discrete"])
-    known_here = {name or "time" for op, name in found if op in (*MOVING, "parameter")}
+    # a tick at the start takes the start values of discrete variables
+    known_here = {n or "time" for op, n in found if op in (*MOVING, "parameter", "discrete")}
     known_here |= {name for _, name in found if _is_in(file, name, OPTIONS, SWITCHES)}
     names = {n for n in known_here if n == "time" or file.variables[n].initial is None}
     if known and names == {*known["dependencies"], *known["parameters"]}:

@@ -149,18 +149,19 @@ static enum status setup(struct instance *instance) {
     struct instance_memory *memory = &instance->memory;
 
     memory->size = before_values + 2 * values_size;
-    memory->block = calloc(1, memory->size);
+    /* the inputs in front of the block: a step reads both */
+    const size_t before_block =
+        aligned((POLYNOMIAL_NODES + 1 + SERIES_INPUT_LENGTH) * input_count * sizeof(double));
+    instance->nodes = calloc(1, before_block + memory->size);
     instance->first_derivatives = calloc(2, values_size);
-    instance->u =
-        calloc((POLYNOMIAL_NODES + 1 + SERIES_INPUT_LENGTH) * input_count + 1, sizeof(double));
     instance->reals = calloc(instance->description->reference_count, sizeof *instance->reals);
-    if (memory->block == NULL || instance->first_derivatives == NULL || instance->u == NULL ||
-        instance->reals == NULL) {
+    if (instance->nodes == NULL || instance->first_derivatives == NULL || instance->reals == NULL) {
         return STATUS_OUT_OF_MEMORY;
     }
     instance->second_derivatives = instance->first_derivatives + values_size;
+    instance->u = instance->nodes + POLYNOMIAL_NODES * input_count;
     instance->input_series = (double(*)[SERIES_INPUT_LENGTH])(instance->u + input_count);
-    instance->nodes = instance->u + (1 + SERIES_INPUT_LENGTH) * input_count;
+    memory->block = (char *)instance->nodes + before_block;
     memory->next_inputs = (struct polynomial *)(void *)memory->block;
     memory->current_inputs = memory->next_inputs + input_count;
     memory->active_inputs = memory->current_inputs + input_count;
@@ -224,9 +225,8 @@ void instance_destroy(struct instance *instance) {
     free(instance->indicators);
     free(instance->absolute_tolerances);
     free(instance->reals);
-    free(instance->u);
+    free(instance->nodes);
     free(instance->first_derivatives);
-    free(instance->memory.block);
     free(instance);
 }
 

@@ -15,11 +15,9 @@ struct integrator {
     double internal_end;         /* end of the last internal step, s since the restart */
     struct integrator_statistics statistics;
 
-    /* one value per state each, parts of values */
-    double *absolute_tolerances;
+    /* one value per state each, parts of values, whose first are the absolute tolerances */
     double *reached_x; /* the state at problem.reached */
     double *x;         /* room for the state that the method writes */
-    double *f;         /* room for a right-hand side */
     double values[];
 };
 
@@ -69,14 +67,11 @@ enum status integrator_create(const struct ode *ode, const struct message_sink *
     }
     created->problem.ode = *ode;
     created->problem.sink = *sink;
-    created->absolute_tolerances = created->values;
     created->reached_x = created->values + n;
     created->x = created->values + 2 * n;
-    created->f = created->values + 3 * n;
-    created->problem.failed_x = created->values + 4 * n;
+    created->problem.failed_x = created->values + 3 * n;
     if (!workspace_create(&created->workspace, workspace_size(ode)) ||
-        !location_create(&created->problem.ode, created->absolute_tolerances,
-                         &created->problem.location)) {
+        !location_create(&created->problem.ode, created->values, &created->problem.location)) {
         integrator_destroy(created);
         return STATUS_OUT_OF_MEMORY;
     }
@@ -128,10 +123,10 @@ static enum status configure(struct integrator *integrator, enum integrator_meth
 enum status integrator_configure(struct integrator *integrator,
                                  const struct integrator_settings *settings) {
     struct problem *problem = &integrator->problem;
-    memcpy(integrator->absolute_tolerances, settings->absolute_tolerances,
+    memcpy(integrator->values, settings->absolute_tolerances,
            problem->ode.state_count * sizeof(double));
     problem->settings = *settings;
-    problem->settings.absolute_tolerances = integrator->absolute_tolerances;
+    problem->settings.absolute_tolerances = integrator->values;
 
     const enum status status = configure(integrator, settings->method);
     problem->evaluation_count = 0;
@@ -288,31 +283,29 @@ const double *integrator_failure(const struct integrator *integrator, double *t)
 /* Returns the error of a state, in its unit, that the tolerances allow. */
 static double allowed_error(const struct integrator *integrator, size_t i) {
     return integrator->problem.settings.relative_tolerance * fabs(integrator->reached_x[i]) +
-           integrator->absolute_tolerances[i];
+           integrator->problem.settings.absolute_tolerances[i];
 }
 
-/* Writes f at the last state to integrator->f. Returns the largest rate (1/s) of a state, relative
- * to its size; NaN if f is not finite. */
-static double rate_of_motion(struct integrator *integrator) {
+/* Writes the right-hand side at the last state to f. Returns the largest rate (1/s) of a state,
+ * relative to its size; NaN if f is not finite. */
+static double rate_of_motion(const struct integrator *integrator, double f[]) {
     const struct problem *problem = &integrator->problem;
     const struct ode *ode = &problem->ode;
     double rate = 0.0;
-    if (ode->rhs(problem->reached, integrator->reached_x, integrator->f, ode->context) !=
-            STATUS_OK ||
-        !problem_are_finite(integrator->f, ode->state_count)) {
+    if (ode->rhs(problem->reached, integrator->reached_x, f, ode->context) != STATUS_OK ||
+        !problem_are_finite(f, ode->state_count)) {
         return NAN;
     }
     for (size_t i = 0; i < ode->state_count; i++) {
         const double size = allowed_error(integrator, i) / problem->settings.relative_tolerance;
-        rate = fmax(rate, fabs(integrator->f[i]) / size);
+        rate = fmax(rate, fabs(f[i]) / size);
     }
     return rate;
 }
 
 /* Returns the fastest rate (1/s) at which deviations from the motion change: power iteration with
- * the Jacobian, whose products are differences of right-hand sides. integrator->f: f at the last
- * state. */
-static double rate_of_deviations(struct integrator *integrator) {
+ * the Jacobian, whose products are differences of right-hand sides. f: of the last state. */
+static double rate_of_deviations(struct integrator *integrator, const double f[]) {
     const struct problem *problem = &integrator->problem;
     const struct ode *ode = &problem->ode;
     double *x = integrator->x;
@@ -331,7 +324,7 @@ static double rate_of_deviations(struct integrator *integrator) {
         }
         rate = 0.0;
         for (size_t i = 0; i < ode->state_count; i++) {
-            product[i] -= integrator->f[i];
+            product[i] -= f[i];
             rate = fmax(rate, fabs(product[i]) / allowed_error(integrator, i));
         }
         if (!(rate > 0.0 && rate < INFINITY)) {
@@ -344,8 +337,9 @@ static double rate_of_deviations(struct integrator *integrator) {
 /* In a stiff problem deviations change far faster than the motion does, and no explicit method can
  * make longer steps than their rate allows, however smooth the motion is. */
 bool integrator_seems_stiff(struct integrator *integrator) {
-    const double of_motion = rate_of_motion(integrator);
-    const double of_deviations = rate_of_deviations(integrator);
+    double *f = integrator->values + 4 * integrator->problem.ode.state_count;
+    const double of_motion = rate_of_motion(integrator, f);
+    const double of_deviations = rate_of_deviations(integrator, f);
     return of_deviations > 100.0 * of_motion &&
            of_deviations * integrator->statistics.last_step > 0.01;
 }

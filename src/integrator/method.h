@@ -13,6 +13,7 @@
  * in s since the restart. */
 struct problem {
     struct message_sink sink;
+    double *failed_x; /* the state at failed_at; here, where a step reads nothing */
     struct ode ode;
     struct integrator_settings settings;
     double origin;     /* time of the simulation at the restart, s: for messages only */
@@ -21,7 +22,6 @@ struct problem {
     bool continues;    /* as in struct integrator_start */
     double reached;    /* end of the last advance; 0 after a restart */
     double failed_at; /* last time at which the right-hand side failed; -INFINITY if it never did */
-    double *failed_x; /* the state there */
     int64_t evaluation_count;      /* calls of the right-hand side, or series begun */
     integrator_observer *observer; /* NULL if there is none */
     void *observer_context;
