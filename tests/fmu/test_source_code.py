@@ -18,6 +18,7 @@ import pytest
 
 from tests.fmu.symbols import libm, listed, standard
 from tests.rp_manipulator.random_motions import random_case, simulate
+from tests.support import programs
 from tests.support.instances import Instance, LoadedFmu
 from tests.support.missing import missing
 from tests.support.paths import EVERY, FMI_HEADERS, FOLDERS, ROOT
@@ -36,16 +37,8 @@ FUSED = re.compile(r"\tv?fn?m(?:add|sub)\w*|\tfml[as]\w*|\tfcm(?:la|ul)\w*")
 
 def run(*command: object, folder: Path | None = None, **environment: str) -> str:
     """Standard output of a command that must succeed."""
-    arguments = [str(argument) for argument in command]
-    result = subprocess.run(
-        arguments,
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=folder,
-        env=os.environ | environment,
-    )
-    assert result.returncode == 0, f"{arguments[:4]}\n{result.stdout}{result.stderr}"
+    result = programs.run(*command, cwd=folder, env=os.environ | environment)
+    assert result.returncode == 0, f"{command[:4]}\n{result.stdout}{result.stderr}"
     return result.stdout
 
 

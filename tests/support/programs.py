@@ -1,32 +1,37 @@
-"""Runs the examples as their page does, but in another folder."""
+"""Programs that tests run: what they print is kept."""
 
 import os
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from tests.support.paths import ROOT
 
 TIMEOUT = 120  # s
-# on matrices this small, threads only wait for each other
+# on small matrices, threads only wait for each other
 ENVIRONMENT = {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
+RPARM = ("-P", "-m", "rparm")  # arguments of Python
 
 
-def python(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
-    """Python with the project's packages in a folder."""
-    return subprocess.run(
-        [sys.executable, *map(str, arguments)],
-        env=os.environ | ENVIRONMENT,
-        cwd=folder,
-        text=True,
-        capture_output=True,
-        timeout=TIMEOUT,
-    )
+def run(*command: object, **options: Any) -> subprocess.CompletedProcess:
+    """Run a program; options of subprocess.run. Texts unless `text` is false."""
+    kept = {"text": True, "capture_output": True}
+    return subprocess.run(list(map(str, command)), **kept | options)
+
+
+def python(
+    *arguments: object, folder: Path = ROOT, environment: Mapping[str, str] | None = None, **options
+) -> subprocess.CompletedProcess:
+    """Run Python with the project's packages in a folder."""
+    given = os.environ | ENVIRONMENT | dict(environment or {})
+    return run(sys.executable, *arguments, cwd=folder, env=given, **{"timeout": TIMEOUT} | options)
 
 
 def printed(example: str, folder: Path) -> list[str]:
     """Lines that an example prints; it leaves its picture and nothing else in the empty folder."""
-    ran = python(folder, ROOT / "examples" / example, "picture.png")
+    ran = python(ROOT / "examples" / example, "picture.png", folder=folder)
     assert (ran.returncode, ran.stderr) == (0, "")
     assert [file.name for file in folder.iterdir()] == ["picture.png"]
     assert (folder / "picture.png").read_bytes().startswith(b"\x89PNG")
