@@ -75,16 +75,7 @@ def test_locks_and_extras_are_there() -> None:
         assert command.extra in ("", *project["optional-dependencies"])
 
 
-@pytest.mark.parametrize(
-    ("arguments", "wanted", "lock", "target"),
-    [
-        ("list", "list", "", ""),
-        ("federate 'a b'", "federate 'a b'", "--federation", ""),
-        ("", "run", "", "all"),
-        ("playground --open", "playground --open", "--release", "playground"),
-        ("--quiet system", "--quiet system", "", "all"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "wanted", "lock", "target"), MISTAKES["called"]["rows"])
 def test_which_command_is_called(
     root: Path, arguments: str, wanted: str, lock: str, target: str
 ) -> None:
