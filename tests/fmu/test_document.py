@@ -1,7 +1,5 @@
 """The model's README.md, its drawing, and the page that fmu/document.py makes of them."""
 
-from __future__ import annotations
-
 import math
 import re
 import subprocess
