@@ -21,6 +21,14 @@ def run(*command: object, **options: Any) -> subprocess.CompletedProcess:
     return subprocess.run(list(map(str, command)), **kept | options)
 
 
+def run_checked(*command: object, folder: Path | None = None, **environment: str) -> str:
+    """Run a program that must succeed; return its standard output."""
+    done = run(*command, cwd=folder, env=os.environ | environment)
+    if done.returncode:
+        raise RuntimeError(f"{' '.join(map(str, command))}\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
 def python(
     *arguments: object, folder: Path = ROOT, environment: Mapping[str, str] | None = None, **options
 ) -> subprocess.CompletedProcess:
