@@ -4,8 +4,6 @@ Nothing of it is compiled or run: plain_c interprets it, and what a call calcula
 of the graph, as if it stood in the expression. Every mistake is a ValueError, in one line.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

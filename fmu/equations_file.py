@@ -4,8 +4,6 @@ Every mistake is a ModelFileError: file, line, section, name, column and what wa
 line.
 """
 
-from __future__ import annotations
-
 import math
 import re
 import tomllib

@@ -3,8 +3,6 @@
 Every mistake is a ModelFileError or a ValueError, in one line.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Collection
 from typing import Any

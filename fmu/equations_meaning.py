@@ -1,7 +1,5 @@
 """Checks what a file with equations means: names, kinds, order and units of its expressions."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping
 from difflib import get_close_matches

@@ -4,8 +4,6 @@ A table of one argument is a polynomial in each segment between two bounds. Ever
 ValueError, in one line.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Writes the playground: one page with everything in it."""
 
-from __future__ import annotations
-
 import argparse
 import base64
 import html

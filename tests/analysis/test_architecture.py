@@ -25,6 +25,7 @@ from tests.analysis.call_graph import (
     read_symbols,
 )
 from tests.support.paths import ROOT
+from tests.support.programs import python
 
 BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).parent
 
@@ -230,9 +231,7 @@ def test_no_circle_of_folders_and_modules(package: Path) -> None:
 @pytest.mark.parametrize(("code", "unneeded"), NOT_LOADED.items())
 def test_what_is_not_needed_is_not_loaded(code: str, unneeded: set[str]) -> None:
     code = f"import sys\n{code}\nprint(*(set(sys.modules) & {unneeded}))"
-    command = [sys.executable, "-P", "-c", code]
-    given = {**os.environ, "PYTHONPATH": str(ROOT)}
-    run = subprocess.run(command, capture_output=True, text=True, env=given)
+    run = python("-P", "-c", code)
     assert run.returncode == 0, run.stderr
     assert run.stdout.splitlines()[-1] == ""
 

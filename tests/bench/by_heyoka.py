@@ -1,7 +1,5 @@
 """The problem of problem.c in heyoka: timed runs, and errors against an exact run."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache, cached_property
 from statistics import median

@@ -6,8 +6,6 @@ Every figure is the median of rounds, or of the repeats of bench, and ratios are
 round. Exits with 0 where targets are missed too: the table shows them.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

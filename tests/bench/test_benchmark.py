@@ -1,7 +1,5 @@
 """The benchmark runs, and all solvers do the same work. Times are not tested."""
 
-from __future__ import annotations
-
 import math
 import os
 import subprocess

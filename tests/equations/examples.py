@@ -1,8 +1,5 @@
 """FMUs of the examples, built once by the command `build`."""
 
-import os
-import subprocess
-import sys
 import zlib
 from collections.abc import Mapping
 from functools import cache
@@ -15,6 +12,7 @@ from fmpy.fmi2 import FMU2Slave
 
 from tests.support.instances import Instance, LoadedFmu
 from tests.support.paths import ROOT
+from tests.support.programs import RPARM, python
 from tests.support.tables import tables
 
 FOLDER = ROOT / "examples" / "models"
@@ -26,12 +24,7 @@ METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3, "taylor": 4}
 
 def build(path: Path, output: Path, *options: str) -> Path:
     """The FMU of FMI 2.0 of a file."""
-    command = [sys.executable, "-P", "-m", "rparm", "build", path, "--output", output, "--json"]
-    command += options
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    ended = subprocess.run(
-        command, cwd=ROOT, capture_output=True, text=True, check=False, env=environment
-    )
+    ended = python(*RPARM, "build", path, "--output", output, "--json", *options)
     assert ended.returncode == 0, ended.stderr
     (fmu,) = output.glob("*.fmu")
     return fmu

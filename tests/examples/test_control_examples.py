@@ -1,9 +1,6 @@
 """Examples of control: optimal control, LQR with a Kalman filter, an environment for learning."""
 
-import os
 import re
-import subprocess
-import sys
 import warnings
 from pathlib import Path
 
@@ -14,8 +11,8 @@ from gymnasium.utils.env_checker import check_env
 
 import rparm
 from examples import gymnasium_environment, lqr_and_kalman, optimal_control
-from tests.examples.scripts import printed
 from tests.support.paths import ROOT
+from tests.support.programs import printed, python
 
 
 @pytest.mark.parametrize("example", ["optimal_control.py", "lqr_and_kalman.py"])
@@ -193,10 +190,7 @@ EXAMPLES = ROOT / "examples"
 
 def test_a_run_of_each_model_is_drawn(tmp_path: Path) -> None:
     picture = tmp_path / "models.png"
-    ran = subprocess.run(
-        [sys.executable, EXAMPLES / "models" / "draw.py", picture],
-        cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, text=True, capture_output=True,
-    )  # fmt: skip
+    ran = python(EXAMPLES / "models" / "draw.py", picture, folder=tmp_path)
     assert ran.returncode == 0, ran.stderr
     files = {file.name.partition(".")[0] for file in (EXAMPLES / "models").glob("*.toml")}
     assert {line.partition(":")[0] for line in ran.stdout.splitlines()} == files

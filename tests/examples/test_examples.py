@@ -1,10 +1,7 @@
 """The examples run as their page says, and what they print is what other ways give."""
 
 import io
-import os
 import re
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
@@ -12,21 +9,14 @@ import numpy as np
 import pytest
 
 import rparm
-from tests.examples.scripts import printed, python
 from tests.support.paths import FMI_HEADERS, ROOT
+from tests.support.programs import printed, python, run
 
 EXAMPLES = ROOT / "examples"
 # warnings of the project's own build, without those for code of GNU
 STRICT = ("-std=c11", "-D_GNU_SOURCE", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror")
 SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 PNG = b"\x89PNG"
-
-
-def run(*command: object, **options: object) -> subprocess.CompletedProcess[str]:
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    return subprocess.run(
-        list(map(str, command)), env=environment, text=True, capture_output=True, **options
-    )
 
 
 @pytest.fixture(scope="module", params=[2, 3])
@@ -72,7 +62,7 @@ def test_an_importer_says_what_is_wrong(
 
 def test_the_slide_sticks_and_slips_in_fmpy(fmu: Path, tmp_path: Path) -> None:
     picture = tmp_path / "slide.png"
-    ran = run(sys.executable, EXAMPLES / "with_fmpy.py", fmu.with_name("RPPlant.fmu"), picture)
+    ran = python(EXAMPLES / "with_fmpy.py", fmu.with_name("RPPlant.fmu"), picture)
     assert ran.returncode == 0, ran.stderr
     assert ran.stdout.splitlines()[-1].startswith("q1 = ")
     assert picture.read_bytes().startswith(PNG)
@@ -80,7 +70,7 @@ def test_the_slide_sticks_and_slips_in_fmpy(fmu: Path, tmp_path: Path) -> None:
 
 def test_friction_takes_energy_and_nothing_else_does(tmp_path: Path) -> None:
     picture = tmp_path / "swings.png"
-    ran = run(sys.executable, EXAMPLES / "with_rparm.py", picture)
+    ran = python(EXAMPLES / "with_rparm.py", picture)
     assert ran.returncode == 0, ran.stderr
     lost = {}
     for line in ran.stdout.splitlines():
@@ -118,6 +108,6 @@ def test_the_federate_has_the_bits_of_a_plain_loop(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("who", ["arm", "controller"])
 def test_no_federate_waits_for_one_that_failed(who: str, tmp_path: Path) -> None:
-    ran = python(tmp_path, "-c", FAILING, who)
+    ran = python("-c", FAILING, who, folder=tmp_path)
     assert ran.returncode == 1
     assert ran.stderr.splitlines()[-1] == "ValueError: this one fails"

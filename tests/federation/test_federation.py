@@ -1,10 +1,7 @@
 """The closed loop as a federation: each FMU in its own process, coupled by HELICS."""
 
 import json
-import os
 import socket
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,7 +17,7 @@ from rparm.systems import ssp
 from rparm.systems.master import Master
 from rparm.systems.ssp import Ssp
 from tests.federation.processes import Start
-from tests.support.paths import ROOT
+from tests.support.programs import RPARM, python
 from tests.support.rparm_project import MISTAKES, Console
 from tests.support.ssp_files import SSP, edited, replace
 
@@ -93,14 +90,7 @@ def test_what_an_fmu_refuses_is_the_message(tmp_path: Path) -> None:
 
 def test_it_is_a_document(short: Ssp) -> None:
     """Whatever the processes of the components print."""
-    command = [sys.executable, "-P", "-m", "rparm", "federation", "nominal", "--json"]
-    done = subprocess.run(
-        [*command, "--ssp", str(short.path)],
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    done = python(*RPARM, "federation", "nominal", "--json", "--ssp", short.path, check=True)
     (variant,) = json.loads(done.stdout)["variants"]
     assert variant["passed"] and set(variant["microseconds_per_step"]) == {
         "helics", "ecos", "master",

@@ -14,6 +14,7 @@ from rparm.federation.network import KEY
 from tests.federation.processes import Process, Start, federation, wait_for_steps
 from tests.support.hosts import DEVICE, Network
 from tests.support.paths import ROOT
+from tests.support.programs import run
 from tests.support.ssp_files import SSP, edited, replace
 
 # ---- On this machine -----------------------------------------------------------------------------
@@ -27,15 +28,8 @@ def said(address: str, user: int | None, *arguments: str) -> str:
     _, port = network.check_address(address)
     environment = {name: value for name, value in os.environ.items() if name != KEY}
     who = (str(port), str(-1 if user is None else user), *arguments)
-    return subprocess.run(
-        [sys.executable, "-m", "tests.federation.stranger", *who],
-        cwd=ROOT,
-        env=environment,
-        stdout=subprocess.PIPE,
-        text=True,
-        timeout=LIMIT,
-        check=True,
-    ).stdout
+    command = (sys.executable, "-m", "tests.federation.stranger", *who)
+    return run(*command, cwd=ROOT, env=environment, timeout=LIMIT, check=True).stdout
 
 
 def test_strangers_change_nothing(start: Start, user: int | None) -> None:

@@ -3,7 +3,6 @@
 #include "fmu_harness.h"
 #include "fmu_states.h"
 
-#include <math.h>
 #include <string.h>
 #include <unity.h>
 

@@ -5,7 +5,6 @@
 #include "fmu_states.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 #include <unity.h>
 

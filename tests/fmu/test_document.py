@@ -1,7 +1,5 @@
 """The model's README.md, its drawing, and the page that fmu/document.py makes of them."""
 
-from __future__ import annotations
-
 import math
 import re
 import subprocess
@@ -21,6 +19,7 @@ from tests.support.tables import tables
 ROOT = Path(__file__).resolve().parents[2]
 MODEL = ROOT / "models" / "rp_manipulator"
 PAGES = (MODEL / "README.md", MODEL / "derivation.md")
+MISTAKES = tables(str(Path(__file__).with_name("mistakes")))
 SVG = "{http://www.w3.org/2000/svg}"
 
 sys.path.insert(0, str(ROOT / "fmu"))
@@ -87,19 +86,7 @@ def test_no_dollar_is_left_in_the_text(page: lxml.html.HtmlElement) -> None:
     assert "$" not in page.text_content()
 
 
-@pytest.mark.parametrize(
-    "latex",
-    [
-        r"\begin{aligned} x &= 1 \\ y &= 2 \end{aligned}",
-        r"\nosuchmacro x",
-        r"\frac{1}",
-        r"\left( x",
-        r"\begin{bmatrix} 1",
-        "x_",
-        "x}",
-        "",
-    ],
-)
+@pytest.mark.parametrize("latex", MISTAKES["formulas"]["rows"])
 def test_incomplete_formulas_are_refused(latex: str) -> None:
     with pytest.raises(FormulaError):
         mathml(latex, "inline")
@@ -178,7 +165,7 @@ def test_only_links_that_work_in_the_fmu_are_kept(model_description: Path, tmp_p
     assert "code site up" in page.text_content()
 
 
-@pytest.mark.parametrize("wrong", tables(str(Path(__file__).with_name("mistakes")))["document"])
+@pytest.mark.parametrize("wrong", MISTAKES["document"])
 def test_bad_input_is_named_in_one_line(wrong: dict[str, str], tmp_path: Path) -> None:
     for key, name in (("readme", "README.md"), ("xml", "modelDescription.xml")):
         if key in wrong:

@@ -166,10 +166,7 @@ def test_the_date_is_that_of_the_sources(tmp_path: Path) -> None:
     ("license_text", "epoch", "message"),
     [
         (None, "", "LICENSE: cannot be read"),
-        ("All rights reserved\n", "", "LICENSE: lacks 'NAME License'"),
-        ("MIT License\n", "", "'Copyright (c) YEAR, AUTHOR'"),
-        ("MIT License\nCopyright (c) 2026, Us\n", "soon", "SOURCE_DATE_EPOCH = 'soon'"),
-        ("MIT License\nCopyright (c) 2026, Us\n", "9" * 30, "is not a time in s"),
+        *TABLES["origins"],
     ],
 )
 def test_a_wrong_origin_is_named(
@@ -307,14 +304,7 @@ def test_items_belong_to_the_guid_and_their_texts_do_not(trajectory: Path, tmp_p
     assert guids[0] == guids[1] != guids[2]
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "word"),
-    [
-        ("RP_TRAJECTORY_LINE", "RP_TRAJECTORY_CIRCLE", "RP_TRAJECTORY_CIRCLE must be 2"),
-        ("RP_TRAJECTORY_LINE", "RP_TRAJECTORY_SPIRAL", "RP_TRAJECTORY_SPIRAL"),
-        ("parameters.motion", "parameters.radius", "motion: parameters.radius must be of type int"),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "word"), TABLES["constants"])
 def test_a_constant_of_another_value_does_not_compile(
     trajectory: Path, tmp_path: Path, old: str, new: str, word: str
 ) -> None:

@@ -19,6 +19,7 @@ from tests.prove import problems
 from tests.support.installed import RELEASE, Installed, wheel_of_release
 from tests.support.missing import missing
 from tests.support.paths import ROOT
+from tests.support.programs import RPARM, python
 
 MODEL = (ROOT / "examples" / "models" / "cart_and_pole.toml").read_text(encoding="utf-8")
 NAME = "CartAndPole"
@@ -197,12 +198,7 @@ def test_the_wheel_proves(installed: Installed) -> None:
     arguments = ("prove", "free_fall", "--method", "taylor", "--json")
     ran = installed.run(*arguments)
     assert ran.returncode == 0, ran.stderr
-    command = [sys.executable, "-P", "-m", "rparm", *arguments]
-    environment = project.child_environment()
-    here = subprocess.run(
-        command, cwd=ROOT, env=environment, capture_output=True, text=True, check=True
-    )
-    assert proven(ran.stdout) == proven(here.stdout)
+    assert proven(ran.stdout) == proven(python(*RPARM, *arguments, check=True).stdout)
 
 
 def proven(document: str) -> dict:

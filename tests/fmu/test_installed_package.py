@@ -2,9 +2,7 @@
 
 import hashlib
 import json
-import os
 import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
@@ -12,7 +10,8 @@ import pytest
 
 from rparm.command_line import COMMANDS
 from tests.support.installed import RELEASE, Installed, wheel_of_release
-from tests.support.paths import NAMES, ROOT, SYSTEMS
+from tests.support.paths import NAMES, SYSTEMS
+from tests.support.programs import RPARM, python, run
 
 UNPACKED = 22_000_000  # bytes; what it needs, with pip, has 230 MB more
 OF_CHECKOUT = ("./run.sh", "./setup.sh", "build/venv", "build/report")
@@ -29,11 +28,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installe
 
 
 def checkout(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-P", "-m", "rparm", *map(str, arguments)],
-        cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)}, text=True, capture_output=True,
-        check=True,
-    )  # fmt: skip
+    return python(*RPARM, *arguments, check=True)
 
 
 def test_it_is_small_and_for_every_platform(wheel: Path) -> None:
@@ -53,10 +48,8 @@ def test_all_files_of_the_release_are_in_it(installed: Installed) -> None:
         "from pathlib import Path; from rparm import shipped; import json\n"
         "print(json.dumps({n: str(shipped.file(n, Path('files'))) for n in shipped.names()}))"
     )
-    made = subprocess.run(
-        [installed.folder / "bin" / "python", "-P", "-c", script],
-        cwd=installed.work, text=True, capture_output=True, check=True,
-    )  # fmt: skip
+    command = (installed.folder / "bin" / "python", "-P", "-c", script)
+    made = run(*command, cwd=installed.work, check=True)
     lines = (line.split("  ") for line in (RELEASE / "SHA256SUMS").read_text().splitlines())
     of_fmus = (".fmu", ".ssp")
     expected = {name: checksum for checksum, name in lines if name.endswith(of_fmus)}

@@ -12,7 +12,8 @@ import pytest
 
 from tests.fmu.symbols import libm, listed, standard
 from tests.support.paths import EVERY, NAMES, ROOT, SYSTEMS
-from tests.support.source_copy import copy_sources, run, settings_of
+from tests.support.programs import run_checked
+from tests.support.source_copy import copy_sources, settings_of
 
 # ---- Archive -------------------------------------------------------------------------------------
 
@@ -181,8 +182,8 @@ def test_a_build_in_another_folder_gives_the_same_bytes(fmu: Path, tmp_path: Pat
     before = os.umask(0o077)
     try:
         settings = settings_of(fmu.parent)
-        run("cmake", "-S", sources, "-B", built, "-DBUILD_TESTING=OFF", *settings)
-        run("cmake", "--build", built, "--parallel", "2")
+        run_checked("cmake", "-S", sources, "-B", built, "-DBUILD_TESTING=OFF", *settings)
+        run_checked("cmake", "--build", built, "--parallel", "2")
     finally:
         os.umask(before)
     for name in (*(f"{name}.fmu" for name in BOTH_VERSIONS), *(f"{name}.ssp" for name in SYSTEMS)):

@@ -16,6 +16,7 @@ from lxml import etree
 from tests.support.generator import change, copied
 from tests.support.instances import STATES, instantiated
 from tests.support.paths import CARRIED, FOLDERS, ROOT
+from tests.support.programs import run
 from tests.support.tables import tables
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
@@ -171,10 +172,8 @@ def test_an_fmu_can_be_checked_by_what_it_carries(folder: Path, scenario: str) -
 
 def collect(variables: Path, output: Path, *names: str) -> subprocess.CompletedProcess[str]:
     """Collect the scenarios of a model as the build does."""
-    command = [sys.executable, ROOT / "fmu" / "references.py", variables, *names]
-    return subprocess.run(
-        [*command, "--output", output], capture_output=True, text=True, check=False
-    )
+    program = ROOT / "fmu" / "references.py"
+    return run(sys.executable, program, variables, *names, "--output", output)
 
 
 @pytest.fixture

@@ -21,6 +21,7 @@ from tests.rp_manipulator.random_motions import random_case, simulate
 from tests.support.instances import Instance, LoadedFmu
 from tests.support.missing import missing
 from tests.support.paths import EVERY, FMI_HEADERS, FOLDERS, ROOT
+from tests.support.programs import run_checked
 from tests.support.rparm_project import load
 
 TAYLOR = {"RPManipulator"}  # compared with the Taylor method, too
@@ -34,26 +35,11 @@ CLASSIFICATIONS = {"__fpclassify", "__isnan", "__signbit"}
 FUSED = re.compile(r"\tv?fn?m(?:add|sub)\w*|\tfml[as]\w*|\tfcm(?:la|ul)\w*")
 
 
-def run(*command: object, folder: Path | None = None, **environment: str) -> str:
-    """Standard output of a command that must succeed."""
-    arguments = [str(argument) for argument in command]
-    result = subprocess.run(
-        arguments,
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=folder,
-        env=os.environ | environment,
-    )
-    assert result.returncode == 0, f"{arguments[:4]}\n{result.stdout}{result.stderr}"
-    return result.stdout
-
-
 @pytest.fixture(scope="module")
 def releases(fmu: Path) -> dict[str, Path]:
     """Folders with sources/ and the description of each FMU, made by the build."""
     targets = [f"{name}_sources" for name in EVERY]
-    run("cmake", "--build", fmu.parent, "--target", *targets)
+    run_checked("cmake", "--build", fmu.parent, "--target", *targets)
     return {name: fmu.parent / "fmu" / name / "release" for name in EVERY}
 
 
@@ -114,13 +100,13 @@ def built(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Load
 def test_sources_and_description_stay_small(fmu: Path, tmp_path: Path, version: str) -> None:
     inner = "fmi3" if version == "fmi3" else ""
     targets = [f"{name}_{inner}_sources".replace("__", "_") for name in EVERY]
-    run("cmake", "--build", fmu.parent, "--target", *targets)
+    run_checked("cmake", "--build", fmu.parent, "--target", *targets)
     sizes = {}
     for name in EVERY:
         release = fmu.parent / "fmu" / name / inner / "release"
         archive = tmp_path / f"{name}.fmu"
         entries = [f"{part}={release / part}" for part in ("modelDescription.xml", "sources")]
-        run(sys.executable, ROOT / "fmu" / "package.py", archive, *entries)
+        run_checked(sys.executable, ROOT / "fmu" / "package.py", archive, *entries)
         sizes[name] = archive.stat().st_size
     assert max(sizes.values()) < LARGEST, sizes
 
@@ -131,26 +117,26 @@ def test_fmpy_compiles_an_fmu_without_binaries(
     archive = tmp_path / "RPManipulator.fmu"
     release = releases[archive.stem]
     entries = [f"{name}={release / name}" for name in ("modelDescription.xml", "sources")]
-    run(sys.executable, ROOT / "fmu" / "package.py", archive, *entries)
+    run_checked(sys.executable, ROOT / "fmu" / "package.py", archive, *entries)
     command = Path(sys.executable).parent / "fmpy"
-    assert "No problems found." in run(command, "validate", archive)
+    assert "No problems found." in run_checked(command, "validate", archive)
     options = ["--configuration", "Debug"]  # compiles three times faster than Release
-    run(command, "compile", archive, *options, CMAKE_BUILD_PARALLEL_LEVEL="2")
+    run_checked(command, "compile", archive, *options, CMAKE_BUILD_PARALLEL_LEVEL="2")
     assert_same_bits(built[archive.stem], LoadedFmu(archive, tmp_path / "compiled"))
 
 
 def test_fmpy_compiles_an_fmu_of_fmi_3(fmu: Path, tmp_path: Path) -> None:
     """By its buildDescription.xml, with fmpy's own headers of FMI."""
-    run("cmake", "--build", fmu.parent, "--target", "RPManipulator_fmi3_sources")
+    run_checked("cmake", "--build", fmu.parent, "--target", "RPManipulator_fmi3_sources")
     release = fmu.parent / "fmu" / "RPManipulator" / "fmi3" / "release"
     assert not list(release.rglob("fmi3Functions.h"))
     archive = tmp_path / "RPManipulator.fmu"
     entries = [f"{name}={release / name}" for name in ("modelDescription.xml", "sources")]
-    run(sys.executable, ROOT / "fmu" / "package.py", archive, *entries)
+    run_checked(sys.executable, ROOT / "fmu" / "package.py", archive, *entries)
     command = Path(sys.executable).parent / "fmpy"
-    assert "No problems found." in run(command, "validate", archive)
+    assert "No problems found." in run_checked(command, "validate", archive)
     options = ["--configuration", "Debug"]
-    run(command, "compile", archive, *options, CMAKE_BUILD_PARALLEL_LEVEL="2")
+    run_checked(command, "compile", archive, *options, CMAKE_BUILD_PARALLEL_LEVEL="2")
     runs = [
         fmpy.simulate_fmu(
             str(path), stop_time=2.0, output_interval=0.01, start_values={"q1": 0.3, "tau1": 2.0}
@@ -196,7 +182,9 @@ def compiled(compiler: str, options: tuple[str, ...], files: list[Path], folder:
         missing(f"{compiler} is not installed: ./setup.sh --platforms installs it")
     command = [compiler, *options, f"-I{FMI_HEADERS}", "-c"]
     with ThreadPoolExecutor(2) as executor:
-        halves = [executor.submit(run, *command, *files[i::2], folder=folder) for i in (0, 1)]
+        halves = [
+            executor.submit(run_checked, *command, *files[i::2], folder=folder) for i in (0, 1)
+        ]
         for half in halves:
             half.result()
 
@@ -221,7 +209,7 @@ def library(
         files = sorted((releases[build.fmu] / "sources").glob("*.c"))
         compiled(build.compiler, build.options, files, folder)
         path = folder / f"{build.fmu}.library"
-        run(build.compiler, "-shared", "-o", path, *sorted(folder.glob("*.o")))
+        run_checked(build.compiler, "-shared", "-o", path, *sorted(folder.glob("*.o")))
         libraries[build] = path
     return libraries[build]
 
@@ -273,7 +261,7 @@ def test_every_optimizer_gives_the_same_series(
     compiled(compiler, (option, "-fPIC"), files, objects)
     unpacked = Path(shutil.copytree(built[build.fmu].folder, tmp_path / "unpacked"))
     target = unpacked / "binaries" / "linux64" / f"{build.fmu}.so"
-    run(compiler, "-shared", "-o", target, *sorted(objects.glob("*.o")))
+    run_checked(compiler, "-shared", "-o", target, *sorted(objects.glob("*.o")))
     rebuilt = LoadedFmu(unpacked, unpacked)
     assert random_motions(rebuilt) == random_motions(built[build.fmu])
     for scenario in scenarios_of(built[build.fmu]):
@@ -297,7 +285,7 @@ def test_the_functions_of_the_standard_are_exported_and_no_others(
 
 @each(WINDOWS)
 def test_so_are_they_on_windows(build: Build, library: Path) -> None:
-    listing = run(f"{build.tools}objdump", "--private-headers", library)
+    listing = run_checked(f"{build.tools}objdump", "--private-headers", library)
     table = listing.partition("[Ordinal/Name Pointer] Table")[2].partition("\n\n")[0]
     assert set(re.findall(r"\[ *\d+\].* (\w+)$", table, re.MULTILINE)) == standard("fmi2")
 
@@ -307,7 +295,7 @@ def test_so_are_they_on_windows(build: Build, library: Path) -> None:
 
 @each(ARM)
 def test_nothing_is_fused_on_arm(build: Build, library: Path) -> None:
-    code = run(f"{build.tools}objdump", "--disassemble", library)
+    code = run_checked(f"{build.tools}objdump", "--disassemble", library)
     assert "\tfmul\t" in code
     assert not FUSED.search(code)
 
@@ -320,7 +308,7 @@ def test_nothing_is_fused_where_the_processor_could(
     patterns = ("rp_*.c", "musl_*.c", "small_vector.c", "sundials_nvector_*.c")
     files = sorted(path for pattern in patterns for path in sources.glob(pattern))
     compiled(compiler, ("-O3", "-march=haswell", "-fPIC"), files, tmp_path)
-    code = run("objdump", "--disassemble", *sorted(tmp_path.glob("*.o")))
+    code = run_checked("objdump", "--disassemble", *sorted(tmp_path.glob("*.o")))
     assert "\tvmulsd " in code
     assert not FUSED.search(code)
 

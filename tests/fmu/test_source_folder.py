@@ -11,6 +11,7 @@ import pytest
 
 from tests.support.generator import VARIABLES, generate
 from tests.support.paths import ROOT
+from tests.support.programs import run
 
 PROGRAM = ROOT / "fmu" / "source_code.py"
 SINE = "double sin(double x)\n{\n\treturn __sin(x);\n}\n"
@@ -71,10 +72,7 @@ class Toy:
         manifest = self.folder / "manifest.json"
         if not manifest.exists():
             manifest.write_text(json.dumps({"libraries": self.libraries, "roots": self.roots}))
-        command = [sys.executable, PROGRAM, manifest, "--output", self.output, *options]
-        return subprocess.run(
-            [str(part) for part in command], capture_output=True, text=True, check=False
-        )
+        return run(sys.executable, PROGRAM, manifest, "--output", self.output, *options)
 
     def contents(self) -> dict[str, str]:
         """Files of sources/ that are not the project's."""

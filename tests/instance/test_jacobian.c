@@ -4,8 +4,6 @@
 #include "one_instance.h"
 #include "oscillator_by_hand.h"
 
-#include <float.h>
-
 /* The oscillator with a spring that depends on position, time and input, and with damping:
  * x'' = -omega^2 (1 + t + u) sin x - gain x'. */
 static double stiffness(const struct oscillator_values *values, double t, double u) {

@@ -8,8 +8,6 @@
 #include "settings.h"
 #include "state.h"
 
-#include <limits.h>
-
 static struct instance_state state; /* of an instance that has taken a step */
 static char block[1024];
 

@@ -20,7 +20,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from sites import FOLDERS, Mutant, mutated
 
-from tests.support.source_copy import copy_sources, run, settings_of
+from tests.support.programs import run_checked
+from tests.support.source_copy import copy_sources, settings_of
 
 COMMON_OPTIONS = ("CMAKE_BUILD_TYPE=Mutants", "CMAKE_C_FLAGS=-O1 -w", "BUILD_TESTING=ON")
 OPTIONS: dict[str, tuple[str, ...]] = {"plain": (), "sanitized": ("SANITIZE=ON",)}
@@ -158,8 +159,8 @@ class Workshop:
         build = self.builds[kind]
         generator = ["-G", "Ninja"] if shutil.which("ninja") else []
         options = [f"-D{option}" for option in (*COMMON_OPTIONS, *OPTIONS[kind])]
-        run("cmake", "-S", self.sources, "-B", build, *generator, *options, *self.settings)
-        run("cmake", "--build", build, "--parallel", "1")
+        run_checked("cmake", "-S", self.sources, "-B", build, *generator, *options, *self.settings)
+        run_checked("cmake", "--build", build, "--parallel", "1")
         self.tests[kind] = c_tests(build)
         self.programs[kind] = {test.name: self.digest(build, test) for test in self.tests[kind]}
 

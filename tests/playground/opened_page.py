@@ -9,17 +9,7 @@ from selenium.webdriver.common.keys import Keys
 
 from tests.support.browser import Browser
 
-# what scripts of the tests use: doubles as text that keeps their bits
-PRELUDE = """
-const {simulation} = window.tested;
-const {plant, controller} = simulation.fmus;
-const encoded = numbers => {
-  const bytes = new Uint8Array(Float64Array.from(numbers).buffer);
-  let text = '';
-  for (const byte of bytes) text += String.fromCharCode(byte);
-  return btoa(text);
-};
-"""
+IN_PAGE = Path(__file__).with_name("in_page.js").read_text(encoding="utf-8")
 
 
 class OpenedPage:
@@ -38,12 +28,16 @@ class OpenedPage:
         """)
 
     def run(self, script: str, *arguments: Any) -> Any:
-        """Value of the body of a function that knows simulation, plant and controller."""
-        return self.browser.run(PRELUDE + script, *arguments)
+        """Value of the body of a function that knows what stands in in_page.js."""
+        return self.browser.run(IN_PAGE + script, *arguments)
 
-    def doubles(self, script: str, *arguments: Any) -> bytes:
-        """Bytes of the doubles in the array that the script returns by `return encoded(array)`."""
-        return base64.b64decode(self.run(script, *arguments))
+    def call(self, function: str, *arguments: Any) -> Any:
+        """Value of a function of in_page.js."""
+        return self.run(f"return {function}(...arguments)", *arguments)
+
+    def doubles(self, function: str, *arguments: Any) -> bytes:
+        """Bytes of the doubles in the array that a function of in_page.js returns."""
+        return base64.b64decode(self.run(f"return encoded({function}(...arguments))", *arguments))
 
     def value(self, name: str) -> float:
         """Value of a variable of the plant."""

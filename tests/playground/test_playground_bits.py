@@ -15,102 +15,6 @@ PLANT = {
     "stribeck_velocity2": 0.05, "stops2": 2, "lower2": -0.2, "upper2": 0.35, "restitution2": 0.4,
 }  # fmt: skip
 
-TRAJECTORY = """
-const [values, inputs, outputs, inputNames] = arguments;
-plant.call('fmi2Reset');
-plant.setUp(0);
-for (const [name, value] of Object.entries(values)) plant.set(name, value);
-plant.initialize();
-const given = plant.reals(inputNames), read = plant.reals(outputs), numbers = [];
-inputs.forEach((row, n) => {
-  given.set(row);
-  plant.doStep(n * 1e-3, 1e-3);
-  numbers.push(...read.get());
-});
-return encoded(numbers);
-"""
-
-COUPLED = """
-const [values, reference, efforts, outputs] = arguments;
-simulation.start(values);
-simulation.isControlled = true;
-simulation.reference = reference;
-const read = plant.reals(outputs), numbers = [];
-for (const row of efforts) {
-  simulation.efforts = row;
-  simulation.step();
-  numbers.push(...read.get());
-}
-return encoded(numbers);
-"""
-
-# the state after these inputs, serialized, as numbers
-SERIALIZED = TRAJECTORY.replace(
-    "return encoded(numbers);",
-    """
-    const state = plant.saveState(), place = plant.allocate(4);
-    plant.call('fmi2SerializedFMUstateSize', state, place);
-    const [size] = new Uint32Array(plant.buffer, place, 1), bytes = plant.allocate(size);
-    plant.call('fmi2SerializeFMUstate', state, bytes, size);
-    return [...new Uint8Array(plant.buffer, bytes, size)];
-    """,
-)
-
-DRAGGED = """
-const [values, outputs, inputNames] = arguments;
-simulation.start(values);
-const given = plant.reals(inputNames), read = plant.reals(outputs), inputs = [], numbers = [];
-for (let n = 0; n < 1000; n++) {
-  if (n === 100) simulation.hand.target = [0.2, 0.5];
-  if (n === 700) simulation.hand.target = null;
-  simulation.step();
-  inputs.push(...given.get());
-  numbers.push(...read.get());
-}
-return encoded([...inputs, ...numbers]);
-"""
-
-# 500 steps twice: before the second time, `back` brings the simulation back
-AGAIN = """
-const [values, outputs, way] = arguments;
-simulation.start(values);
-simulation.isControlled = true;
-simulation.reference = [0.5, 0.1];
-const read = plant.reals(outputs);
-const run = () => {
-  const numbers = [];
-  for (let n = 0; n < 500; n++) {
-    simulation.efforts = [3 * Math.sin(0.01 * simulation.steps), 1];
-    simulation.step();
-    numbers.push(...read.get());
-  }
-  return numbers;
-};
-const ways = {
-  saved: () => {
-    window.tested.save();
-    const first = run();
-    window.tested.restore();
-    return first;
-  },
-  kept: () => {
-    const first = run();
-    simulation.goBack(0.4);
-    return first;
-  },
-  method: () => {
-    window.tested.save();
-    const first = run();
-    simulation.change('plant', 'solver_method', 3);
-    run();
-    window.tested.restore();
-    return first;
-  },
-};
-for (let n = 0; n < 400; n++) simulation.step();
-return encoded([...ways[way](), ...run()]);
-"""
-
 
 def efforts(columns: int) -> np.ndarray:
     """Rows (STEPS, columns) of inputs that change all the time, and stay for a while."""
@@ -125,7 +29,7 @@ def test_plant(opened: OpenedPage, plant: Native, method: str) -> None:
     values = PLANT | {"solver_method": METHODS[method]}
     inputs = efforts(len(INPUTS))
     expected = plant.trajectory(values, inputs)
-    found = opened.doubles(TRAJECTORY, values, inputs.tolist(), OUTPUTS, INPUTS)
+    found = opened.doubles("trajectory", values, inputs.tolist(), OUTPUTS, INPUTS)
     assert len(expected) == 8 * STEPS * len(OUTPUTS)
     assert found == expected
     numbers = np.frombuffer(found).reshape(STEPS, -1)
@@ -138,7 +42,7 @@ def test_one_bit_is_noticed(opened: OpenedPage, plant: Native) -> None:
     inputs = efforts(len(INPUTS))[:50]
     expected = plant.trajectory(PLANT, inputs)
     inputs[20, 0] = np.nextafter(inputs[20, 0], np.inf)
-    assert opened.doubles(TRAJECTORY, PLANT, inputs.tolist(), OUTPUTS, INPUTS) != expected
+    assert opened.doubles("trajectory", PLANT, inputs.tolist(), OUTPUTS, INPUTS) != expected
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -147,7 +51,7 @@ def test_serialized_state(opened: OpenedPage, plant: Native, method: str) -> Non
     values = PLANT | {"solver_method": METHODS[method]}
     inputs = efforts(len(INPUTS))[:300]
     expected = plant.state(values, inputs)
-    found = bytes(opened.run(SERIALIZED, values, inputs.tolist(), OUTPUTS, INPUTS))
+    found = bytes(opened.call("serialized", values, inputs.tolist(), OUTPUTS, INPUTS))
     assert len(expected) > 1000
     assert found == expected
 
@@ -163,12 +67,12 @@ def test_plant_and_controller(
     values = {"plant": PLANT, "controller": controller_values}
     reference, added = (0.6, 0.15), efforts(2)
     expected = coupled_trajectory(plant, controller, values, reference, added)
-    assert opened.doubles(COUPLED, values, reference, added.tolist(), OUTPUTS) == expected
+    assert opened.doubles("coupled", values, reference, added.tolist(), OUTPUTS) == expected
 
 
 def test_drag(opened: OpenedPage, plant: Native) -> None:
     """What the hand makes of its pull is what the native FMU makes of the same forces."""
-    found = np.frombuffer(opened.doubles(DRAGGED, {"plant": PLANT}, OUTPUTS, INPUTS))
+    found = np.frombuffer(opened.doubles("dragged", {"plant": PLANT}, OUTPUTS, INPUTS))
     inputs = found[: 1000 * len(INPUTS)].reshape(1000, -1)
     forces = np.hypot(inputs[:, 2], inputs[:, 3])
     assert forces[100] > 10 and (forces[:100] == 0).all() and (forces[700:] == 0).all()
@@ -178,7 +82,7 @@ def test_drag(opened: OpenedPage, plant: Native) -> None:
 @pytest.mark.parametrize("way", ["saved", "kept", "method"])
 def test_back_in_time(opened: OpenedPage, way: str) -> None:
     """A saved state, a kept one, and one from before a change of the method give the bits back."""
-    numbers = opened.doubles(AGAIN, {"plant": PLANT, "controller": {}}, OUTPUTS, way)
+    numbers = opened.doubles("again", {"plant": PLANT, "controller": {}}, OUTPUTS, way)
     half = len(numbers) // 2
     assert half == 8 * 500 * len(OUTPUTS)
     assert numbers[:half] == numbers[half:]

@@ -191,32 +191,6 @@ def test_history(opened: OpenedPage) -> None:
 CHANGES = 250
 WILD = (-1.0, 0.0, 1e-300, 1e9, 1e300)  # beside the values that sliders have
 
-# changes one after the other, 20 steps after each; where a step fails, as the page goes back
-TORTURE = """
-const [changes] = arguments, counts = {accepted: 0, refused: 0, failed: 0};
-window.tested.reset();
-simulation.isControlled = true;
-for (const [fmu, name, value] of changes) {
-  try {
-    simulation.change(fmu, name, value);
-    counts.accepted++;
-  } catch (error) {
-    if (!(error instanceof FmuError)) throw error;
-    counts.refused++;
-  }
-  try {
-    for (let n = 0; n < 20; n++) simulation.step();
-  } catch (error) {
-    if (!(error instanceof FmuError)) throw error;
-    counts.failed++;
-    if (!simulation.goBack(simulation.time)) throw new Error('there is no state to go back to');
-  }
-}
-counts.energy = plant.get('total_energy');
-counts.steps = simulation.steps;
-return counts;
-"""
-
 
 def changes(opened: OpenedPage, chance: random.Random) -> list[tuple[str, str, float]]:
     """Random values, most of them of sliders, for the variables that the page has controls for."""
@@ -241,7 +215,7 @@ def changes(opened: OpenedPage, chance: random.Random) -> list[tuple[str, str, f
 
 @pytest.mark.parametrize("seed", range(4))
 def test_random_changes(opened: OpenedPage, seed: int) -> None:
-    counts = opened.run(TORTURE, changes(opened, random.Random(seed)))
+    counts = opened.call("torture", changes(opened, random.Random(seed)))
     assert counts["accepted"] > 100
     assert counts["refused"] > 10
     assert counts["steps"] > 100

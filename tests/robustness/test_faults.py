@@ -14,6 +14,7 @@ import pytest
 
 from rparm.__main__ import main
 from tests.support.paths import ROOT
+from tests.support.programs import RPARM, python, run
 from tests.support.ssp_files import SSP
 
 SCENARIO = "constant_effort_single_step"
@@ -111,12 +112,7 @@ def test_no_room_for_files(place: Place, arguments: tuple[str, ...], largest: in
 
 @pytest.mark.parametrize("arguments", [RUN, SYSTEM], ids=["run", "system"])
 def test_no_room_for_the_report(place: Place, arguments: tuple[str, ...]) -> None:
-    mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", place.here],
-        capture_output=True,
-        check=False,
-    )
-    if mounted.returncode:
+    if run("mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", place.here).returncode:
         pytest.skip("only root can make a small disk")
     try:
         code, _, err = place.call(arguments)
@@ -146,13 +142,8 @@ def test_what_builds_an_fmu_leaves_nothing_broken(tmp_path: Path, program: str) 
     }[program]
     (output / file).write_bytes(b"\xff older")
 
-    done = subprocess.run(
-        [sys.executable, "-B", FMU_SOURCES / f"{program}.py", *arguments],
-        preexec_fn=lambda: limit_files(3000),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command = (sys.executable, "-B", FMU_SOURCES / f"{program}.py", *arguments)
+    done = run(*command, preexec_fn=lambda: limit_files(3000))
     assert done.returncode == 2
     assert done.stderr.startswith(f"{program}.py: ") and done.stderr.count("\n") == 1
     assert [x.name for x in output.iterdir()] == [file]
@@ -196,13 +187,8 @@ def test_names_that_the_output_cannot_encode(tmp_path: Path) -> None:
         'title = "A"\ndescription = "B"\ntolerance = 1e-6\n[time]\nstart = 0\nstop = 1\nstep = 1\n'
     )
     (model / "scenarios" / "ü.toml").write_text(text)
-    done = subprocess.run(
-        [sys.executable, "-m", "rparm", "list"],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONIOENCODING": "ascii"},
-        capture_output=True,
-        check=False,
-    )
+    plain = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = run(sys.executable, "-m", "rparm", "list", cwd=tmp_path, env=plain, text=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, b"\\xfc  A\n", b"")
 
 
@@ -245,14 +231,7 @@ def main():
 cli.main = main
 sys.exit(cli._as_program())
 """
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
+    done = python("-c", program)
     assert (done.returncode, done.stderr) == (code, said)
 
 
@@ -275,12 +254,5 @@ def test_the_scripts_take_no_modules_from_elsewhere(tmp_path: Path) -> None:
     assert "unset PYTHONPATH PYTHONHOME" in text
     calls = re.findall(r"/bin/python\" (\S+)", text)
     assert len(calls) == text.count("/bin/python") == 1 and set(calls) == {"-P"}
-    done = subprocess.run(
-        [sys.executable, "-P", "-m", "rparm", "list"],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = python(*RPARM, "list", folder=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")

@@ -5,7 +5,6 @@
 #include "rp_plant_equations.h"
 #include "unity.h"
 
-#include <float.h>
 #include <limits.h>
 #include <math.h>
 #include <string.h>

@@ -4,7 +4,6 @@
 #include "plant_test_support.h"
 #include "unity.h"
 
-#include <float.h>
 #include <math.h>
 #include <string.h>
 

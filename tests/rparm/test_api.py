@@ -2,8 +2,6 @@
 
 import inspect
 import re
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -16,6 +14,7 @@ from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.runs import scenario as scenarios
 from tests.support.paths import ROOT
+from tests.support.programs import python
 from tests.support.rparm_project import MISTAKES
 
 RUN = {"stop_time": 1.0, "step": 0.01}
@@ -173,10 +172,7 @@ def test_every_argument_is_explained() -> None:
 def test_what_stands_on_the_page_runs(tmp_path: Path) -> None:
     blocks = BLOCK.findall(PAGE)
     assert len(blocks) == 4
-    made = subprocess.run(
-        [sys.executable, "-c", "\n".join(blocks)],
-        cwd=tmp_path, env={"PYTHONPATH": str(ROOT)}, text=True, capture_output=True, check=True,
-    )  # fmt: skip
+    made = python("-c", "\n".join(blocks), folder=tmp_path, check=True)
     lines = made.stdout.splitlines()
     assert lines[0].endswith(" rad") and lines[-1].startswith("no model 'RPPlnt', did you")
     assert (tmp_path / "fall.csv").is_file() and (tmp_path / "payload/manifest.json").is_file()
@@ -184,7 +180,4 @@ def test_what_stands_on_the_page_runs(tmp_path: Path) -> None:
 
 def test_importing_it_is_light() -> None:
     script = "import sys, rparm; print(sorted({'fmpy', 'numpy', 'matplotlib'} & set(sys.modules)))"
-    made = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, text=True, capture_output=True, check=True
-    )
-    assert made.stdout.strip() == "[]"
+    assert python("-c", script, check=True).stdout.strip() == "[]"

@@ -1,15 +1,12 @@
 """The command line: runs, mistakes of the user, interruptions."""
 
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from rparm.commands import run as run_command
-from tests.support.paths import ROOT
+from tests.support.programs import python
 from tests.support.rparm_project import (
     FMUS,
     LONG,
@@ -121,14 +118,6 @@ def test_report_in_a_folder_that_takes_no_files(
 
 
 def test_runs_from_anywhere(tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "rparm", "list"],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    lines = done.stdout.splitlines()
+    lines = python("-m", "rparm", "list", folder=tmp_path, check=True).stdout.splitlines()
     assert [line.split()[0] for line in lines] == NAMES
     assert all(load(name).title in line for name, line in zip(NAMES, lines, strict=True))

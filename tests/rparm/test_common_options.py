@@ -1,7 +1,6 @@
 """What all commands have: --json, --quiet, --output and --open; and completion by a shell."""
 
 import json
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -11,6 +10,7 @@ from rparm.command_line import COMMANDS
 from rparm.commands.completion import SCRIPT, SHELLS
 from rparm.systems import comparison
 from tests.support.paths import ROOT
+from tests.support.programs import RPARM, python, run
 from tests.support.rparm_project import MISTAKES, Console
 from tests.support.ssp_files import SSP, edited, replace
 
@@ -127,11 +127,7 @@ printf '%s\\n' "${COMPREPLY[@]}"
 @pytest.fixture(scope="module")
 def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
     file = tmp_path_factory.mktemp("completion") / "script"
-    done = subprocess.run(
-        ["build/venv/bin/python", "-P", "-m", "rparm", "completion", "bash"],
-        cwd=ROOT, env={"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, check=True,
-    )  # fmt: skip
-    file.write_bytes(done.stdout)
+    file.write_text(python(*RPARM, "completion", "bash", check=True).stdout, encoding="utf-8")
     return file
 
 
@@ -143,10 +139,7 @@ def test_bash_completes(script: Path, tmp_path: Path, words: list[str], wanted: 
     (tmp_path / "my_scenario.toml").touch()
     (tmp_path / "my_notes.txt").touch()
     (tmp_path / "my folder").mkdir()
-    done = subprocess.run(
-        ["bash", "-c", BASH, "bash", script, SCRIPT, *words],
-        cwd=tmp_path, text=True, capture_output=True, check=True,
-    )  # fmt: skip
+    done = run("bash", "-c", BASH, "bash", script, SCRIPT, *words, cwd=tmp_path, check=True)
     assert done.stdout.split("\n")[:-1] == wanted
 
 

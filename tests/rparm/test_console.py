@@ -3,9 +3,7 @@
 import argparse
 import json
 import math
-import os
 import random
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +20,7 @@ from rparm.result_tables import RunTable, SweepTable
 from rparm.runs.comparison import TOLERANCES, Run, Runs, Sweep
 from rparm.units import seconds, short, shortened
 from tests.support.paths import ROOT
+from tests.support.programs import python
 from tests.support.rparm_project import FMUS, LONG, MISTAKES, SHORT, Console, load
 from tests.support.ssp_files import SSP
 
@@ -157,13 +156,7 @@ sys.exit(cli.main())
 @pytest.mark.parametrize("option", ["--json", "--quiet", "neither"])
 def test_what_libraries_and_children_print_is_no_result(option: str) -> None:
     options = [] if option == "neither" else [option]
-    done = subprocess.run(
-        [sys.executable, "-c", NOISE, "list", *options],
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    done = python("-c", NOISE, "list", *options, check=True)
     noise = ["by Python", "by a child", "by compiled code"]
     if option == "--json":
         assert document(done.stdout) == {"exit_code": 0, "x": 1}

@@ -31,7 +31,7 @@ from rparm.runs.convergence import (
 )
 from rparm.runs.inputs import Sines
 from tests.support.paths import ROOT
-from tests.support.rparm_project import Console, declared, load, repacked
+from tests.support.rparm_project import MISTAKES, Console, declared, load, repacked
 
 MODEL = ROOT / "models" / "rp_manipulator"
 PATH = MODEL / "convergence" / "smooth_inputs.toml"
@@ -259,15 +259,7 @@ def test_inputs_that_are_not_smooth_are_refused(problem: Problem) -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "reason"),
-    [
-        (None, "cannot be used"),
-        ("{", "cannot be used"),
-        ('{"time": 4.096}', "cannot be used"),
-        ('{"time": 5.0, "final": {"q1": 1.0}, "largest": {"q1": 1.0}}', "does not belong"),
-        ('{"time": 4.096, "final": {"q1": 1.0}, "largest": {"q1": 0.0}}', "does not belong"),
-        ('{"time": 4.096, "final": {"q1": NaN}, "largest": {"q1": 1.0}}', "does not belong"),
-    ],
+    ("content", "reason"), [(None, "cannot be used"), *MISTAKES["exact_state"]["rows"]]
 )
 def test_damaged_exact_states_are_refused(tmp_path: Path, content: str | None, reason: str) -> None:
     model = tmp_path / "models" / "arm"

@@ -2,14 +2,12 @@
 remembers it: nothing is left."""
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from rparm.interruption import uninterrupted
-from tests.support.paths import ROOT
+from tests.support.programs import python
 
 # Sends itself a signal right after the call of a function with a certain number.
 PROGRAM = """
@@ -42,15 +40,8 @@ sys.exit(_as_program())
 
 def stopped(folder: Path, stop: str, kind: str, number: int, *command: str) -> str:
     """Run a command until it is stopped; the line that says what had just been made."""
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, kind, str(number), stop, *command],
-        cwd=ROOT,
-        env=os.environ | {"TMPDIR": str(folder), "PYTHONDONTWRITEBYTECODE": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
+    environment = {"TMPDIR": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+    done = python("-c", PROGRAM, kind, number, stop, *command, environment=environment)
     expected = {"SIGINT": (130, "interrupted\n"), "SIGTERM": (143, "")}
     assert (done.returncode, done.stderr) == expected[stop]
     return next(line for line in done.stdout.splitlines() if line.startswith("made"))
@@ -96,9 +87,7 @@ except SystemExit as end:
 with uninterrupted():
     print("goes on")
 """
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
-    )
+    done = python("-c", program, check=True)
     assert done.stdout == "[1, 2] 143 ['SIGTERM', 'SIGINT']\ngoes on\n"
 
 
@@ -113,8 +102,4 @@ def test_an_interrupt_that_was_caught_does_not_set_the_exit_code(tmp_path: Path)
         "try: exec('raise KeyboardInterrupt')\n"  # as where numba is imported
         "except KeyboardInterrupt: program._end(130)\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-m", "interrupted"],
-        cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=False,
-    )  # fmt: skip
-    assert done.returncode == 130
+    assert python("-m", "interrupted", folder=tmp_path).returncode == 130

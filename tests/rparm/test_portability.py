@@ -24,6 +24,7 @@ from rparm.fmi.versions import Fmi2Instance
 from rparm.runs import comparison, simulation
 from rparm.runs import scenario as scenarios
 from tests.support.paths import ROOT, SYSTEMS
+from tests.support.programs import python
 from tests.support.rparm_project import (
     BUILD,
     FMUS,
@@ -158,14 +159,9 @@ sys.exit(_as_program())
 
 def test_run_without_what_windows_lacks(fmu: Path, tmp_path: Path) -> None:
     arguments = ("run", SHORT, "--tolerance", "1e-8", "--fmu", fmu, "--report", tmp_path / "report")
-    done = subprocess.run(
-        [sys.executable, "-c", WITHOUT_POSIX, *map(str, arguments)],
-        cwd=tmp_path,
-        # the encoding of a console in western Europe
-        env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "cp1252"},
-        capture_output=True,
-        check=False,
-    )
+    console = {"PYTHONIOENCODING": "cp1252"}  # in western Europe
+    options = {"folder": tmp_path, "environment": console, "text": False}
+    done = python("-c", WITHOUT_POSIX, *arguments, **options)
     assert (done.returncode, done.stderr) == (0, b"")
     assert b"passed: 1 scenario" in done.stdout
     assert (tmp_path / "report" / "index.html").is_file()

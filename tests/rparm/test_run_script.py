@@ -17,6 +17,7 @@ import pytest
 
 from rparm.needs import COMMANDS, overview, plan
 from tests.support.paths import ROOT
+from tests.support.programs import run
 from tests.support.rparm_project import MISTAKES
 
 SETUP = """#!/bin/sh
@@ -57,15 +58,9 @@ def root(tmp_path: Path) -> Path:
 
 
 def call(root: Path, *arguments: str, stderr: int = subprocess.PIPE) -> subprocess.CompletedProcess:
-    return subprocess.run(
-        [root / "run.sh", *arguments],
-        cwd=root.parent / "folder of a user",
-        env={**os.environ, "PATH": f"{root / 'bin'}:{os.environ['PATH']}"},
-        stdout=subprocess.PIPE,
-        stderr=stderr,
-        text=True,
-        check=False,
-    )
+    options = {"capture_output": False, "stdout": subprocess.PIPE, "stderr": stderr}
+    options["env"] = {**os.environ, "PATH": f"{root / 'bin'}:{os.environ['PATH']}"}
+    return run(root / "run.sh", *arguments, cwd=root.parent / "folder of a user", **options)
 
 
 @pytest.mark.parametrize(("arguments", "words"), MISTAKES["plan"]["rows"])
@@ -80,16 +75,7 @@ def test_locks_and_extras_are_there() -> None:
         assert command.extra in ("", *project["optional-dependencies"])
 
 
-@pytest.mark.parametrize(
-    ("arguments", "wanted", "lock", "target"),
-    [
-        ("list", "list", "", ""),
-        ("federate 'a b'", "federate 'a b'", "--federation", ""),
-        ("", "run", "", "all"),
-        ("playground --open", "playground --open", "--release", "playground"),
-        ("--quiet system", "--quiet system", "", "all"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "wanted", "lock", "target"), MISTAKES["called"]["rows"])
 def test_which_command_is_called(
     root: Path, arguments: str, wanted: str, lock: str, target: str
 ) -> None:

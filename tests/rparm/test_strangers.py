@@ -13,6 +13,7 @@ from rparm import project
 from rparm.command_line import file_or_name, retyped
 from rparm.needs import NO_READER
 from tests.support.paths import ROOT
+from tests.support.programs import run
 from tests.support.rparm_project import BUILD, MISTAKES, Console
 
 COMMAND = [sys.executable, "-P", "-m", "rparm"]
@@ -134,9 +135,6 @@ def test_it_ends_as_by_a_signal_where_nobody_reads(arguments: list[str]) -> None
 def test_a_current_folder_that_is_gone_is_named(arguments: list[str], tmp_path: Path) -> None:
     script = 'mkdir gone && cd gone && rmdir ../gone && exec "$@"'
     command = ["sh", "-c", script, "sh", *COMMAND, *arguments]
-    done = subprocess.run(
-        command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, text=True,
-        capture_output=True, check=False,
-    )  # fmt: skip
+    done = run(*command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)})
     assert done.returncode == 2 and "the current folder cannot be used: " in done.stderr
     assert done.stderr.count("error:") == 1

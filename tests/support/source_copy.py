@@ -1,7 +1,6 @@
 """Copies of the sources, built apart from them with the settings of a build that is there."""
 
 import shutil
-import subprocess
 from pathlib import Path
 
 from tests.support.paths import ROOT
@@ -22,11 +21,3 @@ def settings_of(build: Path) -> list[str]:
     """Options for CMake: compiler, Python and the places of libraries as in the folder build."""
     lines = (build / "CMakeCache.txt").read_text().splitlines()
     return [f"-D{line.removeprefix('_')}" for line in lines if line.startswith(SETTINGS)]
-
-
-def run(*command: object) -> None:
-    """Run a command that must succeed; print its output if it fails."""
-    arguments = [str(argument) for argument in command]
-    result = subprocess.run(arguments, capture_output=True, text=True, check=False)
-    if result.returncode != 0:
-        raise RuntimeError(f"{' '.join(arguments)}\n{result.stdout}{result.stderr}")
