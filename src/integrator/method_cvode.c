@@ -26,6 +26,10 @@ static const double usual_growth = 1e4;
  * number then depends on who watches them. */
 static const double shortest_first_advance = 1e-150;
 
+/* Shortest internal step, s. It does not change the time, but a step that underflows to 0 would make
+ * Newton's iteration endless, since CVODE then keeps a Jacobian that it takes for an old one. */
+static const double shortest_step = 1e-200;
+
 struct cvode {
     struct sundials base; /* first */
     void *solver;
@@ -141,7 +145,11 @@ static enum status configure(void *memory) {
     int flag =
         CVodeSVtolerances(cvode->solver, settings->relative_tolerance, base->absolute_tolerances);
     if (flag == CV_SUCCESS) {
+        (void)CVodeSetMinStep(cvode->solver, 0.0); // else the one before may be above max_step
         flag = CVodeSetMaxStep(cvode->solver, settings->max_step);
+    }
+    if (flag == CV_SUCCESS && !(settings->max_step > 0.0 && settings->max_step < shortest_step)) {
+        flag = CVodeSetMinStep(cvode->solver, shortest_step);
     }
     return sundials_status(base->problem, flag);
 }

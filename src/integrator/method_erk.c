@@ -279,9 +279,14 @@ static bool is_too_close(double begin, double end) {
 static int step_to(struct erk *erk, double t, double x[]) {
     struct problem *problem = erk->base.problem;
     double reached;
+    const double length = t - erk->step_begin;
     sundials_set_state(&erk->base, erk->step_x);
-    if (!is_too_close(erk->step_begin, t)) {
-        int flag = start(erk, erk->step_begin, t, t - erk->step_begin);
+    if (length < shortest_advance) { // all terms but the first are rounding
+        for (size_t i = 0; i < problem->ode.state_count; i++) {
+            small_vector_data(erk->base.x)[i] += length * erk->step_dx[i];
+        }
+    } else if (!is_too_close(erk->step_begin, t)) {
+        int flag = start(erk, erk->step_begin, t, length);
         if (flag == ARK_SUCCESS) {
             flag = ERKStepEvolve(erk->solver, t, erk->base.x, &reached, ARK_NORMAL);
         }

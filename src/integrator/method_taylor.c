@@ -194,7 +194,8 @@ static const double first_length = 1e-3;
 static double length_to_expand(const struct taylor *taylor, double now, double t, bool is_long) {
     const double longest = longest_step(taylor->series.problem, now);
     if (is_long && taylor->is_searched) {
-        const double last = taylor->last_length > 0.0 ? taylor->last_length : first_length;
+        // events may follow each other so closely that the length underflows
+        const double last = taylor->last_length >= DBL_MIN ? taylor->last_length : first_length;
         return last < longest ? last : longest;
     }
     // parts of equal length leave no sliver at the end; nor does rounding
