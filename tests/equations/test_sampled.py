@@ -22,9 +22,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("sampled")
 
 
-def test_samplers_of_one_instant_run_in_the_order_of_the_file(folder: Path) -> None:
-    """3 * 0.1 and 1 * 0.3 are two doubles and one instant; the first tick is at the start."""
-    run = simulated(made(folder, TEXTS["COUNTERS"]), 30.0, 0.1, {})
+@pytest.mark.parametrize("begin", [0.0, -0.3, -0.6, 1e6])
+def test_samplers_of_one_instant_run_in_the_order_of_the_file(folder: Path, begin: float) -> None:
+    """3 * 0.1 and 1 * 0.3 are two doubles and one instant, at 0 too; the first is at the start."""
+    run = simulated(made(folder, TEXTS["COUNTERS"]), begin + 30.0, 0.1, {}, start_time=begin)
     k = np.arange(len(run))
     assert np.array_equal(run["a"], k + 1)
     assert np.array_equal(run["b"], k // 3 * 3 + 1)
