@@ -10,7 +10,6 @@ plotly/                    the library that draws on pages
 RPARM_RELEASE names the folder of a release that is there; without it, one is built here.
 """
 
-import gzip
 import lzma
 import os
 import shutil
@@ -99,6 +98,6 @@ def _add_plotly(root: Path, staging: Path) -> None:
     folder = staging / "plotly"
     folder.mkdir()
     script = (package / "package_data" / "plotly.min.js").read_bytes()
-    (folder / "plotly.min.js.gz").write_bytes(gzip.compress(script, mtime=0))
+    (folder / "plotly.min.js.xz").write_bytes(lzma.compress(script, preset=9))
     (license_file,) = sorted(package.parent.glob("plotly-*.dist-info/**/LICENSE.txt"))
     shutil.copy(license_file, folder)

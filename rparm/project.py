@@ -316,9 +316,9 @@ def playground_page() -> Path:
 
 
 def plotly_script() -> Path:
-    """Return the library that draws the plots: of the package plotly, or shipped as .gz."""
+    """Return the library that draws the plots: of the package plotly, or shipped as .xz."""
     if INSTALLED:
-        return ROOT / "plotly" / "plotly.min.js.gz"
+        return ROOT / "plotly" / "plotly.min.js.xz"
     found = find_spec("plotly")
     assert found is not None and found.origin is not None  # requirements/run.in has it
     return Path(found.origin).parent / "package_data" / "plotly.min.js"

@@ -3,6 +3,7 @@
 import base64
 import functools
 import gzip
+import lzma
 import os
 import re
 from collections.abc import Sequence
@@ -147,7 +148,7 @@ def _plotly() -> bytes:
     """Return the library, compressed, in a script that unpacks it."""
     file = project.plotly_script()
     bundle = file.read_bytes()
-    bundle = gzip.decompress(bundle) if file.suffix == ".gz" else bundle
+    bundle = lzma.decompress(bundle) if file.suffix == ".xz" else bundle
     version = re.search(rb"plotly\.js v(\S+)", bundle[:200])
     assert version is not None
     packed = base64.b64encode(gzip.compress(bundle, mtime=0)).decode("ascii")
