@@ -52,9 +52,21 @@ def display_unit(variable: Float64, units: dict[str, Unit]) -> dict[str, str]:
     return dict(zip(["displayUnit"], units[variable.unit].display, strict=False))
 
 
-def type_name(variable: str) -> str:
-    """Name of the type of an enumeration, for example SolverMethodType for solver_method."""
-    return "".join(word[:1].upper() + word[1:] for word in variable.split("_")) + "Type"
+def type_names(variables: dict[str, Variable]) -> dict[str, str]:
+    """Types' names by enumerations, for example SolverMethodType for solver_method.
+
+    a_b and aB have two, and no variable has the name of a type: _ is added where it is needed.
+    """
+    names: dict[str, str] = {}
+    taken = set(variables)
+    for variable in (name for name, v in variables.items() if isinstance(v, Enumeration)):
+        words = variable.split("_")
+        name = "".join(word[:1].upper() + word[1:] for word in words) + "Type"
+        while name in taken:
+            name += "_"
+        names[variable] = name
+        taken.add(name)
+    return names
 
 
 def add_items(parent: ET.Element, variable: Enumeration) -> None:

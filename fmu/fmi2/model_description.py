@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import description_parts
 from declaration.load import Declaration, DeclarationError
-from declaration.schema import Enumeration, Float64, Unit, Variable
+from declaration.schema import Float64, Unit, Variable
 from program import Provenance
 
 TYPES = {"float64": "Real", "int32": "Integer", "enumeration": "Enumeration", "boolean": "Boolean"}
@@ -29,12 +29,13 @@ def model_description(
     )
     add_interfaces(root, model.name, sources)
     description_parts.add_units(root, declaration.units)
-    add_types(root, variables)
+    types = description_parts.type_names(variables)
+    add_types(root, variables, types)
     description_parts.add_log_categories(root, "fmi2")
     description_parts.add_experiment(root, declaration.experiment)
     scalars = ET.SubElement(root, "ModelVariables")
     for name, variable in variables.items():
-        add_variable(scalars, name, variable, index, declaration.units)
+        add_variable(scalars, name, variable, types.get(name), index, declaration.units)
     add_structure(root, variables, index)
     return description_parts.document(root)
 
@@ -89,20 +90,23 @@ def add_interfaces(root: ET.Element, identifier: str, sources: Sequence[str]) ->
                 ET.SubElement(files, "File", name=name)
 
 
-def add_types(root: ET.Element, variables: dict[str, Variable]) -> None:
+def add_types(root: ET.Element, variables: dict[str, Variable], types: dict[str, str]) -> None:
     """Write TypeDefinitions: one type for each enumeration."""
-    enumerations = {n: v for n, v in variables.items() if isinstance(v, Enumeration)}
-    if not enumerations:
+    if not types:
         return
     definitions = ET.SubElement(root, "TypeDefinitions")
-    for name, variable in enumerations.items():
-        simple = ET.SubElement(definitions, "SimpleType", name=description_parts.type_name(name))
-        enumeration = ET.SubElement(simple, "Enumeration")
-        description_parts.add_items(enumeration, variable)
+    for name, type_name in types.items():
+        simple = ET.SubElement(definitions, "SimpleType", name=type_name)
+        description_parts.add_items(ET.SubElement(simple, "Enumeration"), variables[name])
 
 
 def add_variable(
-    parent: ET.Element, name: str, variable: Variable, index: dict[str, str], units: dict[str, Unit]
+    parent: ET.Element,
+    name: str,
+    variable: Variable,
+    type_name: str | None,
+    index: dict[str, str],
+    units: dict[str, Unit],
 ) -> None:
     keys = {"name": name, "valueReference": str(variable.reference)}
     for key in ("description", "causality", "variability", "initial"):
@@ -110,8 +114,8 @@ def add_variable(
             keys[key] = text
     scalar = ET.SubElement(parent, "ScalarVariable", keys)
     element = ET.SubElement(scalar, TYPES[variable.type])
-    if isinstance(variable, Enumeration):
-        element.set("declaredType", description_parts.type_name(name))
+    if type_name is not None:
+        element.set("declaredType", type_name)
     if isinstance(variable, Float64):
         element.set("unit", variable.unit)
         element.attrib |= description_parts.display_unit(variable, units)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import description_parts
 from declaration.load import Declaration
-from declaration.schema import Enumeration, Float64, Terminal, Unit, Variable
+from declaration.schema import Float64, Terminal, Unit, Variable
 from program import Provenance
 
 TYPES = {"float64": "Float64", "int32": "Int32", "enumeration": "Enumeration", "boolean": "Boolean"}
@@ -29,12 +29,13 @@ def model_description(declaration: Declaration, provenance: Provenance) -> str:
     )
     add_interfaces(root, model.name, has_events=model.has_events)
     description_parts.add_units(root, declaration.units)
-    add_types(root, declaration)
+    types = description_parts.type_names(variables)
+    add_types(root, declaration, types)
     description_parts.add_log_categories(root, "fmi3")
     description_parts.add_experiment(root, declaration.experiment)
     elements = ET.SubElement(root, "ModelVariables")
     for name, variable in variables.items():
-        add_variable(elements, name, variable, declaration)
+        add_variable(elements, name, variable, types.get(name), declaration)
     add_structure(root, declaration)
     return description_parts.document(root)
 
@@ -64,7 +65,7 @@ def add_interfaces(root: ET.Element, identifier: str, *, has_events: bool) -> No
         co_simulation.set("mightReturnEarlyFromDoStep", "true")
 
 
-def add_types(root: ET.Element, declaration: Declaration) -> None:
+def add_types(root: ET.Element, declaration: Declaration, types: dict[str, str]) -> None:
     """Write TypeDefinitions: one type for each combination of unit and nominal value in use, since
     importers refuse these on variables, and one for each enumeration."""
     definitions = ET.SubElement(root, "TypeDefinitions")
@@ -73,11 +74,9 @@ def add_types(root: ET.Element, declaration: Declaration) -> None:
         if isinstance(variable, Float64) and float_type_name(variable) not in written:
             written.add(float_type_name(variable))
             add_float_type(definitions, variable, declaration.units)
-    for name, variable in declaration.variables.items():
-        if isinstance(variable, Enumeration):
-            type_name = description_parts.type_name(name)
-            enumeration = ET.SubElement(definitions, "EnumerationType", name=type_name)
-            description_parts.add_items(enumeration, variable)
+    for name, type_name in types.items():
+        enumeration = ET.SubElement(definitions, "EnumerationType", name=type_name)
+        description_parts.add_items(enumeration, declaration.variables[name])
 
 
 def float_type_name(variable: Float64) -> str:
@@ -102,15 +101,19 @@ def has_intermediate_update(variable: Variable) -> bool:
 
 
 def add_variable(
-    parent: ET.Element, name: str, variable: Variable, declaration: Declaration
+    parent: ET.Element,
+    name: str,
+    variable: Variable,
+    type_name: str | None,
+    declaration: Declaration,
 ) -> None:
     keys = {"name": name, "valueReference": str(variable.reference)}
     keys |= {key: getattr(variable, key) for key in ("description", "causality", "variability")}
     element = ET.SubElement(parent, TYPES[variable.type], keys)
     if variable.initial is not None:
         element.set("initial", variable.initial)
-    if isinstance(variable, Enumeration):
-        element.set("declaredType", description_parts.type_name(name))
+    if type_name is not None:
+        element.set("declaredType", type_name)
     if isinstance(variable, Float64):
         element.set("declaredType", float_type_name(variable))
     if has_intermediate_update(variable):

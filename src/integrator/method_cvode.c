@@ -26,8 +26,8 @@ static const double usual_growth = 1e4;
  * number then depends on who watches them. */
 static const double shortest_first_advance = 1e-150;
 
-/* Shortest internal step, s. It does not change the time, but a step that underflows to 0 would make
- * Newton's iteration endless, since CVODE then keeps a Jacobian that it takes for an old one. */
+/* Shortest internal step, s. It does not change the time, but a step that underflows to 0 would
+ * make Newton's iteration endless, since CVODE then always keeps its old Jacobian. */
 static const double shortest_step = 1e-200;
 
 struct cvode {

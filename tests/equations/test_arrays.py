@@ -155,6 +155,19 @@ def test_numbers_of_other_units_are_declared_in_si(folder: Path) -> None:
     assert [*map(str, units["m"])] and [d.name for d in units["m"]] == ["mm"]
 
 
+@pytest.mark.parametrize("version", ["", "fmi3"])
+def test_types_of_similar_names_are_told_apart(version: str, folder: Path) -> None:
+    fmu = made(folder, TEXTS["MACHINE"])
+    description = fmpy.read_model_description(fmu.parent / version / fmu.name)
+    items = {v.name: [item.name for item in v.declaredType.items]
+             for v in description.modelVariables if v.name in ("drive", "Drive")}  # fmt: skip
+    assert items == {"drive": ["slow", "fast"], "Drive": ["a", "b"]}
+    names = [kind.name for kind in description.typeDefinitions]
+    assert len({*names, *(v.name for v in description.modelVariables)}) == (
+        len(names) + len(description.modelVariables)
+    )
+
+
 @pytest.mark.parametrize("drive", [1, 2])
 def test_what_is_counted_and_named_changes_at_ticks(drive: int, folder: Path) -> None:
     fmu = made(folder, TEXTS["MACHINE"])

@@ -111,3 +111,28 @@ def test_a_thermostat_sees_an_open_window(folder: Path, method: int, is_enabled:
         input=np.array(times, [("time", "f8"), ("open", "?")]), relative_tolerance=1e-10,
     )  # fmt: skip
     assert np.max(np.abs(run["T"] - room(100.0, is_enabled))) < 1e-8
+
+
+@EACH_METHOD
+@pytest.mark.parametrize("version", ["", "fmi3"])
+def test_a_clutch_locks_slips_and_opens(folder: Path, version: str, method: int) -> None:
+    """Speeds are straight lines. Closed from 1 s to 8 s; too strong a drive from 3 s to 5 s."""
+    fmu = made(folder, TEXTS["CLUTCH"])
+    given = [(0, 0, 4), (1, 0, 4), (1, 1, 4), (3, 1, 4), (3, 1, 20), (5, 1, 20), (5, 1, 4)]
+    given += [(8, 1, 4), (8, 0, 4), (9, 0, 4)]
+    run = simulated(
+        fmu.parent / version / fmu.name, 9.0, 0.25, {"solver_method": method}, also=["locked"],
+        input=np.array(given, [("time", "f8"), ("closed", "?"), ("drive", "f8")]),
+        relative_tolerance=1e-10,
+    )  # fmt: skip
+    met, again = 1 + 28 / (12 + 20 / 3), 5 + (80 / 3) / (12 + 20 / 3)
+    locked = 51 - 12 * (again - 5)
+    end = locked + 2 * (8 - again)
+    times = [0, 1, met, 3, 5, again, 8, 9]
+    w1 = np.interp(run["time"], times, [20, 28, 10, 11, 51, locked, end, end + 8])
+    w2 = np.interp(run["time"], times, [0, 0, 10, 11, 11 + 40 / 3, locked, end, end])
+    np.testing.assert_allclose([run["w1"], run["w2"]], [w1, w2], rtol=0, atol=1e-7)
+    t = run["time"]
+    is_locked = ((t > met + 1e-9) & (t < 3)) | ((t > again) & (t < 8))
+    is_inside = np.min(np.abs(t[:, None] - times), axis=1) > 1e-6
+    assert np.array_equal((run["locked"] != 0)[is_inside], is_locked[is_inside])
