@@ -47,7 +47,7 @@ class Series:
         self.rows = self.order
         self.columns: dict[Value, int] = {}
         if self.is_wide:
-            self.forms = forms(values)
+            self.forms = forms([*rates, *values])
             needed.sort(key=self.forms.__getitem__)
             public = [*rates, *(v for v in needed if v in roots[len(rates) :])]
             self.rows = {value: i for i, value in enumerate(public)}
