@@ -148,7 +148,7 @@ def _series(series: Series, has_domains: bool) -> dict[str, object]:
     rows = [str(row) for row in series.row_of_followed]
     return {
         **series.parts(),
-        "row_count": len(series.rows) + has_domains,
+        "row_count": series.row_count + has_domains,
         "row_of_indicator": ", ".join(rows or ["0"]),
     }
 
@@ -176,7 +176,7 @@ def _domains(
         "domains.c.in",
         distances=Code(leaves(file)).assign(distances).lines,
         ranges=_range_lines(groups),
-        own_row=len(series.rows),
+        own_row=series.row_count,
         located=len(events.located),
     )
     declared = [

@@ -7,8 +7,9 @@ move is taken out of the sums, so that more of them are the same.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import partial, reduce
+from itertools import groupby
 
 from equations.c_code import Code, Leaves, formula, indented
 from equations.graph import (
@@ -25,6 +26,8 @@ from equations.graph import (
 from equations.rolled import SHORTEST, rolled
 from rparm.expressions.expression import in_order
 
+WIDE = 150  # values that move in a model whose series has elements side by side
+
 
 class Series:
     """Rows of a series: of states by their `rates` and of `followed`, and C that writes them."""
@@ -33,32 +36,58 @@ class Series:
         self, graph: Graph, rates: Mapping[Value, Value], followed: list[Value], leaves: Leaves
     ) -> None:
         self.graph, self.leaves = graph, leaves
-        roots = scaled(graph, [*rates.values(), *followed])
+        roots = [*rates.values(), *followed]
+        self.is_wide = sum(value.moves for value in in_order(roots)) >= WIDE
+        roots = scaled(graph, roots, self.is_wide)
         values = [value for value in with_partials(graph, roots) if value.moves]
         self.sums: dict[str, str] = {}  # by term i
-        read = {*roots, *(factor for value in values for factor in self._read(value))}
-        needed = [value for value in values if value in read and value not in rates]
-        self.rows = {value: i for i, value in enumerate([*rates, *needed])}
+        factors = {factor for value in values for factor in self._read(value)}
+        needed = [v for v in values if (v in factors or v in roots) and v not in rates]
+        self.order = {value: i for i, value in enumerate([*rates, *needed])}  # in products
+        self.rows = self.order
+        self.columns: dict[Value, int] = {}
+        if self.is_wide:
+            self.forms = forms([*rates, *values])
+            needed.sort(key=self.forms.__getitem__)
+            public = [*rates, *(v for v in needed if v in roots[len(rates) :])]
+            self.rows = {value: i for i, value in enumerate(public)}
+            own = [v for v in (*rates, *needed) if v in factors or v not in self.rows]
+            self.columns = {value: i for i, value in enumerate(own)}
+        self.row_count = len(self.rows) + len(self.columns)
         self.row_of_followed = [self.rows.get(value, 0) for value in roots[len(rates) :]]
         self.still = Code(leaves)  # what does not move
         self.first = Code(self._own_leaves("0"), "v", self.still)
-        self.first.assign({f"row[{self.rows[value]}][0]": value for value in needed})
+        targets = {place: value for value in needed for place in self._places(value, "0")}
+        targets |= {self._row(value, "0"): value for value in self.columns if value in rates}
+        self.first.assign(targets)
         self.start = Code(self._own_leaves("0"), "z", self.still)
-        self.start.known |= {value: f"row[{self.rows[value]}][0]" for value in needed}
+        self.start.known |= {value: self._row(value, "0") for value in needed}
         self.later = Code(self._own_leaves("k"), "c", self.still)
         self.integrals = ["const double h = origin->time_scale / k;"] if rates else []
         self._coefficients = {value: "" for value in values if value.op in CONDITIONS}
-        for value in self.rows:
-            self._at(value)
+        self._late: list[str] = []  # statements for the values of one form
+        asked = [*rates, *needed]
+        if self.is_wide:  # all that they follow from, too
+            asked = sorted((v for v in in_order(asked) if v.moves), key=self.forms.__getitem__)
+        for _, same in groupby(asked, lambda value: self.is_wide and self.forms[value]):
+            for value in same:
+                self._at(value)
+            self.later.lines += self._late
+            self._late.clear()
         for i, rate in enumerate(roots[: len(rates)]):
             if rate.moves:
-                last = f"h * row[{self.rows[rate]}][k - 1]"
+                last = f"h * {self._row(rate, 'k - 1')}"
             else:
                 last = f"k == 1 ? h * {self.still.of(rate)} : 0.0"
             self.integrals.append(f"row[{i}][k] = {last};")
 
     def parts(self) -> dict[str, list[str]]:
         """What equations.c.in has blocks for."""
+        if self.is_wide:
+            self._sort_sums()
+            width = len(self.columns)
+            own = f"double(*const at)[{width}] = (double(*)[{width}])(void *)row[{len(self.rows)}];"
+            self.still.lines.insert(0, own)
         terms = [f"{name} += {term};" for term, name in self.sums.items()]
         parts = {
             "still": self.still.lines,
@@ -69,7 +98,7 @@ class Series:
             "terms": terms,
             "later": self.later.lines,
         }
-        if sum(map(len, parts.values())) >= SHORTEST:
+        if self.is_wide or sum(map(len, parts.values())) >= SHORTEST:
             for part in ("sums", "terms", "later"):
                 parts[part] = [re.sub(r"\bs(\d+)\b", r"s[\1]", line) for line in parts[part]]
             parts["sums"] = [line.removeprefix("double ") for line in parts["sums"]]
@@ -78,6 +107,31 @@ class Series:
         if terms:
             found["terms"] = ["for (int i = 1; i < k; i++) {", *indented(found["terms"]), "}"]
         return found
+
+    def _sort_sums(self) -> None:
+        """Put sums of one form side by side."""
+        forms = [self.forms[value] for value in self.columns]
+
+        def place(term: str) -> tuple:
+            of = [int(column) for column in re.findall(r"\[(\d+)\]", term)]
+            return term.startswith("i *"), [forms[column] for column in of], of
+
+        names = {self.sums[term]: f"s{i}" for i, term in enumerate(sorted(self.sums, key=place))}
+        self.sums = {term: names[self.sums[term]] for term in sorted(self.sums, key=place)}
+        self.later.lines = [
+            re.sub(r"\bs\d+\b", lambda name: names[name[0]], line) for line in self.later.lines
+        ]
+
+    def _row(self, value: Value, k: str) -> str:
+        """Where coefficient k is read."""
+        if value in self.columns:
+            return f"at[{k}][{self.columns[value]}]"
+        return f"row[{self.rows[value]}][{k}]"
+
+    def _places(self, value: Value, k: str) -> list[str]:
+        """Where coefficient k is written."""
+        public = f"row[{self.rows[value]}][{k}]" if value in self.rows else ""
+        return list(dict.fromkeys(place for place in (self._row(value, k), public) if place))
 
     def _own_leaves(self, k: str) -> Leaves:
         """Coefficient k of all leaves."""
@@ -124,10 +178,10 @@ class Series:
     def _sum(self, x: Value, y: Value, weight: str = "") -> str:
         """The sum of x_i y_(k-i) over i = 1 .. k - 1, with a weight of each term."""
         (f, x), (g, y) = self._varying(x), self._varying(y)
-        rows = (self.rows[x], self.rows[y]) if weight else sorted((self.rows[x], self.rows[y]))
-        term = f"{weight}row[{rows[0]}][i] * row[{rows[1]}][k - i]"
+        x, y = (x, y) if weight else sorted((x, y), key=self.order.__getitem__)
+        term = f"{weight}{self._row(x, 'i')} * {self._row(y, 'k - i')}"
         name = self.sums.setdefault(term, f"s{len(self.sums)}")
-        factor = self.still.of(self.graph.simple("*", f, g))
+        factor = self.still.of(times(self.graph, f, g))
         return name if factor == "1.0" else f"{factor} * {name}"
 
     def _at(self, value: Value) -> str:
@@ -142,6 +196,8 @@ class Series:
             return "0.0"
         leaf = self.later.leaves.get((value.op, value.name), "")
         if value.op == "state":
+            if value in self.columns:
+                self.later.lines.append(f"{self._row(value, 'k')} = {leaf};")
             return leaf
         if value.op == "input":
             found = f"k < SERIES_INPUT_LENGTH ? {leaf} : 0.0"
@@ -151,12 +207,12 @@ class Series:
             found = self._of_function(value)
         else:
             found = self._of_operation(value)
-        if value not in self.rows:
+        if value not in self.rows and value not in self.columns:
             is_plain = " " not in found and not found.startswith("-")
             return found if is_plain else self.later.constant(found)
-        target = f"row[{self.rows[value]}][k]"
-        self.later.lines.append(f"{target} = {found};")
-        return target
+        targets = self._places(value, "k")
+        self.later.lines += [f"{target} = {found};" for target in targets]
+        return targets[0]
 
     def _of_function(self, value: Value) -> str:
         pairs, found = self._pairs(value), ""
@@ -171,7 +227,12 @@ class Series:
         are_finite = reduce(
             partial(self.graph.value, "and"), (self.graph.value("isfinite", g) for _, g, _ in pairs)
         )
-        return f"{self.start.of(are_finite)} ? {found} : {self._where_steep(value)}"
+        is_known, otherwise = self.start.of(are_finite), self._where_steep(value)
+        if value in self.columns and "(" in otherwise:  # then the loop has no calls
+            steep = [f"    {place} = {otherwise};" for place in self._places(value, "k")]
+            self._late.append("\n".join([f"if (!{is_known}) {{", *steep, "}"]))
+            return found
+        return f"{is_known} ? {found} : {otherwise}"
 
     def _where_steep(self, value: Value) -> str:
         """Return a coefficient, where a derivative is infinite, as if the function did not change.
@@ -182,8 +243,9 @@ class Series:
         if value.op != "pow" or exponent.moves:
             return "0.0"
         factor, varying = self._varying(x)
-        rows = [f"row[{self.rows[v]}]" for v in (varying, value)]
-        given = (rows[0], self.still.of(factor), self.still.of(exponent), "k", rows[1])
+        rows = [f"&{self._row(v, '0')}" for v in (varying, value)]
+        stride = str(len(self.columns) or 1)
+        given = (rows[0], self.still.of(factor), self.still.of(exponent), "k", rows[1], stride)
         return formula("slopes_power", *given)
 
     def _of_operation(self, value: Value) -> str:
@@ -206,10 +268,33 @@ class Series:
         return formula(value.op, *given)
 
 
-def scaled(graph: Graph, roots: list[Value]) -> list[Value]:
-    """The roots with factors that do not move in front of products: (a x) y as a (x y)."""
+def forms(values: Iterable[Value]) -> dict[Value, tuple[int, int]]:
+    """How deep values are in the graph, and a number of their form, which elements share."""
+    numbers: dict[tuple, int] = {}
+    found: dict[Value, tuple[int, int]] = {}
+    for value in in_order(values):
+        given = [found[argument] for argument in value.arguments]
+        form = (value.op, re.sub(r"\[.*|\d+$", "", value.name), *(number for _, number in given))
+        moving = (x[0] for x, v in zip(given, value.arguments, strict=True) if v.moves)
+        found[value] = 1 + max(moving, default=0), numbers.setdefault(form, len(numbers))
+    return found
+
+
+def times(graph: Graph, a: Value, b: Value) -> Value:
+    """The product of a factor that does not move and a value, with their signs in front."""
+    product = graph.simple("*", unsigned(a), unsigned(b))
+    return product if (a.op == "negative") == (b.op == "negative") else graph.negative(product)
+
+
+def scaled(graph: Graph, roots: list[Value], is_wide: bool) -> list[Value]:
+    """The roots with factors that do not move in front of products: (a x) y as a (x y).
+
+    is_wide: signs are in front, too, and of two differences x - y and y - x there is one.
+    """
     found: dict[Value, tuple[Value, Value]] = {}  # factor and what it is the factor of
+    differences: dict[tuple[Value, Value], Value] = {}
     one = graph.number(1.0)
+    product = partial(times, graph) if is_wide else partial(graph.simple, "*")
     for value in in_order(roots):
         given = [found[argument] for argument in value.arguments]
         moving = [pair for pair, x in zip(given, value.arguments, strict=True) if x.moves]
@@ -218,12 +303,21 @@ def scaled(graph: Graph, roots: list[Value]) -> list[Value]:
                 f if x.moves else x for (f, _), x in zip(given, value.arguments, strict=True)
             ]
             bases = [base for _, base in moving]
-            found[value] = graph.simple("*", *factors), reduce(partial(graph.value, "*"), bases)
+            found[value] = product(*factors), reduce(partial(graph.value, "*"), bases)
         elif value.op == "negative" and moving:
             found[value] = graph.negative(given[0][0]), given[0][1]
         elif moving:
-            whole = [graph.simple("*", *pair) for pair in given]
-            found[value] = one, graph.value(value.op, *whole, name=value.name)
+            op, whole, sign = value.op, [product(*pair) for pair in given], one
+            last = whole[-1]
+            if is_wide and op in ("+", "-") and last.op == "negative" and last.moves:
+                op, whole[-1] = "-" if op == "+" else "+", last.arguments[0]
+            if is_wide and op == "-" and all(x.moves for x in whole):
+                if (*reversed(whole),) in differences:
+                    sign, whole = graph.negative(one), [*reversed(whole)]
+                differences[*whole] = last
+            if is_wide and op == "/" and whole[0].op == "negative":
+                sign, whole[0] = graph.negative(one), whole[0].arguments[0]
+            found[value] = sign, graph.value(op, *whole, name=value.name)
         else:
             found[value] = one, value
-    return [graph.simple("*", *found[root]) for root in roots]
+    return [product(*found[root]) for root in roots]

@@ -46,12 +46,12 @@ static inline double slopes_logged(double p, double x, double exponent) {
 }
 
 /* Returns coefficient k > 0 of y = (factor x) to the power exponent, if x is 0 at first, from lower
- * orders of y and the coefficients x. If y has no such series, returns 0 as for a constant y: a
- * step that is short enough is right nevertheless. */
+ * orders of y and the coefficients x, which are `stride` apart. If y has no such series, returns 0
+ * as for a constant y: a step that is short enough is right nevertheless. */
 static inline double slopes_power(const double x[], double factor, double exponent, int k,
-                                  const double y[]) {
+                                  const double y[], int stride) {
     int first = 1;
-    while (first <= k && x[first] == 0.0) {
+    while (first <= k && x[first * stride] == 0.0) {
         first++;
     }
     // x is s^first times a series that begins with a number other than 0
@@ -59,14 +59,15 @@ static inline double slopes_power(const double x[], double factor, double expone
     if (y[0] != 0.0 || first > k || exponent < 1.0 || begin != floor(begin) || k < begin) {
         return 0.0;
     }
-    const double x_first = factor * x[first];
+    const double x_first = factor * x[first * stride];
     const int count = k - (int)begin;
     if (count == 0) {
         return pow(x_first, exponent);
     }
     double sum = 0.0;
     for (int i = 1; i <= count; i++) {
-        sum += (i * exponent - (count - i)) * (factor * x[first + i]) * y[k - i];
+        sum +=
+            (i * exponent - (count - i)) * (factor * x[(first + i) * stride]) * y[(k - i) * stride];
     }
     return sum / (count * x_first);
 }

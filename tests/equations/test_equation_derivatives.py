@@ -13,6 +13,7 @@ from tests.equations.compiled import LENGTH, Model
 from tests.equations.examples import MODELS
 
 BOUND = 1e-13
+WIDE = 10**9  # values that move
 NAMES = ("p", "u", "x", "y")
 PYTHON = {name: getattr(mpmath, name) for name in dir(mpmath) if not name.startswith("_")}
 PYTHON |= {"abs": abs, "min": min, "max": max}
@@ -184,6 +185,24 @@ def test_a_branch_that_is_not_taken_may_be_undefined(tmp_path: Path) -> None:
 ENDS = MODELS["derivatives_at_ends"]["of_domains"]
 
 
+def test_a_series_with_values_side_by_side_is_the_same(
+    case: tuple, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As large models have it (fmu/equations/c_series.py)."""
+    model, _, point, _ = case
+    given = (
+        model.values(**point),
+        point["time"],
+        0.2,
+        np.array([[point["u"], 0.3, -0.2, 0.1]]),
+        12,
+    )
+    monkeypatch.setattr("equations.c_series.WIDE", 0)
+    wide = Model(tmp_path, model.file.text)
+    assert "const at)" in (tmp_path / "equations.c").read_text()
+    np.testing.assert_allclose(wide.series(*given), model.series(*given), rtol=1e-12, atol=1e-14)
+
+
 @pytest.mark.parametrize(("rate", "point", "expected"), ENDS, ids=[text for text, *_ in ENDS])
 def test_derivatives_where_plain_rules_give_none(
     tmp_path: Path, rate: str, point: dict[str, float], expected: list[float]
@@ -203,9 +222,13 @@ def test_derivatives_where_plain_rules_give_none(
             assert found == slope if np.isfinite(slope) else not np.isfinite(found)
 
 
+@pytest.mark.parametrize("wide", [0, WIDE])
 @pytest.mark.parametrize("exponent", [1.0, 2.0, 3.0, 5.0, 17.0])
-def test_a_series_of_a_power_begins_at_0(tmp_path: Path, exponent: float) -> None:
+def test_a_series_of_a_power_begins_at_0(
+    tmp_path: Path, exponent: float, wide: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Of an exponent that is a parameter: a whole one, or half a one of a square."""
+    monkeypatch.setattr("equations.c_series.WIDE", wide)
     head = 'name = "M"\n[parameters]\nn = { start = 1 }\n[states]\n'
     text = 'x = { derivative = "2 + time" }\ny = { derivative = "(3 * x)**n" }\n'
     text += 'z = { derivative = "(x * x)**(0.5 + n / 2)" }\n'
