@@ -323,19 +323,19 @@ static enum status perform(const struct call *call, int number, const struct eve
  * such as 3 0.1 and 1 0.3, are at one instant. */
 static enum status run_samplers(const struct call *call, const struct event *event) {
     const struct relations *model = call->model;
-    double *ticks = discrete_of(call) + 1;
+    double *discrete = discrete_of(call);
     model->write_periods(call->values, call->room.every, call->room.offset);
     for (int i = 0; i < model->sampler_count; i++) {
         /* of the sum that is the time of the tick: its parts may cancel */
         const double size =
-            fabs(ticks[-1]) + fabs(call->room.offset[i]) + ticks[i] * call->room.every[i];
+            fabs(discrete[0]) + fabs(call->room.offset[i]) + discrete[1 + i] * call->room.every[i];
         const double rounding = 4.0 * DBL_EPSILON * size;
         if (tick_time(model, call->room, call->values, i) <= call->passed + rounding) {
             const enum status status = perform(call, model->event_count + i, event);
             if (status != STATUS_OK) {
                 return status;
             }
-            ticks[i] += 1.0;
+            discrete[1 + i] += 1.0;
         }
     }
     return STATUS_OK;

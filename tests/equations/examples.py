@@ -24,7 +24,7 @@ METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3, "taylor": 4}
 
 def build(path: Path, output: Path, *options: str) -> Path:
     """The FMU of FMI 2.0 of a file."""
-    ended = python(*RPARM, "build", path, "--output", output, "--json", *options)
+    ended = python(*RPARM, "build", path, "--output", output, "--json", *options, timeout=None)
     assert ended.returncode == 0, ended.stderr
     (fmu,) = output.glob("*.fmu")
     return fmu

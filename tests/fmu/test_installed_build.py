@@ -198,7 +198,7 @@ def test_the_wheel_proves(installed: Installed) -> None:
     arguments = ("prove", "free_fall", "--method", "taylor", "--json")
     ran = installed.run(*arguments)
     assert ran.returncode == 0, ran.stderr
-    assert proven(ran.stdout) == proven(python(*RPARM, *arguments, check=True).stdout)
+    assert proven(ran.stdout) == proven(python(*RPARM, *arguments, check=True, timeout=None).stdout)
 
 
 def proven(document: str) -> dict:

@@ -28,7 +28,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installe
 
 
 def checkout(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return python(*RPARM, *arguments, check=True)
+    return python(*RPARM, *arguments, check=True, timeout=None)
 
 
 def test_it_is_small_and_for_every_platform(wheel: Path) -> None:
