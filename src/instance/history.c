@@ -104,6 +104,7 @@ enum status instance_series(double t, double time_scale, int first, int last,
         .t = instance->state.restart_time.s + t,
         .time_scale = time_scale,
         .inputs = (const double(*)[SERIES_INPUT_LENGTH])instance->input_series,
+        .has_avx2 = instance->has_avx2,
     };
     return instance->model->series->extend(&origin, first, last, rows);
 }
