@@ -1,4 +1,4 @@
-/* The smooth part: friction law, balance of power, rates of the reactions. test_plant_lagrangian.py
+/* The smooth part: friction law, balance of power, rates of the reactions. fmu/test_plant_fmu.py
  * compares motion and joint loads with the Lagrangian. */
 #include "last_text.h"
 #include "plant_test_support.h"
