@@ -43,8 +43,13 @@ def case(
 # ---- Random motions ----------------------------------------------------------------------------
 
 
-def test_random_motions_keep_the_tolerance(loaded: LoadedFmu, exact: Exact) -> None:
-    outcomes = judge_all(loaded, exact, 300, seed=14)
+@pytest.mark.parametrize(
+    ("count", "seed"), [(300, 14), pytest.param(3000, 0, marks=pytest.mark.long)]
+)
+def test_random_motions_keep_the_tolerance(
+    loaded: LoadedFmu, exact: Exact, count: int, seed: int
+) -> None:
+    outcomes = judge_all(loaded, exact, count, seed)
     assert [outcome for outcome in outcomes if not outcome.error <= outcome.allowed] == []
 
 
