@@ -427,21 +427,6 @@ def plant_point(mode: str, seed: int) -> ExactModel:
     return replace(model, found=dict(zip((*outputs, *further), map(float, found), strict=True)))
 
 
-def arm_point(seed: int) -> ExactModel:
-    source = random.Random(f"arm {seed}")
-    values = dict(random_arm(source))
-    values |= {name: source.uniform(-2.0, 2.0) for name in STATES}
-    values |= {"tau1": source.uniform(-9.0, 9.0), "f2": source.uniform(-9.0, 9.0)}
-    arm, knowns = arm_model(), (*STATES, *INPUTS)
-    exact = arm.jacobian(values, knowns)
-    rows = (*STATES[2:], *ACCELERATIONS, *arm.outputs)
-    entries = [[exact[row, known].value for known in knowns] for row in rows]
-    return exact_model(values, STATES, arm.outputs, knowns, entries)
-
-
-arm_model = functools.cache(Model)
-
-
 def drives_point(seed: int) -> ExactModel:
     """Two drives, whose currents follow the command or are at a limit."""
     source = random.Random(f"drives {seed}")
