@@ -1,4 +1,4 @@
-/* The smooth part: friction law, rates of the reactions. test_plant_lagrangian.py compares motion,
+/* The smooth part: friction law, rates of the reactions. fmu/test_plant_fmu.py compares motion,
  * energies and joint loads with the Lagrangian. */
 #include "last_text.h"
 #include "plant_test_support.h"

@@ -60,21 +60,6 @@ def test_a_block_stops_by_stribecks_law(
 
 
 @each_method
-@pytest.mark.parametrize("h", [1.0, 10.0])
-def test_held_for_an_hour(plant: Fmu, method: str, h: float) -> None:
-    """Under gravity without efforts: not one bit of the positions changes."""
-    start = {"q1": 0.4, "q2": 0.123456789}
-    friction = {"coulomb_friction1": 12.0, "coulomb_friction2": 4.0}
-    with started(plant, method, tolerance=1e-8, **start, **friction) as instance:
-        reals = instance.reals(["q1", "q2", "dq1", "dq2"])
-        for i in range(round(3600 / h)):
-            instance.do_step(i * h, h)
-            reals.get()
-            assert reals.view.tolist() == [*start.values(), 0.0, 0.0]
-        assert last_event(instance) == (0, 0.0)
-
-
-@each_method
 def test_held_against_efforts_that_change(plant: Fmu, method: str) -> None:
     """Each millisecond for a minute, within what friction holds: nothing moves or is integrated."""
     start = {"q1": 0.4, "q2": 0.123456789}
