@@ -309,7 +309,7 @@ class Events:
             found += [(i, n, e) for n, e in change.given.items() if n not in counted]
         return [
             f"{{{i}, offsetof(struct equations_values, {self.file.fields.value(name)}), "
-            f"{shortened(f'{name} = ', expression)}}},"
+            f"{shortened(f'{name} = ', expression, self.file.tables)}}},"
             for i, name, expression in found
         ]
 
