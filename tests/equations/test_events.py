@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import _FMU2, FMU2Model, FMU2Slave
 
-from tests.equations.examples import METHODS, MODELS, build, example, simulated
+from tests.equations.examples import METHODS, MODELS, build, example, made, simulated
 
 TEXTS = MODELS["events"]
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
@@ -54,6 +54,17 @@ def test_the_ball_bounces_eleven_times_and_rests(folder: Path, method: int) -> N
     bound = 1e-14 if method in (METHODS["erk"], METHODS["taylor"]) else 1e-11
     assert np.max(np.abs(run["h"] - ball(run["time"]))) <= bound
     assert run["last_event_time"][-1] == pytest.approx(flights(1.0)[-1][0], abs=1e-11)
+
+
+@EACH_METHOD
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-8, 1e-10])
+def test_an_exact_touch_is_no_event(folder: Path, method: int, tolerance: float) -> None:
+    """(t - 1)^2 < 0 never holds, wherever steps end."""
+    for count in (3, 7, 12, 14, 20, 25, 42, 60):
+        options = {"solver_method": method}
+        fmu = made(folder, TEXTS["TOUCH"])
+        run = simulated(fmu, 2.1, 2.1 / count, options, relative_tolerance=tolerance)
+        assert run["hits"][-1] == 0, count
 
 
 @EACH_METHOD
