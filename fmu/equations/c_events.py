@@ -81,6 +81,7 @@ class Tick:
 def ticks(file: ModelFile) -> list[Tick]:
     """When samplers tick, and what each would set now; the largest double is no finite value."""
     graph, found, taken = file.graph, [], {*file.variables, *file.modes}
+    uncoupled = _uncoupled(file)
     one, zero, largest = map(graph.number, (1.0, 0.0, sys.float_info.max))
     for i, sampler in enumerate(file.sampled, 1):
         every, offset = (period.value for period in sampler.periods)
@@ -95,7 +96,8 @@ def ticks(file: ModelFile) -> list[Tick]:
             if old.op in ("state", "discrete"):
                 meaning, unit = "new value", variable.exponents
             else:  # the change, which is 0 or not
-                meaning, new = "change", graph.value("-", new, old)
+                meaning = "count" if target in uncoupled else "change"
+                new = graph.value("-", new, old)
             new = graph.value("if", graph.value("isfinite", new), new, largest)
             own.append((target, new, unit, f"{meaning} of {target}"))
         for key, value, unit, meaning in own:
@@ -108,6 +110,19 @@ def ticks(file: ModelFile) -> list[Tick]:
             description = f"Sampler {i}, {sampler.name}: {meaning}"
             found.append(Tick(name + end, f"tick_{len(found)}", value, unit, description))
     return found
+
+
+def _uncoupled(file: ModelFile) -> set[str]:
+    """Discrete variables that are no reals, from which nothing follows but themselves."""
+    graph, expressions = file.graph, [c for change in file.changes for c in change.conditions]
+    read = [v.value for v in file.of("states", "where", "outputs")]
+    read += [e.value for e in expressions] + [r.distance for r in graph.relations.values()]
+    read += [segment.argument for segment in graph.segments.values()]
+    used = {name for value in read for _, name in value.leaves}
+    for change in file.changes:
+        for target, new in change.given.items():
+            used |= {name for _, name in new.value.leaves if name != target}
+    return {v.name for v in file.of(COUNTS)} - used
 
 
 def has_events(file: ModelFile) -> bool:
