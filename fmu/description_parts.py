@@ -3,7 +3,16 @@
 import xml.etree.ElementTree as ET
 
 from declaration.load import Declaration
-from declaration.schema import Boolean, Display, Enumeration, Experiment, Float64, Model, Unit, Variable
+from declaration.schema import (
+    Boolean,
+    Display,
+    Enumeration,
+    Experiment,
+    Float64,
+    Model,
+    Unit,
+    Variable,
+)
 from program import Provenance
 
 LOG_CATEGORIES = {

@@ -214,7 +214,10 @@ class ModelFile:
             nodes = in_order([tree])
             self.operations += len(nodes)
             for node in nodes:
-                if node.op == "/" and (node.arguments[1].op, node.arguments[1].value) == ("number", 0):
+                if node.op == "/" and (node.arguments[1].op, node.arguments[1].value) == (
+                    "number",
+                    0,
+                ):
                     at = ", ".join(f"{i} = {value}" for i, value in element.indexes.items())
                     raise ExpressionError(node.column, f"division by 0{at and f' at {at}'}")
             if self.operations > MOST_OPERATIONS:

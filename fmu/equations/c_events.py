@@ -30,7 +30,7 @@ from rparm.expressions.expression import CONDITION, Kind, in_order
 
 Guards = dict[Value, Value | None]  # conditions; None: always
 
-INDICATOR = "z_{}"
+INDICATOR = "z[{}]"  # in the order of located relations
 SECOND = {"s": 1}
 INDEXES = re.compile(r"\[([0-9,]+)\]")
 NEXT_TIME = [
@@ -172,10 +172,10 @@ class Events:
     def indicators(self) -> dict[str, Value]:
         """Indicators by their fields: signed distances, or 1."""
         one, found = self.graph.number(1.0), {}
-        for relation in self.located:
+        for i, relation in enumerate(self.located):
             z, used = self.signed(relation), self.used[relation.name]
             z = z if used is None else self.graph.value("if", used, z, one)
-            found[INDICATOR.format(relation.name)] = z
+            found[INDICATOR.format(i)] = z
         return found
 
     def signed(self, relation: Relation) -> Value:
@@ -401,7 +401,7 @@ class Events:
             if used is not None:
                 found = f"{code.of(used)} ? {found} : unused"
             code.lines.append(f"indicator[{i}] = {found};")
-        return code.lines
+        return rolled(code.lines)[0]
 
     def _described(self, code: Code, relation: Relation) -> str:
         """How an indicator follows from the states: from one by a factor, if it can be."""
@@ -414,9 +414,9 @@ class Events:
             factor = self.graph.derivative(distance, x.leaf)
             if not factor.moves:
                 rate = zero if ("time", "") in x.value.leaves else x.value  # unknown here
-                at_zero = Code({**code.leaves, moving[0]: "0.0"}, f"o{len(code.lines)}_")
+                at_zero = Code({**code.leaves, moving[0]: "0.0"})
+                at_zero.lines = code.lines  # which number its constants, too
                 offset = at_zero.of(distance)
-                code.lines += at_zero.lines
                 holds, factor, rate = (code.of(v) for v in (relation.mode, factor, rate))
                 return f"relations_state_indicator({place}, {holds}, {factor}, {offset}, {rate})"
         limit = code.of(relation.limit or zero)

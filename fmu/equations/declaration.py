@@ -94,9 +94,9 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
     for mode in file.modes if c_events.has_events(file) else ():
         own = {"type": "boolean", "variability": "discrete", "description": f"Mode {mode}"}
         tables[mode] = _local(file.fields.count(mode)) | own
-    for name, relation in indicators.items():
+    for i, (name, relation) in enumerate(indicators.items()):
         tables[name] = {
-            **_local(INDICATOR.format(relation.name)),
+            **_local(INDICATOR.format(i)),
             "unit": "1",
             **_dependencies(relation.distance, file),
             "description": "Distance from an event; 1 while it plays no role",
@@ -139,7 +139,9 @@ def flat(file: ModelFile) -> list[str]:
     found = {}
     for name, expression in called:
         known = set(FLAT.findall(expression.text))
-        known |= {node.op for node in in_order([expression.tree]) if node.op == "floor" and not known}
+        known |= {
+            node.op for node in in_order([expression.tree]) if node.op == "floor" and not known
+        }
         leaves = _reached(expression.value.leaves, file, ["discrete"]) if known else ()
         if {op for op, _ in leaves} & {"state", "input", "discrete"}:
             found |= {f"{function} in {name.partition('[')[0]}": None for function in sorted(known)}
