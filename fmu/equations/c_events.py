@@ -26,7 +26,7 @@ from equations.c_code import (
 from equations.errors import NONE, Errors
 from equations.graph import MOVING, Graph, Relation, Value, is_unknown
 from equations.rolled import rolled
-from rparm.expressions.expression import CONDITION, Kind, in_order
+from rparm.expressions.expression import CONDITION, WHOLE, Kind, in_order
 
 Guards = dict[Value, Value | None]  # conditions; None: always
 
@@ -113,7 +113,7 @@ def ticks(file: ModelFile) -> list[Tick]:
 
 
 def _uncoupled(file: ModelFile) -> set[str]:
-    """Discrete variables that are no reals, from which nothing follows but themselves."""
+    """Counters from which nothing follows but themselves."""
     graph, expressions = file.graph, [c for change in file.changes for c in change.conditions]
     read = [v.value for v in file.of("states", "where", "outputs")]
     read += [e.value for e in expressions] + [r.distance for r in graph.relations.values()]
@@ -122,7 +122,7 @@ def _uncoupled(file: ModelFile) -> set[str]:
     for change in file.changes:
         for target, new in change.given.items():
             used |= {name for _, name in new.value.leaves if name != target}
-    return {v.name for v in file.of(COUNTS)} - used
+    return {v.name for v in file.of(COUNTS) if v.kind == WHOLE} - used
 
 
 def has_events(file: ModelFile) -> bool:

@@ -1,8 +1,8 @@
 """Statements that repeat with rising indexes as loops in C: compilers need more than linear time.
 
 Lines repeat if they are the same but for some numbers, which rise by the same steps from turn to
-turn: the number of a constant (n12), the first one in a bracket, and that of a state. A constant that another turn
-reads is kept in an array.
+turn: the number of a constant (n12), the first one in a bracket, and that of a state. A constant
+that another turn reads is kept in an array.
 """
 
 from __future__ import annotations
