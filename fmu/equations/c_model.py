@@ -76,7 +76,7 @@ def _expressions(file: ModelFile) -> list[str]:
     fields = [(file.fields.rate(x.name), x) for x in file.of("states")]
     fields += [(file.fields.value(v.name), v) for v in file.calculated]
     return [
-        f"{{offsetof({STRUCTURE}, {name}), {shortened('', variable.expression)}}},"
+        f"{{offsetof({STRUCTURE}, {name}), {shortened('', variable.expression, file.tables)}}},"
         for name, variable in fields
     ] or ["{0},"]
 
