@@ -1,6 +1,6 @@
 /* Stops: how an update changes what meets them. Rigid ones: the end of bouncing, limits that move,
  * impacts in turn; test_plant_impact.c has their law. Compliant ones: where contacts begin and end.
- * Forces and energies: test_plant_lagrangian.py, the references, the random motions. */
+ * Forces and energies: fmu/test_plant_fmu.py, the references, the random motions. */
 #include "plant_test_support.h"
 #include "rp_plant_contact.h"
 #include "unity.h"
