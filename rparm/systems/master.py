@@ -1,8 +1,8 @@
 """A master that steps connected FMUs.
 
-Every component is an instance of an FMU; connections lead from Real outputs to Real inputs, or from
-Boolean outputs to Boolean inputs. Other inputs keep their values from before initialization. In
-Jacobi order all components make a step, then all outputs are read; each step takes its inputs from
+Every component is an instance of an FMU; connections lead from outputs to inputs of the same type,
+which is no String. Inputs may follow signals from outside, held over a step; others keep their
+values from before initialization. In Jacobi order all components make a step, then all outputs are read; each step takes its inputs from
 what was read at its beginning. In Gauss-Seidel order the components step one after the other, and
 each takes the newest outputs: those of the end of the step from components before it, those of its
 beginning from itself and the components behind it.
@@ -13,8 +13,8 @@ extrapolate from the beginning of the step, in Gauss-Seidel order those from com
 meet value and slope at the end of the step. FMI 3.0 knows slopes of inputs only within a step: at
 the start, those of outputs miss what they owe to the slopes of inputs.
 
-A Boolean that has changed in a step is passed on at the end of the step, in both orders. Then all
-values jump to what follows from it at this time, as at the start.
+A Boolean, Integer or Enumeration that has changed in a step is passed on at the end of the step, in
+both orders. Then all values jump to what follows from it at this time, as at the start.
 """
 
 import time
@@ -29,11 +29,13 @@ from rparm.errors import UserError, placed
 from rparm.fmi.fmi_instance import Instance, Reals, UnpackedFmu
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import INPUTS, Value
+from rparm.runs.inputs import Signal
 from rparm.systems.ecos import Run, said_at_end
 from rparm.systems.structure import Connection, OpenedSystem
 
 ORDERS = ("jacobi", "gauss_seidel")
 INPUT_MODES = ("held", "extrapolated")
+DISCRETE = ("Boolean", "Integer", "Enumeration")
 
 
 # ---- Components ----------------------------------------------------------------------------------
@@ -165,15 +167,17 @@ class Master(AbstractContextManager["Master"]):
     """A system of connected components; a context manager that frees their instances.
 
     In Gauss-Seidel order components step in the order of `fmus`. After each step all Real outputs
-    are read, and Real variables `also` (component, variable). UserError if names are unknown, an
-    input has several connections, or an FMU cannot do what is asked.
+    are read, and Real variables `also` (component, variable). Inputs `driven` (component, variable)
+    follow signals by the time since the start. UserError if names are unknown, an input has several
+    connections, or an FMU cannot do what is asked.
 
     Attributes
     ----------
     names : tuple of str
         "component.variable" of all that is read, by component, outputs first.
     values : ndarray, shape (len(names),)
-        As read right after the last step, and all that follows from a Boolean that changed.
+        As read right after the last step, and all that follows from what switched; behind them
+        the Real signals from outside.
     slopes : ndarray, shape (len(names),)
         Derivatives by time of what is connected, if `inputs` is "extrapolated".
     time : float
@@ -189,13 +193,18 @@ class Master(AbstractContextManager["Master"]):
         order: str = "jacobi",
         inputs: str = "held",
         also: Sequence[tuple[str, str]] = (),
+        driven: Mapping[tuple[str, str], Signal] | None = None,
     ) -> None:
         if order not in ORDERS or inputs not in INPUT_MODES:
             raise UserError(f"expected an order of {ORDERS} and inputs of {INPUT_MODES}")
         self.extrapolates = inputs == "extrapolated"
         self.jacobi = order == "jacobi"
         self.time, self.do_steps = 0.0, 0
-        self._switches, real = _split(fmus, connections, self.extrapolates)
+        driven = driven or {}
+        self._switches, real = _split(fmus, connections, driven, self.extrapolates)
+        switched = {end for end in driven if _type(fmus, *end) in DISCRETE}
+        self._switching = {end: driven[end] for end in driven if end in switched}
+        self._moving = {end: driven[end] for end in driven if end not in switched}
         for component, name in also:
             _find(fmus, component, name, None)
         self._stack = ExitStack()
@@ -203,6 +212,7 @@ class Master(AbstractContextManager["Master"]):
             instances = {}
             for name, fmu in fmus.items():
                 fed = [c.end_connector for c in real if c.end_component == name]
+                fed += [variable for component, variable in self._moving if component == name]
                 instance = fmu.instance(name, fed if self.extrapolates else ())
                 instances[name] = self._stack.enter_context(instance)
         except BaseException:
@@ -229,6 +239,8 @@ class Master(AbstractContextManager["Master"]):
         # where it is among the system's values
         keys = [(name, output) for name, read in outputs.items() for output in read]
         index = {key: i for i, key in enumerate(keys)}
+        first_signal = len(keys)
+        keys += self._moving
         self.names = tuple(f"{component}.{name}" for component, name in keys)
         memory = (c_double * max(len(keys), 1))()
         self.values = np.frombuffer(memory)[: len(keys)]
@@ -239,15 +251,22 @@ class Master(AbstractContextManager["Master"]):
         first = 0
         for name, instance in instances.items():
             incoming = [c for c in connections if c.end_component == name]
+            moving = [end for end in self._moving if end[0] == name]
             feeding = {c.start_connector for c in connections if c.start_component == name}
             self.components[name] = ConnectedInstance(
                 instance,
-                inputs=[c.end_connector for c in incoming],
+                inputs=[*(c.end_connector for c in incoming), *(end[1] for end in moving)],
                 outputs=outputs[name],
                 first=first,
                 feeding=feeding,
-                sources=[index[c.start_component, c.start_connector] for c in incoming],
-                ahead=[c.start_component in self.components and not self.jacobi for c in incoming],
+                sources=[
+                    *(index[c.start_component, c.start_connector] for c in incoming),
+                    *(first_signal + list(self._moving).index(end) for end in moving),
+                ],
+                ahead=[
+                    *(c.start_component in self.components and not self.jacobi for c in incoming),
+                    *(False for _ in moving),
+                ],
                 values=memory,
                 slopes=self.slopes,
             )
@@ -267,7 +286,8 @@ class Master(AbstractContextManager["Master"]):
             if name not in self.components:
                 known = ", ".join(self.components)
                 raise UserError(f"{name}: no such component (there are: {known})")
-        self.time = start
+        self.time = self._start = start
+        self._take_signals()
         for component in self.components.values():
             component.begin(start, stop, parameters.get(component.name, {}))
         self._propagate(self._read_early, "in initialization")
@@ -293,16 +313,26 @@ class Master(AbstractContextManager["Master"]):
         names = ", ".join([*(self.names[i] for i in changing), *switched])
         raise UserError(f"the connections form an algebraic loop: {names}")
 
+    def _take_signals(self) -> None:
+        """Take the Real signals from outside at the present time."""
+        for i, signal in enumerate(self._moving.values(), len(self.values) - len(self._moving)):
+            self.values[i] = self._now(signal)
+
+    def _now(self, signal: Signal) -> float:
+        return signal.values(np.array([self.time - self._start]))[0]
+
     def _transfer_switches(self) -> list[str]:
-        """Set the Boolean inputs whose sources have another value; which these are."""
-        changed = []
+        """Set the discrete inputs whose sources have another value; which these are."""
+        wanted = {end: int(self._now(signal)) for end, signal in self._switching.items()}
         for c in self._switches:
             source = self.components[c.start_component].instance
-            target = self.components[c.end_component].instance
-            value = source.boolean(c.start_connector)
-            if value != target.boolean(c.end_connector):
-                target.set(c.end_connector, value)
-                changed.append(c.end)
+            wanted[c.end_component, c.end_connector] = source.discrete(c.start_connector)
+        changed = []
+        for (component, name), value in wanted.items():
+            target = self.components[component].instance
+            if value != target.discrete(name):
+                target.set(name, value)
+                changed.append(f"{component}.{name}")
         return changed
 
     def _read_early(self, component: ConnectedInstance) -> None:
@@ -344,6 +374,7 @@ class Master(AbstractContextManager["Master"]):
             for component in group:
                 self._read(component, end)
         self.time = end
+        self._take_signals()
         if self._transfer_switches():
             self._propagate(lambda component: self._read(component, end), f"at t = {end!r} s")
             if self.extrapolates:
@@ -392,18 +423,23 @@ def _find(fmus: Mapping[str, Fmu], component: str, name: str, causality: str | N
 
 
 def _split(
-    fmus: Mapping[str, Fmu], connections: Iterable[Connection], sloped: bool
+    fmus: Mapping[str, Fmu],
+    connections: Iterable[Connection],
+    driven: Collection[tuple[str, str]],
+    sloped: bool,
 ) -> tuple[list[Connection], list[Connection]]:
-    """Split connections into Booleans and Reals; no input has two."""
+    """Split connections into discrete ones and Reals; no input has two."""
     switches: list[Connection] = []
     reals: list[Connection] = []
-    seen = set()
+    seen = set(driven)
     for c in connections:
         end = c.end_component, c.end_connector
-        if _is_switch(fmus, c.start_component, c.start_connector, "output"):
+        kind = _type(fmus, c.start_component, c.start_connector, "output")
+        if kind in DISCRETE:
             switches.append(c)
-            if not _is_switch(fmus, *end, "input"):
-                raise UserError(f"{c}: a Boolean feeds a Boolean input only")
+            if _type(fmus, *end) != kind:
+                article = "an" if kind[0] in "EI" else "a"
+                raise UserError(f"{c}: {article} {kind} feeds {article} {kind} input only")
         else:
             reals.append(c)
             _find(fmus, c.start_component, c.start_connector, "output")
@@ -411,18 +447,24 @@ def _split(
         if end in seen:
             raise UserError(f"{'.'.join(end)}: is connected more than once")
         seen.add(end)
+    for end in driven:
+        if _type(fmus, *end) not in DISCRETE:
+            _find(fmus, *end, "input")
     for c in reals if sloped else ():
-        source, target = fmus[c.start_component], fmus[c.end_component]
+        source = fmus[c.start_component]
         if not source.model.gives_output_derivatives:
             raise UserError(f"{c.start_component}: {source.path} has no output derivatives")
-        if not target.model.interpolates_inputs:
-            raise UserError(f"{c.end_component}: {target.path} does not interpolate inputs")
+    for name in dict.fromkeys([*(c.end_component for c in reals), *(end[0] for end in driven)]):
+        if sloped and not fmus[name].model.interpolates_inputs:
+            raise UserError(f"{name}: {fmus[name].path} does not interpolate inputs")
     return switches, reals
 
 
-def _is_switch(fmus: Mapping[str, Fmu], component: str, name: str, causality: str) -> bool:
+def _type(
+    fmus: Mapping[str, Fmu], component: str, name: str, causality: str = "input"
+) -> str | None:
     variable = fmus[component].model.variables.get(name) if component in fmus else None
-    return variable is not None and (variable.type, variable.causality) == ("Boolean", causality)
+    return variable.type if variable is not None and variable.causality == causality else None
 
 
 # ---- A variant -----------------------------------------------------------------------------------
@@ -431,7 +473,8 @@ def run_in_master(ssp: OpenedSystem, variant: str, names: Sequence[str]) -> Run:
     system = ssp.system
     times = system.times
     rows = np.empty((len(times), len(names)))
-    with ssp.unpacked_fmus() as fmus, Master(fmus, system.connections) as master:
+    driven = {tuple(name.split(".", 1)): signal for name, signal in system.inputs.items()}
+    with ssp.unpacked_fmus() as fmus, Master(fmus, system.connections, driven=driven) as master:
         master.initialize(times[0], times[-1], system.parameter_sets[variant])
         readers = [_RowReader(ssp, c, names) for c in master.components.values()]
         begin = time.perf_counter()
@@ -473,14 +516,11 @@ class _RowReader:
         real = [name for name in own if variables[name].type == "Real"]
         self._reals = instance.reals(real)
         self._real_columns = [own[name] for name in real]
-        self._others: list[tuple[int, Callable[[str], int | None], str]] = []
-        for name in own.keys() - set(real):
-            is_boolean = variables[name].type == "Boolean"
-            read = instance.boolean if is_boolean else instance.integer
-            self._others.append((own[name], read, name))
+        self._others = {own[name]: name for name in own.keys() - set(real)}
+        self._discrete = instance.discrete
 
     def read(self, row: np.ndarray) -> None:
         self._reals.get()
         row[self._real_columns] = self._reals.view
-        for column, read, name in self._others:
-            row[column] = read(name)
+        for column, name in self._others.items():
+            row[column] = self._discrete(name)
