@@ -29,7 +29,9 @@ from rparm.errors import UserError, placed
 from rparm.fmi.fmi_instance import Instance, Reals, UnpackedFmu
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import INPUTS, Value
+from rparm.runs.inputs import Signal
 from rparm.systems.ecos import Run, said_at_end
+from rparm.systems.python_component import is_python
 from rparm.systems.ssp import Connection, Ssp
 
 ORDERS = ("jacobi", "gauss_seidel")
@@ -134,7 +136,8 @@ class Snapshot(AbstractContextManager["Snapshot"]):
         for component in master.components.values():
             fmu = component.instance.fmu
             if not fmu.model.saves_states:
-                raise UserError(f"{component.name}: {fmu.path} has no FMU state to go back to")
+                has = "save() and restore(state)" if is_python(fmu.path.name) else "FMU state"
+                raise UserError(f"{component.name}: {fmu.path} has no {has} to go back")
         self._states = [c.instance.saved_state() for c in master.components.values()]
 
     def __exit__(self, *_: object) -> None:
@@ -165,13 +168,15 @@ class Master(AbstractContextManager["Master"]):
     """A system of connected components; a context manager that frees their instances.
 
     In Gauss-Seidel order components step in the order of `fmus`. After each step all Real outputs
-    are read, and Real variables `also` (component, variable). UserError if names are unknown, an
-    input has several connections, or an FMU cannot do what is asked.
+    are read, and Real variables `also` (component, variable). Inputs of `signals`, by
+    "component.variable", take over each step the signal's value at its beginning. UserError if
+    names are unknown, an input has several sources, or an FMU cannot do what is asked.
 
     Attributes
     ----------
     names : tuple of str
-        "component.variable" of all that is read, by component, outputs first.
+        "component.variable" of all that is read, by component, outputs first; at the end Real
+        inputs of signals.
     values : ndarray, shape (len(names),)
         As read right after the last step, and all that follows from a Boolean that changed.
     slopes : ndarray, shape (len(names),)
@@ -189,13 +194,21 @@ class Master(AbstractContextManager["Master"]):
         order: str = "jacobi",
         inputs: str = "held",
         also: Sequence[tuple[str, str]] = (),
+        signals: Mapping[str, Signal] | None = None,
     ) -> None:
         if order not in ORDERS or inputs not in INPUT_MODES:
             raise UserError(f"expected an order of {ORDERS} and inputs of {INPUT_MODES}")
         self.extrapolates = inputs == "extrapolated"
         self.jacobi = order == "jacobi"
         self.time, self.do_steps = 0.0, 0
+        connections, signals = list(connections), signals or {}
         self._switches, real = _split(fmus, connections, self.extrapolates)
+        for name in signals:
+            if name in {c.end for c in connections}:
+                raise UserError(f"{name}: is connected, and cannot follow a signal, too")
+        driven = {name: _driven(fmus, name) for name in signals}
+        self._moved = {name: signals[name] for name, kind in driven.items() if kind == "Real"}
+        self._switched = {n: signals[n] for n, kind in driven.items() if kind == "Boolean"}
         for component, name in also:
             _find(fmus, component, name, None)
         self._stack = ExitStack()
@@ -228,6 +241,9 @@ class Master(AbstractContextManager["Master"]):
 
         # where it is among the system's values
         keys = [(name, output) for name, read in outputs.items() for output in read]
+        self._first_driven = len(keys)
+        driven = [tuple(name.split(".", 1)) for name in self._moved]
+        keys += driven
         index = {key: i for i, key in enumerate(keys)}
         self.names = tuple(f"{component}.{name}" for component, name in keys)
         memory = (c_double * max(len(keys), 1))()
@@ -240,14 +256,16 @@ class Master(AbstractContextManager["Master"]):
         for name, instance in instances.items():
             incoming = [c for c in connections if c.end_component == name]
             feeding = {c.start_connector for c in connections if c.start_component == name}
+            own = [key for key in driven if key[0] == name]
+            sources = [(c.start_component, c.start_connector) for c in incoming] + own
             self.components[name] = ConnectedInstance(
                 instance,
-                inputs=[c.end_connector for c in incoming],
+                inputs=[*(c.end_connector for c in incoming), *(variable for _, variable in own)],
                 outputs=outputs[name],
                 first=first,
                 feeding=feeding,
-                sources=[index[c.start_component, c.start_connector] for c in incoming],
-                ahead=[c.start_component in self.components and not self.jacobi for c in incoming],
+                sources=[index[source] for source in sources],
+                ahead=[x in self.components and not self.jacobi for x, _ in sources],
                 values=memory,
                 slopes=self.slopes,
             )
@@ -267,7 +285,8 @@ class Master(AbstractContextManager["Master"]):
             if name not in self.components:
                 known = ", ".join(self.components)
                 raise UserError(f"{name}: no such component (there are: {known})")
-        self.time = start
+        self.time = self._start = start
+        self._drive()
         for component in self.components.values():
             component.begin(start, stop, parameters.get(component.name, {}))
         self._propagate(self._read_early, "in initialization")
@@ -275,6 +294,12 @@ class Master(AbstractContextManager["Master"]):
             component.instance.exit_initialization()
         if self.extrapolates:
             self._propagate_slopes()
+
+    def _drive(self) -> None:
+        """Take the values that signals have now."""
+        elapsed = np.array([self.time - self._start])
+        for i, signal in enumerate(self._moved.values(), self._first_driven):
+            self.values[i] = signal.values(elapsed)[0]
 
     def _propagate(self, read: Callable[[ConnectedInstance], object], when: str) -> None:
         """Set inputs until no output follows any more: along direct feedthrough, once each."""
@@ -296,6 +321,13 @@ class Master(AbstractContextManager["Master"]):
     def _transfer_switches(self) -> list[str]:
         """Set the Boolean inputs whose sources have another value; which these are."""
         changed = []
+        elapsed = np.array([self.time - self._start])
+        for name, signal in self._switched.items():
+            component, variable = name.split(".", 1)
+            instance, value = self.components[component].instance, bool(signal.values(elapsed)[0])
+            if value != instance.boolean(variable):
+                instance.set(variable, value)
+                changed.append(name)
         for c in self._switches:
             source = self.components[c.start_component].instance
             target = self.components[c.end_component].instance
@@ -344,6 +376,7 @@ class Master(AbstractContextManager["Master"]):
             for component in group:
                 self._read(component, end)
         self.time = end
+        self._drive()
         if self._transfer_switches():
             self._propagate(lambda component: self._read(component, end), f"at t = {end!r} s")
             if self.extrapolates:
@@ -389,6 +422,15 @@ def _find(fmus: Mapping[str, Fmu], component: str, name: str, causality: str | N
     if not fits or causality not in (None, variable.causality):
         kind = f"Real {causality}" if causality else "Real variable"
         raise UserError(f"{component}: {fmus[component].path} has no {kind} {name!r}")
+
+
+def _driven(fmus: Mapping[str, Fmu], name: str) -> str:
+    """Return the type of an input that follows a signal, Real or Boolean."""
+    component, _, variable = name.partition(".")
+    if _is_switch(fmus, component, variable, "input"):
+        return "Boolean"
+    _find(fmus, component, variable, "input")
+    return "Real"
 
 
 def _split(
