@@ -1,8 +1,8 @@
 """A master that steps connected FMUs.
 
 Every component is an instance of an FMU; connections lead from outputs to inputs of the same type,
-which is no String. Inputs may follow signals from outside, held over a step; others keep their
-values from before initialization. In Jacobi order all components make a step, then all outputs are read; each step takes its inputs from
+no String. Inputs may follow signals from outside, each held over a step. Other inputs keep their values from before initialization. In
+Jacobi order all components make a step, then all outputs are read; each step takes its inputs from
 what was read at its beginning. In Gauss-Seidel order the components step one after the other, and
 each takes the newest outputs: those of the end of the step from components before it, those of its
 beginning from itself and the components behind it.
@@ -13,8 +13,8 @@ extrapolate from the beginning of the step, in Gauss-Seidel order those from com
 meet value and slope at the end of the step. FMI 3.0 knows slopes of inputs only within a step: at
 the start, those of outputs miss what they owe to the slopes of inputs.
 
-A Boolean, Integer or Enumeration that has changed in a step is passed on at the end of the step, in
-both orders. Then all values jump to what follows from it at this time, as at the start.
+A Boolean, Integer or Enumeration that has changed in a step is passed on at its end, in both orders.
+Then all values jump to what follows from it at this time, as at the start.
 """
 
 import time
@@ -31,11 +31,12 @@ from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import INPUTS, Value
 from rparm.runs.inputs import Signal
 from rparm.systems.ecos import Run, said_at_end
+from rparm.systems.python_component import is_python
 from rparm.systems.structure import Connection, OpenedSystem
 
 ORDERS = ("jacobi", "gauss_seidel")
 INPUT_MODES = ("held", "extrapolated")
-DISCRETE = ("Boolean", "Integer", "Enumeration")
+DISCRETE = ("Boolean", "Integer", "Enumeration")  # types of what switches
 
 
 # ---- Components ----------------------------------------------------------------------------------
@@ -136,7 +137,8 @@ class Snapshot(AbstractContextManager["Snapshot"]):
         for component in master.components.values():
             fmu = component.instance.fmu
             if not fmu.model.saves_states:
-                raise UserError(f"{component.name}: {fmu.path} has no FMU state to go back to")
+                has = "save() and restore(state)" if is_python(fmu.path.name) else "FMU state"
+                raise UserError(f"{component.name}: {fmu.path} has no {has} to go back")
         self._states = [c.instance.saved_state() for c in master.components.values()]
 
     def __exit__(self, *_: object) -> None:
@@ -167,17 +169,17 @@ class Master(AbstractContextManager["Master"]):
     """A system of connected components; a context manager that frees their instances.
 
     In Gauss-Seidel order components step in the order of `fmus`. After each step all Real outputs
-    are read, and Real variables `also` (component, variable). Inputs `driven` (component, variable)
-    follow signals by the time since the start. UserError if names are unknown, an input has several
-    connections, or an FMU cannot do what is asked.
+    are read, and Real variables `also` (component, variable). Inputs of `signals`, by
+    "component.variable", take over each step the signal's value at its beginning. UserError if
+    names are unknown, an input has several sources, or an FMU cannot do what is asked.
 
     Attributes
     ----------
     names : tuple of str
-        "component.variable" of all that is read, by component, outputs first.
+        "component.variable" of all that is read, by component, outputs first; at the end Real
+        inputs of signals.
     values : ndarray, shape (len(names),)
-        As read right after the last step, and all that follows from what switched; behind them
-        the Real signals from outside.
+        As read right after the last step, and all that follows from what switched.
     slopes : ndarray, shape (len(names),)
         Derivatives by time of what is connected, if `inputs` is "extrapolated".
     time : float
@@ -193,18 +195,21 @@ class Master(AbstractContextManager["Master"]):
         order: str = "jacobi",
         inputs: str = "held",
         also: Sequence[tuple[str, str]] = (),
-        driven: Mapping[tuple[str, str], Signal] | None = None,
+        signals: Mapping[str, Signal] | None = None,
     ) -> None:
         if order not in ORDERS or inputs not in INPUT_MODES:
             raise UserError(f"expected an order of {ORDERS} and inputs of {INPUT_MODES}")
         self.extrapolates = inputs == "extrapolated"
         self.jacobi = order == "jacobi"
         self.time, self.do_steps = 0.0, 0
-        driven = driven or {}
-        self._switches, real = _split(fmus, connections, driven, self.extrapolates)
-        switched = {end for end in driven if _type(fmus, *end) in DISCRETE}
-        self._switching = {end: driven[end] for end in driven if end in switched}
-        self._moving = {end: driven[end] for end in driven if end not in switched}
+        connections, signals = list(connections), signals or {}
+        self._switches, real = _split(fmus, connections, self.extrapolates)
+        for name in signals:
+            if name in {c.end for c in connections}:
+                raise UserError(f"{name}: is connected, and cannot follow a signal, too")
+        driven = {name: _driven(fmus, name) for name in signals}
+        self._moved = {name: signals[name] for name, kind in driven.items() if kind == "Real"}
+        self._switched = {n: signals[n] for n, kind in driven.items() if kind in DISCRETE}
         for component, name in also:
             _find(fmus, component, name, None)
         self._stack = ExitStack()
@@ -212,7 +217,6 @@ class Master(AbstractContextManager["Master"]):
             instances = {}
             for name, fmu in fmus.items():
                 fed = [c.end_connector for c in real if c.end_component == name]
-                fed += [variable for component, variable in self._moving if component == name]
                 instance = fmu.instance(name, fed if self.extrapolates else ())
                 instances[name] = self._stack.enter_context(instance)
         except BaseException:
@@ -238,9 +242,10 @@ class Master(AbstractContextManager["Master"]):
 
         # where it is among the system's values
         keys = [(name, output) for name, read in outputs.items() for output in read]
+        self._first_driven = len(keys)
+        driven = [tuple(name.split(".", 1)) for name in self._moved]
+        keys += driven
         index = {key: i for i, key in enumerate(keys)}
-        first_signal = len(keys)
-        keys += self._moving
         self.names = tuple(f"{component}.{name}" for component, name in keys)
         memory = (c_double * max(len(keys), 1))()
         self.values = np.frombuffer(memory)[: len(keys)]
@@ -251,22 +256,17 @@ class Master(AbstractContextManager["Master"]):
         first = 0
         for name, instance in instances.items():
             incoming = [c for c in connections if c.end_component == name]
-            moving = [end for end in self._moving if end[0] == name]
             feeding = {c.start_connector for c in connections if c.start_component == name}
+            own = [key for key in driven if key[0] == name]
+            sources = [(c.start_component, c.start_connector) for c in incoming] + own
             self.components[name] = ConnectedInstance(
                 instance,
-                inputs=[*(c.end_connector for c in incoming), *(end[1] for end in moving)],
+                inputs=[*(c.end_connector for c in incoming), *(variable for _, variable in own)],
                 outputs=outputs[name],
                 first=first,
                 feeding=feeding,
-                sources=[
-                    *(index[c.start_component, c.start_connector] for c in incoming),
-                    *(first_signal + list(self._moving).index(end) for end in moving),
-                ],
-                ahead=[
-                    *(c.start_component in self.components and not self.jacobi for c in incoming),
-                    *(False for _ in moving),
-                ],
+                sources=[index[source] for source in sources],
+                ahead=[x in self.components and not self.jacobi for x, _ in sources],
                 values=memory,
                 slopes=self.slopes,
             )
@@ -287,7 +287,7 @@ class Master(AbstractContextManager["Master"]):
                 known = ", ".join(self.components)
                 raise UserError(f"{name}: no such component (there are: {known})")
         self.time = self._start = start
-        self._take_signals()
+        self._drive()
         for component in self.components.values():
             component.begin(start, stop, parameters.get(component.name, {}))
         self._propagate(self._read_early, "in initialization")
@@ -295,6 +295,12 @@ class Master(AbstractContextManager["Master"]):
             component.instance.exit_initialization()
         if self.extrapolates:
             self._propagate_slopes()
+
+    def _drive(self) -> None:
+        """Take the values that signals have now."""
+        elapsed = np.array([self.time - self._start])
+        for i, signal in enumerate(self._moved.values(), self._first_driven):
+            self.values[i] = signal.values(elapsed)[0]
 
     def _propagate(self, read: Callable[[ConnectedInstance], object], when: str) -> None:
         """Set inputs until no output follows any more: along direct feedthrough, once each."""
@@ -313,26 +319,20 @@ class Master(AbstractContextManager["Master"]):
         names = ", ".join([*(self.names[i] for i in changing), *switched])
         raise UserError(f"the connections form an algebraic loop: {names}")
 
-    def _take_signals(self) -> None:
-        """Take the Real signals from outside at the present time."""
-        for i, signal in enumerate(self._moving.values(), len(self.values) - len(self._moving)):
-            self.values[i] = self._now(signal)
-
-    def _now(self, signal: Signal) -> float:
-        return signal.values(np.array([self.time - self._start]))[0]
-
     def _transfer_switches(self) -> list[str]:
         """Set the discrete inputs whose sources have another value; which these are."""
-        wanted = {end: int(self._now(signal)) for end, signal in self._switching.items()}
+        elapsed = np.array([self.time - self._start])
+        wanted = {name: int(x.values(elapsed)[0]) for name, x in self._switched.items()}
         for c in self._switches:
             source = self.components[c.start_component].instance
-            wanted[c.end_component, c.end_connector] = source.discrete(c.start_connector)
+            wanted[c.end] = source.discrete(c.start_connector)
         changed = []
-        for (component, name), value in wanted.items():
+        for name, value in wanted.items():
+            component, variable = name.split(".", 1)
             target = self.components[component].instance
-            if value != target.discrete(name):
-                target.set(name, value)
-                changed.append(f"{component}.{name}")
+            if value != target.discrete(variable):
+                target.set(variable, value)
+                changed.append(name)
         return changed
 
     def _read_early(self, component: ConnectedInstance) -> None:
@@ -374,7 +374,7 @@ class Master(AbstractContextManager["Master"]):
             for component in group:
                 self._read(component, end)
         self.time = end
-        self._take_signals()
+        self._drive()
         if self._transfer_switches():
             self._propagate(lambda component: self._read(component, end), f"at t = {end!r} s")
             if self.extrapolates:
@@ -422,24 +422,29 @@ def _find(fmus: Mapping[str, Fmu], component: str, name: str, causality: str | N
         raise UserError(f"{component}: {fmus[component].path} has no {kind} {name!r}")
 
 
+def _driven(fmus: Mapping[str, Fmu], name: str) -> str:
+    """Return the type of an input that follows a signal."""
+    component, _, variable = name.partition(".")
+    kind = _type(fmus, component, variable, "input")
+    if kind not in DISCRETE:
+        _find(fmus, component, variable, "input")
+    return str(kind)
+
+
 def _split(
-    fmus: Mapping[str, Fmu],
-    connections: Iterable[Connection],
-    driven: Collection[tuple[str, str]],
-    sloped: bool,
+    fmus: Mapping[str, Fmu], connections: Iterable[Connection], sloped: bool
 ) -> tuple[list[Connection], list[Connection]]:
     """Split connections into discrete ones and Reals; no input has two."""
     switches: list[Connection] = []
     reals: list[Connection] = []
-    seen = set(driven)
+    seen = set()
     for c in connections:
         end = c.end_component, c.end_connector
         kind = _type(fmus, c.start_component, c.start_connector, "output")
         if kind in DISCRETE:
             switches.append(c)
-            if _type(fmus, *end) != kind:
-                article = "an" if kind[0] in "EI" else "a"
-                raise UserError(f"{c}: {article} {kind} feeds {article} {kind} input only")
+            if _type(fmus, *end, "input") != kind:
+                raise UserError(f"{c}: a {kind} feeds a {kind} input only")
         else:
             reals.append(c)
             _find(fmus, c.start_component, c.start_connector, "output")
@@ -447,22 +452,16 @@ def _split(
         if end in seen:
             raise UserError(f"{'.'.join(end)}: is connected more than once")
         seen.add(end)
-    for end in driven:
-        if _type(fmus, *end) not in DISCRETE:
-            _find(fmus, *end, "input")
     for c in reals if sloped else ():
-        source = fmus[c.start_component]
+        source, target = fmus[c.start_component], fmus[c.end_component]
         if not source.model.gives_output_derivatives:
             raise UserError(f"{c.start_component}: {source.path} has no output derivatives")
-    for name in dict.fromkeys([*(c.end_component for c in reals), *(end[0] for end in driven)]):
-        if sloped and not fmus[name].model.interpolates_inputs:
-            raise UserError(f"{name}: {fmus[name].path} does not interpolate inputs")
+        if not target.model.interpolates_inputs:
+            raise UserError(f"{c.end_component}: {target.path} does not interpolate inputs")
     return switches, reals
 
 
-def _type(
-    fmus: Mapping[str, Fmu], component: str, name: str, causality: str = "input"
-) -> str | None:
+def _type(fmus: Mapping[str, Fmu], component: str, name: str, causality: str) -> str | None:
     variable = fmus[component].model.variables.get(name) if component in fmus else None
     return variable.type if variable is not None and variable.causality == causality else None
 
@@ -473,8 +472,10 @@ def run_in_master(ssp: OpenedSystem, variant: str, names: Sequence[str]) -> Run:
     system = ssp.system
     times = system.times
     rows = np.empty((len(times), len(names)))
-    driven = {tuple(name.split(".", 1)): signal for name, signal in system.inputs.items()}
-    with ssp.unpacked_fmus() as fmus, Master(fmus, system.connections, driven=driven) as master:
+    with (
+        ssp.unpacked_fmus() as fmus,
+        Master(fmus, system.connections, signals=system.inputs) as master,
+    ):
         master.initialize(times[0], times[-1], system.parameter_sets[variant])
         readers = [_RowReader(ssp, c, names) for c in master.components.values()]
         begin = time.perf_counter()
