@@ -1,11 +1,11 @@
 """A master that steps connected FMUs.
 
 Every component is an instance of an FMU; connections lead from outputs to inputs of the same type,
-no String. Inputs may follow signals from outside, each held over a step. Other inputs keep their values from before initialization. In
-Jacobi order all components make a step, then all outputs are read; each step takes its inputs from
-what was read at its beginning. In Gauss-Seidel order the components step one after the other, and
-each takes the newest outputs: those of the end of the step from components before it, those of its
-beginning from itself and the components behind it.
+no String. Inputs may follow signals from outside, each held over a step; others keep their values
+from before initialization. In Jacobi order all components make a step, then all outputs are read;
+each step takes its inputs from what was read at its beginning. In Gauss-Seidel order the components
+step one after the other, and each takes the newest outputs: those of the end of the step from
+components before it, those of its beginning from itself and the components behind it.
 
 Inputs keep their values over a step, a zero-order hold ("held"), or are straight lines through the
 value of their source at the time at which it was read, with its slope there: in Jacobi order they
@@ -13,8 +13,8 @@ extrapolate from the beginning of the step, in Gauss-Seidel order those from com
 meet value and slope at the end of the step. FMI 3.0 knows slopes of inputs only within a step: at
 the start, those of outputs miss what they owe to the slopes of inputs.
 
-A Boolean, Integer or Enumeration that has changed in a step is passed on at its end, in both orders.
-Then all values jump to what follows from it at this time, as at the start.
+A Boolean, Integer or Enumeration that has changed in a step is passed on at the end of the step, in
+both orders. Then all values jump to what follows from it at this time, as at the start.
 """
 
 import time
