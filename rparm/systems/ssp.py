@@ -17,12 +17,11 @@ from typing import NoReturn
 import fmpy
 from lxml import etree
 
-from rparm.errors import UnplacedError, UserError, placed
+from rparm.errors import UnplacedError, UserError, did_you_mean, placed
 from rparm.files import is_file
 from rparm.fmi.fmu_file import read_xml, unpack, wrong_name
 from rparm.fmi.model import Model, Value
 from rparm.interruption import temporary_folder
-from rparm.project import STRUCTURE
 from rparm.systems.structure import (
     ALONE,
     Component,
@@ -36,6 +35,7 @@ from rparm.systems.structure import (
     times,
 )
 
+STRUCTURE = "SystemStructure.ssd"  # the file that has the system
 NAMESPACES = {
     "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
     "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",

@@ -6,20 +6,24 @@ every set gives all that any of them changes. OMSimulator needs the type of each
 own annotation, and accepts no SystemGeometry.
 """
 
+import sys
 import zipfile
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from fmpy.model_description import BaseUnit
 
+from rparm.errors import UserError
 from rparm.files import whole
-from rparm.fmi.fmu_file import Described, describe
+from rparm.fmi.fmu_file import describe
 from rparm.fmi.model import Value, Variable
-from rparm.project import STRUCTURE
-from rparm.systems.ssp import ALONE, FMU_TYPE, SETTABLE, System
+from rparm.systems import loop_file
+from rparm.systems.ssp import FMU_TYPE, STRUCTURE
+from rparm.systems.structure import ALONE, SETTABLE, Component, OpenedSystem
 
 BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset")
+TYPED = ("Real", "Integer", "Boolean", "String")  # connectors
 DATE = (1980, 1, 1, 0, 0, 0)
 UNIX = 3
 HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -32,14 +36,14 @@ SPACES = f"""xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"
 Sets = Mapping[str, Mapping[str, Mapping[str, Value]]]  # by variant, component and variable
 
 
-def write(path: Path, system: System, fmus: Mapping[str, Path], inputs: Iterable[str] = ()) -> None:
-    """Write a system with the FMU of each component; `inputs` of these become the system's.
+def write(path: Path, opened: OpenedSystem) -> None:
+    """Write a system with its FMUs and variants; what its file makes move becomes inputs of it.
 
     The bytes depend only on the contents.
     """
-    writer = _Writer(system, fmus, inputs)
+    files = _Writer(opened).files()
     with whole(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
-        for name, content in sorted(writer.files().items()):
+        for name, content in sorted(files.items()):
             entry = zipfile.ZipInfo(name, DATE)
             entry.create_system, entry.external_attr = UNIX, 0o100644 << 16
             # an FMU is compressed already
@@ -48,54 +52,41 @@ def write(path: Path, system: System, fmus: Mapping[str, Path], inputs: Iterable
             archive.writestr(entry, content, compresslevel=9)
 
 
-def sources(fmus: Mapping[str, Path]) -> dict[str, str]:
-    """Return the place of each component's FMU in an archive; other FMUs of a name get others."""
-    found: dict[str, str] = {}
-    taken: dict[str, Path] = {}
-    for component, path in fmus.items():
-        name = (
-            path.name if taken.setdefault(path.name, path) == path else f"{component}_{path.name}"
-        )
-        found[component] = f"resources/{name}"
-    return found
-
-
-def complete_sets(system: System, described: Mapping[str, Described]) -> Sets:
-    """Return sets that each give all that any changes; without one that another set repeats."""
+def complete_sets(opened: OpenedSystem) -> Sets:
+    """Return sets that each give all that any changes; the default only if no other repeats it."""
+    given = opened.system.parameter_sets
     names: dict[str, dict[str, None]] = {}
-    for components in system.parameter_sets.values():
+    for components in given.values():
         for component, values in components.items():
             names.setdefault(component, {}).update(dict.fromkeys(values))
+    starts = {component: opened.models[component].start_values for component in names}
     sets = {
         variant: {
             component: {
-                name: components.get(component, {}).get(
-                    name, described[component].model.start_values[name]
-                )
-                for name in wanted
+                name: (starts[component] | components.get(component, {}))[name] for name in of
             }
-            for component, wanted in names.items()
-            if wanted
+            for component, of in names.items()
+            if of
         }
-        for variant, components in system.parameter_sets.items()
+        for variant, components in given.items()
     }
     others = [values for variant, values in sets.items() if variant != ALONE]
     return {v: values for v, values in sets.items() if v != ALONE or values not in others}
 
 
 class _Writer:
-    def __init__(self, system: System, fmus: Mapping[str, Path], inputs: Iterable[str]) -> None:
-        self.system = system
-        self.fmus = fmus
-        self.inputs = [(name, *name.split(".", 1)) for name in inputs]
-        self.sources = sources(fmus)
-        self.described = {name: describe(path) for name, path in fmus.items()}
+    def __init__(self, opened: OpenedSystem) -> None:
+        self.opened, self.system = opened, opened.system
+        self.inputs = [(name, *name.split(".", 1)) for name in opened.system.inputs]
+        self.sets = complete_sets(opened)
+        self.descriptions: dict[str, str] = {}  # of components
         self.units: dict[str, BaseUnit] = {}
-        for described in self.described.values():
-            for unit in described.description.unitDefinitions:
+        for name in opened.models:
+            description = describe(opened.fmu(name)).description
+            self.descriptions[name] = description.description or ""
+            for unit in description.unitDefinitions:
                 if unit.baseUnit is not None:
                     self.units.setdefault(unit.name, unit.baseUnit)
-        self.sets = complete_sets(system, self.described)
 
     def files(self) -> dict[str, bytes]:
         """Return the content of each file by its name."""
@@ -104,7 +95,8 @@ class _Writer:
             for component, values in components.items():
                 texts[_set_file(component, variant)] = self.parameters(variant, component, values)
         files = {name: text.encode() for name, text in texts.items()}
-        return files | {self.sources[name]: path.read_bytes() for name, path in self.fmus.items()}
+        fmus = {c.source: self.opened.fmu(c.name).read_bytes() for c in self.system.components}
+        return files | fmus
 
     # ---- The structure ---------------------------------------------------------------------------
     def structure(self) -> str:
@@ -112,16 +104,17 @@ class _Writer:
         step, start, stop = map(_text, (system.step, system.start, system.stop))
         ends = [(c.start_component, c.start_connector, c.end_component, c.end_connector)
                 for c in system.connections]  # fmt: skip
-        used = {end for connection in ends for end in (connection[:2], connection[2:])}
-        used |= {(component, name) for _, component, name in self.inputs}
-        elements = [self.component(i, c.name, used) for i, c in enumerate(system.components)]
-        own = "".join(self.connector(x, 0, 0.5, *of) for x, *of in self.inputs)
-        connectors = f"    <ssd:Connectors>\n{own}    </ssd:Connectors>\n" if own else ""
         connections = [_connection(*end) for end in ends]
         connections += [_connection("", *entry) for entry in self.inputs]
-        return f"""{HEAD}<ssd:SystemStructureDescription version="1.0" name={quoteattr(system.name)}
+        elements = [self.component(i, c) for i, c in enumerate(system.components)]
+        own = "".join(self.connector(x, 0, 0.5, *of) for x, *of in self.inputs)
+        connectors = f"    <ssd:Connectors>\n{own}    </ssd:Connectors>\n" if own else ""
+        name = quoteattr(system.name)
+        said = f" description={quoteattr(system.description)}" if system.description else ""
+        shown = [self.variable(c.name, name) for c in system.components for name in c.connectors]
+        return f"""{HEAD}<ssd:SystemStructureDescription version="1.0" name={name}{said}
     {SPACES}>
-  <ssd:System name={quoteattr(system.name)}>
+  <ssd:System name={name}>
 {connectors}    <ssd:Elements>
 {"".join(elements)}    </ssd:Elements>
     <ssd:Connections>
@@ -137,7 +130,7 @@ class _Writer:
       </ssc:Annotation>
     </ssd:Annotations>
   </ssd:System>
-{self.unit_list("ssd", (self.variable(*end) for end in used))}\
+{self.unit_list("ssd", shown)}\
   <ssd:DefaultExperiment startTime="{start}" stopTime="{stop}">
     <ssd:Annotations>
       <ssc:Annotation type="com.opensimulationplatform">
@@ -148,13 +141,11 @@ class _Writer:
 </ssd:SystemStructureDescription>
 """
 
-    def component(self, number: int, name: str, used: Collection[tuple[str, str]]) -> str:
-        """Return an element with its `used` variables as connectors: inputs left, outputs right."""
-        described = self.described[name]
-        variables = [v for v in described.model.variables.values() if (name, v.name) in used]
-        connectors = ""
-        for x, causality in enumerate(("input", "output")):
-            shown = [v.name for v in variables if v.causality == causality]
+    def component(self, number: int, component: Component) -> str:
+        """Return an element: inputs to its left, outputs to its right."""
+        name, connectors = component.name, ""
+        for x, kind in enumerate(("input", "output")):
+            shown = [c.name for c in component.connectors.values() if c.kind == kind]
             for i, variable in enumerate(shown):
                 place = 1 - (i + 0.5) / len(shown)
                 connectors += "    " + self.connector(variable, x, place, name, variable)
@@ -167,12 +158,11 @@ class _Writer:
             bindings = f"""        <ssd:ParameterBindings>
 {bindings}        </ssd:ParameterBindings>
 """
-        description = described.description.description or ""
         left = 70 * number
         return f"""\
       <ssd:Component name={quoteattr(name)} type="{FMU_TYPE}"
-          source={quoteattr(self.sources[name])} implementation="CoSimulation"
-          description={quoteattr(description)}>
+          source={quoteattr(component.source)} implementation="CoSimulation"
+          description={quoteattr(self.descriptions[name])}>
         <ssd:Connectors>
 {connectors}        </ssd:Connectors>
         <ssd:ElementGeometry x1="{left}" y1="0" x2="{left + 40}" y2="40"/>
@@ -181,12 +171,11 @@ class _Writer:
 
     def connector(self, shown: str, x: int, y: float, component: str, name: str) -> str:
         variable = self.variable(component, name)
-        kind = f"<ssc:{variable.type}{self.unit(variable)}/>"
-        if variable.type == "Enumeration":  # whose items a file would have to list: the FMU's
-            kind = ""
+        # an Enumeration would have to be listed here: without a type it is the FMU's
+        typed = f"<ssc:{variable.type}{self.unit(variable)}/>" if variable.type in TYPED else ""
         return (
             f"      <ssd:Connector name={quoteattr(shown)} kind={quoteattr(variable.causality)}>"
-            f'{kind}<ssd:ConnectorGeometry x="{x}" y="{y:.3g}"/></ssd:Connector>\n'
+            f'{typed}<ssd:ConnectorGeometry x="{x}" y="{y:.3g}"/></ssd:Connector>\n'
         )
 
     # ---- Parameter sets and units ----------------------------------------------------------------
@@ -209,7 +198,7 @@ class _Writer:
 """
 
     def variable(self, component: str, name: str) -> Variable:
-        return self.described[component].model.variables[name]
+        return self.opened.models[component].variables[name]
 
     def unit(self, variable: Variable) -> str:
         """Return the attribute for a unit that the FMUs define."""
@@ -249,3 +238,17 @@ def _text(value: Value) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     return repr(float(value)).removesuffix(".0") if isinstance(value, float) else str(value)
+
+
+def main() -> None:
+    """Write the SSP of a loop file for a build: LOOP FMUS SSP; the folder FMUS has those named."""
+    loop, fmus, path = map(Path, sys.argv[1:])
+    try:
+        with loop_file.opened(loop, fmus=fmus) as opened:
+            write(path, opened)
+    except UserError as error:
+        sys.exit(f"error: {error}")
+
+
+if __name__ == "__main__":
+    main()
