@@ -142,6 +142,12 @@ def add_tolerance(parser: argparse.ArgumentParser, text: str) -> None:
     parser.add_argument("--tolerance", type=relative_tolerance, metavar="X", help=text)
 
 
+def add_step(parser: argparse.ArgumentParser) -> None:
+    """Add the communication step of a system, in place of the file's."""
+    text = "communication step, as 0.001 or 1ms (default: the system's)"
+    parser.add_argument("--step", type=_step, metavar="TIME", help=text)
+
+
 def add_report(parser: argparse.ArgumentParser, part: str = "") -> None:
     """Add the folder for pages and results."""
     folder = project.report_folder(part)
@@ -240,6 +246,16 @@ def _seconds(text: str) -> float:
             return seconds
     form = "a number, or one with s, ms, cs or ks"
     raise argparse.ArgumentTypeError(f"expected 1 s or more: {form}, got {text!r}")
+
+
+def _step(text: str) -> float:
+    try:
+        step = typed_quantity(text, SECONDS)
+    except WrongValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    if step <= 0:
+        raise argparse.ArgumentTypeError(f"expected more than 0 s, got {text!r}")
+    return step
 
 
 def _version(text: str) -> str:
