@@ -74,7 +74,7 @@ class _Picture:
                 width = max(self.wide[name] for name in columns[i])
                 self.x |= {name: x + (width - self.wide[name]) // 2 for name in columns[i]}
                 x += width
-        self.width = x
+        self.width = max(x, 700)  # pages stretch smaller pictures
         rows = {name: j for column in columns for j, name in enumerate(column)}
         self.y = {name: 20 + j * (HEIGHT + APART) for name, j in rows.items()}
         self.bottom = 20 + (max(rows.values()) + 1) * (HEIGHT + APART)
