@@ -48,25 +48,25 @@ RESOURCES = "resources"  # folder of the FMUs, as in an SSP
 
 @contextmanager
 def opened(
-    path: Path, step: float | None = None, version: str = VERSIONS[0]
+    path: Path, step: float | None = None, version: str = VERSIONS[0], fmus: Path | None = None
 ) -> Iterator[OpenedSystem]:
     """Read a loop file and build what it names; a `step` in s replaces its own.
 
-    FMUs of the project, and built ones, are of this `version` of FMI. UserError if anything is
-    wrong.
+    FMUs of the project, and built ones, are of this `version` of FMI; those in a folder `fmus`
+    need not run here. UserError if anything is wrong.
     """
     path = Path(path)
     content = read_toml(path)
     with temporary_folder() as folder:
-        yield LoopReader(path, folder, version).system(content, step)
+        yield LoopReader(path, folder, version, fmus).system(content, step)
 
 
 class LoopReader(Reader):
     """Takes the sections of one file; errors name the file and the key."""
 
-    def __init__(self, path: Path, folder: Path, version: str) -> None:
+    def __init__(self, path: Path, folder: Path, version: str, fmus: Path | None) -> None:
         super().__init__(path)
-        self.folder, self.version = folder, version
+        self.folder, self.version, self.fmus = folder, version, fmus
         self.models: dict[str, Model] = {}  # by component, as the rest
         self.sources: dict[str, str] = {}  # in the folder
         self.files: dict[str, Path] = {}  # FMUs that the user knows
@@ -179,9 +179,12 @@ class LoopReader(Reader):
                 fmu = self.built(path)
             elif suffix == FMU:
                 made = fmu = path
+            elif self.fmus:
+                made = fmu = self.fmus / f"{given}{FMU}"
             else:
                 made = fmu = project.built(project.model(given), FMU, version=self.version)
-            read_model(fmu)  # runs on this platform
+            if not self.fmus:
+                read_model(fmu)  # runs on this platform
         except UserError as error:
             self.fail(f"{where}: {error}")
         self.files[name] = made

@@ -1,11 +1,11 @@
 """A master that steps connected FMUs.
 
-Every component is an instance of an FMU; connections lead from Real outputs to Real inputs, or from
-Boolean outputs to Boolean inputs. Other inputs keep their values from before initialization. In
-Jacobi order all components make a step, then all outputs are read; each step takes its inputs from
-what was read at its beginning. In Gauss-Seidel order the components step one after the other, and
-each takes the newest outputs: those of the end of the step from components before it, those of its
-beginning from itself and the components behind it.
+Every component is an instance of an FMU; connections lead from outputs to inputs of the same type,
+no String. Inputs may follow signals from outside, each held over a step; others keep their values
+from before initialization. In Jacobi order all components make a step, then all outputs are read;
+each step takes its inputs from what was read at its beginning. In Gauss-Seidel order the components
+step one after the other, and each takes the newest outputs: those of the end of the step from
+components before it, those of its beginning from itself and the components behind it.
 
 Inputs keep their values over a step, a zero-order hold ("held"), or are straight lines through the
 value of their source at the time at which it was read, with its slope there: in Jacobi order they
@@ -13,8 +13,8 @@ extrapolate from the beginning of the step, in Gauss-Seidel order those from com
 meet value and slope at the end of the step. FMI 3.0 knows slopes of inputs only within a step: at
 the start, those of outputs miss what they owe to the slopes of inputs.
 
-A Boolean that has changed in a step is passed on at the end of the step, in both orders. Then all
-values jump to what follows from it at this time, as at the start.
+A Boolean, Integer or Enumeration that has changed in a step is passed on at the end of the step, in
+both orders. Then all values jump to what follows from it at this time, as at the start.
 """
 
 import time
@@ -36,6 +36,7 @@ from rparm.systems.structure import Connection, OpenedSystem
 
 ORDERS = ("jacobi", "gauss_seidel")
 INPUT_MODES = ("held", "extrapolated")
+DISCRETE = ("Boolean", "Integer", "Enumeration")  # types of what switches
 
 
 # ---- Components ----------------------------------------------------------------------------------
@@ -178,7 +179,7 @@ class Master(AbstractContextManager["Master"]):
         "component.variable" of all that is read, by component, outputs first; at the end Real
         inputs of signals.
     values : ndarray, shape (len(names),)
-        As read right after the last step, and all that follows from a Boolean that changed.
+        As read right after the last step, and all that follows from what switched.
     slopes : ndarray, shape (len(names),)
         Derivatives by time of what is connected, if `inputs` is "extrapolated".
     time : float
@@ -208,7 +209,7 @@ class Master(AbstractContextManager["Master"]):
                 raise UserError(f"{name}: is connected, and cannot follow a signal, too")
         driven = {name: _driven(fmus, name) for name in signals}
         self._moved = {name: signals[name] for name, kind in driven.items() if kind == "Real"}
-        self._switched = {n: signals[n] for n, kind in driven.items() if kind == "Boolean"}
+        self._switched = {n: signals[n] for n, kind in driven.items() if kind in DISCRETE}
         for component, name in also:
             _find(fmus, component, name, None)
         self._stack = ExitStack()
@@ -319,22 +320,19 @@ class Master(AbstractContextManager["Master"]):
         raise UserError(f"the connections form an algebraic loop: {names}")
 
     def _transfer_switches(self) -> list[str]:
-        """Set the Boolean inputs whose sources have another value; which these are."""
-        changed = []
+        """Set the discrete inputs whose sources have another value; which these are."""
         elapsed = np.array([self.time - self._start])
-        for name, signal in self._switched.items():
-            component, variable = name.split(".", 1)
-            instance, value = self.components[component].instance, bool(signal.values(elapsed)[0])
-            if value != instance.boolean(variable):
-                instance.set(variable, value)
-                changed.append(name)
+        wanted = {name: int(x.values(elapsed)[0]) for name, x in self._switched.items()}
         for c in self._switches:
             source = self.components[c.start_component].instance
-            target = self.components[c.end_component].instance
-            value = source.boolean(c.start_connector)
-            if value != target.boolean(c.end_connector):
-                target.set(c.end_connector, value)
-                changed.append(c.end)
+            wanted[c.end] = source.discrete(c.start_connector)
+        changed = []
+        for name, value in wanted.items():
+            component, variable = name.split(".", 1)
+            target = self.components[component].instance
+            if value != target.discrete(variable):
+                target.set(variable, value)
+                changed.append(name)
         return changed
 
     def _read_early(self, component: ConnectedInstance) -> None:
@@ -425,27 +423,28 @@ def _find(fmus: Mapping[str, Fmu], component: str, name: str, causality: str | N
 
 
 def _driven(fmus: Mapping[str, Fmu], name: str) -> str:
-    """Return the type of an input that follows a signal, Real or Boolean."""
+    """Return the type of an input that follows a signal."""
     component, _, variable = name.partition(".")
-    if _is_switch(fmus, component, variable, "input"):
-        return "Boolean"
-    _find(fmus, component, variable, "input")
-    return "Real"
+    kind = _type(fmus, component, variable, "input")
+    if kind not in DISCRETE:
+        _find(fmus, component, variable, "input")
+    return str(kind)
 
 
 def _split(
     fmus: Mapping[str, Fmu], connections: Iterable[Connection], sloped: bool
 ) -> tuple[list[Connection], list[Connection]]:
-    """Split connections into Booleans and Reals; no input has two."""
+    """Split connections into discrete ones and Reals; no input has two."""
     switches: list[Connection] = []
     reals: list[Connection] = []
     seen = set()
     for c in connections:
         end = c.end_component, c.end_connector
-        if _is_switch(fmus, c.start_component, c.start_connector, "output"):
+        kind = _type(fmus, c.start_component, c.start_connector, "output")
+        if kind in DISCRETE:
             switches.append(c)
-            if not _is_switch(fmus, *end, "input"):
-                raise UserError(f"{c}: a Boolean feeds a Boolean input only")
+            if _type(fmus, *end, "input") != kind:
+                raise UserError(f"{c}: a {kind} feeds a {kind} input only")
         else:
             reals.append(c)
             _find(fmus, c.start_component, c.start_connector, "output")
@@ -462,9 +461,9 @@ def _split(
     return switches, reals
 
 
-def _is_switch(fmus: Mapping[str, Fmu], component: str, name: str, causality: str) -> bool:
+def _type(fmus: Mapping[str, Fmu], component: str, name: str, causality: str) -> str | None:
     variable = fmus[component].model.variables.get(name) if component in fmus else None
-    return variable is not None and (variable.type, variable.causality) == ("Boolean", causality)
+    return variable.type if variable is not None and variable.causality == causality else None
 
 
 # ---- A variant -----------------------------------------------------------------------------------
@@ -518,14 +517,11 @@ class _RowReader:
         real = [name for name in own if variables[name].type == "Real"]
         self._reals = instance.reals(real)
         self._real_columns = [own[name] for name in real]
-        self._others: list[tuple[int, Callable[[str], int | None], str]] = []
-        for name in own.keys() - set(real):
-            is_boolean = variables[name].type == "Boolean"
-            read = instance.boolean if is_boolean else instance.integer
-            self._others.append((own[name], read, name))
+        self._others = {own[name]: name for name in own.keys() - set(real)}
+        self._discrete = instance.discrete
 
     def read(self, row: np.ndarray) -> None:
         self._reals.get()
         row[self._real_columns] = self._reals.view
-        for column, read, name in self._others:
-            row[column] = read(name)
+        for column, name in self._others.items():
+            row[column] = self._discrete(name)

@@ -344,8 +344,8 @@ class PythonInstance(Instance):
     def _integer(self, reference: int) -> int:
         raise AssertionError(reference)
 
-    def boolean(self, name: str) -> bool:
-        return bool(getattr(self.made.object, name))
+    def discrete(self, name: str) -> int:
+        return int(getattr(self.made.object, name))
 
     def _real_calls(self, references: Array, values: Array) -> tuple[Call, Call]:
         places, numbers = list(references), view(values)
