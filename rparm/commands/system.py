@@ -1,4 +1,4 @@
-"""`system` and `coupling`: run systems, compare them, study what their coupling costs."""
+"""`system`: run systems, compare the project's with references, estimate errors of others."""
 
 import argparse
 from collections.abc import Sequence
@@ -197,32 +197,3 @@ def _simulated(
     estimates = not comparison.why_no_estimate(section.ssp)
     with Progress(name, 3 * steps if estimates else steps) as progress:
         return comparison.run_alone(section.ssp, name, section.names, progress)
-
-
-def add_coupling_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Steps the system in several orders, with inputs held and extrapolated and with step-size "
-        "control, and compares it with the solution in continuous time; predicts and measures the "
-        "largest stable steps of each system."
-    )
-    add_system(parser)
-    add_report(parser, "system")
-
-
-def do_coupling(options: argparse.Namespace) -> Ended:
-    from rparm.linearization.largest_step import study_steps
-
-    folder, known = comparison.coupling_study()
-    path = options.ssp or project.built(folder, ".ssp", "--ssp", options.fmi)
-    check_writable(options.report)
-    console.stage(f"studying the coupling of {folder.name}")
-    parts = known.study_coupling(path, options.report)
-    for other, rest in comparison.rests().items():
-        if other != folder and not options.ssp:
-            ssp = project.built(other, ".ssp", version=options.fmi)
-            parts[f"largest steps of {other.name}"] = study_steps(ssp, rest)
-    failed = [name for name, part in parts.items() if not part["passed"]]
-    picture = (options.report / known.COUPLING_PICTURE).absolute()
-    verdict = console.verdict_line(failed, parts, "part")
-    document = {"parts": parts, "picture": picture}
-    return Ended(1 if failed else 0, verdict, document, page=picture)

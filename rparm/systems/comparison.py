@@ -1,4 +1,7 @@
-"""Runs of a system's variants compared with references; what study.py in its folder must define."""
+"""Runs of a system's variants compared with references, or with runs at smaller steps.
+
+Here is also what study.py in the folder of a system must define.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,9 +14,11 @@ import numpy as np
 from rparm import files, project
 from rparm.errors import UserError
 from rparm.files import is_file
+from rparm.fmi.fmu_file import Fmu
 from rparm.runs import comparison
 from rparm.runs.comparison import Compared, Summed
 from rparm.systems import ecos, master
+from rparm.systems.master import Master
 from rparm.systems.structure import OpenedSystem
 
 if TYPE_CHECKING:
@@ -195,6 +200,92 @@ def _check_experiment(ssp: OpenedSystem, experiment: tuple[float, float, float])
             f"{system.step!r} s; the references are for {start!r} to {stop!r} s in steps of "
             f"{step!r} s"
         )
+
+
+# ---- By halving the step -------------------------------------------------------------------------
+HALVINGS = 4  # of the communication step
+
+
+@dataclass(frozen=True, eq=False)
+class Halved:
+    """What the coupling costs in one way to step, by runs at steps that are halved."""
+
+    order: str  # as in `rparm.systems.master`
+    inputs: str
+    steps: np.ndarray  # (runs,) s
+    # (runs,) largest distance of an output from the limit that the last two runs lead to, relative
+    # to the largest value of outputs in its unit
+    errors: np.ndarray
+    orders: np.ndarray  # (runs - 2,) by differences of three runs each
+    worst: str  # output with the largest error at the first step
+
+    @property
+    def expected(self) -> int:
+        """Power of the step by which errors fall, of smooth systems."""
+        return 2 if self.inputs == "extrapolated" else 1
+
+
+def halve(
+    ssp: OpenedSystem,
+    variant: str,
+    way: tuple[str, str],
+    progress: Callable[[int], object] = lambda _: None,
+) -> Halved:
+    """Run a variant at its step and at smaller ones, in one of `master.ways`; compare the runs.
+
+    UserError if a component is in Python: its law changes with the step.
+    """
+    for name in ssp.python:
+        why = "is in Python: its law changes with the step, which shows no error of the coupling"
+        raise UserError(f"{ssp.path}: component {name!r} {why}")
+    system = ssp.system
+    with ssp.unpacked_fmus() as fmus:
+        runs = [
+            _every(fmus, ssp, variant, way, 2**halvings, progress)
+            for halvings in range(HALVINGS + 1)
+        ]
+    names = [
+        f"{component}.{name}"
+        for component, model in ssp.models.items()
+        for name in model.real_outputs
+    ]
+    values = np.array([rows[:, : len(names)] for rows in runs])
+    sizes: dict[str | None, float] = {}
+    units = [ssp.variable(name).unit for name in names]
+    for unit, largest in zip(units, np.abs(values[-1]).max(axis=0).tolist(), strict=True):
+        sizes[unit] = max(sizes.get(unit, 0.0), largest)
+    values = values / [sizes[unit] or 1.0 for unit in units]
+    found = Halved(*way, system.step / 2.0 ** np.arange(len(runs)), *[np.zeros(0)] * 2, "")
+    limit = values[-1] + (values[-1] - values[-2]) / (2**found.expected - 1)
+    errors = np.abs(values - limit)
+    differences = np.abs(np.diff(values, axis=0)).max(axis=(1, 2), initial=0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        orders = np.log2(differences[:-1] / differences[1:])
+    place = int(errors[0].max(axis=0).argmax())
+    return replace(found, errors=errors.max(axis=(1, 2)), orders=orders, worst=names[place])
+
+
+def _every(
+    fmus: Mapping[str, Fmu],
+    ssp: OpenedSystem,
+    variant: str,
+    way: tuple[str, str],
+    parts: int,
+    progress: Callable[[int], object],
+) -> np.ndarray:
+    """Run with steps in `parts`; return rows (steps + 1, names) at the whole ones."""
+    system = ssp.system
+    with Master(fmus, system.connections, *way, signals=system.inputs) as master:
+        master.initialize(system.start, system.stop, system.parameter_sets[variant])
+        rows = np.empty((system.steps + 1, len(master.names)))
+        rows[0] = master.values
+        for i in range(1, system.steps * parts + 1):
+            master.advance(system.start + i * system.step / parts)
+            if i % parts == 0:
+                rows[i // parts] = master.values
+            if i % 100 == 0:
+                progress(100)
+    return rows
 
 
 # ---- study.py of a system ------------------------------------------------------------------------

@@ -28,7 +28,7 @@ from fmpy.fmi1 import FMICallException
 from rparm.errors import UserError, placed
 from rparm.fmi.fmi_instance import Instance, Reals, UnpackedFmu
 from rparm.fmi.fmu_file import Fmu
-from rparm.fmi.model import INPUTS, Value
+from rparm.fmi.model import INPUTS, Model, Value
 from rparm.runs.inputs import Signal
 from rparm.systems.ecos import Run, said_at_end
 from rparm.systems.python_component import is_python
@@ -464,6 +464,17 @@ def _split(
 def _type(fmus: Mapping[str, Fmu], component: str, name: str, causality: str) -> str | None:
     variable = fmus[component].model.variables.get(name) if component in fmus else None
     return variable.type if variable is not None and variable.causality == causality else None
+
+
+def ways(models: Mapping[str, Model], connections: Iterable[Connection]) -> list[tuple[str, str]]:
+    """Return the orders and inputs in which a master can step connected components."""
+    can = all(
+        models[c.start_component].gives_output_derivatives
+        and models[c.end_component].interpolates_inputs
+        for c in connections
+        if models[c.start_component].variables[c.start_connector].type == "Real"
+    )
+    return [(order, inputs) for inputs in INPUT_MODES[: 1 + can] for order in ORDERS]
 
 
 # ---- A variant -----------------------------------------------------------------------------------

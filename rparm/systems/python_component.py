@@ -222,7 +222,7 @@ def _kind(value: object) -> tuple[str, Any]:
         return "Boolean", value
     if isinstance(value, int | float | np.integer | np.floating):
         return "Real", float(value)
-    return ("String", value) if isinstance(value, str) else (ANY, None)
+    return ("String", value) if isinstance(value, str) else (ANY, show(value))
 
 
 @dataclass(frozen=True)
