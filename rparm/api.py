@@ -4,6 +4,8 @@ All values are in the units of their variables (SI), times in s. Mistakes raise
 `rparm.errors.UserError`, whose text is one line.
 """
 
+import html
+import webbrowser
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -24,10 +26,13 @@ from rparm.runs import simulation
 from rparm.runs.comparison import load_reference
 from rparm.runs.simulation import Input
 from rparm.systems import comparison, ecos, master, ssp
+from rparm.units import unit
 
 if TYPE_CHECKING:
     from rparm.identification.identify import Identification
     from rparm.linearization.linear import Linear
+
+MOST_DRAWN = 10  # columns of a table in a notebook
 
 
 # ---- Runs ----------------------------------------------------------------------------------------
@@ -73,10 +78,63 @@ class Table(Mapping[str, np.ndarray]):
             files.write_trajectory(Path(path), self._times, self._names, self._values)
 
     def to_pandas(self) -> Any:
-        """Return the columns as a pandas.DataFrame; pandas must be installed."""
-        import pandas
+        """Return the columns as a pandas.DataFrame; needs pandas, as the extra `campaign`."""
+        with _needing("campaign"):
+            import pandas
 
         return pandas.DataFrame(dict(self))
+
+    def plot(self, *names: str, output: str | Path | None = None, show: bool = True) -> Path:
+        """Plot columns over the time on a page, those of one unit together; return its path.
+
+        Parameters
+        ----------
+        names : str
+            Of columns; default: all.
+        output : path, optional
+            Folder for the page; default: "plots" among the reports.
+        show : bool
+            Open the page in a browser.
+        """
+        from rparm.report import overview, pages, run_data  # take long to import
+
+        curves: dict[str, list[run_data.Curve]] = {}
+        for name in names or self._names:
+            curve = run_data.result_curve(name, self[name])
+            curves.setdefault(unit(self.units.get(name)), []).append(curve)
+        plots = [
+            run_data.Plot(", ".join(curve.name for curve in drawn), of_all, drawn)
+            for of_all, drawn in curves.items()
+        ]
+        rows = run_data.thinned([values for plot in plots for values in plot.columns])
+        drawn = [plot.at(rows) for plot in plots]
+        data = run_data.RunData("table", "Run", self._times[rows], drawn)
+        page = pages.RunPage("Run", f"{self._size}.", overview.RAN, (), data, ())
+        folder = Path(output or project.report_folder("plots"))
+        with written(folder):
+            path = pages.write_alone(folder, page)
+        if show:
+            webbrowser.open_new_tab(path.absolute().as_uri())
+        return path
+
+    @property
+    def _size(self) -> str:
+        return f"{len(self._times)} rows, {len(self)} columns"
+
+    def _repr_html_(self) -> str:
+        """Draw the first columns for notebooks, without scripts."""
+        from rparm.report.overview import sparkline_svg
+
+        shown = self._names[:MOST_DRAWN]
+        more = f", {len(shown)} drawn" if len(shown) < len(self._names) else ""
+        rows = []
+        for name in shown:
+            finite = self[name][np.isfinite(self[name])]
+            range_of = f"{finite.min():.4g} to {finite.max():.4g}" if len(finite) else "not finite"
+            texts = html.escape(name), html.escape(f"{range_of} {unit(self.units.get(name))}")
+            picture = sparkline_svg(self._times, self[name])
+            rows.append(f"<tr><th>{texts[0]}</th><td>{picture}</td><td>{texts[1]}</td></tr>")
+        return f"<table><caption>{self._size}{more}</caption>{''.join(rows)}</table>"
 
 
 def fmu(name: str, fmi: int = 2) -> Path:
@@ -95,9 +153,9 @@ def fmu(name: str, fmi: int = 2) -> Path:
 def simulate(
     fmu: str | Path,
     *,
-    stop_time: float,
-    step: float,
-    start_time: float = 0.0,
+    stop_time: float | None = None,
+    step: float | None = None,
+    start_time: float | None = None,
     start_values: Mapping[str, Value] | None = None,
     inputs: Mapping[str, Input] | None = None,
     outputs: Sequence[str] | None = None,
@@ -113,7 +171,8 @@ def simulate(
     fmu : path
         Any FMU; see `fmu` for the project's.
     stop_time, step, start_time : float
-        s. `step` is the communication step; a whole number of them leads to the stop time.
+        s; default: those of the FMU's default experiment, else from 0, in 200 steps. `step`
+        is the communication step; a whole number of them leads to the stop time.
     start_values : mapping, optional
         Parameters and states by name: numbers, texts with a unit ("30 deg"), items' names.
     inputs : mapping, optional
@@ -130,11 +189,12 @@ def simulate(
         Row i is what is read right after the step to time i; row 0 at the start.
     """
     path = Path(fmu)
-    times = simulation.communication_points(start_time, stop_time, step)
     if not (simulation.is_finite_number(tolerance) and 0 < tolerance < 1):
         raise UserError(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")
     with Fmu(path) as opened:
         model = opened.model
+        with placed(path):
+            times = simulation.times_of(model.experiment, start_time, stop_time, step)
         names = list(model.real_outputs if outputs is None else outputs)
         for name in names:
             if name not in model.real_outputs:
