@@ -16,7 +16,7 @@ import numpy as np
 
 from rparm import files, project, proof
 from rparm.building import build as build
-from rparm.errors import UserError, hint
+from rparm.errors import UserError, hint, placed
 from rparm.federation import federation, network
 from rparm.files import written
 from rparm.fmi.fmu_file import Fmu

@@ -6,7 +6,6 @@ import math
 import re
 import shlex
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from importlib.util import find_spec
 from itertools import count
 from pathlib import Path
@@ -14,7 +13,7 @@ from pathlib import Path
 from rparm import console, project, schemas
 from rparm.building import NEEDED
 from rparm.command_line import Ended, add_document, add_flag, add_fmi, add_output
-from rparm.errors import UserError
+from rparm.errors import UserError, closest
 from rparm.files import check_for_windows, copied, create, from_folder, from_here, written
 from rparm.fmi.model import INPUTS, Model, Variable
 from rparm.project import VERSIONS
@@ -199,23 +198,25 @@ def _components(given: Sequence[str], folder: Path) -> dict[str, tuple[str, Mode
 def _system_file(name: str, components: Mapping[str, tuple[str, Model]]) -> str:
     """Write a system without connections, with guesses of them as comments."""
     experiments = [model.experiment for _, model in components.values()]
-    stop = max((x.stop for x in experiments if x.stop), default=scenario.USUAL_STOP)
-    steps = (x.step for x in experiments if x.step and 0 < x.step <= stop)
-    count = math.ceil(stop / min(steps, default=stop / scenario.USUAL_STEPS) - WHOLE_STEP)
-    guesses, inputs = [], []
+    stop = max((x.stop for x in experiments if x.stop and x.stop > 0), default=scenario.USUAL_STOP)
+    least = stop / scenario.MAX_STEPS
+    steps = (x.step for x in experiments if x.step and least <= x.step <= stop)
+    whole = math.ceil(stop / min(steps, default=stop / scenario.USUAL_STEPS) - 1e-6)
+    guesses: list[str] = []
+    inputs: list[str] = []
     for component, (_, model) in components.items():
         for variable in (x for x in model.variables.values() if x.is_a(INPUTS)):
             key = f"# {scenario.toml_text(f'{component}.{variable.name}')} ="
             unit = f"  # {' '.join(variable.unit.split())}" if variable.unit else ""
             feeding = _feeding(component, variable, components)
             guesses += [f"{key} {scenario.toml_text(output)}{unit}" for output in feeding]
-            inputs.append(
-                f"{key} {{ constant = {scenario.toml_value(variable.start or 0.0)} }}{unit}"
-            )
+            nothing = False if variable.type == "Boolean" else 0.0
+            start = nothing if variable.start is None else variable.written(variable.start)
+            inputs.append(f"{key} {{ constant = {scenario.toml_value(start)} }}{unit}")
     return SYSTEM_FILE.format(
         program=project.PROGRAM,
         name=scenario.toml_text(name),
-        step=float(f"{stop / count:.12g}"),
+        step=float(f"{stop / whole:.12g}"),
         stop=stop,
         components="\n".join(f"{x} = {scenario.toml_text(y)}" for x, (y, _) in components.items()),
         guesses="".join(f"{line}\n" for line in guesses),
@@ -235,8 +236,8 @@ def _feeding(
         and (output.type, output.unit) == (variable.type, variable.unit)
     }  # fmt: skip
     same = [output for output, name in outputs.items() if name == variable.name]
-    similar = get_close_matches(variable.name, outputs.values(), n=1)
-    return same or [output for output, name in outputs.items() if name in similar][:1]
+    similar = closest(variable.name, outputs.values())
+    return same or [output for output, name in outputs.items() if name == similar][:1]
 
 
 def add_schema_options(parser: argparse.ArgumentParser) -> None:
