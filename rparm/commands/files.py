@@ -61,7 +61,7 @@ stop = {stop!r}  # s
 
 [connections]  # "component.input" = "component.output"
 {guesses}
-[inputs]  # an input that nothing feeds has its start value
+[inputs]  # an input that neither this nor a connection feeds has its start value
 {inputs}
 [parameters]  # other values than those of the FMUs, as numbers or with a unit: "12 kg"
 """
@@ -209,10 +209,11 @@ def _system_file(name: str, components: Mapping[str, tuple[str, Model]]) -> str:
             key = f"# {scenario.toml_text(f'{component}.{variable.name}')} ="
             unit = f"  # {' '.join(variable.unit.split())}" if variable.unit else ""
             feeding = _feeding(component, variable, components)
-            guesses += [f"{key} {scenario.toml_text(output)}{unit}" for output in feeding]
             nothing = False if variable.type == "Boolean" else 0.0
             start = nothing if variable.start is None else variable.written(variable.start)
-            inputs.append(f"{key} {{ constant = {scenario.toml_value(start)} }}{unit}")
+            constant = f"{key} {{ constant = {scenario.toml_value(start)} }}{unit}"
+            inputs += [] if feeding else [constant]
+            guesses += [f"{key} {scenario.toml_text(output)}{unit}" for output in feeding]
     return SYSTEM_FILE.format(
         program=project.PROGRAM,
         name=scenario.toml_text(name),
