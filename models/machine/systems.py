@@ -11,7 +11,7 @@ from lxml import etree
 
 from rparm.fmi.model import Model, Value
 from rparm.systems import ecos, ssp
-from rparm.systems.ssp import Connection, Ssp
+from rparm.systems.structure import Connection, OpenedSystem
 
 STRUCTURE = "SystemStructure.ssd"
 VARIANT = "changed"
@@ -34,7 +34,7 @@ def direct(connections: Iterable[Connection]) -> list[Connection]:
 
 
 def write_system(
-    opened: Ssp,
+    opened: OpenedSystem,
     path: Path,
     parameters: Parameters,
     stop: float,
@@ -67,7 +67,7 @@ def write_system(
 
 
 def run_in_ecos(
-    opened: Ssp,
+    opened: OpenedSystem,
     parameters: Parameters,
     stop: float,
     step: float,

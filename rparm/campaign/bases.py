@@ -24,7 +24,7 @@ from rparm.runs import scenario
 from rparm.runs.scenario import MAX_STEPS, Scenario
 from rparm.systems import ssp
 from rparm.systems.master import start_value
-from rparm.systems.ssp import Connection, Ssp
+from rparm.systems.structure import Connection, OpenedSystem
 from rparm.units import quantity
 
 
@@ -176,7 +176,7 @@ class SystemBase(Base):
 
     KIND = "system"
 
-    def __init__(self, folder: str, opened: Ssp, variant: str, times: np.ndarray) -> None:
+    def __init__(self, folder: str, opened: OpenedSystem, variant: str, times: np.ndarray) -> None:
         self._ssp, self._system = opened, opened.system
         self._names = [component.name for component in self._system.components]
         self._parameters = self._system.parameter_sets[variant]
@@ -283,7 +283,7 @@ def _said_of(where: object) -> Iterator[None]:
         raise UserError(f"{where}: {error}") from None
 
 
-def _system_times(opened: Ssp, given: Mapping[str, float]) -> np.ndarray:
+def _system_times(opened: OpenedSystem, given: Mapping[str, float]) -> np.ndarray:
     """Return the communication points (n + 1,) of a system in s, each computed from its number."""
     system = opened.system
     start = given.get("start", system.start)

@@ -20,7 +20,7 @@ from rparm.files import check_writable, written
 from rparm.result_tables import FederationTable
 from rparm.systems import comparison, ecos, ssp
 from rparm.systems.master import Master
-from rparm.systems.ssp import Ssp
+from rparm.systems.structure import OpenedSystem
 from rparm.units import counted
 
 BOUND = 1e-12  # on the largest difference to the master, relative to the variable's largest value
@@ -115,7 +115,7 @@ def _command(path: Path, variant: str, component: str, address: str) -> str:
     return f"{KEY}={key()} {project.PROGRAM} {shlex.join(arguments)}"
 
 
-def _check_names(system: Ssp, options: argparse.Namespace) -> None:
+def _check_names(system: OpenedSystem, options: argparse.Namespace) -> None:
     for kind, given, known in (
         ("variant", options.names, system.system.parameters),
         ("component", options.elsewhere, system.models),
@@ -128,7 +128,7 @@ def _check_names(system: Ssp, options: argparse.Namespace) -> None:
         raise UserError("--elsewhere: name one variant, which the other machine steps too")
 
 
-def _master(system: Ssp, variant: str, record: Record) -> tuple[float, float]:
+def _master(system: OpenedSystem, variant: str, record: Record) -> tuple[float, float]:
     """Compare with the Jacobi master: return the largest relative difference, and its time, s."""
     with system.unpacked_fmus() as fmus, Master(fmus, real_connections(system)) as master:
         times = system.system.times

@@ -22,7 +22,7 @@ from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value
 from rparm.interruption import ENDINGS
 from rparm.systems.master import begin_instance, check_finite
-from rparm.systems.ssp import Connection, Ssp
+from rparm.systems.structure import Connection, OpenedSystem
 
 Result = TypeVar("Result")
 POLL = 0.05  # s, between two looks
@@ -66,7 +66,7 @@ class Part:
         )
 
 
-def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
+def parts(ssp: OpenedSystem, variant: str) -> dict[str, Part]:
     """Return the parts of a variant, by component; UserError if it is unknown."""
     system = ssp.system
     if variant not in system.parameters:
@@ -98,7 +98,7 @@ def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
     return made
 
 
-def real_connections(ssp: Ssp) -> Sequence[Connection]:
+def real_connections(ssp: OpenedSystem) -> Sequence[Connection]:
     return [c for c in ssp.system.connections if ssp.variable(c.start).type == "Real"]
 
 

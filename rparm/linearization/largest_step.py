@@ -21,7 +21,7 @@ from rparm.linearization.system import SystemSubject, connected, looped
 from rparm.systems import ssp
 from rparm.systems.comparison import Rest
 from rparm.systems.master import INPUT_MODES, ORDERS, Master
-from rparm.systems.ssp import Connection
+from rparm.systems.structure import Connection
 from rparm.units import verdict
 
 FASTEST, SLOWEST = 1e-3, 1e2  # of the time scales of fastest and slowest pole: steps to try

@@ -12,7 +12,7 @@ from rparm.fmi.fmu_file import MODEL_EXCHANGE, Fmu
 from rparm.fmi.model import Value, Variable
 from rparm.linearization import linear
 from rparm.systems.master import INPUT_MODES, ORDERS, Master
-from rparm.systems.ssp import Connection, Ssp
+from rparm.systems.structure import Connection, OpenedSystem
 
 NEGLIGIBLE = 1e-14  # of the largest entries of row and column: rounding
 
@@ -27,7 +27,7 @@ class SystemSubject(ExitStack):
 
     def __init__(
         self,
-        ssp: Ssp,
+        ssp: OpenedSystem,
         variant: str,
         time: float | None = None,
         without: Sequence[str] = (),
@@ -143,7 +143,7 @@ class SystemSubject(ExitStack):
         return self.ssp.models[component].variables[output].type == "Real"
 
 
-def bypassed(ssp: Ssp, connections: Sequence[Connection], name: str) -> list[Connection]:
+def bypassed(ssp: OpenedSystem, connections: Sequence[Connection], name: str) -> list[Connection]:
     """Remove a component: its source feeds what it fed, by the same names."""
     sources = dict.fromkeys(c.start_component for c in connections if c.end_component == name)
     result = []
@@ -161,7 +161,9 @@ def bypassed(ssp: Ssp, connections: Sequence[Connection], name: str) -> list[Con
     return result
 
 
-def _next_event(ssp: Ssp, name: str, values: Mapping[str, Value], time: float) -> float | None:
+def _next_event(
+    ssp: OpenedSystem, name: str, values: Mapping[str, Value], time: float
+) -> float | None:
     """Return the first time event of a component, if its FMU is for model exchange, too."""
     try:
         fmu = Fmu(ssp.fmu(name), kind=MODEL_EXCHANGE)

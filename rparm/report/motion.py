@@ -18,7 +18,7 @@ from rparm.runs.comparison import Run
 from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import Result
 from rparm.systems.comparison import Outcome
-from rparm.systems.ssp import Ssp
+from rparm.systems.structure import OpenedSystem
 
 Rows = Sequence[int] | np.ndarray | slice  # of a run, that are shown
 EVERY = slice(None)
@@ -67,7 +67,7 @@ def of_result(
     return of_recorded(scenario.model, recorded, rows)
 
 
-def of_outcome(system: str, ssp: Ssp, outcome: Outcome, rows: Rows = EVERY) -> dict | None:
+def of_outcome(system: str, ssp: OpenedSystem, outcome: Outcome, rows: Rows = EVERY) -> dict | None:
     """Return data for a run of a variant of `system`, a folder; None: nothing to animate."""
     given = ssp.system.parameter_sets[outcome.variant]
     values = {

@@ -20,7 +20,7 @@ from rparm.report.run_data import Plot, RunData, result_curve, thinned
 from rparm.report.scenario_page import cells, meanings
 from rparm.systems import ecos
 from rparm.systems.comparison import BOUND, Diagram, Outcome, Study, load_study
-from rparm.systems.ssp import Ssp, System
+from rparm.systems.structure import OpenedSystem, System
 from rparm.units import milliseconds, short, unit
 
 MOST_ROWS = 350  # of a file of values, which has many columns
@@ -32,7 +32,7 @@ class Section:
     """A system whose variants are run."""
 
     folder: Path
-    ssp: Ssp
+    ssp: OpenedSystem
 
     @cached_property
     def study(self) -> Study:
@@ -161,7 +161,7 @@ def _values(folder: Path, outcome: Outcome, rows: np.ndarray) -> dict[str, str]:
     return {"csv": csv, "csv_note": note}
 
 
-def _plot(ssp: Ssp, outcome: Outcome, diagram: Diagram) -> Plot:
+def _plot(ssp: OpenedSystem, outcome: Outcome, diagram: Diagram) -> Plot:
     curves = []
     for name in diagram.curves:
         wanted = diagram.references.get(name)
@@ -196,7 +196,7 @@ def _description(system: System, variant: str) -> str:
     return f"{said}. {how}" if said else how
 
 
-def _parameters(ssp: Ssp, variant: str) -> list[Table]:
+def _parameters(ssp: OpenedSystem, variant: str) -> list[Table]:
     """Return a table of the variant's values, then start values per component."""
     given = ssp.system.parameter_sets[variant]
     connected = {(x.end_component, x.end_connector) for x in ssp.system.connections}
@@ -220,7 +220,7 @@ def _parameters(ssp: Ssp, variant: str) -> list[Table]:
     return own + others
 
 
-def _solvers(ssp: Ssp, run: ecos.Run) -> list[Table]:
+def _solvers(ssp: OpenedSystem, run: ecos.Run) -> list[Table]:
     """Return statistics of the components that integrate."""
     rows = []
     for component in ssp.models:
@@ -232,7 +232,7 @@ def _solvers(ssp: Ssp, run: ecos.Run) -> list[Table]:
     return [Table("Solvers", ("component", *ecos.STATISTICS.values()), rows, note)] if rows else []
 
 
-def _errors(ssp: Ssp, outcome: Outcome) -> Table:
+def _errors(ssp: OpenedSystem, outcome: Outcome) -> Table:
     found = outcome.errors.items()
     rows = [(name, unit(ssp.variable(name).unit), f"{error:.2e}") for name, error in found]
     note = "Largest difference from the reference of Ecos's order, relative to the variable's "

@@ -14,7 +14,7 @@ from rparm.files import is_file
 from rparm.runs import comparison
 from rparm.runs.comparison import Compared, Summed
 from rparm.systems import ecos
-from rparm.systems.ssp import Ssp
+from rparm.systems.structure import OpenedSystem
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,7 +54,7 @@ class Outcome(Compared):
         return self.run.values[:, self.run.names.index(name)]
 
 
-def recorded(ssp: Ssp) -> list[str]:
+def recorded(ssp: OpenedSystem) -> list[str]:
     """Return all Real outputs of all components, then the continuous states that are no outputs."""
     outputs, states = [], []
     for component, model in ssp.models.items():
@@ -63,7 +63,7 @@ def recorded(ssp: Ssp) -> list[str]:
     return list(dict.fromkeys((*outputs, *states)))
 
 
-def discrete(ssp: Ssp) -> list[str]:
+def discrete(ssp: OpenedSystem) -> list[str]:
     """Return all Integer and Boolean outputs of all components; references may have them or not."""
     return [
         f"{component}.{variable.name}"
@@ -74,10 +74,10 @@ def discrete(ssp: Ssp) -> list[str]:
 
 
 def simulate(
-    ssp: Ssp,
+    ssp: OpenedSystem,
     variant: str,
     expected: Reference,
-    engine: Callable[[Ssp, str, Sequence[str]], ecos.Run] = ecos.run,
+    engine: Callable[[OpenedSystem, str, Sequence[str]], ecos.Run] = ecos.run,
 ) -> Outcome:
     """Run a variant and compare it; UserError if a component or the engine fails."""
     run = engine(ssp, variant, [*recorded(ssp), *discrete(ssp)])
@@ -95,7 +95,7 @@ def reference_names(system: Path) -> list[str]:
 
 
 def load_reference(
-    ssp: Ssp, variant: str, system: Path, experiment: tuple[float, float, float]
+    ssp: OpenedSystem, variant: str, system: Path, experiment: tuple[float, float, float]
 ) -> Reference:
     """Read and check the reference of a variant of the system in a folder.
 
@@ -119,7 +119,7 @@ def load_reference(
     return Reference(path, steps, values, comparison.read_summed(system))
 
 
-def _steps(ssp: Ssp, times: np.ndarray, wrong: files.Failure) -> np.ndarray:
+def _steps(ssp: OpenedSystem, times: np.ndarray, wrong: files.Failure) -> np.ndarray:
     """Return the numbers of the communication points at `times`, (rows,)."""
     system = ssp.system
     steps = np.rint((times - system.start) / system.step).astype(int)
@@ -133,7 +133,7 @@ def _steps(ssp: Ssp, times: np.ndarray, wrong: files.Failure) -> np.ndarray:
     return steps
 
 
-def _check_experiment(ssp: Ssp, experiment: tuple[float, float, float]) -> None:
+def _check_experiment(ssp: OpenedSystem, experiment: tuple[float, float, float]) -> None:
     """Check that the references are for the system's times."""
     system = ssp.system
     if not np.allclose((system.start, system.stop, system.step), experiment, rtol=1e-9, atol=0.0):
@@ -184,7 +184,7 @@ class Study(Protocol):
     MEASURES: Sequence[Measure]
     DIAGRAMS: Sequence[Diagram]  # of the page of a variant
 
-    def figure(self, ssp: Ssp, outcome: Outcome) -> "Figure":
+    def figure(self, ssp: OpenedSystem, outcome: Outcome) -> "Figure":
         """Draw a run of one variant, for READMEs."""
         ...
 

@@ -30,7 +30,7 @@ from rparm.errors import StoppedError, UserError, one_line
 from rparm.interruption import run_group, temporary_folder
 
 if TYPE_CHECKING:
-    from rparm.systems.ssp import Ssp
+    from rparm.systems.structure import OpenedSystem
 
 PLAN, ROWS, DONE, LOG = "plan.json", "rows.npy", "done.json", "ecos.log"
 # of an instance: [path of its FMU] fmi2Status text, [its name] Status text in FMI 3.0
@@ -73,7 +73,7 @@ def absent() -> str:
     return ""
 
 
-def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
+def run(ssp: "OpenedSystem", variant: str, names: Sequence[str]) -> Run:
     """Run a system from start to stop with a parameter set; read variables ``component.variable``.
 
     UserError if a component fails or a value is not finite, with component, variable and time, or
@@ -117,14 +117,14 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     return result
 
 
-def said_at_end(ssp: "Ssp") -> list[str]:
+def said_at_end(ssp: "OpenedSystem") -> list[str]:
     """Return the statistics that components have, as ``component.variable``."""
     models = ssp.models.items()
     return [f"{c}.{name}" for c, model in models for name in STATISTICS if name in model.variables]
 
 
 def _check_messages(
-    ssp: "Ssp", variant: str, times: np.ndarray, messages: Sequence[re.Match[str]]
+    ssp: "OpenedSystem", variant: str, times: np.ndarray, messages: Sequence[re.Match[str]]
 ) -> None:
     """Refuse a run in which a component has failed, or that Ecos has stopped."""
     for match in messages:
@@ -136,12 +136,12 @@ def _check_messages(
         raise UserError(f"{ssp.path}: {variant}: Ecos stopped at t = {times[-1]:.6g} s")
 
 
-def _to_read(ssp: "Ssp", names: Sequence[str]) -> list[tuple[str, str]]:
+def _to_read(ssp: "OpenedSystem", names: Sequence[str]) -> list[tuple[str, str]]:
     """Return the names of variables as Ecos has them, each after the name of its reader."""
     return [(READERS[ssp.variable(name).type], name.replace(".", "::", 1)) for name in names]
 
 
-def _check_parameters(ssp: "Ssp", variant: str) -> None:
+def _check_parameters(ssp: "OpenedSystem", variant: str) -> None:
     """Refuse what Ecos would leave out with a warning in its log only: Enumerations."""
     for component, values in ssp.system.parameters[variant].items():
         model = ssp.models[component]
@@ -184,13 +184,13 @@ def _unzip(folder: Path) -> Path:
     return command.parent
 
 
-def _sender(ssp: "Ssp", message: re.Match[str]) -> str:
+def _sender(ssp: "OpenedSystem", message: re.Match[str]) -> str:
     """Return the name of the component that a message is of."""
     component = message["component"]
     return repr(component) if component is not None else _components(ssp, message["fmu"])
 
 
-def _components(ssp: "Ssp", fmu: str) -> str:
+def _components(ssp: "OpenedSystem", fmu: str) -> str:
     """Name of the component whose FMU it is: of FMI 2.0, Ecos's log names only the FMU."""
     fmu = fmu.replace("\\", "/")  # a path of Windows
     names = [c.name for c in ssp.system.components if fmu.endswith("/" + c.source)]
@@ -198,7 +198,7 @@ def _components(ssp: "Ssp", fmu: str) -> str:
 
 
 def _check_values(
-    ssp: "Ssp", variant: str, names: Sequence[str], times: np.ndarray, values: np.ndarray
+    ssp: "OpenedSystem", variant: str, names: Sequence[str], times: np.ndarray, values: np.ndarray
 ) -> None:
     """Refuse values (times, names) that are not finite, naming the first component that has one."""
     bad_rows = np.flatnonzero(~np.isfinite(values).all(axis=1))

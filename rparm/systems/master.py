@@ -30,7 +30,7 @@ from rparm.fmi.fmi_instance import Instance, Reals, UnpackedFmu
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import INPUTS, Value
 from rparm.systems.ecos import Run, said_at_end
-from rparm.systems.ssp import Connection, Ssp
+from rparm.systems.structure import Connection, OpenedSystem
 
 ORDERS = ("jacobi", "gauss_seidel")
 INPUT_MODES = ("held", "extrapolated")
@@ -426,7 +426,7 @@ def _is_switch(fmus: Mapping[str, Fmu], component: str, name: str, causality: st
 
 
 # ---- A variant -----------------------------------------------------------------------------------
-def run_in_master(ssp: Ssp, variant: str, names: Sequence[str]) -> Run:
+def run_in_master(ssp: OpenedSystem, variant: str, names: Sequence[str]) -> Run:
     """Run a variant in Jacobi order; read ``component.variable`` as Ecos would, all finite."""
     system = ssp.system
     times = system.times
@@ -449,7 +449,7 @@ def run_in_master(ssp: Ssp, variant: str, names: Sequence[str]) -> Run:
     return Run(tuple(names), times, rows, wall_time, tuple(dict.fromkeys(messages)), said)
 
 
-def _value_at_end(master: Master, ssp: Ssp, name: str) -> float:
+def _value_at_end(master: Master, ssp: OpenedSystem, name: str) -> float:
     component, _, variable = name.partition(".")
     row = np.empty(1)
     _RowReader(ssp, master.components[component], [name]).read(row)
@@ -459,7 +459,9 @@ def _value_at_end(master: Master, ssp: Ssp, name: str) -> float:
 class _RowReader:
     """Reads the wanted variables of one component into a row of the system's."""
 
-    def __init__(self, ssp: Ssp, component: ConnectedInstance, names: Sequence[str]) -> None:
+    def __init__(
+        self, ssp: OpenedSystem, component: ConnectedInstance, names: Sequence[str]
+    ) -> None:
         self.component = component
         instance = component.instance
         own: dict[str, int] = {}

@@ -14,7 +14,7 @@ from rparm.linearization.margins import margins, open_loop
 from rparm.linearization.study import Request, study
 from rparm.linearization.system import SystemSubject, connected, looped
 from rparm.systems import ssp
-from rparm.systems.ssp import Connection
+from rparm.systems.structure import Connection
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.systems import step_control
 from rparm.systems.master import Master, Snapshot
-from rparm.systems.ssp import Connection
+from rparm.systems.structure import Connection
 from tests.support.rparm_project import BUILD, MISTAKES, fmi3_fmu
 
 H, STEPS = 0.05, 40
