@@ -5,9 +5,10 @@ All values are in the units of their variables (SI), times in s. Mistakes raise
 """
 
 import html
+import weakref
 import webbrowser
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +26,8 @@ from rparm.runs import scenario as scenarios
 from rparm.runs import simulation
 from rparm.runs.comparison import load_reference
 from rparm.runs.simulation import Input
-from rparm.systems import comparison, ecos, master, ssp
+from rparm.systems import comparison, ecos, master, opened
+from rparm.systems.structure import OpenedSystem
 from rparm.units import unit
 
 if TYPE_CHECKING:
@@ -295,50 +297,74 @@ class Scenario:
 
 
 class System:
-    """A system of connected FMUs, by its name or the path of its SSP.
+    """A system of connected components: a loop file, an SSP, or one of the project by its name.
+
+    It is opened once, which builds files with equations, and again when a file has changed.
 
     Attributes
     ----------
     variants : tuple of str
         Names of its parameter sets; "default" if it has none.
     notes : tuple of str
-        What was chosen where the SSP says nothing: times, values of inputs that nothing feeds.
+        What was chosen where its file says nothing: times, values of inputs that nothing feeds.
     """
 
     def __init__(self, name: str | Path, *, fmi: int = 2) -> None:
-        self.path = Path(name)
-        if self.path.suffix.lower() != ".ssp":
+        self.path, self._version = Path(name), version(fmi)
+        if self.path.suffix.lower() not in opened.SUFFIXES:
             known = project.systems()
             if name not in known:
                 raise UserError(f"no system {str(name)!r}{hint(str(name), known)}")
-            self.path = project.built(known[str(name)], ".ssp", version=version(fmi))
-        with ssp.unpacked(self.path) as opened:
-            self.variants = tuple(opened.system.parameters)
-            self.notes = tuple(opened.notes)
+            self.path = project.built(known[str(name)], ".ssp", version=self._version)
+        self._stack = ExitStack()
+        weakref.finalize(self, self._stack.close)
+        system = self._open()
+        self.variants = tuple(system.system.parameters)
+        self.notes = tuple(system.notes)
 
-    def run(self, variant: str | None = None, *, engine: str = "master") -> Table:
+    def _open(self) -> OpenedSystem:
+        if not hasattr(self, "_opened") or self._files != _changes(self._opened):
+            self._stack.close()
+            door = opened.opened(self.path, version=self._version)
+            self._opened = self._stack.enter_context(door)
+            self._files = _changes(self._opened)
+        return self._opened
+
+    def run(
+        self,
+        variant: str | None = None,
+        *,
+        parameters: Mapping[str, Value] | None = None,
+        step: float | None = None,
+        engine: str = "master",
+    ) -> Table:
         """Step a variant from its start to its stop time, in Jacobi order.
 
         Parameters
         ----------
         variant : str, optional
             Default: the first one.
+        parameters : mapping, optional
+            Values in place of the variant's by "component.variable": of parameters, states at the
+            start, inputs that nothing feeds; numbers, or texts with a unit ("12 kg").
+        step : float, optional
+            s; communication step in place of the file's.
         engine : str
             "master", rparm's own; "ecos", where ecospy is installed; "helics", each FMU in its
-            own process, where helics is installed.
+            own process, where helics is installed. These two take neither parameters nor step.
 
         Returns
         -------
         Table
-            Columns "component.variable": all Real outputs and states, read after the inputs of
-            the next step have been set. With "helics": all Real outputs, read after
-            the step.
+            Columns "component.variable": what the file keeps, else all Real outputs and states,
+            read after the inputs of the next step have been set. With "helics": all Real outputs,
+            read after the step.
         """
-        variant = self.variants[0] if variant is None else variant
-        if variant not in self.variants:
-            raise UserError(
-                f"{self.path}: has no variant {variant!r}{hint(variant, self.variants)}"
-            )
+        system = self._open()
+        known = tuple(system.system.parameters)
+        variant = known[0] if variant is None else variant
+        if variant not in known:
+            raise UserError(f"{self.path}: has no variant {variant!r}{hint(variant, known)}")
         engines = {
             "master": master.run_in_master,
             "ecos": ecos.run,
@@ -346,9 +372,16 @@ class System:
         }
         if engine not in engines:
             raise UserError(f"engine: expected one of {', '.join(engines)}, got {engine!r}")
-        with ssp.unpacked(self.path) as opened:
-            run = engines[engine](opened, variant, comparison.recorded(opened))
-            units = {name: opened.variable(name).unit for name in run.names}
+        if engine != "master" and (parameters or step is not None):
+            raise UserError(f"engine: {engine!r} takes neither parameters nor step")
+        changed = system.with_values(variant, parameters or {})
+        if step is not None:
+            times = changed.system.start, changed.system.stop, step
+            simulation.communication_points(*times)  # checks them
+            changed = replace(changed, system=replace(changed.system, step=step))
+        names = changed.system.keep or comparison.recorded(changed)
+        run = engines[engine](changed, variant, names)
+        units = {name: changed.variable(name).unit for name in run.names}
         return Table(run.times, run.names, run.values, units)
 
     def study_coupling(self, output: str | Path) -> dict[str, dict[str, object]]:
@@ -368,6 +401,13 @@ class System:
         if not project.is_built_from(self.path.stem, folder):
             raise UserError(f"{self.path}: has no study of its coupling, {folder.name} has one")
         return known.study_coupling(self.path, Path(output))
+
+
+def _changes(system: OpenedSystem) -> dict[Path, int]:
+    """Return the times of change of all files beside those of a system."""
+    folders = {file.absolute().parent for file in (system.path, *system.files.values())}
+    files_there = (file for folder in folders if folder.is_dir() for file in folder.iterdir())
+    return {file: file.stat().st_mtime_ns for file in files_there if files.is_file(file)}
 
 
 def version(fmi: int) -> str:

@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import math
 import re
 import shlex
 from collections.abc import Mapping, Sequence
@@ -13,11 +12,12 @@ from pathlib import Path
 from rparm import console, project, schemas
 from rparm.building import NEEDED
 from rparm.command_line import Ended, add_document, add_flag, add_fmi, add_output
-from rparm.errors import UserError, closest
+from rparm.errors import UserError, closest, placed
 from rparm.files import check_for_windows, copied, create, from_folder, from_here, written
 from rparm.fmi.model import INPUTS, Model, Variable
 from rparm.project import VERSIONS
 from rparm.runs import scenario
+from rparm.systems.structure import times
 
 SUFFIX = ".toml"
 MODEL_NAME = re.compile("[A-Za-z][A-Za-z0-9_]*", re.ASCII)
@@ -197,11 +197,10 @@ def _components(given: Sequence[str], folder: Path) -> dict[str, tuple[str, Mode
 
 def _system_file(name: str, components: Mapping[str, tuple[str, Model]]) -> str:
     """Write a system without connections, with guesses of them as comments."""
-    experiments = [model.experiment for _, model in components.values()]
-    stop = max((x.stop for x in experiments if x.stop and x.stop > 0), default=scenario.USUAL_STOP)
-    least = stop / scenario.MAX_STEPS
-    steps = (x.step for x in experiments if x.step and least <= x.step <= stop)
-    whole = math.ceil(stop / min(steps, default=stop / scenario.USUAL_STEPS) - 1e-6)
+    models = {name: model for name, (_, model) in components.items()}
+    ends = any((model.experiment.stop or 0.0) > 0 for model in models.values())
+    with placed("default experiments"):
+        _, stop, step, _ = times(0.0, None if ends else scenario.USUAL_STOP, None, models)
     guesses: list[str] = []
     inputs: list[str] = []
     for component, (_, model) in components.items():
@@ -217,7 +216,7 @@ def _system_file(name: str, components: Mapping[str, tuple[str, Model]]) -> str:
     return SYSTEM_FILE.format(
         program=project.PROGRAM,
         name=scenario.toml_text(name),
-        step=float(f"{stop / whole:.12g}"),
+        step=step,
         stop=stop,
         components="\n".join(f"{x} = {scenario.toml_text(y)}" for x, (y, _) in components.items()),
         guesses="".join(f"{line}\n" for line in guesses),
