@@ -12,6 +12,14 @@ SHORTEST_PART = 3  # letters of a longer name that may be meant
 class UserError(Exception):
     """Something the user can put right, in one line: file, key, what is wrong, what is expected."""
 
+    code = 2  # of a command that ends with it
+
+
+class CodeError(UserError):
+    """What the user's own Python code raised or returned wrongly, with its file and line."""
+
+    code = 1
+
 
 class StoppedError(UserError):
     """A run that failed after its start; `result` has its rows up to there, or is None."""

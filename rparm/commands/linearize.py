@@ -5,12 +5,12 @@ from pathlib import Path
 
 from rparm import console, project
 from rparm.command_line import Ended, add_fmi, add_report, file_or_name, names, pairs, retyped
-from rparm.errors import WrongValueError
+from rparm.errors import UserError, WrongValueError
 from rparm.files import check_writable, from_here, written
 from rparm.units import SECONDS, typed_quantity
 
 MOST_COLUMNS, MOST_ROWS = 6, 12  # of matrices in the terminal
-SUFFIXES = (".fmu", ".ssp")
+SUFFIXES = (".fmu", ".ssp", ".toml")
 SHORTEST = 1e-9  # s, of samples: pictures of much shorter ones overflow
 
 
@@ -19,7 +19,10 @@ def add_linearize_options(parser: argparse.ArgumentParser) -> None:
         "Finds an equilibrium, and A, B, C and D about it; of a system also the margins of a "
         "loop that is broken, and the largest stable communication step."
     )
-    parser.add_argument("what", metavar="FMU|SSP", help="a file, or a name of the project")
+    text = "an FMU, a loop file, an SSP, or a name of the project"
+    parser.add_argument("what", metavar="FILE|NAME", help=text)
+    text = "parameter set of a system, as --variant"
+    parser.add_argument("given_variant", nargs="?", default="", metavar="VARIANT", help=text)
     add_fmi(parser, project.VERSIONS[0], "version of FMI where a name is given (default: 2)")
     parser.add_argument("--variant", default="", metavar="NAME", help="parameter set of a system")
     parser.add_argument(
@@ -56,6 +59,9 @@ def do_linearize(options: argparse.Namespace) -> Ended:
         study.check_file(path)
     check_writable(options.report)
     console.stage(f"linearizing {options.what}")
+    if options.variant and options.given_variant:
+        raise UserError("--variant: a variant is given already")
+    options.variant = options.variant or options.given_variant
     request = study.Request(
         options.what, pairs("--at", options.at), options.time, names(options.trim or ()),
         options.inputs and names(options.inputs), options.outputs and names(options.outputs),

@@ -21,6 +21,7 @@ from rparm.fmi.model import INPUTS, PARAMETERS, Model, Variable
 from rparm.interruption import temporary_folder
 from rparm.project import VERSIONS
 from rparm.runs.inputs import Constant, InputReader, Reader, Switches
+from rparm.systems.python_component import PythonComponent, is_python
 from rparm.systems.structure import (
     ALONE,
     Component,
@@ -42,31 +43,31 @@ REQUIRED = ("name", COMPONENTS)
 OPTIONAL = ("description", *TIMES, KEEP, CONNECTIONS, INPUTS, PARAMETERS, VARIANTS)
 NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 VARIANT = re.compile(r"\w[\w-]{0,99}", re.ASCII)
-FMU, EQUATIONS, PYTHON = ".fmu", ".toml", ".py"
+FMU, EQUATIONS = ".fmu", ".toml"
 RESOURCES = "resources"  # folder of the FMUs, as in an SSP
 
 
 @contextmanager
 def opened(
-    path: Path, step: float | None = None, version: str = VERSIONS[0]
+    path: Path, step: float | None = None, version: str = VERSIONS[0], fmus: Path | None = None
 ) -> Iterator[OpenedSystem]:
     """Read a loop file and build what it names; a `step` in s replaces its own.
 
-    FMUs of the project, and built ones, are of this `version` of FMI. UserError if anything is
-    wrong.
+    FMUs of the project, and built ones, are of this `version` of FMI; those in a folder `fmus`
+    need not run here. UserError if anything is wrong.
     """
     path = Path(path)
     content = read_toml(path)
     with temporary_folder() as folder:
-        yield LoopReader(path, folder, version).system(content, step)
+        yield LoopReader(path, folder, version, fmus).system(content, step)
 
 
 class LoopReader(Reader):
     """Takes the sections of one file; errors name the file and the key."""
 
-    def __init__(self, path: Path, folder: Path, version: str) -> None:
+    def __init__(self, path: Path, folder: Path, version: str, fmus: Path | None) -> None:
         super().__init__(path)
-        self.folder, self.version = folder, version
+        self.folder, self.version, self.fmus = folder, version, fmus
         self.models: dict[str, Model] = {}  # by component, as the rest
         self.sources: dict[str, str] = {}  # in the folder
         self.files: dict[str, Path] = {}  # FMUs that the user knows
@@ -84,7 +85,8 @@ class LoopReader(Reader):
         components = self.table(content[COMPONENTS], f"[{COMPONENTS}]")
         if not components:
             self.fail(f"[{COMPONENTS}]: expected a component")
-        connections = [
+        self.moved = self.entries(content, INPUTS)
+        self.connections = connections = [
             self.connection(end, start, components)
             for end, start in self.entries(content, CONNECTIONS).items()
         ]
@@ -167,10 +169,11 @@ class LoopReader(Reader):
 
     def component(self, name: str, given: str, where: str) -> None:
         """Find what a component is made of, and what it declares."""
-        file, _, class_name = given.partition(":") if f"{PYTHON}:" in given else (given, "", "")
+        if is_python(given):
+            self.code(name, given)
+            return
+        file = given
         path, suffix = self.path.parent / file, Path(file).suffix.lower()
-        if suffix == PYTHON:
-            self.fail(f"{where}: {given}: Python components cannot be run yet")
         if suffix in (FMU, EQUATIONS) and not is_file(path):
             self.fail(f"{where}: {file}: {missing(path)}")
         try:
@@ -179,14 +182,30 @@ class LoopReader(Reader):
                 fmu = self.built(path)
             elif suffix == FMU:
                 made = fmu = path
+            elif self.fmus:
+                made = fmu = self.fmus / f"{given}{FMU}"
             else:
                 made = fmu = project.built(project.model(given), FMU, version=self.version)
-            read_model(fmu)  # runs on this platform
+            if not self.fmus:
+                read_model(fmu)  # runs on this platform
         except UserError as error:
             self.fail(f"{where}: {error}")
         self.files[name] = made
         self.models[name] = self._fmus.read(name, fmu, made)
         self.sources[name] = self.copied(name, fmu)
+
+    def code(self, name: str, given: str) -> None:
+        """Read a component in Python; a function has the inputs and outputs that are connected."""
+        outside = [
+            self.parts(x, INPUTS, {name: ""})[1] for x in self.moved if x.startswith(f"{name}.")
+        ]
+        inputs = [c.end_connector for c in self.connections if c.end_component == name] + outside
+        outputs = [c.start_connector for c in self.connections if c.start_component == name]
+        made = PythonComponent.read(
+            given, self.path.parent, list(dict.fromkeys(inputs)), list(dict.fromkeys(outputs))
+        )
+        self.python[name] = lambda: made
+        self.models[name], self.sources[name] = made.model, given
 
     def built(self, path: Path) -> Path:
         """Build an FMU of a file with equations, once."""
@@ -273,14 +292,9 @@ class LoopReader(Reader):
             given = self.numbers(given.pop("file"), f"{where} file") | given
         found: dict[str, dict[str, Parameter]] = {}
         for name, value in given.items():
-            component, _ = self.parts(name, where, self.models)
-            found.setdefault(component, {})
-            if component in self.python:
-                variable = name.partition(".")[2]
-                found[component][variable] = Parameter("Python", value, None)
-            else:
-                _, variable = self.variable(name, where)
-                found[component][variable.name] = self.parameter(value, variable, f"{where} {name}")
+            component, variable = self.variable(name, where)
+            own = found.setdefault(component, {})
+            own[variable.name] = self.parameter(value, variable, f"{where} {name}")
         return found
 
     def parameter(self, given: Any, variable: Variable, where: str) -> Parameter:

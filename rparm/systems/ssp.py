@@ -17,12 +17,11 @@ from typing import NoReturn
 import fmpy
 from lxml import etree
 
-from rparm.errors import UnplacedError, UserError, placed
+from rparm.errors import UnplacedError, UserError, did_you_mean, placed
 from rparm.files import is_file
 from rparm.fmi.fmu_file import read_xml, unpack, wrong_name
 from rparm.fmi.model import Model, Value
 from rparm.interruption import temporary_folder
-from rparm.project import STRUCTURE
 from rparm.systems.structure import (
     ALONE,
     Component,
@@ -36,6 +35,7 @@ from rparm.systems.structure import (
     times,
 )
 
+STRUCTURE = "SystemStructure.ssd"  # the file that has the system
 NAMESPACES = {
     "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
     "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
@@ -50,6 +50,13 @@ STEP_SIZE = (
     "ssd:Annotations/ssc:Annotation[@type='com.opensimulationplatform']"
     "/osp:Algorithm/osp:FixedStepAlgorithm/@baseStepSize"
 )
+VERSION, VERSION_1 = "1.0", r"1\."  # of SSP
+KINDS = {"System": "a system in the system", "SignalDictionaryReference": "a signal dictionary"}
+# of a system, with what to do
+IGNORED = {
+    "ParameterBindings": "bind at components",
+    "SignalDictionaries": "connect outputs to inputs",
+}
 # of a variant, whose results are files of that name
 PLAIN_NAME = re.compile(r"\w[\w .+-]{0,99}")
 
@@ -80,6 +87,7 @@ class SspReader:
         self.path = path
         self.folder = folder
         self.descriptions: dict[str, str] = {}  # of parameter sets, by name
+        self.own: dict[str, str] = {}  # kinds of the system's own connectors, by name
         self.models: dict[str, Model] = {}  # of the components
 
     def fail(self, file: str, message: str, node: etree._Element | None = None) -> NoReturn:
@@ -93,6 +101,9 @@ class SspReader:
             self.fail(file, "is missing in the SSP")
         with placed(f"{self.path}: {file}"):
             tree = read_xml(path)
+        version = tree.getroot().get("version", VERSION)
+        if not re.match(VERSION_1, version):
+            self.fail(file, f"is of SSP {version}, expected {VERSION}", tree.getroot())
         validator = _schema(schema)
         if not validator.validate(tree):
             first = validator.error_log[0]
@@ -106,13 +117,10 @@ class SspReader:
         root = self.parse(STRUCTURE, STRUCTURE_SCHEMA)
         system = root.find("ssd:System", NAMESPACES)
         elements = system.find("ssd:Elements", NAMESPACES)
-        for path in ("ssd:Connectors", "ssd:ParameterBindings"):
-            node = system.find(path, NAMESPACES)
+        for name, way_out in IGNORED.items():
+            node = system.find(f"ssd:{name}", NAMESPACES)
             if node is not None:
-                name = etree.QName(node).localname
-                self.fail(
-                    STRUCTURE, f"engines ignore {name} of the system; bind at components", node
-                )
+                self.fail(STRUCTURE, f"engines ignore {name} of the system; {way_out}", node)
         components: dict[str, Component] = {}
         bound: dict[str, dict[str, dict[str, Parameter]]] = {}
         for node in elements if elements is not None else ():
@@ -123,7 +131,10 @@ class SspReader:
             bound[component.name] = self.bindings(node, component.name)
         if not components:
             self.fail(STRUCTURE, "the system has no components", system)
-        connections = system.iterfind("ssd:Connections/ssd:Connection", NAMESPACES)
+        own = system.iterfind("ssd:Connectors/ssd:Connector", NAMESPACES)
+        self.own = {node.get("name"): node.get("kind") for node in own}
+        nodes = system.iterfind("ssd:Connections/ssd:Connection", NAMESPACES)
+        connections = map(self.connection, nodes)
         fmus = FmuReader(self.path)
         for component in components.values():
             file = self.folder / component.source
@@ -135,7 +146,7 @@ class SspReader:
         return System(
             name=system.get("name"),
             components=tuple(components.values()),
-            connections=tuple(self.connection(node) for node in connections),
+            connections=tuple(filter(None, connections)),
             start=start,
             stop=stop,
             step=step,
@@ -146,8 +157,9 @@ class SspReader:
 
     def component(self, node: etree._Element) -> Component:
         name = node.get("name")
-        if etree.QName(node).localname != "Component" or node.get("type", FMU_TYPE) != FMU_TYPE:
-            self.fail(STRUCTURE, f"element {name!r} is not an FMU", node)
+        kind = KINDS.get(etree.QName(node).localname) or node.get("type", FMU_TYPE)
+        if kind != FMU_TYPE:
+            self.fail(STRUCTURE, f"element {name!r} is {kind}, expected an FMU", node)
         source = node.get("source")
         self.check_source(source, name, node)
         connectors: dict[str, Connector] = {}
@@ -168,16 +180,25 @@ class SspReader:
             where = f"component {component!r}: {source!r} is no path in the SSP"
             self.fail(STRUCTURE, f"{where}: {wrong}", node)
 
-    def connection(self, node: etree._Element) -> Connection:
+    def connection(self, node: etree._Element) -> Connection | None:
+        """Return a connection; None for the system's own connectors, which nothing is behind."""
         ends = ("startElement", "startConnector", "endElement", "endConnector")
         connection = Connection(*(node.get(name, "") for name in ends))
-        if not (connection.start_component and connection.end_component):
-            self.fail(STRUCTURE, f"connection {connection} to the system's own connectors", node)
-        if any(etree.QName(x).namespace == NAMESPACES["ssc"] for x in node):
+        for child in node:
+            if etree.QName(child).namespace == NAMESPACES["ssc"]:
+                name = etree.QName(child).localname
+                self.fail(STRUCTURE, f"connection {connection}: {name} is not supported", node)
+        if connection.start_component and connection.end_component:
+            return connection
+        name, kind = connection.end_connector, "output"
+        if not connection.start_component:
+            name, kind = connection.start_connector, "input"
+        if self.own.get(name) != kind:
+            where = f"connection {connection}: the system"
             self.fail(
-                STRUCTURE, f"connection {connection} has a transformation, leave it out", node
+                STRUCTURE, f"{where} has no {kind} {name!r}{did_you_mean(name, self.own)}", node
             )
-        return connection
+        return None
 
     def experiment(
         self, root: etree._Element, step: float | None

@@ -15,6 +15,7 @@ from rparm.fmi.fmu_file import LARGEST_SYSTEM, Fmu, describe
 from rparm.fmi.model import INPUTS, TOLERANCE, Model, Value, Variable
 from rparm.runs.inputs import Signal
 from rparm.runs.scenario import MAX_STEPS
+from rparm.systems.python_component import ANY
 from rparm.units import number
 
 ALONE = "default"  # the variant of a system that has no parameter sets
@@ -26,6 +27,7 @@ SETTABLE = {
     "Enumeration": ("Integer",),
     "Boolean": ("Boolean",),
     "String": ("String",),
+    ANY: (ANY,),  # of a component in Python
 }
 PARAMETERS = ("parameter", "input", "output")  # causalities of variables with a start value
 
