@@ -151,7 +151,7 @@ def largest_load(m: float, length: float, ka: float) -> float:
 
 @pytest.fixture(scope="module", params=["checkout", "wheel"])
 def typed(request: pytest.FixtureRequest, tmp_path_factory) -> tuple[Path, str]:
-    """The folder of someone who has typed all, and what was printed; the wheel finds no compiler."""
+    """The folder of someone who has typed all, and what was printed."""
     folder, where = (tmp_path_factory.mktemp(name) for name in ("typed", "environment"))
     given = ENVIRONMENT | {"BROWSER": "true", "HOME": str(folder)}
     if request.param == "wheel":
