@@ -197,13 +197,7 @@ class _Stepper:
         self._federate.publish(self._outputs.view)
 
     def _constants(self) -> list[object]:
-        model = self._instance.fmu.model
-        return [
-            self._instance.boolean(name)
-            if model.variables[name].type == "Boolean"
-            else self._instance.integer(name)
-            for name in self._part.constant
-        ]
+        return [self._instance.discrete(name) for name in self._part.constant]
 
 
 # ---- Watching ------------------------------------------------------------------------------------

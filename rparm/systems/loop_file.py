@@ -21,6 +21,7 @@ from rparm.fmi.model import INPUTS, PARAMETERS, Model, Variable
 from rparm.interruption import temporary_folder
 from rparm.project import VERSIONS
 from rparm.runs.inputs import Constant, InputReader, Reader, Switches
+from rparm.systems.python_component import PythonComponent, is_python
 from rparm.systems.structure import (
     ALONE,
     Component,
@@ -42,7 +43,7 @@ REQUIRED = ("name", COMPONENTS)
 OPTIONAL = ("description", *TIMES, KEEP, CONNECTIONS, INPUTS, PARAMETERS, VARIANTS)
 NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 VARIANT = re.compile(r"\w[\w-]{0,99}", re.ASCII)
-FMU, EQUATIONS, PYTHON = ".fmu", ".toml", ".py"
+FMU, EQUATIONS = ".fmu", ".toml"
 RESOURCES = "resources"  # folder of the FMUs, as in an SSP
 
 
@@ -84,7 +85,8 @@ class LoopReader(Reader):
         components = self.table(content[COMPONENTS], f"[{COMPONENTS}]")
         if not components:
             self.fail(f"[{COMPONENTS}]: expected a component")
-        connections = [
+        self.moved = self.entries(content, INPUTS)
+        self.connections = connections = [
             self.connection(end, start, components)
             for end, start in self.entries(content, CONNECTIONS).items()
         ]
@@ -167,10 +169,11 @@ class LoopReader(Reader):
 
     def component(self, name: str, given: str, where: str) -> None:
         """Find what a component is made of, and what it declares."""
-        file, _, class_name = given.partition(":") if f"{PYTHON}:" in given else (given, "", "")
+        if is_python(given):
+            self.code(name, given)
+            return
+        file = given
         path, suffix = self.path.parent / file, Path(file).suffix.lower()
-        if suffix == PYTHON:
-            self.fail(f"{where}: {given}: Python components cannot be run yet")
         if suffix in (FMU, EQUATIONS) and not is_file(path):
             self.fail(f"{where}: {file}: {missing(path)}")
         try:
@@ -190,6 +193,19 @@ class LoopReader(Reader):
         self.files[name] = made
         self.models[name] = self._fmus.read(name, fmu, made)
         self.sources[name] = self.copied(name, fmu)
+
+    def code(self, name: str, given: str) -> None:
+        """Read a component in Python; a function has the inputs and outputs that are connected."""
+        outside = [
+            self.parts(x, INPUTS, {name: ""})[1] for x in self.moved if x.startswith(f"{name}.")
+        ]
+        inputs = [c.end_connector for c in self.connections if c.end_component == name] + outside
+        outputs = [c.start_connector for c in self.connections if c.start_component == name]
+        made = PythonComponent.read(
+            given, self.path.parent, list(dict.fromkeys(inputs)), list(dict.fromkeys(outputs))
+        )
+        self.python[name] = lambda: made
+        self.models[name], self.sources[name] = made.model, given
 
     def built(self, path: Path) -> Path:
         """Build an FMU of a file with equations, once."""
@@ -276,14 +292,9 @@ class LoopReader(Reader):
             given = self.numbers(given.pop("file"), f"{where} file") | given
         found: dict[str, dict[str, Parameter]] = {}
         for name, value in given.items():
-            component, _ = self.parts(name, where, self.models)
-            found.setdefault(component, {})
-            if component in self.python:
-                variable = name.partition(".")[2]
-                found[component][variable] = Parameter("Python", value, None)
-            else:
-                _, variable = self.variable(name, where)
-                found[component][variable.name] = self.parameter(value, variable, f"{where} {name}")
+            component, variable = self.variable(name, where)
+            own = found.setdefault(component, {})
+            own[variable.name] = self.parameter(value, variable, f"{where} {name}")
         return found
 
     def parameter(self, given: Any, variable: Variable, where: str) -> Parameter:
