@@ -17,6 +17,7 @@ from rparm.systems import comparison, ecos
 from rparm.systems.master import run_in_master
 from rparm.systems.opened import opened
 from rparm.systems.structure import OpenedSystem
+from tests.support.programs import python
 from tests.support.rparm_project import BUILD, Console, repacked
 from tests.support.tables import tables
 
@@ -136,6 +137,18 @@ def test_the_coupling_error_is_of_first_order_and_as_estimated(loop: OpenedSyste
         np.testing.assert_allclose(estimated, apart, rtol=0.05)
     np.testing.assert_allclose(errors[4] / errors[2], 2.0, rtol=0.05)
     np.testing.assert_allclose(errors[2] / errors[1], 2.0, rtol=0.03)
+
+
+def test_integers_go_from_component_to_component(tmp_path: Path) -> None:
+    """Each counter adds one to what the other has counted before the step."""
+    for name, text in TABLES["counters"].items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    build = ("-m", "pythonfmu", "build", "-f", tmp_path / "counter.py", "-d", tmp_path)
+    python(*build, check=True)
+    with opened(tmp_path / "loop.toml") as system:
+        assert ecos.unsuited(system) == "there are connections of type Integer"
+        run = run_in_master(system, "default", comparison.kept(system))
+    assert run.values.tolist() == [[i, i] for i in range(11)]
 
 
 # ---- The command ---------------------------------------------------------------------------------
