@@ -143,6 +143,12 @@ def add_tolerance(parser: argparse.ArgumentParser, text: str) -> None:
     parser.add_argument("--tolerance", type=relative_tolerance, metavar="X", help=text)
 
 
+def add_step(parser: argparse.ArgumentParser) -> None:
+    """Add the communication step of a system, in place of the file's."""
+    text = "communication step, as 0.001 or 1ms (default: the system's)"
+    parser.add_argument("--step", type=positive_seconds, metavar="TIME", help=text)
+
+
 def add_report(parser: argparse.ArgumentParser, part: str = "") -> None:
     """Add the folder for pages and results."""
     folder = project.report_folder(part)

@@ -90,18 +90,22 @@ class FederationTable:
 
 
 class VariantTable:
-    """Runs of a system's variants, with the measures of the system."""
+    """Runs of a system's variants, with the measures of the system; `error` names their errors."""
 
-    def __init__(self, names: Iterable[str], measures: Sequence[Measure]) -> None:
+    def __init__(
+        self, names: Iterable[str], measures: Sequence[Measure], error: str = "error"
+    ) -> None:
         self._measures = measures
-        columns = {"error": 7}
+        columns = {error: max(7, *map(len, error.split()))}
         columns |= {m.name: max(9, *map(len, m.name.split())) for m in measures}
         self._table = Table("variant", names, {**columns, "time": 7})
 
     def row(self, outcome: Outcome) -> None:
         measured = (f"{_seven_digits(m.value(outcome))} {m.unit}" for m in self._measures)
-        cells = [short(outcome.error, 1), *measured, seconds(outcome.run.wall_time)]
-        self._table.row(outcome.variant, cells, verdict(outcome.passed))
+        error = short(outcome.error, 1) if outcome.errors else NONE
+        cells = [error, *measured, seconds(outcome.run.wall_time)]
+        good = "ran" if outcome.is_estimate else verdict(outcome.passed)
+        self._table.row(outcome.variant, cells, good)
         if not outcome.passed:
             bound = f"above its bound {short(BOUND)}"
             console.remark(f"error {short(outcome.error, 1)} of {outcome.worst}, {bound}")

@@ -478,8 +478,16 @@ def ways(models: Mapping[str, Model], connections: Iterable[Connection]) -> list
 
 
 # ---- A variant -----------------------------------------------------------------------------------
-def run_in_master(ssp: OpenedSystem, variant: str, names: Sequence[str]) -> Run:
-    """Run a variant in Jacobi order; read ``component.variable`` as Ecos would, all finite."""
+def run_in_master(
+    ssp: OpenedSystem,
+    variant: str,
+    names: Sequence[str],
+    progress: Callable[[int], object] = lambda _: None,
+) -> Run:
+    """Run a variant in Jacobi order; read ``component.variable`` as Ecos would, all finite.
+
+    `progress` is called with the steps just done.
+    """
     system = ssp.system
     times = system.times
     rows = np.empty((len(times), len(names)))
@@ -491,12 +499,19 @@ def run_in_master(ssp: OpenedSystem, variant: str, names: Sequence[str]) -> Run:
         readers = [_RowReader(ssp, c, names) for c in master.components.values()]
         begin = time.perf_counter()
         for row, end in enumerate(times.tolist()):
-            if row:
-                master.advance(end)
-            for reader in readers:
-                with reader.component.instance.explained(f"at t = {end!r} s"):
-                    reader.component.set_inputs(master.values[reader.component.sources])
-                    reader.read(rows[row])
+            try:
+                if row:
+                    master.advance(end)
+                for reader in readers:
+                    with reader.component.instance.explained(f"at t = {end!r} s"):
+                        reader.component.set_inputs(master.values[reader.component.sources])
+                        reader.read(rows[row])
+            except UserError as error:
+                if row > 1:
+                    error.result = Run(tuple(names), times[:row], rows[:row], 0.0, ())
+                raise
+            if row and row % 100 == 0:
+                progress(100)
         wall_time = time.perf_counter() - begin
         known = master.components.values()
         messages = [f"{c.name!r}: {text}" for c in known for text in c.instance.messages]

@@ -3,13 +3,13 @@
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
-from rparm.errors import UserError, WrongValueError, did_you_mean, placed
+from rparm.errors import UserError, WrongValueError, did_you_mean, hint, placed
 from rparm.files import difference
 from rparm.fmi.fmu_file import LARGEST_SYSTEM, Fmu, describe
 from rparm.fmi.model import INPUTS, TOLERANCE, Model, Value, Variable
@@ -187,6 +187,43 @@ class OpenedSystem:
         ]
         held = [f"not connected, constant: {', '.join(alone)}"] if alone else []
         return [*self.system.notes, *held]
+
+    def with_values(self, variant: str, given: Mapping[str, Any]) -> "OpenedSystem":
+        """Replace values of a variant, by ``component.variable``; UserError for a wrong one."""
+        values = {name: dict(own) for name, own in self.system.parameters[variant].items()}
+        for name, value in given.items():
+            with placed(f"{self.path}: parameters: {name}"):
+                component, _, own = name.partition(".")
+                if component not in self.models:
+                    known = hint(component, self.models)
+                    raise WrongValueError(f"no component {component!r}{known}")
+                values.setdefault(component, {})[own] = self._checked(component, own, value)
+        sets = self.system.parameters | {variant: values}
+        changed = replace(self.system, parameters=sets)
+        check(self.path, changed, self.models)
+        return replace(self, system=changed)
+
+    def _checked(self, component: str, name: str, given: Any) -> Parameter:
+        variable = self.models[component].variables.get(name)
+        if variable is None:
+            known = self.models[component].variables
+            raise WrongValueError(
+                f"{component!r} has no variable {name!r}{did_you_mean(name, known)}"
+            )
+        feeding = [c.start for c in self.system.connections if c.end == f"{component}.{name}"]
+        if feeding:
+            raise WrongValueError(f"is connected, to {feeding[0]}")
+        if f"{component}.{name}" in self.system.inputs:
+            raise WrongValueError("is an input that moves")
+        if not (variable.can_start or variable.is_a(INPUTS)):
+            raise WrongValueError(
+                variable.why_it_follows
+                if variable.follows
+                else f"is {_causality(variable)}, which cannot be set"
+            )
+        value = variable.checked(given.item() if isinstance(given, np.generic) else given)
+        kind = "Integer" if variable.type == "Enumeration" else variable.type
+        return Parameter(kind, value, variable.unit if kind == "Real" else None)
 
     def variable(self, name: str) -> Variable:
         """Return the variable ``component.variable`` as the FMU declares it."""
