@@ -82,7 +82,7 @@ class FederationTable:
     def row(
         self, name: str, steps: int, difference: float, times: Sequence[float], passed: bool
     ) -> None:
-        shown = [f"{us:.1f}" if us < 10_000 else f"{us:.0f}" for us in times]
+        shown = ["-" if us != us else f"{us:.{1 if us < 10_000 else 0}f}" for us in times]
         self._table.row(name, [_count(steps), short(difference, 1), *shown], verdict(passed))
         if not passed:
             bound = f"above its bound {short(self._bound)}"

@@ -9,9 +9,9 @@ from rparm import console, project
 from rparm.command_line import (
     Ended,
     add_report,
+    add_step,
     add_system,
     file_or_name,
-    positive_seconds,
     retyped,
 )
 from rparm.console import Progress
@@ -44,7 +44,7 @@ def add_coupling_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("what", nargs="?", metavar="FILE|NAME", help=text)
     text = "parameter set (default: the first)"
     parser.add_argument("variant", nargs="?", metavar="VARIANT", help=text)
-    parser.add_argument("--step", type=positive_seconds, metavar="TIME", help="the longest step")
+    add_step(parser)
     add_system(parser)
     add_report(parser, "system")
 

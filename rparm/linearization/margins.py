@@ -52,13 +52,16 @@ def open_loop(broken: Linear) -> Linear:
 def margins(loop: Linear) -> Margins:
     """Return the margins of a loop L, which has one input and one output and is minimal."""
     if loop.dt:
-        found = margins(_in_w(loop))
+        in_w = _in_w(loop)
+        found = margins(in_w)
         gains, turns = (
             tuple(_real(crossing, loop.dt) for crossing in crossings)
             for crossings in (found.gain_crossings, found.phase_crossings)
         )
         found = replace(found, gain_crossings=gains, phase_crossings=turns)
-        delay = min(_delays(found), default=math.inf)
+        # with a gain of 1 or more at the end of frequencies, a delay of one sample is too much
+        delays = [*_delays(found), *([loop.dt] if abs(in_w.D[0, 0]) >= 1 else [])]
+        delay = min(delays, default=math.inf)
         return replace(found, delay=delay) if found.stable else found
     grid = searched(loop)
     gains = tuple(_crossings(loop, grid, lambda value: np.abs(value) - 1))

@@ -3,7 +3,7 @@
 import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -99,7 +99,8 @@ def of_system(opened: OpenedSystem, request: Request) -> Study:
         held = subject.held(parts)
         parts = {name: part.without(held[name]) for name, part in parts.items()}
         if subject.python:
-            whole = sampled(parts, subject.kept, opened.system.step)
+            feeding = [c.start for c in subject.connections]
+            whole = sampled(parts, subject.kept, opened.system.step, feeding)
         else:
             whole = connected(parts, subject.kept)
         found = _chosen(whole, trimmed, request)
@@ -152,9 +153,11 @@ def _chosen(found: Linear, trimmed: Trimmed, request: Request) -> Linear:
 
 
 def _units(subject: FmuSubject | SystemSubject, found: Linear) -> dict[str, str]:
-    names = (*found.at, *found.outputs)  # all states and inputs
-    known = {name: subject.variable(name).unit for name in names}
-    return {name: unit for name, unit in known.items() if unit}
+    units: dict[str, str] = {}
+    for name in (*found.at, *found.outputs):  # all states and inputs
+        with suppress(UserError):  # a number that Python saves is no variable
+            units[name] = subject.variable(name).unit or ""
+    return {name: unit for name, unit in units.items() if unit}
 
 
 # ---- Files ---------------------------------------------------------------------------------------

@@ -227,12 +227,15 @@ def connected(
 
 
 def sampled(
-    parts: Mapping[str, linear.Linear], connections: Iterable[Connection], step: float
+    parts: Mapping[str, linear.Linear],
+    connections: Iterable[Connection],
+    step: float,
+    feeding: Iterable[str],
 ) -> linear.Linear:
     """Join linear models as a master steps them in Jacobi order, every `step` s, inputs held.
 
-    Outputs that follow inputs at once are states, too: they are read before the next inputs are
-    set. Inputs are as in `connected`.
+    Outputs that follow inputs at once and are `feeding` others are states, too: they are read
+    before the next inputs are set. Inputs are as in `connected`.
     """
     inputs = [f"{name}.{u}" for name, part in parts.items() for u in part.inputs]
     outputs = [f"{name}.{y}" for name, part in parts.items() for y in part.outputs]
@@ -241,11 +244,12 @@ def sampled(
         A, B, C, D = _clear(part)
         blocks.append((*((A, B) if part.dt else hold(A, B, step)[:2]), C, D))
     A, B, C, D = map(_diagonal, zip(*blocks, strict=True))
-    late = D.any(axis=1)  # outputs that are states
-    n, m, k = len(A), len(inputs), int(late.sum())
+    late = D.any(axis=1) & np.isin(outputs, list(feeding))  # outputs that are states
+    n, k = len(A), int(late.sum())
     y = np.zeros((len(outputs), n + k))  # of all states
     y[~late, :n], y[late, n:] = C[~late], np.eye(k)
     u = _feeding(inputs, outputs, connections) @ y
+    at_once = np.where(late[:, None], 0.0, D)
     x = np.hstack([A, np.zeros((n, k))]) + B @ u
     whole, terms = np.vstack([x, C[late] @ x + D[late] @ u]), np.abs(np.vstack([x, C[late] @ x]))
     joined = {
@@ -261,8 +265,8 @@ def sampled(
         outputs=tuple(outputs),
         A=linear.cleared(whole, terms),
         B=np.vstack([B, C[late] @ B + D[late]]),
-        C=y,
-        D=np.zeros((len(outputs), m)),
+        C=y + at_once @ u,
+        D=at_once,
         **joined
         | {
             "x": np.append(joined["x"], joined["y"][late]),

@@ -235,11 +235,10 @@ def halve(
 ) -> Halved:
     """Run a variant at its step and at smaller ones, in one of `master.ways`; compare the runs.
 
-    UserError if a component is in Python: its law changes with the step.
+    UserError for `why_no_estimate`.
     """
-    for name in ssp.python:
-        why = "is in Python: its law changes with the step, which shows no error of the coupling"
-        raise UserError(f"{ssp.path}: component {name!r} {why}")
+    if why_not := why_no_estimate(ssp):
+        raise UserError(f"{ssp.path}: halves of the step show no error of the coupling: {why_not}")
     system = ssp.system
     with ssp.unpacked_fmus() as fmus:
         runs = [
