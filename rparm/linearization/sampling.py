@@ -256,7 +256,7 @@ class _Numbers:
 
         def take(name: str, number: float) -> float:
             found.append(float(number))
-            self.names.append(name or "saved")
+            self.names.append(name if name[:1] not in ("", "[") else f"saved{name}")
             return number
 
         self._walked(state, "", take)

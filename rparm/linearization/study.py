@@ -3,7 +3,7 @@
 import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -149,8 +149,10 @@ def _chosen(found: Linear, trimmed: Trimmed, request: Request) -> Linear:
 
 
 def _units(subject: FmuSubject | SystemSubject, found: Linear) -> dict[str, str]:
-    names = (*found.at, *found.outputs)  # all states and inputs
-    known = {name: subject.variable(name).unit for name in names}
+    known: dict[str, str | None] = {}
+    for name in (*found.at, *found.outputs):  # all states and inputs
+        with suppress(UserError):  # a number that save() of a component in Python gives
+            known[name] = subject.variable(name).unit
     return {name: unit for name, unit in known.items() if unit}
 
 
