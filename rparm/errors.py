@@ -13,6 +13,7 @@ class UserError(Exception):
     """Something the user can put right, in one line: file, key, what is wrong, what is expected."""
 
     code = 2  # of a command that ends with it
+    result: Any = None  # of a run that failed after its start: its rows up to there
 
 
 class CodeError(UserError):
@@ -22,7 +23,7 @@ class CodeError(UserError):
 
 
 class StoppedError(UserError):
-    """A run that failed after its start; `result` has its rows up to there, or is None."""
+    """A run that failed after its start; `result` may still be None."""
 
     def __init__(self, text: str, result: Any) -> None:
         super().__init__(text)

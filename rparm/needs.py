@@ -31,7 +31,7 @@ COMMANDS = {
     "list": Command("name the scenarios", "files", target=""),
     "system": Command("run systems in Ecos, check them, write a report", "system", "system"),
     "coupling": Command(
-        "study how far co-simulation of a system is from its exact solution", "system", "system"
+        "study how far co-simulation of a system is from its exact solution", "coupling", "system"
     ),
     "linearize": Command(
         "find an equilibrium, a linear model, margins, the largest step",

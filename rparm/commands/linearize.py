@@ -4,14 +4,22 @@ import argparse
 from pathlib import Path
 
 from rparm import console, project
-from rparm.command_line import Ended, add_fmi, add_report, file_or_name, names, pairs, retyped
-from rparm.errors import UserError, WrongValueError
+from rparm.command_line import (
+    Ended,
+    add_fmi,
+    add_report,
+    file_or_name,
+    names,
+    pairs,
+    positive_seconds,
+    retyped,
+    seconds,
+)
+from rparm.errors import UserError
 from rparm.files import check_writable, from_here, written
-from rparm.units import SECONDS, typed_quantity
 
 MOST_COLUMNS, MOST_ROWS = 6, 12  # of matrices in the terminal
 SUFFIXES = (".fmu", ".ssp", ".toml")
-SHORTEST = 1e-9  # s, of samples: pictures of much shorter ones overflow
 
 
 def add_linearize_options(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +38,7 @@ def add_linearize_options(parser: argparse.ArgumentParser) -> None:
         help="states, inputs and parameters, with units as in 30deg; with --trim also outputs, and "
         "first guesses of what it moves",
     )  # fmt: skip
-    parser.add_argument("--time", type=_seconds, help="time of the point (default: the start)")
+    parser.add_argument("--time", type=seconds, help="time of the point (default: the start)")
     for option, text in (
         ("--trim", "states and inputs to move until the point is an equilibrium"),
         ("--inputs", "inputs of the model (default: all)"),
@@ -43,7 +51,7 @@ def add_linearize_options(parser: argparse.ArgumentParser) -> None:
         help="break the loop at this input, and find its margins",
     )  # fmt: skip
     parser.add_argument(
-        "--step", type=_positive_seconds, metavar="TIME", help="sample the model, too, inputs held"
+        "--step", type=positive_seconds, metavar="TIME", help="sample the model, too, inputs held"
     )
     parser.add_argument(
         "--save", nargs="+", default=[], type=Path, metavar="FILE", help=".json, .mat or .csv"
@@ -104,17 +112,3 @@ def _command(options: argparse.Namespace) -> str:
     for name in ("variant", "at", "time", "trim", "inputs", "outputs", "without", "cut", "step"):
         given["break" if name == "cut" else name] = getattr(options, name)
     return retyped("linearize", [file_or_name(options.what, SUFFIXES)], given)
-
-
-def _seconds(text: str) -> float:
-    try:
-        return typed_quantity(text, SECONDS)
-    except WrongValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
-
-
-def _positive_seconds(text: str) -> float:
-    seconds = _seconds(text)
-    if seconds < SHORTEST:
-        raise argparse.ArgumentTypeError(f"expected {SHORTEST:g} s or more, got {text!r}")
-    return seconds

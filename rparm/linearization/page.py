@@ -38,6 +38,7 @@ STEPS = (
     "grow, though each component is integrated exactly. The frequency is that of the motion that "
     "grows."
 )
+ABOUT = "How small deviations move about one point: x' = A x + B u, y = C x + D u."
 POINT = (
     "Values about which the model is linearized. Far from them it is less accurate: compare it "
     "with a run."
@@ -96,6 +97,7 @@ def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
         "linearization.html",
         root="",
         title=f"{name}: linear model",
+        about=ABOUT,
         again=again,
         notes=[*notes(found), *_not_drawn(found)],
         parts=parts,

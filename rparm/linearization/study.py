@@ -23,6 +23,7 @@ from rparm.linearization.trim import Trimmed, trim
 from rparm.project import VERSIONS
 from rparm.systems.opened import SUFFIXES
 from rparm.systems.opened import opened as open_system
+from rparm.systems.structure import OpenedSystem
 
 Document = dict[str, Any]
 
@@ -68,7 +69,8 @@ def study(request: Request) -> Study:
     """Linearize what is asked for."""
     path = _path(request)
     if path.suffix.lower() in SUFFIXES:
-        return _of_system(path, request)
+        with open_system(path, version=request.version) as opened:
+            return of_system(opened, request)
     for option, given in (
         ("--variant", request.variant), ("--break", request.cut), ("--without", request.without)
     ):  # fmt: skip
@@ -85,9 +87,10 @@ def study(request: Request) -> Study:
         return Study(path, found, _units(subject, found), request.free)
 
 
-def _of_system(path: Path, request: Request) -> Study:
+def of_system(opened: OpenedSystem, request: Request) -> Study:
+    """Linearize a system that is open."""
+    path = opened.path
     with ExitStack() as stack:
-        opened = stack.enter_context(open_system(path, version=request.version))
         variant = request.variant or next(iter(opened.system.parameters), "")
         made = SystemSubject(opened, variant, request.time, request.without, request.cut)
         subject = stack.enter_context(made)

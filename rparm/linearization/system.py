@@ -12,7 +12,8 @@ from rparm.fmi.fmu_file import MODEL_EXCHANGE, Fmu
 from rparm.fmi.model import Value, Variable
 from rparm.linearization import linear
 from rparm.linearization.sampling import hold
-from rparm.systems.master import INPUT_MODES, ORDERS, Master
+from rparm.systems import master
+from rparm.systems.master import Master
 from rparm.systems.python_component import PythonComponent, PythonInstance
 from rparm.systems.structure import Connection, OpenedSystem
 
@@ -79,9 +80,9 @@ class SystemSubject(ExitStack):
         """Linearize components, without held states; UserError if one is sampled, or a loop."""
         parameters = self.merged(values)
         found = {}
-        with Master(self.fmus, self.connections) as master:
-            master.initialize(self.time, None, parameters)
-            for name, component in master.components.items():
+        with Master(self.fmus, self.connections) as whole:
+            whole.initialize(self.time, None, parameters)
+            for name, component in whole.components.items():
                 instance = component.instance
                 if isinstance(instance, PythonInstance):
                     self._laws[name] = instance, instance.numbers[: len(instance.made.inputs)]
@@ -111,15 +112,7 @@ class SystemSubject(ExitStack):
     @property
     def ways(self) -> list[tuple[str, str]]:
         """Orders and inputs in which a master can step the system."""
-        models = {name: fmu.model for name, fmu in self.fmus.items()}
-        can = all(
-            models[c.start_component].gives_output_derivatives
-            and models[c.end_component].interpolates_inputs
-            for c in self.connections
-            if self._is_real(c.start_component, c.start_connector)
-        )
-        modes = INPUT_MODES if can else INPUT_MODES[:1]
-        return [(order, inputs) for inputs in modes for order in ORDERS]
+        return master.ways({n: fmu.model for n, fmu in self.fmus.items()}, self.connections)
 
     def held(self, parts: Mapping[str, linear.Linear]) -> dict[str, list[str]]:
         """Return held states by component."""

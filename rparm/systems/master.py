@@ -28,7 +28,7 @@ from fmpy.fmi1 import FMICallException
 from rparm.errors import UserError, placed
 from rparm.fmi.fmi_instance import Instance, Reals, UnpackedFmu
 from rparm.fmi.fmu_file import Fmu
-from rparm.fmi.model import INPUTS, Value
+from rparm.fmi.model import INPUTS, Model, Value
 from rparm.runs.inputs import Signal
 from rparm.systems.ecos import Run, said_at_end
 from rparm.systems.python_component import is_python
@@ -466,9 +466,28 @@ def _type(fmus: Mapping[str, Fmu], component: str, name: str, causality: str) ->
     return variable.type if variable is not None and variable.causality == causality else None
 
 
+def ways(models: Mapping[str, Model], connections: Iterable[Connection]) -> list[tuple[str, str]]:
+    """Return the orders and inputs in which a master can step connected components."""
+    can = all(
+        models[c.start_component].gives_output_derivatives
+        and models[c.end_component].interpolates_inputs
+        for c in connections
+        if models[c.start_component].variables[c.start_connector].type == "Real"
+    )
+    return [(order, inputs) for inputs in INPUT_MODES[: 1 + can] for order in ORDERS]
+
+
 # ---- A variant -----------------------------------------------------------------------------------
-def run_in_master(ssp: OpenedSystem, variant: str, names: Sequence[str]) -> Run:
-    """Run a variant in Jacobi order; read ``component.variable`` as Ecos would, all finite."""
+def run_in_master(
+    ssp: OpenedSystem,
+    variant: str,
+    names: Sequence[str],
+    progress: Callable[[int], object] = lambda _: None,
+) -> Run:
+    """Run a variant in Jacobi order; read ``component.variable`` as Ecos would, all finite.
+
+    `progress` is called with the steps just done.
+    """
     system = ssp.system
     times = system.times
     rows = np.empty((len(times), len(names)))
@@ -480,12 +499,19 @@ def run_in_master(ssp: OpenedSystem, variant: str, names: Sequence[str]) -> Run:
         readers = [_RowReader(ssp, c, names) for c in master.components.values()]
         begin = time.perf_counter()
         for row, end in enumerate(times.tolist()):
-            if row:
-                master.advance(end)
-            for reader in readers:
-                with reader.component.instance.explained(f"at t = {end!r} s"):
-                    reader.component.set_inputs(master.values[reader.component.sources])
-                    reader.read(rows[row])
+            try:
+                if row:
+                    master.advance(end)
+                for reader in readers:
+                    with reader.component.instance.explained(f"at t = {end!r} s"):
+                        reader.component.set_inputs(master.values[reader.component.sources])
+                        reader.read(rows[row])
+            except UserError as error:
+                if row > 1:
+                    error.result = Run(tuple(names), times[:row], rows[:row], 0.0, ())
+                raise
+            if row and row % 100 == 0:
+                progress(100)
         wall_time = time.perf_counter() - begin
         known = master.components.values()
         messages = [f"{c.name!r}: {text}" for c in known for text in c.instance.messages]

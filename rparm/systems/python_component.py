@@ -14,7 +14,7 @@ import sys
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from ctypes import CFUNCTYPE, POINTER, Array, c_double, c_int, c_size_t, c_uint, c_void_p
+from ctypes import CFUNCTYPE, Array, c_double, c_int, c_size_t, c_uint, c_void_p
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
@@ -450,21 +450,16 @@ class _Calls:
 
     def __init__(self, instance: PythonInstance) -> None:
         self._instance, self.dll = instance, self
-        values = CFUNCTYPE(c_int, c_void_p, POINTER(c_uint), c_size_t, POINTER(c_double))
+        values = CFUNCTYPE(c_int, c_void_p, c_void_p, c_size_t, c_void_p)
         step = CFUNCTYPE(c_int, c_void_p, c_double, c_double, c_int)
-        nothing = CFUNCTYPE(c_int, c_void_p, c_void_p, c_size_t, c_void_p)
-        self.fmi2GetReal = values(self._moved(instance.get_reals, True))
-        self.fmi2SetReal = values(self._moved(instance.put_reals, False))
+        self.fmi2GetReal = values(self._moved(instance.get_reals))
+        self.fmi2SetReal = values(self._moved(instance.put_reals))
         self.fmi2DoStep = step(lambda _, t, h, __: self._status(instance.do_step, t, h))
-        self.fmi2GetBoolean = self.fmi2SetBoolean = nothing(lambda *_: 0)
 
-    def _moved(self, move: Callable[..., None], reads: bool) -> Callable[..., int]:
-        def called(_: int, references: Any, count: int, values: Any) -> int:
-            numbers = np.array(values[:count])
-            status = self._status(move, references[:count], numbers)
-            if reads:
-                values[:count] = numbers.tolist()
-            return status
+    def _moved(self, move: Callable[..., None]) -> Callable[..., int]:
+        def called(_: int, references: int, count: int, values: int) -> int:
+            places = (c_uint * count).from_address(references)[:]
+            return self._status(move, places, view((c_double * count).from_address(values)))
 
         return called
 
