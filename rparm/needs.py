@@ -44,6 +44,7 @@ COMMANDS = {
         "run a scenario or a system many times, over parameters",
         "campaign", "campaign", "campaign",
     ),
+    "ssp": Command("write a system as an SSP, for other tools", "files", "system"),
     "federation": Command(
         "run a system with each FMU in its own process, coupled by HELICS",
         "federation", "federation", "federation",

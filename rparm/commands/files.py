@@ -278,6 +278,35 @@ def do_build(options: argparse.Namespace) -> Ended:
     return Ended(0, verdict, {"fmus": [path.absolute() for path in paths]})
 
 
+def add_ssp_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Writes NAME.ssp, SSP 1.0 of the system NAME in FILE.toml: its FMUs, connections and "
+        "variants. Inputs that move become inputs of the system. Components in Python are packed "
+        "as FMUs by pythonfmu."
+    )
+    parser.add_argument("file", metavar="FILE.toml", type=Path, help="the system")
+    add_fmi(parser, VERSIONS[0], "version of FMI of the project's and of built FMUs (default: 2)")
+    text = "the file, or a folder for it (default: the current one)"
+    parser.add_argument("-o", "--output", type=Path, metavar="PATH", default=Path(), help=text)
+
+
+def do_ssp(options: argparse.Namespace) -> Ended:
+    from rparm.systems import loop_file, ssp_writer  # take long
+
+    with loop_file.opened(options.file, version=options.fmi) as opened:
+        path, name = options.output, f"{opened.system.name}.ssp"
+        path = path if path.suffix.lower() == ".ssp" else path / name
+        with written(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            needed = ssp_writer.write(path, opened)
+        inputs = list(opened.system.inputs)
+    notes = [f"inputs of the system: {', '.join(inputs)}"] if inputs else []
+    notes += [f"{component} runs where there is {what}" for component, what in needed.items()]
+    console.messages(str(path), [*opened.notes, *notes])
+    document = {"file": path.absolute(), "inputs": inputs, "needs": needed}
+    return Ended(0, f"{path}: written", document, page=path)
+
+
 def add_fmu_options(parser: argparse.ArgumentParser) -> None:
     parser.description = "Copies the FMU of a model, for another tool."
     parser.add_argument("name", metavar="NAME", help="name of the FMU, or of its model")

@@ -126,6 +126,11 @@ class PythonComponent(AbstractContextManager["PythonComponent"]):
             gives_directional_derivatives=False,
         )
 
+    @property
+    def target(self) -> str:
+        """Name of its class or function in the file."""
+        return str(self._target(self._module()).__name__)
+
     def made(self) -> "Made":
         """Run the file, and make an object of its class."""
         target = self._target(self._module())

@@ -18,7 +18,9 @@ from rparm.errors import UserError
 from rparm.files import whole
 from rparm.fmi.fmu_file import describe
 from rparm.fmi.model import Value, Variable
+from rparm.interruption import temporary_folder
 from rparm.systems import loop_file
+from rparm.systems.python_component import ANY
 from rparm.systems.ssp import FMU_TYPE, STRUCTURE
 from rparm.systems.structure import ALONE, SETTABLE, Component, OpenedSystem
 
@@ -36,12 +38,15 @@ SPACES = f"""xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"
 Sets = Mapping[str, Mapping[str, Mapping[str, Value]]]  # by variant, component and variable
 
 
-def write(path: Path, opened: OpenedSystem) -> None:
+def write(path: Path, opened: OpenedSystem) -> dict[str, str]:
     """Write a system with its FMUs and variants; what its file makes move becomes inputs of it.
 
-    The bytes depend only on the contents.
+    Return what components in Python need to run. Without these the bytes depend only on the
+    contents.
     """
-    files = _Writer(opened).files()
+    with temporary_folder() as folder:
+        writer = _Writer(opened, folder)
+        files = writer.files()
     with whole(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
         for name, content in sorted(files.items()):
             entry = zipfile.ZipInfo(name, DATE)
@@ -50,43 +55,69 @@ def write(path: Path, opened: OpenedSystem) -> None:
             stored = name.endswith(".fmu")
             entry.compress_type = zipfile.ZIP_STORED if stored else zipfile.ZIP_DEFLATED
             archive.writestr(entry, content, compresslevel=9)
-
-
-def complete_sets(opened: OpenedSystem) -> Sets:
-    """Return sets that each give all that any changes; the default only if no other repeats it."""
-    given = opened.system.parameter_sets
-    names: dict[str, dict[str, None]] = {}
-    for components in given.values():
-        for component, values in components.items():
-            names.setdefault(component, {}).update(dict.fromkeys(values))
-    starts = {component: opened.models[component].start_values for component in names}
-    sets = {
-        variant: {
-            component: {
-                name: (starts[component] | components.get(component, {}))[name] for name in of
-            }
-            for component, of in names.items()
-            if of
-        }
-        for variant, components in given.items()
-    }
-    others = [values for variant, values in sets.items() if variant != ALONE]
-    return {v: values for v, values in sets.items() if v != ALONE or values not in others}
+    return writer.needed
 
 
 class _Writer:
-    def __init__(self, opened: OpenedSystem) -> None:
-        self.opened, self.system = opened, opened.system
-        self.inputs = [(name, *name.split(".", 1)) for name in opened.system.inputs]
-        self.sets = complete_sets(opened)
-        self.descriptions: dict[str, str] = {}  # of components
+    def __init__(self, opened: OpenedSystem, folder: Path) -> None:
+        self.system = opened.system
+        self.inputs = [(name, *name.split(".", 1)) for name in self.system.inputs]
+        self.needed: dict[str, str] = {}  # by components in Python, whose FMUs go into the folder
+        self.fmus: dict[str, Path] = {}
+        self.sources: dict[str, str] = {}
+        self.descriptions: dict[str, str] = {}
+        self.variables: dict[str, Mapping[str, Variable]] = {}  # by component and name
         self.units: dict[str, BaseUnit] = {}
-        for name in opened.models:
-            description = describe(opened.fmu(name)).description
-            self.descriptions[name] = description.description or ""
-            for unit in description.unitDefinitions:
+        for component in self.system.components:
+            name, source = component.name, component.source
+            fmu = opened.fmu(name)
+            if name in opened.python:
+                fmu, source = folder / f"{name}.fmu", f"resources/{name}.fmu"
+                self.needed[name] = self.pack(opened, name, fmu)
+            found = describe(fmu)
+            self.fmus[name], self.sources[name] = fmu, source
+            self.descriptions[name] = found.description.description or ""
+            self.variables[name] = found.model.variables
+            for unit in found.description.unitDefinitions:
                 if unit.baseUnit is not None:
                     self.units.setdefault(unit.name, unit.baseUnit)
+        self.sets = self.complete_sets()
+
+    def pack(self, opened: OpenedSystem, name: str, path: Path) -> str:
+        """Pack a component in Python, with its values of all variants that no FMU can take."""
+        from rparm.systems import python_fmu  # a build needs none of it
+
+        found = [
+            {k: p.value for k, p in components.get(name, {}).items() if p.type == ANY}
+            for components in self.system.parameters.values()
+        ]
+        if any(values != found[0] for values in found):
+            text = "variants give arrays or tables different values, which no FMU can have"
+            raise UserError(f"{opened.path}: component {name!r}: {text}")
+        return python_fmu.pack(name, opened.python[name](), found[0], path)
+
+    def complete_sets(self) -> Sets:
+        """Return sets that each give all that any changes; not a default that another repeats."""
+        names: dict[str, dict[str, None]] = {}
+        for components in self.system.parameters.values():
+            for component, values in components.items():
+                own = {name: None for name, value in values.items() if value.type != ANY}
+                names.setdefault(component, {}).update(own)
+        sets = {
+            variant: {
+                component: {
+                    name: components.get(component, {}).get(
+                        name, self.variable(component, name).start
+                    )
+                    for name in own
+                }
+                for component, own in names.items()
+                if own
+            }
+            for variant, components in self.system.parameter_sets.items()
+        }
+        others = [values for variant, values in sets.items() if variant != ALONE]
+        return {v: values for v, values in sets.items() if v != ALONE or values not in others}
 
     def files(self) -> dict[str, bytes]:
         """Return the content of each file by its name."""
@@ -95,8 +126,7 @@ class _Writer:
             for component, values in components.items():
                 texts[_set_file(component, variant)] = self.parameters(variant, component, values)
         files = {name: text.encode() for name, text in texts.items()}
-        fmus = {c.source: self.opened.fmu(c.name).read_bytes() for c in self.system.components}
-        return files | fmus
+        return files | {self.sources[name]: path.read_bytes() for name, path in self.fmus.items()}
 
     # ---- The structure ---------------------------------------------------------------------------
     def structure(self) -> str:
@@ -161,7 +191,7 @@ class _Writer:
         left = 70 * number
         return f"""\
       <ssd:Component name={quoteattr(name)} type="{FMU_TYPE}"
-          source={quoteattr(component.source)} implementation="CoSimulation"
+          source={quoteattr(self.sources[name])} implementation="CoSimulation"
           description={quoteattr(self.descriptions[name])}>
         <ssd:Connectors>
 {connectors}        </ssd:Connectors>
@@ -198,7 +228,7 @@ class _Writer:
 """
 
     def variable(self, component: str, name: str) -> Variable:
-        return self.opened.models[component].variables[name]
+        return self.variables[component][name]
 
     def unit(self, variable: Variable) -> str:
         """Return the attribute for a unit that the FMUs define."""

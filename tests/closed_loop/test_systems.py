@@ -25,7 +25,7 @@ def add(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Add:
 
     def one(name: str, archive: str, suffix: str) -> Path:
         (tmp_path / "models" / name).mkdir(parents=True)
-        (tmp_path / "models" / name / STRUCTURE).touch()
+        (tmp_path / "models" / name / project.LOOP).touch()
         edits: dict[str, Edit] = {
             STRUCTURE: replace('System name="closed_loop"', f'System name="{name}"')
         }
