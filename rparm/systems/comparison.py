@@ -107,6 +107,8 @@ def why_no_estimate(ssp: OpenedSystem) -> str:
     for c in ssp.system.connections:
         if ssp.variable(c.start).type == "Real" and ssp.variable(c.start).variability == "discrete":
             return f"{c.start} is sampled"
+    if not any(ssp.variable(name).type == "Real" for name in kept(ssp)):
+        return "no Real is recorded"
     return "" if ssp.system.connections else "there are no connections"
 
 

@@ -10,6 +10,7 @@ import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
 
@@ -107,11 +108,14 @@ class LoopReader(Reader):
             descriptions=descriptions,
             description=description,
         )
-        system = self.with_inputs(system, self.entries(content, INPUTS))
         check(self.path, system, self.models)
+        self.check_delays()
+        system = self.with_inputs(system, self.moved)
         keep = None
         if KEEP in content:
             keep = tuple(map(self.kept, self.array(content[KEEP], KEEP, "component.variable")))
+            if twice := [name for i, name in enumerate(keep) if name in keep[:i]]:
+                self.fail(f"{KEEP}: {twice[0]} is there twice")
         system = replace(system, keep=keep, notes=tuple(self.notes))
         return OpenedSystem(
             self.path, self.folder, system, self.models, files=self.files, python=self.python
@@ -172,16 +176,18 @@ class LoopReader(Reader):
         if is_python(given):
             self.code(name, given)
             return
-        file = given
-        path, suffix = self.path.parent / file, Path(file).suffix.lower()
+        path, suffix = self.path.parent / given, Path(given).suffix.lower()
         if suffix in (FMU, EQUATIONS) and not is_file(path):
-            self.fail(f"{where}: {file}: {missing(path)}")
+            self.fail(f"{where}: {given}: {missing(path)}")
         try:
             if suffix == EQUATIONS:
                 made = path
                 fmu = self.built(path)
             elif suffix == FMU:
                 made = fmu = path
+            elif not NAME.fullmatch(given):
+                expected = "a file .fmu, .toml with equations or .py, or a name of the project"
+                self.fail(f"{where}: expected {expected}, got {show(given)}")
             elif self.fmus:
                 made = fmu = self.fmus / f"{given}{FMU}"
             else:
@@ -243,6 +249,20 @@ class LoopReader(Reader):
             *self.parts(start, where, components), *self.parts(end, where, components)
         )
 
+    def check_delays(self) -> None:
+        """Refuse connections by which an output follows from itself at once, as FMUs declare."""
+        causes = {c.end: {c.start} for c in self.connections}
+        for component, model in self.models.items():
+            for output, known in model.dependencies.items():
+                inputs = {f"{component}.{x}" for x in known if model.variables[x].is_a(INPUTS)}
+                causes[f"{component}.{output}"] = inputs
+        try:
+            TopologicalSorter(causes).prepare()
+        except CycleError as error:
+            loop = " -> ".join(name for name in error.args[1])
+            way_out = "a state or a sampler must be in between"
+            self.fail(f"[{CONNECTIONS}]: a loop without delay, {loop}: {way_out}")
+
     # ---- Times -----------------------------------------------------------------------------------
 
     def times(self, content: Mapping[str, Any], step: float | None) -> tuple[float, float, float]:
@@ -299,12 +319,8 @@ class LoopReader(Reader):
 
     def parameter(self, given: Any, variable: Variable, where: str) -> Parameter:
         if not (variable.can_start or variable.is_a(INPUTS)):
-            text = (
-                variable.why_it_follows
-                if variable.follows
-                else f"is of kind {variable.causality}, which no one sets"
-            )
-            self.fail(f"{where}: {text}")
+            kind = f"is of causality {variable.causality}, and cannot be set"
+            self.fail(f"{where}: {variable.why_it_follows if variable.follows else kind}")
         if variable.type == "String":
             return Parameter("String", self.text(given, where), None)
         with self.placed(where):
@@ -328,9 +344,13 @@ class LoopReader(Reader):
     def with_inputs(self, system: System, given: Mapping[str, Any]) -> System:
         """Add inputs from outside; constants are parameters of all variants that give no other."""
         known: dict[str, Variable] = {}
-        fed = {str(c.end): str(c) for c in system.connections}
+        fed = {c.end: str(c) for c in system.connections}
+        for values in system.parameters.values():
+            for name in (f"{component}.{x}" for component in values for x in values[component]):
+                if name in fed:
+                    self.fail(f"{name}: the value is that of a connection, {fed[name]}")
         for name in given:
-            component, variable = self.variable(name, f"[{INPUTS}]")
+            _, variable = self.variable(name, f"[{INPUTS}]")
             if name in fed:
                 self.fail(f"[{INPUTS}.{name}]: the input has a connection already, {fed[name]}")
             known[name] = replace(variable, name=name)
