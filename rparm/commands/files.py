@@ -302,7 +302,8 @@ def do_ssp(options: argparse.Namespace) -> Ended:
             path.parent.mkdir(parents=True, exist_ok=True)
             needed = ssp_writer.write(path, opened)
         inputs = list(opened.system.inputs)
-    notes = [f"inputs of the system: {', '.join(inputs)}"] if inputs else []
+    few = "inputs of the system, which Ecos and libcosim do not load"
+    notes = [f"{few}: {', '.join(inputs)}"] if inputs else []
     notes += [f"{component} runs where there is {what}" for component, what in needed.items()]
     console.messages(str(path), [*opened.notes, *notes])
     document = {"file": path.absolute(), "inputs": inputs, "needs": needed}
