@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from pieces import write_pieces  # noqa: E402
 
 SHARE = "rparm/share"
-OF_MODELS = (".csv", ".json", ".py", ".ssd", ".svg", ".toml")
+OF_MODELS = (".csv", ".json", ".py", ".svg", ".toml")
 OF_FMU = ("fmu/**/*.py", "fmu/**/*.toml", "fmu/**/*.in", "fmu/*.css", "fmu/*.html")
 OF_FMU += ("src/instance/*.toml",)
 # modules that are not for a model
@@ -56,8 +56,8 @@ class CustomBuildHook(BuildHookInterface):
         for file in sorted(file for pattern in OF_FMU for file in root.glob(pattern)):
             if file.stem not in OF_RELEASES:
                 include[str(file)] = f"{SHARE}/{file.relative_to(root).as_posix()}"
-        page = "examples/models/README.md"
-        include[str(root / page)] = f"{SHARE}/{page}"
+        for page in ("examples/models/README.md", "docs/tutorial.md"):
+            include[str(root / page)] = f"{SHARE}/{page}"
         write_pieces(release, staging)
         shutil.copy(release / "built.tar.xz", staging)
         _add_plotly(root, staging)

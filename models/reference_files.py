@@ -3,20 +3,18 @@
 The reference of a scenario is three files in the format of the FMI cross-check, in a folder of its
 name: MODEL_ref.csv with the outputs, MODEL_in.csv with the inputs, MODEL_ref.opt with the times.
 The reference of a system's variant is a folder of its name with CSV files; the variant's parameters
-are in the system's folder, in resources/<component>_<variant>.ssv.
+are in loop.toml of the system's folder.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 
-from rparm.files import write_text, write_trajectory
+from rparm.files import read_toml, write_text, write_trajectory
 from rparm.fmi.model import Value
 from rparm.runs.scenario import Scenario
 
-NAMESPACE = {"ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues"}
 KEPT = 20  # every 20th communication point of a system goes into its files
 
 Columns = Mapping[str, np.ndarray]
@@ -65,17 +63,15 @@ def _write_table(path: Path, times: np.ndarray, names: Sequence[str], table: np.
 
 
 # ---- Systems -------------------------------------------------------------------------------------
-def variants(system: Path, components: Iterable[str]) -> dict[str, dict[str, Value]]:
+def variants(system: Path) -> dict[str, dict[str, Value]]:
     """Return the parameters of every variant of the system in a folder, ``component.name``."""
-    found: dict[str, dict[str, Value]] = {}
-    for component in components:
-        for path in sorted((system / "resources").glob(f"{component}_*.ssv")):
-            parameters = found.setdefault(path.stem.removeprefix(f"{component}_"), {})
-            for parameter in ElementTree.parse(path).iterfind(".//ssv:Parameter", NAMESPACE):
-                kind, value = parameter[0].tag, parameter[0].get("value", "")
-                is_number = kind.endswith(("}Real", "}Integer"))
-                name = f"{component}.{parameter.get('name')}"
-                parameters[name] = float(value) if is_number else value
+    content = read_toml(system / "loop.toml")
+    found = {}
+    for name, given in content["variants"].items():
+        values = content["parameters"] | given
+        del values["description"]
+        # a number, or a text with it and the variable's own unit
+        found[name] = {key: float(str(value).split()[0]) for key, value in values.items()}
     return found
 
 

@@ -60,7 +60,7 @@ def _ended(arguments: Sequence[str]) -> Ended:
     except Answered as answer:
         return Ended(0, answer.text, {answer.name: answer.text})
     except UserError as error:
-        return Ended(2, "", error=error)
+        return Ended(error.code, "", error=error)
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("rparm"):
             raise

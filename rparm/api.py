@@ -4,8 +4,11 @@ All values are in the units of their variables (SI), times in s. Mistakes raise
 `rparm.errors.UserError`, whose text is one line.
 """
 
+import html
+import weakref
+import webbrowser
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +17,7 @@ import numpy as np
 
 from rparm import files, project, proof
 from rparm.building import build as build
-from rparm.errors import UserError, hint
+from rparm.errors import UserError, hint, placed
 from rparm.federation import federation, network
 from rparm.files import written
 from rparm.fmi.fmu_file import Fmu
@@ -23,11 +26,15 @@ from rparm.runs import scenario as scenarios
 from rparm.runs import simulation
 from rparm.runs.comparison import load_reference
 from rparm.runs.simulation import Input
-from rparm.systems import comparison, ecos, master, ssp
+from rparm.systems import comparison, ecos, master, opened
+from rparm.systems.structure import OpenedSystem
+from rparm.units import unit
 
 if TYPE_CHECKING:
     from rparm.identification.identify import Identification
     from rparm.linearization.linear import Linear
+
+MOST_DRAWN = 10  # columns of a table in a notebook
 
 
 # ---- Runs ----------------------------------------------------------------------------------------
@@ -73,10 +80,65 @@ class Table(Mapping[str, np.ndarray]):
             files.write_trajectory(Path(path), self._times, self._names, self._values)
 
     def to_pandas(self) -> Any:
-        """Return the columns as a pandas.DataFrame; pandas must be installed."""
-        import pandas
+        """Return the columns as a pandas.DataFrame; needs pandas, as the extra `campaign`."""
+        with _needing("campaign"):
+            import pandas
 
         return pandas.DataFrame(dict(self))
+
+    def plot(self, *names: str, output: str | Path | None = None, show: bool = True) -> Path:
+        """Plot columns over the time on a page, those of one unit together; return its path.
+
+        Parameters
+        ----------
+        names : str
+            Of columns; default: all.
+        output : path, optional
+            Folder for the page; default: "plots" among the reports.
+        show : bool
+            Open the page in a browser.
+        """
+        from rparm.report import overview, pages, run_data  # take long to import
+
+        curves: dict[str, list[run_data.Curve]] = {}
+        for name in names or self._names:
+            curve = run_data.result_curve(name, self[name])
+            curves.setdefault(unit(self.units.get(name)), []).append(curve)
+        plots = [
+            run_data.Plot(", ".join(curve.name for curve in drawn), of_all, drawn)
+            for of_all, drawn in curves.items()
+        ]
+        rows = run_data.thinned([values for plot in plots for values in plot.columns])
+        drawn = [plot.at(rows) for plot in plots]
+        data = run_data.RunData("table", "Run", self._times[rows], drawn)
+        about = "Run", f"{self._size}.", overview.RAN
+        page = pages.RunPage(*about, facts=(), data=data, tables=(), overview=False)
+        folder = Path(output or project.report_folder("plots"))
+        with written(folder):
+            path = pages.write_alone(folder, page)
+        if show:
+            webbrowser.open_new_tab(path.absolute().as_uri())
+        return path
+
+    @property
+    def _size(self) -> str:
+        span = f"{self._times[0]:g} to {self._times[-1]:g} s"
+        return f"{len(self._times)} rows from {span}, {len(self)} columns"
+
+    def _repr_html_(self) -> str:
+        """Draw the first columns for notebooks, without scripts."""
+        from rparm.report.overview import sparkline_svg
+
+        shown = self._names[:MOST_DRAWN]
+        more = f", {len(shown)} drawn" if len(shown) < len(self._names) else ""
+        rows = []
+        for name in shown:
+            finite = self[name][np.isfinite(self[name])]
+            range_of = f"{finite.min():.4g} to {finite.max():.4g}" if len(finite) else "not finite"
+            texts = html.escape(name), html.escape(f"{range_of} {unit(self.units.get(name))}")
+            picture = sparkline_svg(self._times, self[name])
+            rows.append(f"<tr><th>{texts[0]}</th><td>{picture}</td><td>{texts[1]}</td></tr>")
+        return f"<table><caption>{self._size}{more}</caption>{''.join(rows)}</table>"
 
 
 def fmu(name: str, fmi: int = 2) -> Path:
@@ -95,9 +157,9 @@ def fmu(name: str, fmi: int = 2) -> Path:
 def simulate(
     fmu: str | Path,
     *,
-    stop_time: float,
-    step: float,
-    start_time: float = 0.0,
+    stop_time: float | None = None,
+    step: float | None = None,
+    start_time: float | None = None,
     start_values: Mapping[str, Value] | None = None,
     inputs: Mapping[str, Input] | None = None,
     outputs: Sequence[str] | None = None,
@@ -113,7 +175,8 @@ def simulate(
     fmu : path
         Any FMU; see `fmu` for the project's.
     stop_time, step, start_time : float
-        s. `step` is the communication step; a whole number of them leads to the stop time.
+        s; default: those of the FMU's default experiment, else from 0, in 200 steps. `step`
+        is the communication step; a whole number of them leads to the stop time.
     start_values : mapping, optional
         Parameters and states by name: numbers, texts with a unit ("30 deg"), items' names.
     inputs : mapping, optional
@@ -130,11 +193,12 @@ def simulate(
         Row i is what is read right after the step to time i; row 0 at the start.
     """
     path = Path(fmu)
-    times = simulation.communication_points(start_time, stop_time, step)
     if not (simulation.is_finite_number(tolerance) and 0 < tolerance < 1):
         raise UserError(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")
     with Fmu(path) as opened:
         model = opened.model
+        with placed(path):
+            times = simulation.times_of(model.experiment, start_time, stop_time, step)
         names = list(model.real_outputs if outputs is None else outputs)
         for name in names:
             if name not in model.real_outputs:
@@ -235,50 +299,74 @@ class Scenario:
 
 
 class System:
-    """A system of connected FMUs, by its name or the path of its SSP.
+    """A system of connected components: a loop file, an SSP, or one of the project by its name.
+
+    It is opened once, which builds files with equations, and again when a file has changed.
 
     Attributes
     ----------
     variants : tuple of str
         Names of its parameter sets; "default" if it has none.
     notes : tuple of str
-        What was chosen where the SSP says nothing: times, values of inputs that nothing feeds.
+        What was chosen where its file says nothing: times, values of inputs that nothing feeds.
     """
 
     def __init__(self, name: str | Path, *, fmi: int = 2) -> None:
-        self.path = Path(name)
-        if self.path.suffix.lower() != ".ssp":
+        self.path, self._version = Path(name), version(fmi)
+        if self.path.suffix.lower() not in opened.SUFFIXES:
             known = project.systems()
             if name not in known:
                 raise UserError(f"no system {str(name)!r}{hint(str(name), known)}")
-            self.path = project.built(known[str(name)], ".ssp", version=version(fmi))
-        with ssp.unpacked(self.path) as opened:
-            self.variants = tuple(opened.system.parameters)
-            self.notes = tuple(opened.notes)
+            self.path = project.built(known[str(name)], ".ssp", version=self._version)
+        self._stack = ExitStack()
+        weakref.finalize(self, self._stack.close)
+        system = self._open()
+        self.variants = tuple(system.system.parameters)
+        self.notes = tuple(system.notes)
 
-    def run(self, variant: str | None = None, *, engine: str = "master") -> Table:
+    def _open(self) -> OpenedSystem:
+        if not hasattr(self, "_opened") or self._files != _changes(self._opened):
+            self._stack.close()
+            door = opened.opened(self.path, version=self._version)
+            self._opened = self._stack.enter_context(door)
+            self._files = _changes(self._opened)
+        return self._opened
+
+    def run(
+        self,
+        variant: str | None = None,
+        *,
+        parameters: Mapping[str, Value] | None = None,
+        step: float | None = None,
+        engine: str = "master",
+    ) -> Table:
         """Step a variant from its start to its stop time, in Jacobi order.
 
         Parameters
         ----------
         variant : str, optional
             Default: the first one.
+        parameters : mapping, optional
+            Values in place of the variant's by "component.variable": of parameters, states at the
+            start, inputs that nothing feeds; numbers, or texts with a unit ("12 kg").
+        step : float, optional
+            s; communication step in place of the file's.
         engine : str
             "master", rparm's own; "ecos", where ecospy is installed; "helics", each FMU in its
-            own process, where helics is installed.
+            own process, where helics is installed. These two take neither parameters nor step.
 
         Returns
         -------
         Table
-            Columns "component.variable": all Real outputs and states, read after the inputs of
-            the next step have been set. With "helics": all Real outputs, read after
-            the step.
+            Columns "component.variable": what the file keeps, else all Real outputs and states,
+            read after the inputs of the next step have been set. With "helics": all Real outputs,
+            read after the step.
         """
-        variant = self.variants[0] if variant is None else variant
-        if variant not in self.variants:
-            raise UserError(
-                f"{self.path}: has no variant {variant!r}{hint(variant, self.variants)}"
-            )
+        system = self._open()
+        known = tuple(system.system.parameters)
+        variant = known[0] if variant is None else variant
+        if variant not in known:
+            raise UserError(f"{self.path}: has no variant {variant!r}{hint(variant, known)}")
         engines = {
             "master": master.run_in_master,
             "ecos": ecos.run,
@@ -286,9 +374,16 @@ class System:
         }
         if engine not in engines:
             raise UserError(f"engine: expected one of {', '.join(engines)}, got {engine!r}")
-        with ssp.unpacked(self.path) as opened:
-            run = engines[engine](opened, variant, comparison.recorded(opened))
-            units = {name: opened.variable(name).unit for name in run.names}
+        if engine != "master" and (parameters or step is not None):
+            raise UserError(f"engine: {engine!r} takes neither parameters nor step")
+        changed = system.with_values(variant, parameters or {})
+        if step is not None:
+            times = changed.system.start, changed.system.stop, step
+            simulation.communication_points(*times)  # checks them
+            changed = replace(changed, system=replace(changed.system, step=step))
+        names = changed.system.keep or comparison.recorded(changed)
+        run = engines[engine](changed, variant, names)
+        units = {name: changed.variable(name).unit for name in run.names}
         return Table(run.times, run.names, run.values, units)
 
     def study_coupling(self, output: str | Path) -> dict[str, dict[str, object]]:
@@ -308,6 +403,13 @@ class System:
         if not project.is_built_from(self.path.stem, folder):
             raise UserError(f"{self.path}: has no study of its coupling, {folder.name} has one")
         return known.study_coupling(self.path, Path(output))
+
+
+def _changes(system: OpenedSystem) -> dict[Path, int]:
+    """Return the times of change of all files beside those of a system."""
+    folders = {file.absolute().parent for file in (system.path, *system.files.values())}
+    files_there = (file for folder in folders if folder.is_dir() for file in folder.iterdir())
+    return {file: file.stat().st_mtime_ns for file in files_there if files.is_file(file)}
 
 
 def version(fmi: int) -> str:

@@ -15,6 +15,7 @@ from rparm.needs import COMMANDS, COMMON, DEFAULT, EXIT_CODES, HELP, VERSION
 from rparm.project import PROGRAM, VERSIONS
 from rparm.units import SECONDS, typed_quantity
 
+SHORTEST = 1e-9  # s, of steps
 EPILOG = f"""With --json, standard output has one JSON document and nothing else. "exit_code" is in
 it, and "error" with the message if there is one. A command that is interrupted prints none.
 {EXIT_CODES}."""
@@ -142,6 +143,12 @@ def add_tolerance(parser: argparse.ArgumentParser, text: str) -> None:
     parser.add_argument("--tolerance", type=relative_tolerance, metavar="X", help=text)
 
 
+def add_step(parser: argparse.ArgumentParser) -> None:
+    """Add the communication step of a system, in place of the file's."""
+    text = "communication step, as 0.001 or 1ms (default: the system's)"
+    parser.add_argument("--step", type=positive_seconds, metavar="TIME", help=text)
+
+
 def add_report(parser: argparse.ArgumentParser, part: str = "") -> None:
     """Add the folder for pages and results."""
     folder = project.report_folder(part)
@@ -170,7 +177,7 @@ def _add_folder(
 def add_silence(parser: argparse.ArgumentParser, default: float, text: str) -> None:
     """Add the longest time that something may be silent."""
     text = f"{text} (default: {default:g} s)"
-    parser.add_argument("--silence", type=_seconds, metavar="TIME", default=default, help=text)
+    parser.add_argument("--silence", type=_silence, metavar="TIME", default=default, help=text)
 
 
 def number(text: str) -> int:
@@ -233,7 +240,21 @@ def relative_tolerance(text: str) -> float:
     raise argparse.ArgumentTypeError(f"expected a number between 0 and 1, got {text!r}")
 
 
-def _seconds(text: str) -> float:
+def seconds(text: str) -> float:
+    try:
+        return typed_quantity(text, SECONDS)
+    except WrongValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def positive_seconds(text: str) -> float:
+    found = seconds(text)
+    if found < SHORTEST:
+        raise argparse.ArgumentTypeError(f"expected {SHORTEST:g} s or more, got {text!r}")
+    return found
+
+
+def _silence(text: str) -> float:
     with suppress(WrongValueError):
         seconds = typed_quantity(text, SECONDS)
         if seconds >= 1:

@@ -12,9 +12,18 @@ SHORTEST_PART = 3  # letters of a longer name that may be meant
 class UserError(Exception):
     """Something the user can put right, in one line: file, key, what is wrong, what is expected."""
 
+    code = 2  # of a command that ends with it
+    result: Any = None  # of a run that failed after its start: its rows up to there
+
+
+class CodeError(UserError):
+    """What the user's own Python code raised or returned wrongly, with its file and line."""
+
+    code = 1
+
 
 class StoppedError(UserError):
-    """A run that failed after its start; `result` has its rows up to there, or is None."""
+    """A run that failed after its start; `result` may still be None."""
 
     def __init__(self, text: str, result: Any) -> None:
         super().__init__(text)

@@ -26,11 +26,12 @@ COMMANDS = {
     "new": Command("write a scenario to start from", "files"),
     "build": Command("make FMUs of a file with equations", "files"),
     "new-model": Command("write a file with equations to start from", "files", target=""),
+    "new-system": Command("write a file of a system to start from", "files"),
     "schema": Command("print a JSON Schema by which editors check files", "files", target=""),
     "list": Command("name the scenarios", "files", target=""),
     "system": Command("run systems in Ecos, check them, write a report", "system", "system"),
     "coupling": Command(
-        "study how far co-simulation of a system is from its exact solution", "system", "system"
+        "study how far co-simulation of a system is from its exact solution", "coupling", "system"
     ),
     "linearize": Command(
         "find an equilibrium, a linear model, margins, the largest step",
@@ -43,6 +44,7 @@ COMMANDS = {
         "run a scenario or a system many times, over parameters",
         "campaign", "campaign", "campaign",
     ),
+    "ssp": Command("write a system as an SSP, for other tools", "files", "system"),
     "federation": Command(
         "run a system with each FMU in its own process, coupled by HELICS",
         "federation", "federation", "federation",

@@ -4,7 +4,7 @@ models/MODEL/scenarios/NAME.toml        a scenario
 models/MODEL/convergence/NAME.toml      a problem for the order of convergence, of that format
 models/MODEL/references/NAME/           MODEL_ref.csv of a scenario, exact.json of a problem
 models/MODEL/references/scales.toml     sums that errors are divided by, instead of maxima
-models/SYSTEM/SystemStructure.ssd       connects models to a system
+models/SYSTEM/loop.toml                 connects models to a system
 models/SYSTEM/references/VARIANT/       ecos.csv of a variant of the system
 models/SYSTEM/study.py                  what to measure, draw and study there
 models/*/campaigns/NAME.toml            a campaign
@@ -45,7 +45,7 @@ INSTALLED = shipped.SHARE.is_dir()  # else the package is in a checkout
 ROOT = shipped.SHARE if INSTALLED else PACKAGE.parent
 PROGRAM = "rparm" if INSTALLED else "./run.sh"
 
-STRUCTURE = "SystemStructure.ssd"
+LOOP = "loop.toml"  # the file of a system
 DIAGRAM = "system.svg"
 STUDY = "study"  # the module of a system's folder that rparm.systems.comparison describes
 IDENTIFICATION = "identification"  # module of a system's folder, read by identification.request
@@ -191,9 +191,9 @@ def making_references(folder: Path, name: str) -> str:
 
 def systems() -> dict[str, Path]:
     """Return the folders of all systems by name."""
-    found = sorted(path.parent for path in models_folder().glob(f"*/{STRUCTURE}"))
+    found = sorted(path.parent for path in models_folder().glob(f"*/{LOOP}"))
     if not found:
-        raise UserError(f"{models_folder()}: has no folder with {STRUCTURE}")
+        raise UserError(f"{models_folder()}: has no folder with {LOOP}")
     return {folder.name: folder for folder in found}
 
 
@@ -267,9 +267,9 @@ def built_for_all() -> Path:
     return shipped.unpacked(archive, ROOT / "build" / "built")
 
 
-def page_of_models() -> Path:
-    """Return the page that explains files with equations."""
-    return from_root(ROOT / "examples" / "models" / "README.md")
+def page(name: str) -> Path:
+    """Return a page that also the wheel has, by its path in the project."""
+    return from_root(ROOT / name)
 
 
 def model_builder() -> Path:

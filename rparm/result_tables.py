@@ -82,7 +82,7 @@ class FederationTable:
     def row(
         self, name: str, steps: int, difference: float, times: Sequence[float], passed: bool
     ) -> None:
-        shown = [f"{us:.1f}" if us < 10_000 else f"{us:.0f}" for us in times]
+        shown = ["-" if us != us else f"{us:.{1 if us < 10_000 else 0}f}" for us in times]
         self._table.row(name, [_count(steps), short(difference, 1), *shown], verdict(passed))
         if not passed:
             bound = f"above its bound {short(self._bound)}"
@@ -90,18 +90,22 @@ class FederationTable:
 
 
 class VariantTable:
-    """Runs of a system's variants, with the measures of the system."""
+    """Runs of a system's variants, with the measures of the system; `error` names their errors."""
 
-    def __init__(self, names: Iterable[str], measures: Sequence[Measure]) -> None:
+    def __init__(
+        self, names: Iterable[str], measures: Sequence[Measure], error: str = "error"
+    ) -> None:
         self._measures = measures
-        columns = {"error": 7}
+        columns = {error: max(7, *map(len, error.split()))}
         columns |= {m.name: max(9, *map(len, m.name.split())) for m in measures}
         self._table = Table("variant", names, {**columns, "time": 7})
 
     def row(self, outcome: Outcome) -> None:
         measured = (f"{_seven_digits(m.value(outcome))} {m.unit}" for m in self._measures)
-        cells = [short(outcome.error, 1), *measured, seconds(outcome.run.wall_time)]
-        self._table.row(outcome.variant, cells, verdict(outcome.passed))
+        error = short(outcome.error, 1) if outcome.errors else NONE
+        cells = [error, *measured, seconds(outcome.run.wall_time)]
+        good = "ran" if outcome.is_estimate else verdict(outcome.passed)
+        self._table.row(outcome.variant, cells, good)
         if not outcome.passed:
             bound = f"above its bound {short(BOUND)}"
             console.remark(f"error {short(outcome.error, 1)} of {outcome.worst}, {bound}")

@@ -17,6 +17,7 @@ from rparm.files import write_text, written
 from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS
 from rparm.runs import scenario
 from rparm.runs.inputs import BESIDE, CONSTANT, FILE, MEASURED, SINE, SINES, TABLE
+from rparm.systems import loop_file
 from rparm.units import NUMBER
 
 Schema = dict[str, Any]
@@ -64,7 +65,7 @@ def _without_null(found: Any) -> Any:
     return {key: _without_null(value) for key, value in found.items() if value is not None}
 
 
-def _of_scenarios() -> Schema:
+def _input() -> Schema:
     signal = {"anyOf": [*QUANTITY["anyOf"], {"type": "boolean"}]}
     row = {"type": "array", "prefixItems": [QUANTITY, signal], "minItems": 2, "maxItems": 2}
     shapes = {CONSTANT: signal, TABLE: _list(row), FILE: TEXT}
@@ -73,7 +74,12 @@ def _of_scenarios() -> Schema:
     beside["hold"] = {"type": "boolean"}
     one = {"oneOf": [{"required": [shape]} for shape in shapes]}
     one |= {"dependentRequired": {key: [shape] for key, shape in BESIDE.items()}}
-    of_file = {key: beside[key] for key, shape in BESIDE.items() if shape == FILE}
+    return _table(shapes | beside) | one
+
+
+def _of_scenarios() -> Schema:
+    given = _input()["properties"]
+    of_file = {key: given[key] for key, shape in BESIDE.items() if shape == FILE}
     length = {"if": {"type": "number"}, "then": {"exclusiveMinimum": 0}} | QUANTITY
     times = dict.fromkeys(scenario.TIMES, QUANTITY) | {"step": {"anyOf": [length, _list(length)]}}
     keys = {
@@ -83,12 +89,34 @@ def _of_scenarios() -> Schema:
         "panels": _list(_list({"type": "string"})),
         "time": _table(times, scenario.TIMES),
         **dict.fromkeys((PARAMETERS, INITIAL), _by_name({"type": ["number", "string", "boolean"]})),
-        INPUTS: _by_name(_table(shapes | beside) | one),
+        INPUTS: _by_name(_input()),
         MEASURED: _by_name(_table({FILE: TEXT} | of_file, [FILE])),
     }
     known = {key: keys[key] for key in (*scenario.REQUIRED, *scenario.OPTIONAL)}
     both = {"not": {"required": [scenario.MODEL, scenario.FMU]}}
     return {"$schema": DIALECT, "title": "Scenario"} | _table(known, scenario.REQUIRED) | both
+
+
+def _of_loops() -> Schema:
+    def of_variables(entry: Schema) -> Schema:
+        """By component.variable, or in a table by component."""
+        return _by_name({"anyOf": [entry, _by_name(entry)]})
+
+    value = {"type": ["number", "string", "boolean", "array"]}
+    times = dict.fromkeys(loop_file.TIMES, QUANTITY)
+    times["step"] = {"if": {"type": "number"}, "then": {"exclusiveMinimum": 0}} | QUANTITY
+    keys = {
+        "name": {"type": "string", "pattern": f"^{loop_file.NAME.pattern}$"},
+        "description": TEXT,
+        loop_file.KEEP: _list({"type": "string", "pattern": r"\."}),
+        loop_file.COMPONENTS: _by_name(TEXT),
+        loop_file.CONNECTIONS: of_variables({"type": "string", "pattern": r"\."}),
+        INPUTS: of_variables(_input()),
+        PARAMETERS: of_variables(value),
+        loop_file.VARIANTS: _by_name(of_variables(value) | {"properties": {"description": TEXT}}),
+    }
+    head = {"$schema": DIALECT, "title": "System"}
+    return head | _table(times | keys, loop_file.REQUIRED)
 
 
 def _list(item: Schema) -> Schema:
@@ -105,5 +133,5 @@ def _by_name(entry: Schema) -> Schema:
 
 
 KINDS: dict[str, Callable[[], Schema]] = {
-    "model": _of_models, "scenario": _of_scenarios, "campaign": _of_campaigns,
+    "model": _of_models, "scenario": _of_scenarios, "campaign": _of_campaigns, "loop": _of_loops,
 }  # fmt: skip

@@ -13,7 +13,7 @@ from rparm.models.system_figure import draw, draw_limit, tracking_error
 from rparm.models import system_figure
 from rparm.report.pages import STYLE
 from rparm.systems.comparison import Diagram, Outcome, Rest
-from rparm.systems.ssp import Ssp
+from rparm.systems.structure import OpenedSystem
 
 EFFORTS = (("tau1", "N·m"), ("f2", "N"))
 ARM = "arm"  # the component
@@ -56,7 +56,7 @@ def study_coupling(ssp: Path, report: Path) -> dict[str, dict[str, object]]:
 
 
 # ---- Picture of a run ----------------------------------------------------------------------------
-def figure(ssp: Ssp, outcome: Outcome) -> Figure:
+def figure(ssp: OpenedSystem, outcome: Outcome) -> Figure:
     """Joints over their references, tracking errors, efforts, and the end effector's path."""
     with mpl.rc_context(STYLE):
         picture = Figure(figsize=(14, 9), layout="constrained")

@@ -26,7 +26,7 @@ from rparm.fmi.model import Value
 from rparm.report.pages import ERROR_COLORS, RUN_COLOR, STYLE, save_figure
 from rparm.systems import ssp
 from rparm.systems.master import Master
-from rparm.systems.ssp import Ssp
+from rparm.systems.structure import OpenedSystem
 
 FOLDER = Path(__file__).resolve().parent
 VARIANTS = ("pick_and_place", "pick_and_place_untold")
@@ -61,7 +61,7 @@ METHODS = (
 )
 
 
-def parameters(opened: Ssp, variant: str) -> dict[str, dict[str, Value]]:
+def parameters(opened: OpenedSystem, variant: str) -> dict[str, dict[str, Value]]:
     """Values of a variant by component and name, with the controller in its continuous form."""
     values = {name: dict(found) for name, found in opened.system.parameter_sets[variant].items()}
     del values[SENSOR]
@@ -77,7 +77,7 @@ def reference(variant: str) -> Columns:
 
 
 def run(
-    opened: Ssp,
+    opened: OpenedSystem,
     fmus: Mapping[str, Fmu],
     method: Method,
     variant: str,

@@ -1,4 +1,4 @@
-"""The experiment that the references are made for; SystemStructure.ssd has to agree."""
+"""The experiment that the references are made for; loop.toml has to agree."""
 
 START, STOP = 0.0, 4.0  # s
 STEPS_PER_SECOND = 1000

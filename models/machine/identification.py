@@ -9,7 +9,7 @@ with noise, two ticks late.
 from pathlib import Path
 
 import numpy as np
-from rparm.models.machine.systems import VARIANT, write_system
+from rparm.models.machine.systems import VARIANT, changed
 
 from rparm import files, project
 from rparm.fmi.model import Value
@@ -79,11 +79,6 @@ def _write(machine: Path, log: Path, circle: dict[str, float]) -> None:
         values["trajectory"] = CIRCLE | circle
         values["controller"] |= FLAT
         values["plant"] |= FLAT | TRUE | {"breakaway_friction1": 0.0, "breakaway_friction2": 0.0}
-        changed = log.with_suffix(".ssp")
-        write_system(opened, changed, values, STOP, STEP)
-    try:
-        with ssp.unpacked(changed) as opened:
-            run = master.run_in_master(opened, VARIANT, list(COLUMNS.values()))
-    finally:
-        changed.unlink()
+        other = changed(opened, values, STOP, STEP)
+        run = master.run_in_master(other, VARIANT, list(COLUMNS.values()))
     files.write_trajectory(log, np.asarray(run.times), list(COLUMNS), run.values, None, True)

@@ -12,7 +12,7 @@ from rparm.models.system_figure import draw, draw_limit, tracking_error
 from rparm.models import system_figure
 from rparm.report.pages import ERROR_COLORS, MUTED, RUN_COLOR, STYLE
 from rparm.systems.comparison import Diagram, Measure, Outcome, Rest
-from rparm.systems.ssp import Ssp
+from rparm.systems.structure import OpenedSystem
 
 EFFORTS = (("tau1", "N·m"), ("f2", "N"))
 MOTORS = (("current", "A"), ("voltage", "V"))
@@ -69,7 +69,7 @@ REST = Rest(
 
 
 # ---- Picture of a run ----------------------------------------------------------------------------
-def figure(ssp: Ssp, outcome: Outcome) -> Figure:
+def figure(ssp: OpenedSystem, outcome: Outcome) -> Figure:
     """Joints over their references, errors, efforts, modes, motors, wall, and the path."""
     with mpl.rc_context(STYLE):
         picture = Figure(figsize=(14, 14), layout="constrained")
@@ -117,7 +117,7 @@ def figure(ssp: Ssp, outcome: Outcome) -> Figure:
     return picture
 
 
-def _draw_motor(axes: dict[str, Axes], ssp: Ssp, outcome: Outcome, joint: int) -> bool:
+def _draw_motor(axes: dict[str, Axes], ssp: OpenedSystem, outcome: Outcome, joint: int) -> bool:
     """Current and voltage of a motor; whether one of them is near its limit."""
     is_limited = False
     values = ssp.models["actuator"].start_values

@@ -30,7 +30,7 @@ from rparm.fmi.fmu_file import Fmu
 from rparm.report.pages import ERROR_COLORS, RUN_COLOR, STYLE, save_figure
 from rparm.systems import ssp
 from rparm.systems.master import Master
-from rparm.systems.ssp import Ssp
+from rparm.systems.structure import OpenedSystem
 
 FOLDER = Path(__file__).resolve().parent
 
@@ -221,7 +221,7 @@ def _product(depth: np.ndarray) -> float:
 
 
 # ---- Ecos ----------------------------------------------------------------------------------------
-def in_ecos(opened: Ssp) -> Measure:
+def in_ecos(opened: OpenedSystem) -> Measure:
 
     def measure(stiffness: float, damping: float) -> np.ndarray:
         run = run_in_ecos(opened, pressed(stiffness, damping), STEPS * STEP, STEP, [DEPTH])
@@ -231,7 +231,7 @@ def in_ecos(opened: Ssp) -> Measure:
 
 
 # ---- rparm's master ------------------------------------------------------------------------------
-def under_master(opened: Ssp, fmus: Mapping[str, Fmu], order: str, inputs: str) -> Measure:
+def under_master(opened: OpenedSystem, fmus: Mapping[str, Fmu], order: str, inputs: str) -> Measure:
     """Runs the machine under rparm's master; the controller sees the joints themselves."""
     connections = direct(opened.system.connections)
 

@@ -9,22 +9,24 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
 from rparm import project
 from rparm.campaign.campaign_file import Campaign, checked
-from rparm.campaign.job import Component, HeldInputs
+from rparm.campaign.job import Archive, Component, HeldInputs
 from rparm.errors import UserError, WrongValueError, did_you_mean, hint, placed
 from rparm.fmi.compiled_loop import Part
 from rparm.fmi.fmu_file import describe, read_model
 from rparm.fmi.model import INPUTS, Model, Value, Variable
 from rparm.runs import scenario
 from rparm.runs.scenario import MAX_STEPS, Scenario
-from rparm.systems import ssp
 from rparm.systems.master import start_value
-from rparm.systems.ssp import Connection, Ssp
+from rparm.systems.opened import SUFFIXES
+from rparm.systems.opened import opened as open_system
+from rparm.systems.python_component import PythonComponent
+from rparm.systems.structure import ALONE, Connection, OpenedSystem
 from rparm.units import quantity
 
 
@@ -36,7 +38,7 @@ class Base(ABC):
     """
 
     KIND: ClassVar[str]  # for messages
-    archives: dict[str, bytes]  # FMUs by their hash
+    archives: dict[str, Archive]  # FMUs and Python components by their hash
     tolerance: float | None = None
     questions: tuple[str, ...] = ()  # to ask the user about the scenario or system
     _fed: Collection[str] = ()  # inputs that outputs feed
@@ -176,7 +178,7 @@ class SystemBase(Base):
 
     KIND = "system"
 
-    def __init__(self, folder: str, opened: Ssp, variant: str, times: np.ndarray) -> None:
+    def __init__(self, folder: str, opened: OpenedSystem, variant: str, times: np.ndarray) -> None:
         self._ssp, self._system = opened, opened.system
         self._names = [component.name for component in self._system.components]
         self._parameters = self._system.parameter_sets[variant]
@@ -184,10 +186,27 @@ class SystemBase(Base):
         given = {f"{name}.": values for name, values in self._parameters.items()}
         super().__init__(opened.path, folder, times, models, given)
         self.questions = tuple(f"{opened.path.name}: {text}" for text in opened.notes)
-        contents = {name: opened.fmu(name).read_bytes() for name in self._names}
-        self._hashes = {name: _sha256(content) for name, content in contents.items()}
-        self.archives = {self._hashes[name]: content for name, content in contents.items()}
-        self._fed = {c.end for c in self._system.connections}
+        self._hashes, self.archives = {}, {}
+        for name in self._names:
+            content = self._archive(name)
+            is_python = isinstance(content, PythonComponent)
+            read = repr(content.__reduce__()).encode() if is_python else content
+            self._hashes[name] = _sha256(read)
+            self.archives[self._hashes[name]] = content
+        moved = self._system.inputs
+        self._fed = {*(c.end for c in self._system.connections), *moved}
+        for name, signal in moved.items():
+            kind = opened.variable(name).type
+            if kind not in ("Real", "Boolean"):
+                raise UserError(f"{opened.path}: {name}: moves, and is neither Real nor Boolean")
+            held = self._reals if kind == "Real" else self._switches
+            held[name] = signal.values(times - self._system.start)
+
+    def _archive(self, name: str) -> Archive:
+        if name not in self._ssp.python:
+            return self._ssp.fmu(name).read_bytes()
+        with self._ssp.unpacked_fmu(name) as component:
+            return cast(PythonComponent, component)
 
     def components(
         self, read: Sequence[tuple[int, str]], fixed: Mapping[tuple[int, str], Value]
@@ -203,6 +222,7 @@ class SystemBase(Base):
             return self._names.index(c.start_component), c.start_connector
 
         outputs = {"Real": list(read), "Boolean": []}
+        moved = {"Real": list(self._reals), "Boolean": list(self._switches)}
         for kind, known in outputs.items():
             every = dict.fromkeys([*known, *map(source, fed[kind])])
             known[:] = sorted(every, key=lambda key: key[0])
@@ -210,10 +230,13 @@ class SystemBase(Base):
         for i, name in enumerate(self._names):
             parts = {}
             for kind, known in outputs.items():
-                incoming = [c for c in fed[kind] if c.end_component == name]
+                held = moved[kind]  # is in front of the outputs
+                sources = {c.end: len(held) + known.index(source(c)) for c in fed[kind]}
+                sources |= {end: place for place, end in enumerate(held)}
+                own = {end: x for end, x in sources.items() if end.startswith(f"{name}.")}
                 parts[kind] = Part(
-                    tuple(self._reference(i, c.end_connector) for c in incoming),
-                    tuple(known.index(source(c)) for c in incoming),
+                    tuple(self._reference(i, end.partition(".")[2]) for end in own),
+                    tuple(own.values()),
                     tuple(self._reference(i, variable) for j, variable in known if j == i),
                 )
             with self._ssp.unpacked_fmu(name) as fmu:
@@ -228,7 +251,11 @@ class SystemBase(Base):
 
     @property
     def hashes(self) -> dict[str, str]:
-        return {self.path.name: _sha256(self.path.read_bytes())} | self._hashes
+        files = {self.path.name: _sha256(self.path.read_bytes())}
+        if not self._ssp.is_ssp:  # it may read others
+            read = self._parameters, *(x.tolist() for x in self._reals.values())
+            files[f"values of {self.path.name}"] = _sha256(repr(read).encode())
+        return files | self._hashes
 
 
 def _sha256(content: bytes) -> str:
@@ -252,11 +279,9 @@ def opened(
         yield ScenarioBase(path, loaded, model)
         return
     assert campaign.system is not None
-    with ssp.unpacked(given or _system_file(campaign.system, where)) as system:
+    with open_system(given or _system_file(campaign.system, where)) as system:
         variants = system.system.parameters
-        variant = campaign.variant
-        if variant is None and not system.system.has_sets:
-            variant = next(iter(variants))
+        variant = campaign.variant or (ALONE if ALONE in variants else None)
         if variant not in variants:
             wrong = f"missing key {'variant'!r}" if variant is None else f"no variant {variant!r}"
             raise UserError(f"{where}: variant: {wrong}{hint(variant or '', variants)}")
@@ -267,7 +292,7 @@ def opened(
 
 def _system_file(name: str, where: Path) -> Path:
     """Return the SSP of a system of the project, or a file beside the campaign's."""
-    if Path(name).suffix.lower() == ".ssp":
+    if Path(name).suffix.lower() in SUFFIXES:
         return where.parent / name
     folders = project.systems()
     if name not in folders:
@@ -283,7 +308,7 @@ def _said_of(where: object) -> Iterator[None]:
         raise UserError(f"{where}: {error}") from None
 
 
-def _system_times(opened: Ssp, given: Mapping[str, float]) -> np.ndarray:
+def _system_times(opened: OpenedSystem, given: Mapping[str, float]) -> np.ndarray:
     """Return the communication points (n + 1,) of a system in s, each computed from its number."""
     system = opened.system
     start = given.get("start", system.start)

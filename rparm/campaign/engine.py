@@ -33,7 +33,7 @@ from distributed.scheduler import KilledWorker
 from tornado.ioloop import PeriodicCallback
 
 from rparm.campaign.campaign_file import Campaign
-from rparm.campaign.job import Job
+from rparm.campaign.job import Archive, Job
 from rparm.campaign.planning import Points
 from rparm.campaign.results import RESUMES, Results
 from rparm.campaign.runs import Plugin, Rows, run_block
@@ -85,7 +85,7 @@ class Engine:
         client: distributed.Client,
         campaign: Campaign,
         job: Job,
-        archives: Mapping[str, bytes],
+        archives: Mapping[str, Archive],
         points: Points,
         results: Results,
     ) -> None:

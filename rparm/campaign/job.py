@@ -12,7 +12,9 @@ from numba import njit
 
 from rparm.fmi.compiled_loop import Part
 from rparm.fmi.model import Value
+from rparm.systems.python_component import PythonComponent
 
+Archive = bytes | PythonComponent  # content of an FMU, or a component in Python
 PLAIN = ("start", "final", "minimum", "maximum", "rms", "integral")  # of one variable
 LYAPUNOV = "lyapunov"
 FINAL_INTEGER = "final_integer"
@@ -142,7 +144,7 @@ class Component:
     """An instance of an FMU."""
 
     name: str
-    archive: str  # hash of its FMU
+    archive: str  # hash of its FMU or code
     values: dict[str, Value]  # set before initialization
     reals: Part
     switches: Part  # Booleans

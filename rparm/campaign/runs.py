@@ -9,15 +9,17 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, suppre
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import cast
 
 import numpy as np
 from distributed import Worker, WorkerPlugin, get_worker
 
-from rparm.campaign.job import Job, Recorded, Target
+from rparm.campaign.job import Archive, Job, Recorded, Target
 from rparm.errors import UserError, one_line
 from rparm.fmi.compiled_loop import Stepper, Tangent
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
+from rparm.systems.python_component import PythonComponent
 
 LONGEST_REASON = 500  # characters
 
@@ -154,18 +156,21 @@ class Runner(AbstractContextManager["Runner"]):
 
 
 @contextmanager
-def open_fmus(archives: Mapping[str, bytes], folder: Path) -> Iterator[dict[str, Fmu]]:
+def open_fmus(archives: Mapping[str, Archive], folder: Path) -> Iterator[dict[str, Fmu]]:
     """Unpack FMUs by their hash, in a folder."""
     with ExitStack() as stack:
         fmus = {}
         for digest, content in archives.items():
+            if isinstance(content, PythonComponent):
+                fmus[digest] = cast(Fmu, content)
+                continue
             path = _copy(folder, digest)
             path.write_bytes(content)
             fmus[digest] = stack.enter_context(Fmu(path, folder))
         yield fmus
 
 
-def check(job: Job, archives: Mapping[str, bytes], path: Path) -> None:
+def check(job: Job, archives: Mapping[str, Archive], path: Path) -> None:
     """Load the FMUs of a job and instantiate each; the UserError names `path` if that fails."""
     with TemporaryDirectory(prefix="rparm-") as name:
         folder = Path(name)
@@ -186,7 +191,7 @@ def _copy(folder: Path, digest: str) -> Path:
 class Workshop:
     """The FMUs of a job, unpacked on a worker, and a runner for each of its threads."""
 
-    def __init__(self, job: Job, archives: Mapping[str, bytes], within: Path | None) -> None:
+    def __init__(self, job: Job, archives: Mapping[str, Archive], within: Path | None) -> None:
         self._job, self._local = job, threading.local()
         self._stack, self._runners = ExitStack(), []
         folder = self._stack.enter_context(TemporaryDirectory(prefix="rparm-", dir=within))
@@ -211,7 +216,7 @@ class Workshop:
 class Plugin(WorkerPlugin):
     """FMUs and job of a campaign on a worker, which may serve others, too."""
 
-    def __init__(self, name: str, job: Job, archives: Mapping[str, bytes]) -> None:
+    def __init__(self, name: str, job: Job, archives: Mapping[str, Archive]) -> None:
         self.name, self._job, self._archives = name, job, archives
         self._workshop: Workshop | None = None
         self._lock = threading.Lock()
@@ -244,10 +249,10 @@ class Plugin(WorkerPlugin):
         if is_last:
             self._workshop.close()
 
-    def __getstate__(self) -> tuple[str, Job, Mapping[str, bytes]]:
+    def __getstate__(self) -> tuple[str, Job, Mapping[str, Archive]]:
         return self.name, self._job, self._archives
 
-    def __setstate__(self, state: tuple[str, Job, Mapping[str, bytes]]) -> None:
+    def __setstate__(self, state: tuple[str, Job, Mapping[str, Archive]]) -> None:
         self.__init__(*state)
 
 

@@ -19,7 +19,7 @@ from rparm import files, project
 from rparm.campaign import bases, campaign_file, planning, runs
 from rparm.campaign.bases import Base
 from rparm.campaign.campaign_file import Campaign
-from rparm.campaign.job import Job
+from rparm.campaign.job import Archive, Job
 from rparm.campaign.planning import FAILURE, RUN, Points, plan
 from rparm.campaign.results import Results
 from rparm.campaign.runs import Rows, Runner, open_fmus
@@ -160,7 +160,7 @@ def replay(
     return Replay(given, kept, [table, written], "")
 
 
-def _apart(job: Job, archives: Mapping[str, bytes], run: int, targets: np.ndarray) -> Rows | None:
+def _apart(job: Job, archives: Mapping[str, Archive], run: int, targets: np.ndarray) -> Rows | None:
     """Make a run in another process, which it may take down: None then."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()

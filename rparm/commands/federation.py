@@ -1,6 +1,7 @@
 """`federation` and `federate`: run a system with each FMU in its own process, coupled by HELICS."""
 
 import argparse
+import math
 import os
 import shlex
 import time
@@ -18,9 +19,10 @@ from rparm.federation.federation import Record
 from rparm.federation.network import KEY, key
 from rparm.files import check_writable, written
 from rparm.result_tables import FederationTable
-from rparm.systems import comparison, ecos, ssp
+from rparm.systems import comparison, ecos
 from rparm.systems.master import Master
-from rparm.systems.ssp import Ssp
+from rparm.systems.opened import SUFFIXES, opened
+from rparm.systems.structure import OpenedSystem
 from rparm.units import counted
 
 BOUND = 1e-12  # on the largest difference to the master, relative to the variable's largest value
@@ -28,11 +30,12 @@ BOUND = 1e-12  # on the largest difference to the master, relative to the variab
 
 def add_federation_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Runs variants of the closed loop with each FMU in its own process, coupled by HELICS, "
-        "and compares every value with that of the master that steps all in one process in "
-        "Jacobi order. The processes may be on several machines."
+        "Runs variants of the closed loop, or of the system in a file, with each component in its "
+        "own process, coupled by HELICS, and compares every value with that of the master that "
+        "steps all in one process in Jacobi order. The processes may be on several machines."
     )
-    parser.add_argument("names", nargs="*", metavar="NAME", help="variants (default: all)")
+    text = "a loop file or an SSP first; variants (default: all)"
+    parser.add_argument("names", nargs="*", metavar="NAME", help=text)
     add_system(
         parser,
         "the system (default: the closed loop)",
@@ -59,6 +62,8 @@ def do_federation(options: argparse.Namespace) -> Ended:
     """Run the variants; compare each with the master that steps all in one process."""
     network.separate_messages()
     path = options.ssp
+    if path is None and options.names and Path(options.names[0]).suffix.lower() in SUFFIXES:
+        path = Path(options.names.pop(0))
     if path is None:
         folder, _ = comparison.coupling_study()
         path = project.built(folder, ".ssp", "--ssp", options.fmi)
@@ -67,7 +72,7 @@ def do_federation(options: argparse.Namespace) -> Ended:
     if options.output:
         check_writable(options.output)
     key()  # a wrong one is refused before anything runs
-    with ssp.unpacked(path) as system:
+    with opened(path) as system:
         _check_names(system, options)
         console.messages(str(path), system.notes)
         names = options.names or list(system.system.parameters)
@@ -88,7 +93,9 @@ def do_federation(options: argparse.Namespace) -> Ended:
                     system, name, address, options.elsewhere, options.silence, progress, connected
                 )
             difference, master_time = _master(system, name, record)
-            ecos_time = ecos.run(system, name, comparison.recorded(system)).wall_time
+            ecos_time = math.nan
+            if not ecos.unsuited(system):
+                ecos_time = ecos.run(system, name, comparison.recorded(system)).wall_time
             passed = difference <= BOUND
             seconds = {"helics": record.wall_time, "ecos": ecos_time, "master": master_time}
             times = {by: 1e6 * s / steps for by, s in seconds.items()}
@@ -96,7 +103,8 @@ def do_federation(options: argparse.Namespace) -> Ended:
             if options.output:
                 _write(options.output / f"{name}.csv", record)
             row = {"name": name, "steps": steps, "difference": difference, "bound": BOUND}
-            rows.append({**row, "microseconds_per_step": times, "passed": passed})
+            known = {by: us for by, us in times.items() if math.isfinite(us)}
+            rows.append({**row, "microseconds_per_step": known, "passed": passed})
             failed += [] if passed else [name]
     code = 1 if failed else 0
     return Ended(code, console.verdict_line(failed, names, "variant"), {"variants": rows})
@@ -115,7 +123,7 @@ def _command(path: Path, variant: str, component: str, address: str) -> str:
     return f"{KEY}={key()} {project.PROGRAM} {shlex.join(arguments)}"
 
 
-def _check_names(system: Ssp, options: argparse.Namespace) -> None:
+def _check_names(system: OpenedSystem, options: argparse.Namespace) -> None:
     for kind, given, known in (
         ("variant", options.names, system.system.parameters),
         ("component", options.elsewhere, system.models),
@@ -128,9 +136,13 @@ def _check_names(system: Ssp, options: argparse.Namespace) -> None:
         raise UserError("--elsewhere: name one variant, which the other machine steps too")
 
 
-def _master(system: Ssp, variant: str, record: Record) -> tuple[float, float]:
+def _master(system: OpenedSystem, variant: str, record: Record) -> tuple[float, float]:
     """Compare with the Jacobi master: return the largest relative difference, and its time, s."""
-    with system.unpacked_fmus() as fmus, Master(fmus, real_connections(system)) as master:
+    signals = system.system.inputs
+    with (
+        system.unpacked_fmus() as fmus,
+        Master(fmus, real_connections(system), signals=signals) as master,
+    ):
         times = system.system.times
         master.initialize(times[0], times[-1], system.system.parameter_sets[variant])
         begin = time.perf_counter()
@@ -144,7 +156,7 @@ def _master(system: Ssp, variant: str, record: Record) -> tuple[float, float]:
 
 def add_federate_options(parser: argparse.ArgumentParser) -> None:
     parser.description = "Steps one component of a system until the federation has come to the end."
-    parser.add_argument("ssp", type=Path, metavar="SSP", help="the system")
+    parser.add_argument("ssp", type=Path, metavar="FILE", help="the system: a loop file or an SSP")
     parser.add_argument("variant", metavar="VARIANT")
     parser.add_argument("component", metavar="COMPONENT")
     parser.add_argument(
@@ -164,7 +176,7 @@ def do_federate(options: argparse.Namespace) -> Ended:
     if KEY not in os.environ:
         raise UserError(f"{KEY}: not in the environment, copy the whole line of the federation")
     key()
-    with ssp.unpacked(options.ssp) as system:
+    with opened(options.ssp) as system:
         made = parts(system, options.variant)
         if options.component not in made:
             known = hint(options.component, made, "there are")

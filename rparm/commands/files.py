@@ -4,18 +4,23 @@ import argparse
 import json
 import re
 import shlex
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
+from itertools import count
 from pathlib import Path
 
 from rparm import console, project, schemas
 from rparm.building import NEEDED
 from rparm.command_line import Ended, add_document, add_flag, add_fmi, add_output
-from rparm.errors import UserError
+from rparm.errors import UserError, closest, placed
 from rparm.files import check_for_windows, copied, create, from_folder, from_here, written
+from rparm.fmi.model import INPUTS, Model, Variable
 from rparm.project import VERSIONS
 from rparm.runs import scenario
+from rparm.systems.structure import times
 
 SUFFIX = ".toml"
+MODELS_PAGE, TUTORIAL = "examples/models/README.md", "docs/tutorial.md"
 MODEL_NAME = re.compile("[A-Za-z][A-Za-z0-9_]*", re.ASCII)
 MODEL_FILE = """\
 # A body on a spring: change it to what you simulate. examples/models/README.md explains the file.
@@ -43,6 +48,23 @@ energy = {{ value = "(mass * v**2 + spring * x) / 2", unit = "J" }}
 
 [check]                         # of parameters; the text is the message if it does not hold
 "a body with neither spring nor damper drifts away" = "k > 0 or c > 0"
+"""
+
+
+SYSTEM_FILE = """\
+# A system of FMUs. Run it by {program} system FILE.toml.
+name = {name}
+step = {step!r}  # s: outputs reach the inputs that they feed after each step
+stop = {stop!r}  # s
+
+[components]
+{components}
+
+[connections]  # "component.input" = "component.output"
+{guesses}
+[inputs]  # an input that neither this nor a connection feeds has its start value
+{inputs}
+[parameters]  # other values than those of the FMUs, as numbers or with a unit: "12 kg"
 """
 
 
@@ -110,11 +132,7 @@ def add_new_model_options(parser: argparse.ArgumentParser) -> None:
 
 
 def do_new_model(options: argparse.Namespace) -> Ended:
-    if not MODEL_NAME.fullmatch(options.name):
-        wrong = f"{options.name!r} is no name for a model"
-        raise UserError(f"{wrong}: a letter, then letters, digits, _")
-    check_for_windows(options.name)
-    path = (options.output or Path()) / f"{options.name}.toml"
+    path = _own_file(options, "model")
     of_schema = path.with_name("model.schema.json")
     # the packages that make it come with the compiler of `build`: without them there is none
     text = schemas.text("model") if all(map(find_spec, NEEDED)) else ""
@@ -126,6 +144,102 @@ def do_new_model(options: argparse.Namespace) -> Ended:
         create(of_schema, text)
     verdict = f"{path}: written; {project.PROGRAM} build {shlex.quote(str(path))} makes FMUs of it"
     return Ended(0, verdict, {"file": path.absolute()}, page=path.absolute())
+
+
+def _own_file(options: argparse.Namespace, kind: str) -> Path:
+    """Return the file for a new model or system; UserError for an impossible name."""
+    if not MODEL_NAME.fullmatch(options.name):
+        wrong = f"{options.name!r} is no name for a {kind}"
+        raise UserError(f"{wrong}: a letter, then letters, digits, _")
+    check_for_windows(options.name)
+    return (options.output or Path()) / f"{options.name}{SUFFIX}"
+
+
+def add_new_system_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Writes NAME.toml, a system of FMUs that runs as it is. Connections that names and units "
+        f"suggest are comments in it. Run it by {project.PROGRAM} system NAME.toml; "
+        f"{project.page(TUTORIAL)} begins from equations and a controller in Python."
+    )
+    parser.add_argument("name", metavar="NAME", help="of the system: letters, digits and _")
+    text = "files .fmu, or names of the project's; one may come several times"
+    parser.add_argument("fmus", nargs="+", metavar="FMU", help=text)
+    add_output(parser, "folder for the file (default: the current one)")
+
+
+def do_new_system(options: argparse.Namespace) -> Ended:
+    path = _own_file(options, "system")
+    found = _components(options.fmus, path.parent)
+    text = _system_file(path.stem, found)
+    with written(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    create(path, text)
+    verdict = f"{path}: written; run it by {project.PROGRAM} system {shlex.quote(str(path))}"
+    return Ended(0, verdict, {"file": path.absolute(), "components": list(found)}, page=path)
+
+
+def _components(given: Sequence[str], folder: Path) -> dict[str, tuple[str, Model]]:
+    """Return the source of each component, as a file in `folder` names it, and its description."""
+    from rparm.fmi.fmu_file import read_model  # takes long
+
+    found: dict[str, tuple[str, Model]] = {}
+    for text in given:
+        path = Path(text)
+        if path.suffix.lower() == ".fmu":
+            source = from_folder(path, folder)
+        else:
+            path = project.built(project.model(text), ".fmu")
+            source = path.stem
+        first = re.sub(r"\W", "_", path.stem, flags=re.ASCII)
+        names = (first if n == 1 else f"{first}{n}" for n in count(1))
+        name = next(name for name in names if name not in found)
+        found[name] = source, read_model(path)
+    return found
+
+
+def _system_file(name: str, components: Mapping[str, tuple[str, Model]]) -> str:
+    """Write a system without connections, with guesses of them as comments."""
+    models = {name: model for name, (_, model) in components.items()}
+    ends = any((model.experiment.stop or 0.0) > 0 for model in models.values())
+    with placed("default experiments"):
+        _, stop, step, _ = times(0.0, None if ends else scenario.USUAL_STOP, None, models)
+    guesses: list[str] = []
+    inputs: list[str] = []
+    for component, (_, model) in components.items():
+        for variable in (x for x in model.variables.values() if x.is_a(INPUTS)):
+            key = f"# {scenario.toml_text(f'{component}.{variable.name}')} ="
+            unit = f"  # {' '.join(variable.unit.split())}" if variable.unit else ""
+            feeding = _feeding(component, variable, components)
+            nothing = False if variable.type == "Boolean" else 0.0
+            start = nothing if variable.start is None else variable.written(variable.start)
+            constant = f"{key} {{ constant = {scenario.toml_value(start)} }}{unit}"
+            inputs += [] if feeding else [constant]
+            guesses += [f"{key} {scenario.toml_text(output)}{unit}" for output in feeding]
+    return SYSTEM_FILE.format(
+        program=project.PROGRAM,
+        name=scenario.toml_text(name),
+        step=step,
+        stop=stop,
+        components="\n".join(f"{x} = {scenario.toml_text(y)}" for x, (y, _) in components.items()),
+        guesses="".join(f"{line}\n" for line in guesses),
+        inputs="".join(f"{line}\n" for line in inputs),
+    )
+
+
+def _feeding(
+    component: str, variable: Variable, components: Mapping[str, tuple[str, Model]]
+) -> list[str]:
+    """Return outputs of its type and unit that have the input's name; else the most similar one."""
+    outputs = {
+        f"{other}.{output.name}": output.name
+        for other, (_, model) in components.items()
+        for output in model.variables.values()
+        if other != component and output.causality == "output"
+        and (output.type, output.unit) == (variable.type, variable.unit)
+    }  # fmt: skip
+    same = [output for output, name in outputs.items() if name == variable.name]
+    similar = closest(variable.name, outputs.values())
+    return same or [output for output, name in outputs.items() if name == similar][:1]
 
 
 def add_schema_options(parser: argparse.ArgumentParser) -> None:
@@ -150,7 +264,7 @@ def do_schema(options: argparse.Namespace) -> Ended:
 def add_build_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Makes FMUs of the equations in FILE.toml, for FMI 2.0 and 3.0: NAME.fmu and "
-        f"fmi3/NAME.fmu. {project.page_of_models()} explains the file. Beside it FILE.lock.toml "
+        f"fmi3/NAME.fmu. {project.page(MODELS_PAGE)} explains the file. Beside it FILE.lock.toml "
         "keeps the value references."
     )
     parser.add_argument("file", metavar="FILE.toml", type=Path, help="the file with the equations")
@@ -164,6 +278,36 @@ def do_build(options: argparse.Namespace) -> Ended:
     paths = build(options.file, output=options.output or Path(), platforms=options.platforms)
     verdict = f"{' and '.join(map(str, paths))}: built"
     return Ended(0, verdict, {"fmus": [path.absolute() for path in paths]})
+
+
+def add_ssp_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Writes NAME.ssp, SSP 1.0 of the system NAME in FILE.toml: its FMUs, connections and "
+        "variants. Inputs that move become inputs of the system. Components in Python are packed "
+        "as FMUs by pythonfmu."
+    )
+    parser.add_argument("file", metavar="FILE.toml", type=Path, help="the system")
+    add_fmi(parser, VERSIONS[0], "version of FMI of the project's and of built FMUs (default: 2)")
+    text = "the file, or a folder for it (default: the current one)"
+    parser.add_argument("-o", "--output", type=Path, metavar="PATH", default=Path(), help=text)
+
+
+def do_ssp(options: argparse.Namespace) -> Ended:
+    from rparm.systems import loop_file, ssp_writer  # take long
+
+    with loop_file.opened(options.file, version=options.fmi) as opened:
+        path, name = options.output, f"{opened.system.name}.ssp"
+        path = path if path.suffix.lower() == ".ssp" else path / name
+        with written(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            needed = ssp_writer.write(path, opened)
+        inputs = list(opened.system.inputs)
+    few = "inputs of the system, which Ecos and libcosim do not load"
+    notes = [f"{few}: {', '.join(inputs)}"] if inputs else []
+    notes += [f"{component} runs where there is {what}" for component, what in needed.items()]
+    console.messages(str(path), [*opened.notes, *notes])
+    document = {"file": path.absolute(), "inputs": inputs, "needs": needed}
+    return Ended(0, f"{path}: written", document, page=path)
 
 
 def add_fmu_options(parser: argparse.ArgumentParser) -> None:

@@ -4,14 +4,22 @@ import argparse
 from pathlib import Path
 
 from rparm import console, project
-from rparm.command_line import Ended, add_fmi, add_report, file_or_name, names, pairs, retyped
-from rparm.errors import WrongValueError
+from rparm.command_line import (
+    Ended,
+    add_fmi,
+    add_report,
+    file_or_name,
+    names,
+    pairs,
+    positive_seconds,
+    retyped,
+    seconds,
+)
+from rparm.errors import UserError
 from rparm.files import check_writable, from_here, written
-from rparm.units import SECONDS, typed_quantity
 
 MOST_COLUMNS, MOST_ROWS = 6, 12  # of matrices in the terminal
-SUFFIXES = (".fmu", ".ssp")
-SHORTEST = 1e-9  # s, of samples: pictures of much shorter ones overflow
+SUFFIXES = (".fmu", ".ssp", ".toml")
 
 
 def add_linearize_options(parser: argparse.ArgumentParser) -> None:
@@ -19,7 +27,10 @@ def add_linearize_options(parser: argparse.ArgumentParser) -> None:
         "Finds an equilibrium, and A, B, C and D about it; of a system also the margins of a "
         "loop that is broken, and the largest stable communication step."
     )
-    parser.add_argument("what", metavar="FMU|SSP", help="a file, or a name of the project")
+    text = "an FMU, a loop file, an SSP, or a name of the project"
+    parser.add_argument("what", metavar="FILE|NAME", help=text)
+    text = "parameter set of a system, as --variant"
+    parser.add_argument("given_variant", nargs="?", default="", metavar="VARIANT", help=text)
     add_fmi(parser, project.VERSIONS[0], "version of FMI where a name is given (default: 2)")
     parser.add_argument("--variant", default="", metavar="NAME", help="parameter set of a system")
     parser.add_argument(
@@ -27,7 +38,7 @@ def add_linearize_options(parser: argparse.ArgumentParser) -> None:
         help="states, inputs and parameters, with units as in 30deg; with --trim also outputs, and "
         "first guesses of what it moves",
     )  # fmt: skip
-    parser.add_argument("--time", type=_seconds, help="time of the point (default: the start)")
+    parser.add_argument("--time", type=seconds, help="time of the point (default: the start)")
     for option, text in (
         ("--trim", "states and inputs to move until the point is an equilibrium"),
         ("--inputs", "inputs of the model (default: all)"),
@@ -40,7 +51,7 @@ def add_linearize_options(parser: argparse.ArgumentParser) -> None:
         help="break the loop at this input, and find its margins",
     )  # fmt: skip
     parser.add_argument(
-        "--step", type=_positive_seconds, metavar="TIME", help="sample the model, too, inputs held"
+        "--step", type=positive_seconds, metavar="TIME", help="sample the model, too, inputs held"
     )
     parser.add_argument(
         "--save", nargs="+", default=[], type=Path, metavar="FILE", help=".json, .mat or .csv"
@@ -56,6 +67,9 @@ def do_linearize(options: argparse.Namespace) -> Ended:
         study.check_file(path)
     check_writable(options.report)
     console.stage(f"linearizing {options.what}")
+    if options.variant and options.given_variant:
+        raise UserError("--variant: a variant is given already")
+    options.variant = options.variant or options.given_variant
     request = study.Request(
         options.what, pairs("--at", options.at), options.time, names(options.trim or ()),
         options.inputs and names(options.inputs), options.outputs and names(options.outputs),
@@ -98,17 +112,3 @@ def _command(options: argparse.Namespace) -> str:
     for name in ("variant", "at", "time", "trim", "inputs", "outputs", "without", "cut", "step"):
         given["break" if name == "cut" else name] = getattr(options, name)
     return retyped("linearize", [file_or_name(options.what, SUFFIXES)], given)
-
-
-def _seconds(text: str) -> float:
-    try:
-        return typed_quantity(text, SECONDS)
-    except WrongValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
-
-
-def _positive_seconds(text: str) -> float:
-    seconds = _seconds(text)
-    if seconds < SHORTEST:
-        raise argparse.ArgumentTypeError(f"expected {SHORTEST:g} s or more, got {text!r}")
-    return seconds

@@ -1,4 +1,4 @@
-"""`system` and `coupling`: run systems, compare them, study what their coupling costs."""
+"""`system`: run systems, compare the project's with references, estimate errors of others."""
 
 import argparse
 from collections.abc import Sequence
@@ -6,26 +6,31 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from rparm import console, project
-from rparm.command_line import Ended, add_flag, add_report, add_system
-from rparm.errors import UserError, did_you_mean, hint, together
+from rparm.command_line import Ended, add_flag, add_report, add_step, add_system
+from rparm.console import Progress
+from rparm.errors import UserError, did_you_mean, together
 from rparm.files import check_writable, from_here, written
 from rparm.project import PROGRAM
 from rparm.report import overview, system_page
 from rparm.report.overview import Entry
 from rparm.report.system_page import Section
 from rparm.result_tables import VariantTable
-from rparm.systems import comparison, ecos, master, ssp
-from rparm.systems.comparison import Outcome
+from rparm.systems import comparison, ecos, master
+from rparm.systems.comparison import Outcome, Reference
+from rparm.systems.opened import SUFFIXES, opened
 from rparm.units import counted
 
 
 def add_system_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Runs the variants of the systems in Ecos and compares every variable with the reference."
+        "Runs the variants of the systems in Ecos and compares every variable with the reference. "
+        "A system of your own, loop.toml or an SSP, has no reference: half the step shows how much "
+        "the coupling costs."
     )
     add_system(parser)
-    text = "variants, or systems with all theirs (default: all)"
+    text = "a file FILE.toml or FILE.ssp first; variants, or systems with all theirs (default: all)"
     parser.add_argument("names", nargs="*", metavar="NAME", help=text)
+    add_step(parser)
     add_report(parser)
     text = "draw each variant into a picture in this folder, too"
     parser.add_argument("--pictures", type=Path, metavar="DIR", help=text)
@@ -36,7 +41,7 @@ def do_system(options: argparse.Namespace) -> Ended:
     """Run the variants that the options name, or all; or name them."""
     with ExitStack() as stack:
         try:
-            systems = [_opened(path, stack) for path in _paths(options)]
+            systems = [_opened(path, options, stack) for path in _paths(options)]
         except UserError:
             if not options.list:
                 # if a system cannot be run, older results must not pass for new ones
@@ -53,12 +58,16 @@ def do_system(options: argparse.Namespace) -> Ended:
         check_writable(options.report)
         with written(options.report):
             for system, names in chosen:
-                system_page.remove(options.report, system.name, names)
+                system_page.remove(options.report, system.name, [*map(system.page, names)])
         return _run(chosen, options)
 
 
 def _paths(options: argparse.Namespace) -> list[Path]:
     """Return the SSPs to open: the given one, or all that the names may be of."""
+    if options.names and Path(options.names[0]).suffix.lower() in SUFFIXES:
+        if options.ssp:
+            raise UserError(f"{options.names[0]}: --ssp names another file, {options.ssp}")
+        options.ssp = Path(options.names.pop(0))
     if options.ssp:
         return [options.ssp]
     folders = project.systems()
@@ -67,14 +76,14 @@ def _paths(options: argparse.Namespace) -> list[Path]:
     return [project.built(folder, ".ssp", "--ssp", options.fmi) for folder in folders.values()]
 
 
-def _opened(path: Path, stack: ExitStack) -> Section:
-    """Open the system in an SSP, with the folder that it is from."""
-    unpacked = stack.enter_context(ssp.unpacked(path))
-    name, folders = unpacked.system.name, project.systems()
-    if name not in folders:
-        raise UserError(f"{path}: no system {name!r} has references{hint(name, folders)}")
-    console.messages(str(path), unpacked.notes)
-    return Section(folders[name], unpacked)
+def _opened(path: Path, options: argparse.Namespace, stack: ExitStack) -> Section:
+    """Open the system in a file, with the folder that it is from, if it is the project's."""
+    system = stack.enter_context(opened(path, options.step, options.fmi))
+    folder = project.systems().get(system.system.name)
+    if folder is None and options.pictures:
+        raise UserError(f"--pictures: {path} is no system of the project, which has pictures")
+    console.messages(str(path), system.notes)
+    return Section(folder, system)
 
 
 def _choose(systems: Sequence[Section], names: Sequence[str]) -> list[tuple[Section, list[str]]]:
@@ -102,50 +111,60 @@ def _choose(systems: Sequence[Section], names: Sequence[str]) -> list[tuple[Sect
 
 def _run(chosen: Sequence[tuple[Section, Sequence[str]]], options: argparse.Namespace) -> Ended:
     """Run variants; a row appears as a variant ends, and its files are written then."""
-    plans = []
+    plans: list[tuple[Section, dict[str, Reference | None]]] = []
     for system, names in chosen:
-        given = system.folder, system.study.EXPERIMENT
-        plans.append((system, {n: comparison.load_reference(system.ssp, n, *given) for n in names}))
+        references: dict[str, Reference | None] = dict.fromkeys(names)
+        if system.folder and system.study:
+            given = system.folder, system.study.EXPERIMENT
+            references = {n: comparison.load_reference(system.ssp, n, *given) for n in names}
+        plans.append((system, references))
     outcomes: list[Outcome] = []
     failures: dict[str, UserError] = {}
+    code = 1
     entries: list[Entry] = []
     rows: list[dict[str, object]] = []
-    absent = ecos.absent()
-    engine, where = (master.run_in_master, "this process") if absent else (ecos.run, "Ecos")
-    if absent:
-        print(f"{absent}: the master of rparm steps the systems, in the same order as Ecos")
     for section, references in plans:
+        why_not = ecos.absent() if section.folder else ecos.unsuited(section.ssp)
+        engine, where = (master.run_in_master, "this process") if why_not else (ecos.run, "Ecos")
+        if why_not:
+            steps = f"the master of rparm steps {section.name}, in the same order as Ecos"
+            print(f"{why_not}: {steps}")
         console.stage(f"simulating {counted(references, 'variant')} of {section.name} in {where}")
-        table = VariantTable(references, section.study.MEASURES)
+        error_title = "error" if section.folder else "coupling error"
+        table = VariantTable(references, section.measures, error_title)
         for name, reference in references.items():
             try:
-                outcome = comparison.simulate(section.ssp, name, reference, engine)
+                outcome = _simulated(section, name, reference, engine)
             except UserError as error:
                 failures[name] = error
                 table.failed(name)
                 rows.append({"system": section.name, "name": name, "error": str(error)})
+                code = max(code, error.code)
                 with written(options.report):
                     entries.append(system_page.write_failed(options.report, section, name, error))
                 continue
             table.row(outcome)
-            measures = {m.name: (m.value(outcome), m.unit) for m in section.study.MEASURES}
+            measures = {m.name: (m.value(outcome), m.unit) for m in section.measures}
+            found = {"error": outcome.error, "worst": outcome.worst} if outcome.errors else {}
+            if outcome.is_estimate:
+                console.remark(system_page.estimate(section, outcome))
+                found = {f"coupling_{key}": value for key, value in found.items()}
+            else:
+                found |= {"bound": comparison.BOUND, "passed": outcome.passed}
             rows.append(
                 {
                     "system": section.name,
                     "name": outcome.variant,
                     "steps": outcome.steps,
-                    "error": outcome.error,
-                    "worst": outcome.worst,
-                    "bound": comparison.BOUND,
+                    **found,
                     "measures": {m: {"value": v, "unit": u} for m, (v, u) in measures.items()},
                     "seconds": outcome.run.wall_time,
-                    "passed": outcome.passed,
                 }
             )
             console.messages(name, outcome.run.messages)
             with written(options.report):
                 entries.append(system_page.write_variant(options.report, section, outcome))
-            if options.pictures:
+            if options.pictures and section.study:
                 from rparm.report.pages import save_figure  # matplotlib takes long to import
 
                 with written(options.pictures):
@@ -159,36 +178,22 @@ def _run(chosen: Sequence[tuple[Section, Sequence[str]]], options: argparse.Name
     print(f"report: {from_here(index)}")
     failed = [*failures, *(outcome.variant for outcome in outcomes if not outcome.passed)]
     verdict = console.verdict_line(failed, rows, "variant")
+    if not failed and not any(section.folder for section, _ in plans):
+        verdict = verdict.replace("passed", "ran")
     document = {"passed": not failed, "variants": rows, "report": index.absolute()}
     if failures:
-        return Ended(2, verdict, document, together(list(failures.values())), index)
+        return Ended(code, verdict, document, together(list(failures.values())), index)
     return Ended(1 if failed else 0, verdict, document, page=index)
 
 
-def add_coupling_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Steps the system in several orders, with inputs held and extrapolated and with step-size "
-        "control, and compares it with the solution in continuous time; predicts and measures the "
-        "largest stable steps of each system."
-    )
-    add_system(parser)
-    add_report(parser, "system")
-
-
-def do_coupling(options: argparse.Namespace) -> Ended:
-    from rparm.linearization.largest_step import study_steps
-
-    folder, known = comparison.coupling_study()
-    path = options.ssp or project.built(folder, ".ssp", "--ssp", options.fmi)
-    check_writable(options.report)
-    console.stage(f"studying the coupling of {folder.name}")
-    parts = known.study_coupling(path, options.report)
-    for other, rest in comparison.rests().items():
-        if other != folder and not options.ssp:
-            ssp = project.built(other, ".ssp", version=options.fmi)
-            parts[f"largest steps of {other.name}"] = study_steps(ssp, rest)
-    failed = [name for name, part in parts.items() if not part["passed"]]
-    picture = (options.report / known.COUPLING_PICTURE).absolute()
-    verdict = console.verdict_line(failed, parts, "part")
-    document = {"parts": parts, "picture": picture}
-    return Ended(1 if failed else 0, verdict, document, page=picture)
+def _simulated(
+    section: Section, name: str, reference: Reference | None, engine: comparison.Engine
+) -> Outcome:
+    """Run a variant, with a bar on a terminal if that takes long."""
+    steps = section.ssp.system.steps
+    if reference is not None:
+        with Progress(name, steps) as progress:
+            return comparison.simulate(section.ssp, name, reference, engine, progress)
+    estimates = not comparison.why_no_estimate(section.ssp)
+    with Progress(name, 3 * steps if estimates else steps) as progress:
+        return comparison.run_alone(section.ssp, name, section.names, progress)

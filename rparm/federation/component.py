@@ -9,7 +9,7 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from threading import Event, Thread
 from typing import TypeVar
 
@@ -22,7 +22,7 @@ from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value
 from rparm.interruption import ENDINGS
 from rparm.systems.master import begin_instance, check_finite
-from rparm.systems.ssp import Connection, Ssp
+from rparm.systems.structure import Connection, OpenedSystem
 
 Result = TypeVar("Result")
 POLL = 0.05  # s, between two looks
@@ -50,7 +50,8 @@ class Part:
     constant: tuple[str, ...]  # outputs that feed an input which is no Real: they must not change
     rounds: int  # exchanges in initialization after which no output changes any more
     times: np.ndarray  # s, communication points
-    system: str  # variant and SHA-256 of the SSP, the same in all processes
+    system: str  # variant and SHA-256 of the system's file, the same in all processes
+    moved: dict[str, np.ndarray] = field(default_factory=dict)  # (times,) inputs from outside
 
     def check_same(self, other: str) -> None:
         """Refuse to step with a federation of another variant, or of another SSP."""
@@ -61,12 +62,12 @@ class Part:
             variants = f"its variant is {here!r}, that of the federation is {there!r}"
             raise UserError(f"{self.component}: {variants}")
         raise UserError(
-            f"{self.component}: its SSP is not that of the federation (SHA-256 {own[:12]}..., "
+            f"{self.component}: its file is not that of the federation (SHA-256 {own[:12]}..., "
             f"expected {foreign[:12]}...): copy the file"
         )
 
 
-def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
+def parts(ssp: OpenedSystem, variant: str) -> dict[str, Part]:
     """Return the parts of a variant, by component; UserError if it is unknown."""
     system = ssp.system
     if variant not in system.parameters:
@@ -78,6 +79,9 @@ def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
     def source(c: Connection) -> Source:
         return Source(c.start_component, published[c.start_component].index(c.start_connector))
 
+    for name in system.inputs:
+        if ssp.variable(name).type != "Real":
+            raise UserError(f"{ssp.path}: {name}: moves; processes exchange only Real values")
     made = {}
     for component in system.components:
         name = component.name
@@ -94,11 +98,16 @@ def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
             rounds=len(system.components) + 1,
             times=system.times,
             system=whole,
+            moved={
+                end.partition(".")[2]: signal.values(system.elapsed)
+                for end, signal in system.inputs.items()
+                if end.startswith(f"{name}.")
+            },
         )
     return made
 
 
-def real_connections(ssp: Ssp) -> Sequence[Connection]:
+def real_connections(ssp: OpenedSystem) -> Sequence[Connection]:
     return [c for c in ssp.system.connections if ssp.variable(c.start).type == "Real"]
 
 
@@ -144,6 +153,7 @@ class _Stepper:
         self._part, self._instance, self._federate = part, instance, federate
         self._outputs = instance.reals(part.published)
         self._inputs = instance.reals(part.inputs)
+        self._moved = instance.reals(list(part.moved))
 
     def run(self) -> None:
         self._initialize()
@@ -151,7 +161,7 @@ class _Stepper:
         times = self._part.times.tolist()
         for point, (start, end) in enumerate(zip(times[:-1], times[1:], strict=True), start=1):
             with self._instance.explained(f"in the step from t = {start!r} s"):
-                self._take()
+                self._take(point - 1)
                 self._instance.do_step(start, end - start)
             with self._instance.explained(f"at t = {end!r} s"):
                 self._give(f"at t = {end!r} s")
@@ -172,15 +182,18 @@ class _Stepper:
             before = self._outputs.view.copy()
             self._federate.exchange()
             with instance.explained("in initialization"):
-                self._take()
+                self._take(0)
             self._give_early()
         if not np.array_equal(before, self._outputs.view):
             raise UserError(f"{part.component}: the connections form an algebraic loop")
         self._federate.begin()
         instance.exit_initialization()
 
-    def _take(self) -> None:
-        """Set the inputs to what their sources have published."""
+    def _take(self, point: int) -> None:
+        """Set the inputs to what their sources have published, or to their values at a time."""
+        if self._part.moved:
+            self._moved.view[:] = [values[point] for values in self._part.moved.values()]
+            self._moved.set()
         if self._part.inputs:
             values = self._federate.read()
             self._inputs.view[:] = [values[s.component][s.index] for s in self._part.sources]
@@ -197,13 +210,7 @@ class _Stepper:
         self._federate.publish(self._outputs.view)
 
     def _constants(self) -> list[object]:
-        model = self._instance.fmu.model
-        return [
-            self._instance.boolean(name)
-            if model.variables[name].type == "Boolean"
-            else self._instance.integer(name)
-            for name in self._part.constant
-        ]
+        return [self._instance.discrete(name) for name in self._part.constant]
 
 
 # ---- Watching ------------------------------------------------------------------------------------

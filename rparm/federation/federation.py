@@ -17,7 +17,7 @@ from rparm.federation import SILENCE
 from rparm.federation.component import LEAVE, POLL, Part, Silence, parts, run_watched
 from rparm.federation.network import ABSENT, ANSWER, ENDED, Broker, Federate
 from rparm.interruption import temporary_folder, uninterrupted
-from rparm.systems.ssp import Ssp
+from rparm.systems.structure import OpenedSystem
 
 RECORDER = "recorder"
 
@@ -38,7 +38,7 @@ def arguments(ssp: Path, variant: str, component: str, address: str) -> list[str
 
 
 def run(
-    ssp: Ssp,
+    ssp: OpenedSystem,
     variant: str,
     address: str,
     elsewhere: Collection[str] = (),

@@ -246,9 +246,12 @@ class Instance(ABC):
     @abstractmethod
     def _integer(self, reference: int) -> int: ...
 
-    def boolean(self, name: str) -> bool:
+    def discrete(self, name: str) -> int:
+        """Return the value of a Boolean (0 or 1), Integer or Enumeration."""
+        variable = self.fmu.model.variables[name]
+        getter = self.SETTERS[variable.type].replace("set", "get")
         with self.explained(f"({name})"):
-            return bool(self.fmi.getBoolean([self.fmu.model.variables[name].reference])[0])
+            return int(getattr(self.fmi, getter)([variable.reference])[0])
 
     def reals(self, names: Sequence[str], memory: Array | None = None) -> Reals:
         """Return Real variables to get or set together, many times, in `memory` if given."""

@@ -30,7 +30,6 @@ def write(
     """Write the page and its picture into a folder; its path. `again` is what makes it again."""
     picture = figure_of(found.whiteness, found.known, found.covariances.scatter)
     pages.save_figure(picture, folder / PICTURE)
-    pages.write_assets(folder)
     logs = ", ".join(recording.path.name for recording in found.recordings)
     page = pages.RunPage(
         title=f"{found.model}: identified parameters",
@@ -50,8 +49,7 @@ def write(
         again=again,
         overview=False,
     )
-    values = {"root": "", "page": page, "data": page.data and page.data.json()}
-    return pages.write_page(folder / pages.INDEX, "run.html", **values)
+    return pages.write_alone(folder, page)
 
 
 # ---- Plots ---------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from rparm.linearization.system import SystemSubject, connected, looped
 from rparm.systems import ssp
 from rparm.systems.comparison import Rest
 from rparm.systems.master import INPUT_MODES, ORDERS, Master
-from rparm.systems.ssp import Connection
+from rparm.systems.structure import Connection
 from rparm.units import verdict
 
 FASTEST, SLOWEST = 1e-3, 1e2  # of the time scales of fastest and slowest pole: steps to try
@@ -50,17 +50,35 @@ def largest_steps(
     parts: Mapping[str, Linear],
     connections: Sequence[Connection],
     ways: Sequence[tuple[str, str]] = tuple((o, i) for o in ORDERS for i in INPUT_MODES),
+    law: Callable[[str, float], Linear] | None = None,
 ) -> list[LargestStep]:
-    """Find the limit of each way to step `parts`, in their order; empty if there is no loop."""
+    """Find the limit of each way to step `parts`, in their order; empty if there is no loop.
+
+    `law` gives the model of a sampled part, which is called once a step, at another step.
+    """
     loop = looped(parts, connections)
     if not loop.parts:
         return []
-    poles = connected(loop.parts, loop.connections).poles
+    laws = [part.dt for part in loop.parts.values() if part.dt]
+    if laws:
+        own = [part.poles for part in loop.parts.values() if not part.dt]
+        poles = np.concatenate([*own, 1 / np.array(laws)])
+    else:
+        poles = connected(loop.parts, loop.connections).poles
     rates = np.abs(poles[poles != 0])
     rates = rates if len(rates) else np.ones(1)
     count = 1 + math.ceil(math.log(SLOWEST / FASTEST * rates.max() / rates.min(), RATIO))
     tried = np.geomspace(FASTEST / rates.max(), SLOWEST / rates.min(), count)
-    held = cache(lambda name, step: hold(loop.parts[name].A, loop.parts[name].B, step))
+
+    @cache
+    def held(name: str, step: float) -> Held:
+        part = loop.parts[name]
+        if not part.dt or law is None:
+            return hold(part.A, part.B, step)
+        found = law(name, step)
+        found = found.without(set(found.states).difference(part.states))
+        found = found.select(part.inputs, part.outputs)
+        return found.A, found.B, np.zeros_like(found.B)
 
     def eigenvalues(step: float, way: tuple[str, str]) -> np.ndarray:
         return np.linalg.eigvals(transition(loop.parts, loop.connections, step, *way, held))

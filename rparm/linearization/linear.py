@@ -12,7 +12,16 @@ from rparm.errors import UnplacedError, UserError, WrongValueError, did_you_mean
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import PARAMETERS, Model, Value, Variable
-from rparm.linearization.sampling import Tick, held_numbers, hold, period, samplers, ticks
+from rparm.linearization.sampling import (
+    Tick,
+    held_numbers,
+    hold,
+    law,
+    period,
+    samplers,
+    ticks,
+)
+from rparm.systems.python_component import PythonComponent, PythonInstance
 from rparm.units import typed_quantity
 
 if TYPE_CHECKING:
@@ -313,8 +322,35 @@ def _check_finite(instance: Instance, names: list[str], numbers: np.ndarray) -> 
         raise UserError(f"{instance.name}: {names[bad[0]]} or a derivative of it is not finite")
 
 
+def law_model(instance: PythonInstance, time: float, step: float, u: np.ndarray) -> Linear:
+    """Linearize a component in Python at a time, s, with inputs u (m,), as sampled every `step`."""
+    found, inputs = law(instance, time, step, u), tuple(instance.made.inputs)
+    outputs = tuple(instance.made.outputs)
+    n, p = len(found.states), len(outputs)
+    return Linear(
+        states=found.states,
+        inputs=inputs,
+        outputs=outputs,
+        A=found.partials[:, :n],
+        B=found.partials[:, n:],
+        C=np.eye(p, n, n - p),
+        D=np.zeros((p, len(inputs))),
+        x=found.x,
+        u=u,
+        y=found.x[n - p :],
+        rates=(found.after - found.x) / step,
+        at=dict(zip((*found.states, *inputs), [*found.x.tolist(), *u.tolist()], strict=True)),
+        dt=step,
+    )
+
+
 def require_derivatives(fmu: Fmu) -> None:
-    """Refuse an FMU that gives no directional derivatives."""
+    """Refuse an FMU that gives no directional derivatives, or Python that has no save()."""
+    if isinstance(fmu, PythonComponent):
+        if not fmu.model.saves_states:
+            why = "has no save() and restore(state), which a linear model needs"
+            raise UserError(f"{fmu.path}: {why}")
+        return
     if not fmu.model.gives_directional_derivatives:
         raise UserError(f"{fmu.path}: gives no directional derivatives, which A, B, C, D are from")
 

@@ -1,6 +1,10 @@
 """Margins of a loop: by how much its gain, phase and delay may change until it becomes unstable.
 
 The loop is broken at a signal: L is what comes back, with its sign changed, by what is sent in.
+
+A sampled loop is taken to the plane of w by z = (1 + w T/2) / (1 - w T/2): the unit circle becomes
+the imaginary axis, where gains and phases of L are the same and frequencies are tan(omega T/2) 2/T.
+A further delay is exact in whole samples.
 """
 
 import math
@@ -9,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rparm.errors import UserError
 from rparm.linearization import responses
 from rparm.linearization.linear import Linear, cleared, zeros
 
@@ -46,27 +51,63 @@ def open_loop(broken: Linear) -> Linear:
 
 def margins(loop: Linear) -> Margins:
     """Return the margins of a loop L, which has one input and one output and is minimal."""
+    if loop.dt:
+        in_w = _in_w(loop)
+        found = margins(in_w)
+        gains, turns = (
+            tuple(_real(crossing, loop.dt) for crossing in crossings)
+            for crossings in (found.gain_crossings, found.phase_crossings)
+        )
+        found = replace(found, gain_crossings=gains, phase_crossings=turns)
+        # with a gain of 1 or more at the end of frequencies, a delay of one sample is too much
+        delays = [*_delays(found), *([loop.dt] if abs(in_w.D[0, 0]) >= 1 else [])]
+        delay = min(delays, default=math.inf)
+        return replace(found, delay=delay) if found.stable else found
     grid = searched(loop)
     gains = tuple(_crossings(loop, grid, lambda value: np.abs(value) - 1))
     turns = (*_crossings(loop, grid, np.imag), *_ends(loop))
     turns = tuple(found for found in turns if found.value.real < 0)
-    poles = closed(loop).poles
+    poles = closed(loop).poles if 1 + loop.D[0, 0] else np.zeros(1)
     if not np.all(poles.real < -ROUNDING * np.abs(poles)):
         return Margins(False, math.nan, math.nan, math.nan, math.nan, gains, turns)
     factors = [1 / abs(found.value) for found in turns]
-    lags = [(math.pi + float(np.angle(found.value))) % (2 * math.pi) for found in gains]
-    delays = [lag / found.frequency for lag, found in zip(lags, gains, strict=True)]
-    if abs(loop.D[0, 0]) >= 1:
-        delays.append(0.0)  # at high frequencies any delay is too much
-    return Margins(
+    found = Margins(
         stable=True,
         gain_up=min((factor for factor in factors if factor > 1), default=math.inf),
         gain_down=max((factor for factor in factors if factor < 1), default=0.0),
-        phase=math.degrees(min(lags, default=math.nan)),
-        delay=min(delays, default=math.inf),
+        phase=math.degrees(min(map(_lag, gains), default=math.nan)),
+        delay=math.inf,
         gain_crossings=gains,
         phase_crossings=turns,
     )
+    # at high frequencies any delay is too much
+    delays = [*_delays(found), *([0.0] if abs(loop.D[0, 0]) >= 1 else [])]
+    return replace(found, delay=min(delays, default=math.inf))
+
+
+def _lag(crossing: Crossing) -> float:
+    """Return the further lag in rad that makes a crossing of gain 1 one of phase -180 degrees."""
+    return (math.pi + float(np.angle(crossing.value))) % (2 * math.pi)
+
+
+def _delays(found: Margins) -> list[float]:
+    return [_lag(crossing) / crossing.frequency for crossing in found.gain_crossings]
+
+
+def _in_w(loop: Linear) -> Linear:
+    """Take a sampled loop to the plane of w."""
+    half, one = loop.dt / 2, np.eye(len(loop.A))
+    try:
+        inverse = np.linalg.inv(one + loop.A)
+    except np.linalg.LinAlgError:
+        raise UserError("the broken loop has a pole at -1: its margins are not known") from None
+    A, B = inverse @ (loop.A - one) / half, inverse @ loop.B
+    return replace(loop, A=A, B=B, C=2 / half * loop.C @ inverse, D=loop.D - loop.C @ B, dt=0.0)
+
+
+def _real(crossing: Crossing, step: float) -> Crossing:
+    """Return a crossing in the plane of w at its frequency."""
+    return replace(crossing, frequency=2 / step * math.atan(crossing.frequency * step / 2))
 
 
 def _ends(loop: Linear) -> Iterator[Crossing]:
@@ -92,6 +133,8 @@ def searched(loop: Linear) -> np.ndarray:
     Crossings are zeros of L(s) L(-s) - 1 and L(s) - L(-s) on the axis. Rounding moves them as
     eigenvalues, so they only say where to look, as poles and zeros do.
     """
+    if loop.dt:
+        return 2 / loop.dt * np.arctan(searched(_in_w(loop)) * loop.dt / 2)
     scale = responses.suited(loop.A, loop.B, loop.C)
     A, B, C, D = loop.A * scale / scale[:, None], loop.B / scale[:, None], loop.C * scale, loop.D
     none = np.zeros_like(A)

@@ -38,6 +38,7 @@ STEPS = (
     "grow, though each component is integrated exactly. The frequency is that of the motion that "
     "grows."
 )
+ABOUT = "How small deviations move about one point: x' = A x + B u, y = C x + D u."
 POINT = (
     "Values about which the model is linearized. Far from them it is less accurate: compare it "
     "with a run."
@@ -96,6 +97,7 @@ def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
         "linearization.html",
         root="",
         title=f"{name}: linear model",
+        about=ABOUT,
         again=again,
         notes=[*notes(found), *_not_drawn(found)],
         parts=parts,
@@ -133,7 +135,12 @@ def _not_drawn(found: Study) -> list[str]:
 def notes(found: Study) -> list[str]:
     """Say what has been left out, in a sentence each."""
     linear, texts = found.linear, []
-    if linear.dt:
+    if found.python:
+        texts.append(
+            f"Sampled every {milliseconds(linear.dt)}, the communication step, because of Python: "
+            f"{_names(found.python)}. States are those at its begin; inputs are held over it."
+        )
+    elif linear.dt:
         names = _names(list(dict.fromkeys(tick.name for tick in linear.ticks)))
         texts.append(
             f"Sampled every {milliseconds(linear.dt)} by {names}. States are those just before the "
@@ -156,7 +163,7 @@ def notes(found: Study) -> list[str]:
             f"Not in the loop: {_names(found.loop.dropped)}. The break does not move them, or they "
             "do not come back to it, or others stand for them."
         )
-        hidden = found.loop.hidden
+        hidden = found.loop.rates_of(found.loop.hidden)
         growing = hidden[hidden.real > REAL * np.abs(hidden)]
         if len(growing):
             texts.append(
@@ -336,7 +343,7 @@ def nyquist_figure(loop: Linear, step: float | None) -> Figure:
         figure = Figure(figsize=(6, 6), layout="constrained")
         axes = figure.subplots()
         grid = searched(loop)
-        _nyquist(axes, frequency_response(loop)(grid), "-", "continuous")
+        _nyquist(axes, frequency_response(loop)(grid), "-", "sampled" if loop.dt else "continuous")
         if step is not None:
             sampled, name = loop.sampled(step), f"held for {milliseconds(step)}"
             response = frequency_response(sampled)(_below(grid, sampled))

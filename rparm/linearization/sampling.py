@@ -1,13 +1,14 @@
 """Sampling: held inputs, the samplers of a file with equations, and the period they make.
 
 The FMU of such a file has local variables that say when each sampler ticks, and which values it
-would set now: a tick is differentiated like any other equation.
+would set now: a tick is differentiated like any other equation. The law of a component in Python is
+differentiated by differences of its step over its inputs and the numbers that its save() gives.
 """
 
 import math
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,12 +16,18 @@ import numpy as np
 from rparm.errors import UnplacedError, UserError
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.model import Model
+from rparm.systems.python_component import PythonInstance
 
 TERMS = 13  # of Taylor's series of an exponential
 SAME = 1e-12  # relative, of times that differ by rounding only
 UNDEFINED = sys.float_info.max  # in place of a new value that is not finite
 # description of a local variable, as fmu/equations writes it
 ABOUT = re.compile(r"Sampler (\d+), ([^:]+): (?:(period|offset)|(new value|change|count) of (.+))")
+
+MOVED = 2.0**-12  # of a number, or of 1 if it is smaller: to differentiate by
+# ratios of differences over twice and once as much: 1 at a jump and 2 beside it; of second ones 2
+# at a corner and 4 beside it, or any if it is farther away
+FIRST, SECOND = 1.5, (2.5, 100.0)
 
 
 @dataclass
@@ -170,3 +177,114 @@ def _instants(every: Sequence[Tick]) -> list[tuple[float, list[Tick]]]:
         else:
             found.append((time, [tick]))
     return sorted(found, key=lambda instant: instant[0])
+
+
+# ---- Components in Python ------------------------------------------------------------------------
+@dataclass(frozen=True, eq=False)
+class Law:
+    """A component in Python: from states and inputs to the states one step later.
+
+    States are the numbers that save() gives, then its outputs: those returned hold after the step.
+    """
+
+    states: tuple[str, ...]
+    x: np.ndarray  # (n,)
+    after: np.ndarray  # (n,) one step later
+    partials: np.ndarray  # (n, n + m) of `after` by states and inputs
+
+
+def law(instance: PythonInstance, time: float, step: float, inputs: np.ndarray) -> Law:
+    """Differentiate the step from `time` with `inputs` (m,); UserError if there is a corner."""
+    kept, made = instance.save(), instance.made
+    numbers = _Numbers(instance)
+    x = numbers.of(kept)
+    names = [f"saved {name}" if name in made.outputs else name for name in numbers.names]
+    point = np.array([*x, *inputs])
+
+    def stepped(moved: np.ndarray) -> np.ndarray:
+        instance.restore(numbers.put(kept, moved[: len(x)].tolist()))
+        outputs = instance.stepped(time, step, moved[len(x) :])
+        found = numbers.of(instance.save())
+        if len(found) != len(x):
+            raise UserError(f"{instance.name}: save() gives {len(found)} numbers after a step, "
+                            f"and {len(x)} before")  # fmt: skip
+        return np.array([*found, *outputs])
+
+    after = stepped(point)
+    columns = [_difference(stepped, point, i, after) for i in range(len(point))]
+    instance.restore(kept)
+    known = [*names, *made.inputs]
+    for cause, (_, corners) in zip(known, columns, strict=True):
+        if corners.any():
+            effect = [*names, *made.outputs][int(corners.argmax())]
+            why = f"{effect} has a corner or a jump over {cause} at the point"
+            raise UserError(f"{instance.name}: {why}: it has no linear model")
+    whole = np.array([column for column, _ in columns]).reshape(len(point), len(after)).T
+    resting = np.zeros((len(after), len(made.outputs)))  # no output of before matters
+    partials = np.hstack([whole[:, : len(x)], resting, whole[:, len(x) :]])
+    outputs = instance.numbers[len(made.inputs) :]
+    return Law((*names, *made.outputs), np.array([*x, *outputs]), after, partials)
+
+
+def _difference(
+    function: Callable[[np.ndarray], np.ndarray], point: np.ndarray, i: int, middle: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the derivative by number i, of fourth order, and where there is a corner."""
+    length = MOVED * 2.0 ** math.ceil(math.log2(max(abs(point[i]), 1.0)))
+
+    def at(count: int) -> np.ndarray:
+        moved = point.copy()
+        moved[i] += count * length
+        return function(moved)
+
+    near, far = (at(1), at(-1)), (at(2), at(-2))
+    size = np.max(np.abs([*near, *far, middle]), axis=0)
+    rounding = 128 * sys.float_info.epsilon * size
+    once, twice = (np.abs(up + down - 2 * middle) for up, down in (near, far))
+    is_smooth = (SECOND[0] * once <= twice) & (twice <= SECOND[1] * once + rounding)
+    once, wide = (np.abs(up - down) for up, down in (near, far))
+    corners = ((twice > rounding) & ~is_smooth) | ((wide > rounding) & (wide < FIRST * once))
+    return (8 * (near[0] - near[1]) - (far[0] - far[1])) / (12 * length), corners
+
+
+class _Numbers:
+    """The numbers within what save() gives: in lists, tuples, dicts and arrays."""
+
+    def __init__(self, instance: PythonInstance) -> None:
+        self._instance, self.names = instance, list[str]()
+
+    def of(self, state: object) -> list[float]:
+        """Return the numbers; `names` are theirs."""
+        found: list[float] = []
+        self.names = []
+
+        def take(name: str, number: float) -> float:
+            found.append(float(number))
+            self.names.append(name if name and name[0] != "[" else f"saved{name}")
+            return number
+
+        self._walked(state, "", take)
+        return found
+
+    def put(self, state: object, numbers: Sequence[float]) -> object:
+        """Return the state with other numbers."""
+        rest = iter(numbers)
+        return self._walked(state, "", lambda _name, _number: next(rest))
+
+    def _walked(self, state: object, name: str, visit: Callable[[str, float], float]) -> object:
+        if isinstance(state, np.ndarray) and state.dtype.kind in "fiu":
+            moved = [visit(f"{name}[{i}]", x) for i, x in enumerate(state.ravel().tolist())]
+            return np.array(moved, float).reshape(state.shape)
+        if state is None or isinstance(state, bool | str | np.bool_):
+            return state
+        if isinstance(state, int | float | np.integer | np.floating):
+            return visit(name, float(state))
+        if isinstance(state, dict):
+            begin = f"{name}." if name else ""
+            return {key: self._walked(x, f"{begin}{key}", visit) for key, x in state.items()}
+        if isinstance(state, list | tuple):
+            items = [self._walked(x, f"{name}[{i}]", visit) for i, x in enumerate(state)]
+            return items if isinstance(state, list) else tuple(items)
+        given = type(state).__name__
+        expected = "expected numbers, in lists, dicts or arrays"
+        raise UserError(f"{self._instance.name}: save() gives a {given}, {expected}")

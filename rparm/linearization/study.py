@@ -3,7 +3,7 @@
 import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -18,10 +18,12 @@ from rparm.linearization import linear
 from rparm.linearization.largest_step import LargestStep, largest_steps
 from rparm.linearization.linear import FmuSubject, Linear
 from rparm.linearization.margins import Margins, margins, open_loop
-from rparm.linearization.system import SystemSubject, connected
+from rparm.linearization.system import SystemSubject, connected, sampled
 from rparm.linearization.trim import Trimmed, trim
 from rparm.project import VERSIONS
-from rparm.systems import ssp
+from rparm.systems.opened import SUFFIXES
+from rparm.systems.opened import opened as open_system
+from rparm.systems.structure import OpenedSystem
 
 Document = dict[str, Any]
 
@@ -60,13 +62,15 @@ class Study:
     largest: Sequence[LargestStep] = ()  # of a system that is not broken and has a loop
     loop: Linear | None = None  # L where the system is broken
     margins: Margins | None = None  # of `loop`
+    python: Sequence[str] = ()  # components in Python, which sample the system
 
 
 def study(request: Request) -> Study:
     """Linearize what is asked for."""
     path = _path(request)
-    if path.suffix.lower() == ".ssp":
-        return _of_system(path, request)
+    if path.suffix.lower() in SUFFIXES:
+        with open_system(path, version=request.version) as opened:
+            return of_system(opened, request)
     for option, given in (
         ("--variant", request.variant), ("--break", request.cut), ("--without", request.without)
     ):  # fmt: skip
@@ -83,9 +87,10 @@ def study(request: Request) -> Study:
         return Study(path, found, _units(subject, found), request.free)
 
 
-def _of_system(path: Path, request: Request) -> Study:
+def of_system(opened: OpenedSystem, request: Request) -> Study:
+    """Linearize a system that is open."""
+    path = opened.path
     with ExitStack() as stack:
-        opened = stack.enter_context(ssp.unpacked(path))
         variant = request.variant or next(iter(opened.system.parameters), "")
         made = SystemSubject(opened, variant, request.time, request.without, request.cut)
         subject = stack.enter_context(made)
@@ -93,20 +98,27 @@ def _of_system(path: Path, request: Request) -> Study:
         parts = subject.parts(trimmed.values)
         held = subject.held(parts)
         parts = {name: part.without(held[name]) for name, part in parts.items()}
-        whole = connected(parts, subject.kept)
+        if subject.python:
+            feeding = [c.start for c in subject.connections]
+            whole = sampled(parts, subject.kept, opened.system.step, feeding)
+        else:
+            whole = connected(parts, subject.kept)
         found = _chosen(whole, trimmed, request)
         units = _units(subject, found)
         if subject.cut is not None:
             source = subject.cut.start
             loop = open_loop(whole.select([request.cut], [source]))
-            return Study(path, found, units, request.free, variant, (), loop, margins(loop))
-        largest = largest_steps(parts, subject.connections, subject.ways)
-        return Study(path, found, units, request.free, variant, largest)
+            limits = {"loop": loop, "margins": margins(loop)}
+        else:
+            steps = largest_steps(parts, subject.connections, subject.ways, subject.law)
+            limits = {"largest": steps}
+        python = tuple(subject.python)
+        return Study(path, found, units, request.free, variant, python=python, **limits)
 
 
 def _path(request: Request) -> Path:
     path, name = Path(request.what), str(request.what)
-    if path.suffix.lower() in (".fmu", ".ssp"):
+    if path.suffix.lower() in (".fmu", *SUFFIXES):
         return path
     systems, models = project.systems(), project.models()
     for suffix, folders in ((".ssp", systems), (".fmu", models)):
@@ -115,7 +127,7 @@ def _path(request: Request) -> Path:
                 return project.built(folder, suffix, version=request.version)
     known = [*models, *systems]
     guess = did_you_mean(name, [*known, *project.built_names(".fmu"), *project.built_names(".ssp")])
-    expected = "expected a file .fmu or .ssp, or a name"
+    expected = "expected a file .fmu, .toml or .ssp, or a name"
     raise UserError(f"{name}: {expected}{guess} (known: {', '.join(known)})")
 
 
@@ -141,9 +153,11 @@ def _chosen(found: Linear, trimmed: Trimmed, request: Request) -> Linear:
 
 
 def _units(subject: FmuSubject | SystemSubject, found: Linear) -> dict[str, str]:
-    names = (*found.at, *found.outputs)  # all states and inputs
-    known = {name: subject.variable(name).unit for name in names}
-    return {name: unit for name, unit in known.items() if unit}
+    units: dict[str, str] = {}
+    for name in (*found.at, *found.outputs):  # all states and inputs
+        with suppress(UserError):  # a number that Python saves is no variable
+            units[name] = subject.variable(name).unit or ""
+    return {name: unit for name, unit in units.items() if unit}
 
 
 # ---- Files ---------------------------------------------------------------------------------------

@@ -11,8 +11,11 @@ from rparm.files import UnreadableError
 from rparm.fmi.fmu_file import MODEL_EXCHANGE, Fmu
 from rparm.fmi.model import Value, Variable
 from rparm.linearization import linear
-from rparm.systems.master import INPUT_MODES, ORDERS, Master
-from rparm.systems.ssp import Connection, Ssp
+from rparm.linearization.sampling import hold
+from rparm.systems import master
+from rparm.systems.master import Master
+from rparm.systems.python_component import PythonComponent, PythonInstance
+from rparm.systems.structure import Connection, OpenedSystem
 
 NEGLIGIBLE = 1e-14  # of the largest entries of row and column: rounding
 
@@ -27,7 +30,7 @@ class SystemSubject(ExitStack):
 
     def __init__(
         self,
-        ssp: Ssp,
+        ssp: OpenedSystem,
         variant: str,
         time: float | None = None,
         without: Sequence[str] = (),
@@ -54,6 +57,8 @@ class SystemSubject(ExitStack):
             for fmu in self.fmus.values():
                 linear.require_derivatives(fmu)
             self.push(stack.pop_all())
+        self.python = [name for name, fmu in self.fmus.items() if isinstance(fmu, PythonComponent)]
+        self._laws: dict[str, tuple[PythonInstance, np.ndarray]] = {}  # with inputs of the point
 
     def _found(self, name: str) -> Connection:
         """Return the connection to an input."""
@@ -75,16 +80,28 @@ class SystemSubject(ExitStack):
         """Linearize components, without held states; UserError if one is sampled, or a loop."""
         parameters = self.merged(values)
         found = {}
-        with Master(self.fmus, self.connections) as master:
-            master.initialize(self.time, None, parameters)
-            for name, component in master.components.items():
-                part = linear.linear_model(component.instance)
+        with Master(self.fmus, self.connections) as whole:
+            whole.initialize(self.time, None, parameters)
+            for name, component in whole.components.items():
+                instance = component.instance
+                if isinstance(instance, PythonInstance):
+                    self._laws[name] = instance, instance.numbers[: len(instance.made.inputs)]
+                    found[name] = self.law(name, self.ssp.system.step)
+                    continue
+                part = linear.linear_model(instance)
                 self._refuse_sampled(name, part, parameters.get(name, {}))
                 found[name] = part
         return found
 
+    def law(self, name: str, step: float) -> linear.Linear:
+        """Linearize a component in Python at the point of `parts`, called every `step` s."""
+        instance, inputs = self._laws[name]
+        return linear.law_model(instance, self.time, step, inputs)
+
     def at(self, values: Mapping[str, Value]) -> linear.Linear:
         """Linearize at values of parameters and states, held ones too, with all loops closed."""
+        if self.python:
+            raise UserError(f"--trim: component {self.python[0]!r} is in Python: give its point")
         return connected(self.parts(values), self.connections)
 
     @property
@@ -95,15 +112,7 @@ class SystemSubject(ExitStack):
     @property
     def ways(self) -> list[tuple[str, str]]:
         """Orders and inputs in which a master can step the system."""
-        models = {name: fmu.model for name, fmu in self.fmus.items()}
-        can = all(
-            models[c.start_component].gives_output_derivatives
-            and models[c.end_component].interpolates_inputs
-            for c in self.connections
-            if self._is_real(c.start_component, c.start_connector)
-        )
-        modes = INPUT_MODES if can else INPUT_MODES[:1]
-        return [(order, inputs) for inputs in modes for order in ORDERS]
+        return master.ways({n: fmu.model for n, fmu in self.fmus.items()}, self.connections)
 
     def held(self, parts: Mapping[str, linear.Linear]) -> dict[str, list[str]]:
         """Return held states by component."""
@@ -113,6 +122,11 @@ class SystemSubject(ExitStack):
     def merged(self, values: Mapping[str, Value]) -> dict[str, dict[str, Value]]:
         """Join all that is set, by component."""
         merged = {name: dict(self._parameters.get(name, {})) for name in self.names}
+        elapsed = np.array([self.time - self.ssp.system.start])
+        for name, signal in self.ssp.system.inputs.items():
+            component, _, variable = name.partition(".")
+            if component in merged:
+                merged[component][variable] = signal.values(elapsed)[0].item()
         for name, value in values.items():
             component, _, variable = name.partition(".")
             fed = {c.end for c in self.connections}
@@ -143,7 +157,7 @@ class SystemSubject(ExitStack):
         return self.ssp.models[component].variables[output].type == "Real"
 
 
-def bypassed(ssp: Ssp, connections: Sequence[Connection], name: str) -> list[Connection]:
+def bypassed(ssp: OpenedSystem, connections: Sequence[Connection], name: str) -> list[Connection]:
     """Remove a component: its source feeds what it fed, by the same names."""
     sources = dict.fromkeys(c.start_component for c in connections if c.end_component == name)
     result = []
@@ -161,7 +175,9 @@ def bypassed(ssp: Ssp, connections: Sequence[Connection], name: str) -> list[Con
     return result
 
 
-def _next_event(ssp: Ssp, name: str, values: Mapping[str, Value], time: float) -> float | None:
+def _next_event(
+    ssp: OpenedSystem, name: str, values: Mapping[str, Value], time: float
+) -> float | None:
     """Return the first time event of a component, if its FMU is for model exchange, too."""
     try:
         fmu = Fmu(ssp.fmu(name), kind=MODEL_EXCHANGE)
@@ -212,6 +228,59 @@ def connected(
             for text in part.flat
         ),
         left_out=tuple(f"{name}.{y}" for name, part in parts.items() for y in part.left_out),
+    )
+
+
+def sampled(
+    parts: Mapping[str, linear.Linear],
+    connections: Iterable[Connection],
+    step: float,
+    feeding: Iterable[str],
+) -> linear.Linear:
+    """Join linear models as a master steps them in Jacobi order, every `step` s, inputs held.
+
+    Outputs that follow inputs at once and are `feeding` others are states, too: they are read
+    before the next inputs are set. Inputs are as in `connected`.
+    """
+    inputs = [f"{name}.{u}" for name, part in parts.items() for u in part.inputs]
+    outputs = [f"{name}.{y}" for name, part in parts.items() for y in part.outputs]
+    blocks = []
+    for part in parts.values():
+        A, B, C, D = _clear(part)
+        blocks.append((*((A, B) if part.dt else hold(A, B, step)[:2]), C, D))
+    A, B, C, D = map(_diagonal, zip(*blocks, strict=True))
+    late = D.any(axis=1) & np.isin(outputs, list(feeding))  # outputs that are states
+    n, k = len(A), int(late.sum())
+    y = np.zeros((len(outputs), n + k))  # of all states
+    y[~late, :n], y[late, n:] = C[~late], np.eye(k)
+    u = _feeding(inputs, outputs, connections) @ y
+    at_once = np.where(late[:, None], 0.0, D)
+    x = np.hstack([A, np.zeros((n, k))]) + B @ u
+    whole, terms = np.vstack([x, C[late] @ x + D[late] @ u]), np.abs(np.vstack([x, C[late] @ x]))
+    joined = {
+        key: np.concatenate([getattr(part, key) for part in parts.values()])
+        for key in ("x", "u", "y", "rates")
+    }
+    return linear.Linear(
+        states=(
+            *(f"{name}.{x}" for name, part in parts.items() for x in part.states),
+            *(name for name, is_late in zip(outputs, late, strict=True) if is_late),
+        ),
+        inputs=tuple(inputs),
+        outputs=tuple(outputs),
+        A=linear.cleared(whole, terms),
+        B=np.vstack([B, C[late] @ B + D[late]]),
+        C=y + at_once @ u,
+        D=at_once,
+        **joined
+        | {
+            "x": np.append(joined["x"], joined["y"][late]),
+            "rates": np.append(joined["rates"], np.zeros(k)),
+        },
+        at={f"{name}.{v}": value for name, part in parts.items() for v, value in part.at.items()},
+        held=tuple(f"{name}.{x}" for name, part in parts.items() for x in part.held),
+        left_out=tuple(f"{name}.{y}" for name, part in parts.items() for y in part.left_out),
+        dt=step,
     )
 
 

@@ -18,7 +18,7 @@ from rparm.runs.comparison import Run
 from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import Result
 from rparm.systems.comparison import Outcome
-from rparm.systems.ssp import Ssp
+from rparm.systems.structure import OpenedSystem
 
 Rows = Sequence[int] | np.ndarray | slice  # of a run, that are shown
 EVERY = slice(None)
@@ -67,16 +67,19 @@ def of_result(
     return of_recorded(scenario.model, recorded, rows)
 
 
-def of_outcome(system: str, ssp: Ssp, outcome: Outcome, rows: Rows = EVERY) -> dict | None:
-    """Return data for a run of a variant of `system`, a folder; None: nothing to animate."""
+def of_outcome(
+    folder: str, ssp: OpenedSystem, outcome: Outcome, rows: Rows = EVERY, component: str = ""
+) -> dict | None:
+    """Return data for a run of a variant, by the folder of the system, or of one component."""
     given = ssp.system.parameter_sets[outcome.variant]
     values = {
-        f"{component}.{name}": value
-        for component, model in ssp.models.items()
-        for name, value in (model.start_values | given.get(component, {})).items()
+        f"{owner}.{name}": value
+        for owner, model in ssp.models.items()
+        for name, value in (model.start_values | given.get(owner, {})).items()
     }
     columns = dict(zip(outcome.run.names, outcome.run.values.T, strict=True))
-    return of_recorded(system, Recorded(outcome.run.times, columns, {}, values), rows)
+    recorded = Recorded(outcome.run.times, columns, {}, values)
+    return of_recorded(folder, recorded.component(component) if component else recorded, rows)
 
 
 def of_recorded(folder: str, recorded: Recorded, rows: Rows = EVERY) -> dict[str, Any] | None:
@@ -96,6 +99,11 @@ def of_recorded(folder: str, recorded: Recorded, rows: Rows = EVERY) -> dict[str
         "reference": reference and {name: taken(values) for name, values in reference.items()},
         "arm": dict(animation.arm),
     }
+
+
+def can_animate(folder: str) -> bool:
+    """Return whether a folder below models/ has an animation."""
+    return _animate(folder) is not None
 
 
 def _animate(folder: str) -> Callable[[Recorded], Animation] | None:

@@ -25,6 +25,7 @@ SECTIONS = {
 }
 WIDTH, HEIGHT, MARGIN = 100.0, 24.0, 2.0  # of the view box
 SPACE = "\N{NO-BREAK SPACE}"  # before a unit
+THIN = 'vector-effect="non-scaling-stroke"'
 COLUMNS = 60  # the curve's extremes in each are drawn
 
 
@@ -158,3 +159,10 @@ def sparkline(x: np.ndarray, y: np.ndarray) -> str:
     x, y = across * (WIDTH - 2 * MARGIN), up * (HEIGHT - 2 * MARGIN)
     points = zip(MARGIN + x, HEIGHT - MARGIN - y, strict=True)
     return "M" + "L".join(f"{a:.4g} {b:.4g}" for a, b in points)
+
+
+def sparkline_svg(x: np.ndarray, y: np.ndarray) -> str:
+    """Draw a sparkline as an element of any page."""
+    line = f'<path d="{sparkline(x, y)}" fill="none" stroke="{pages.RUN_COLOR}" {THIN}/>'
+    box = f'viewBox="0 0 {WIDTH:g} {HEIGHT:g}" preserveAspectRatio="none"'
+    return f'<svg width="360" height="48" {box}>{line}</svg>'

@@ -113,6 +113,13 @@ def write_run(path: Path, page: RunPage) -> Path:
     return write_page(path, "run.html", root="../", page=page, data=page.data and page.data.json())
 
 
+def write_alone(folder: Path, page: RunPage) -> Path:
+    """Write a page without an overview and what it loads; return its path."""
+    write_assets(folder)
+    values = {"root": "", "page": page, "data": page.data and page.data.json()}
+    return write_page(folder / INDEX, "run.html", **values)
+
+
 def write_page(path: Path, template: str, **values: object) -> Path:
     """Write a page, complete or not at all; return its path."""
     write_text(path, _templates.get_template(template).render(values))

@@ -1,5 +1,7 @@
 """The report's pages of systems: one a variant, with the diagram of the system."""
 
+import re
+import shlex
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -10,34 +12,78 @@ from typing import Any
 import numpy as np
 
 from rparm import files, project
-from rparm.errors import StoppedError, UserError
-from rparm.files import whole
+from rparm.errors import UserError
+from rparm.files import from_here, whole, write_text
 from rparm.fmi.model import KINDS
-from rparm.report import motion, overview, pages
-from rparm.report.overview import FAILED, PASSED, SYSTEM, Entry
+from rparm.report import block_diagram, motion, overview, pages
+from rparm.report.overview import FAILED, PASSED, RAN, SYSTEM, Entry
 from rparm.report.pages import RunPage, Table
 from rparm.report.run_data import Plot, RunData, result_curve, thinned
 from rparm.report.scenario_page import cells, meanings
-from rparm.systems import ecos
-from rparm.systems.comparison import BOUND, Diagram, Outcome, Study, load_study
-from rparm.systems.ssp import Ssp, System
+from rparm.systems import comparison, ecos
+from rparm.systems.comparison import BOUND, Diagram, Measure, Outcome, Study, load_study
+from rparm.systems.structure import OpenedSystem
 from rparm.units import milliseconds, short, unit
 
 MOST_ROWS = 350  # of a file of values, which has many columns
 DIGITS = 12  # there; errors have a bound of 1e-7
+CURVES, DIAGRAMS = 6, 24  # most in a diagram, and on a page, of a system of a user
 
 
 @dataclass(frozen=True)
 class Section:
     """A system whose variants are run."""
 
-    folder: Path
-    ssp: Ssp
+    folder: Path | None  # of a system of the project; None: of a user
+    ssp: OpenedSystem
 
     @cached_property
-    def study(self) -> Study:
+    def study(self) -> Study | None:
         """Module study.py of its folder."""
-        return load_study(self.folder)
+        return self.folder and load_study(self.folder)
+
+    @property
+    def measures(self) -> Sequence[Measure]:
+        return self.study.MEASURES if self.study else ()
+
+    @cached_property
+    def diagrams(self) -> Sequence[Diagram]:
+        """Diagrams of its folder; of a user's system, of what is kept by unit."""
+        if self.study:
+            return self.study.DIAGRAMS
+        groups: dict[tuple[str, str | None], list[str]] = {}
+        for name in comparison.kept(self.ssp):
+            variable = self.ssp.variable(name)
+            groups.setdefault((variable.type, variable.unit), []).append(name)
+        parts = [
+            names[i : i + CURVES] for names in groups.values() for i in range(0, len(names), CURVES)
+        ]
+        return [Diagram(", ".join(names), names) for names in parts[:DIAGRAMS]]
+
+    @cached_property
+    def animated(self) -> tuple[str, str] | None:
+        """Return a component that has an animation, and the folder of its model."""
+        for name, model in self.ssp.models.items():
+            for folder in project.models().values():
+                if project.is_built_from(model.name, folder) and motion.can_animate(folder.name):
+                    return name, folder.name
+        return None
+
+    @property
+    def names(self) -> list[str]:
+        """Names to record: what is kept, and what the animation shows."""
+        component = "" if self.folder or self.animated is None else self.animated[0]
+        shown = self.ssp.models[component].variables.values() if component else ()
+        moving = [
+            f"{component}.{v.name}"
+            for v in shown
+            if v.causality in ("input", "output") and v.type in ("Real", "Integer", "Boolean")
+        ]
+        return list(dict.fromkeys([*comparison.kept(self.ssp), *moving]))
+
+    def page(self, variant: str) -> str:
+        """Name the page of a variant, and its file of values."""
+        return variant if self.folder else re.sub(r"[^\w.-]", "_", f"{self.name}_{variant}")
 
     @property
     def variants(self) -> list[str]:
@@ -45,24 +91,25 @@ class Section:
 
     @property
     def name(self) -> str:
-        return self.folder.name
+        return self.folder.name if self.folder else self.ssp.system.name
 
     @property
     def title(self) -> str:
         """The system and the version of FMI of its components."""
         versions = sorted({model.fmi_version for model in self.ssp.models.values()})
-        return f"{self.ssp.path.stem} (FMI {' and '.join(versions)})"
+        name = self.ssp.path.stem if self.folder else self.name
+        return f"{name} (FMI {' and '.join(versions)})"
 
 
-def remove(report: Path, system: str, variants: Sequence[str]) -> None:
-    """Remove what an earlier run left of these variants."""
+def remove(report: Path, system: str, names: Sequence[str]) -> None:
+    """Remove what an earlier run left of these pages."""
     folder = report / SYSTEM
-    overview.forget(report, SYSTEM, variants)
+    overview.forget(report, SYSTEM, names)
     if not overview.read(report, SYSTEM):
         (folder / f"{system}.svg").unlink(missing_ok=True)
-    for variant in variants:
+    for name in names:
         for suffix in (".csv", ".html"):
-            (folder / f"{variant}{suffix}").unlink(missing_ok=True)
+            (folder / f"{name}{suffix}").unlink(missing_ok=True)
     with suppress(OSError):  # not there, or there is more in it
         folder.rmdir()
 
@@ -71,43 +118,54 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
     """Write the page and the values of a run, complete or not at all; its line in the overview."""
     run, ssp, folder = outcome.run, section.ssp, _folder(report, section)
     rows, data = _data(section, outcome)
-    error = f"{outcome.error:.1e}"
-    above = f"the error of {outcome.worst}, {error}, is above its bound {short(BOUND)}"
+    failures = []
+    if not outcome.passed:
+        error = f"{outcome.error:.1e}"
+        failures = [f"the error of {outcome.worst}, {error}, is above its bound {short(BOUND)}"]
+    known = {"error": None, "bound": None, "detail": estimate(section, outcome)}
+    if not outcome.is_estimate:
+        error = float(outcome.error) if np.isfinite(outcome.error) else None
+        known = {"error": error, "bound": BOUND, "detail": f"worst variable: {outcome.worst}"}
     page = RunPage(
-        status=PASSED if outcome.passed else FAILED,
+        status=RAN if outcome.is_estimate else PASSED if outcome.passed else FAILED,
         facts=_facts(section, outcome),
         data=data,
-        tables=[*_parameters(ssp, outcome.variant), *_solvers(ssp, run), _errors(ssp, outcome)],
+        tables=[*_parameters(ssp, outcome.variant), *_solvers(ssp, run), *_errors(ssp, outcome)],
         notes=[
-            *(f"{m.name.capitalize()}: {m.meaning}." for m in section.study.MEASURES),
+            *(f"{m.name.capitalize()}: {m.meaning}." for m in section.measures),
             "These numbers are of all steps, also of those that the file leaves out.",
         ],
-        failures=[*([] if outcome.passed else [above]), *run.messages],
-        **_values(folder, outcome, rows),
+        failures=[*failures, *run.messages],
+        **_values(section, folder, outcome, rows),
         **_texts(section, outcome.variant),
     )
     return overview.write_page(
         folder,
-        outcome.variant,
+        section.page(outcome.variant),
         page,
         section.title,
         title=", ".join(f"{name} {value}" for name, value in _measures(section, outcome)),
-        error=float(outcome.error) if np.isfinite(outcome.error) else None,
-        bound=BOUND,
-        detail=f"worst variable: {outcome.worst}",
+        **known,
     )
+
+
+def estimate(section: Section, outcome: Outcome) -> str:
+    """Say how large the coupling error is, or why that is not known."""
+    if not outcome.errors:
+        return f"coupling error not estimated: {comparison.why_no_estimate(section.ssp)}"
+    return f"coupling error about {outcome.error:.1e} ({outcome.worst}), by half the step"
 
 
 def write_failed(report: Path, section: Section, variant: str, error: UserError) -> Entry:
     """Write the page of a variant that stopped early: what was recorded until then."""
     folder, system = _folder(report, section), section.ssp.system
-    run = error.result if isinstance(error, StoppedError) else None
+    run = error.result
     facts = [("system", section.title), ("time", f"{system.start:g} to {system.stop:g} s")]
     data, values = None, {}
     if run is not None:
         outcome = Outcome(variant, len(run.times) - 1, run, {})
         rows, data = _data(section, outcome)
-        values = _values(folder, outcome, rows)
+        values = _values(section, folder, outcome, rows)
         facts.append(("results until", f"{run.times[-1]:g} s"))
     page = RunPage(
         status=FAILED,
@@ -118,7 +176,8 @@ def write_failed(report: Path, section: Section, variant: str, error: UserError)
         **values,
         **_texts(section, variant),
     )
-    return overview.write_page(folder, variant, page, section.title, title="", detail=str(error))
+    name, more = section.page(variant), {"title": "", "detail": str(error)}
+    return overview.write_page(folder, name, page, section.title, **more)
 
 
 def _folder(report: Path, section: Section) -> Path:
@@ -126,42 +185,56 @@ def _folder(report: Path, section: Section) -> Path:
     pages.write_assets(report)
     folder = report / SYSTEM
     folder.mkdir(parents=True, exist_ok=True)
-    with whole(folder / f"{section.name}.svg") as path:
+    if section.folder is None:
+        write_text(folder / _diagram(section), block_diagram.draw(section.ssp))
+        return folder
+    with whole(folder / _diagram(section)) as path:
         path.write_bytes((section.folder / project.DIAGRAM).read_bytes())
     return folder
 
 
+def _diagram(section: Section) -> str:
+    return re.sub(r"[^\w.-]", "_", f"{section.name}.svg")
+
+
 def _texts(section: Section, variant: str) -> dict[str, Any]:
     """Return the texts of a variant's page, however its run ended."""
-    stem = section.ssp.path.stem
+    stem = section.ssp.path.stem if section.folder else section.name
+    of_file = "" if section.folder else f"{shlex.quote(str(from_here(section.ssp.path)))} "
     return {
         "title": f"{stem}: {variant}",
-        "description": _description(section.ssp.system, variant),
-        "diagram": (f"{section.name}.svg", f"Components of {stem} and the signals between them"),
-        "again": f"{project.PROGRAM} system {variant}",
+        "description": _description(section, variant),
+        "diagram": (_diagram(section), f"Components of {stem} and the signals between them"),
+        "again": f"{project.PROGRAM} system {of_file}{variant}",
     }
 
 
 def _data(section: Section, outcome: Outcome) -> tuple[np.ndarray, RunData]:
     """Return the rows of the file of values, and plots and motion at these."""
     times = outcome.run.times
-    plots = [_plot(section.ssp, outcome, diagram) for diagram in section.study.DIAGRAMS]
+    plots = [_plot(section.ssp, outcome, diagram) for diagram in section.diagrams]
     rows = thinned([column for plot in plots for column in plot.columns], MOST_ROWS)
     plots = [plot.at(rows) for plot in plots]
-    moving = motion.of_outcome(section.name, section.ssp, outcome, rows)
+    if section.folder:
+        moving = motion.of_outcome(section.name, section.ssp, outcome, rows)
+    else:
+        component, model = section.animated or ("", "")
+        moving = motion.of_outcome(model, section.ssp, outcome, rows, component)
     return rows, RunData(outcome.variant, "", times[rows], plots, motion=moving)
 
 
-def _values(folder: Path, outcome: Outcome, rows: np.ndarray) -> dict[str, str]:
+def _values(section: Section, folder: Path, outcome: Outcome, rows: np.ndarray) -> dict[str, str]:
     """Write the file of values; what the page says of it."""
-    run, csv = outcome.run, f"{outcome.variant}.csv"
-    files.write_trajectory(folder / csv, run.times[rows], run.names, run.values[rows], DIGITS, True)
+    run, csv = outcome.run, f"{section.page(outcome.variant)}.csv"
+    names = run.names if section.folder else comparison.kept(section.ssp)
+    values = run.values[np.ix_(rows, [run.names.index(name) for name in names])]
+    files.write_trajectory(folder / csv, run.times[rows], names, values, DIGITS, True)
     every = milliseconds(np.diff(run.times[rows]).max(initial=0.0))
     note = f"It has a row every {every}, the extremes of the plots in between, and {DIGITS} digits."
     return {"csv": csv, "csv_note": note}
 
 
-def _plot(ssp: Ssp, outcome: Outcome, diagram: Diagram) -> Plot:
+def _plot(ssp: OpenedSystem, outcome: Outcome, diagram: Diagram) -> Plot:
     curves = []
     for name in diagram.curves:
         wanted = diagram.references.get(name)
@@ -179,24 +252,33 @@ def _facts(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
         ("system", section.title),
         ("time", f"{system.start:g} to {system.stop:g} s"),
         ("steps", str(outcome.steps)),
-        ("worst error", f"{outcome.error:.1e} of {short(BOUND)} ({outcome.worst})"),
+        _error(section, outcome),
         *_measures(section, outcome),
         ("wall time", f"{outcome.run.wall_time:.3f} s"),
     ]
 
 
+def _error(section: Section, outcome: Outcome) -> tuple[str, str]:
+    if outcome.is_estimate:
+        return "coupling error", estimate(section, outcome).removeprefix("coupling error ")
+    return "worst error", f"{outcome.error:.1e} of {short(BOUND)} ({outcome.worst})"
+
+
 def _measures(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
-    return [(m.name, f"{m.value(outcome):.3g} {m.unit}") for m in section.study.MEASURES]
+    return [(m.name, f"{m.value(outcome):.3g} {m.unit}") for m in section.measures]
 
 
-def _description(system: System, variant: str) -> str:
+def _description(section: Section, variant: str) -> str:
     """Describe the variant, and how it is run."""
-    said = system.descriptions.get(variant, "").rstrip(".")
-    how = f"Run by Ecos with steps of {milliseconds(system.step)}."
-    return f"{said}. {how}" if said else how
+    system = section.ssp.system
+    said = system.descriptions.get(variant, "" if section.folder else system.description)
+    why_not = "" if section.folder else ecos.unsuited(section.ssp)
+    by = f"rparm's own master ({why_not})" if why_not else "Ecos"
+    how = f"Run by {by} with steps of {milliseconds(system.step)}."
+    return f"{said.rstrip('.')}. {how}" if said else how
 
 
-def _parameters(ssp: Ssp, variant: str) -> list[Table]:
+def _parameters(ssp: OpenedSystem, variant: str) -> list[Table]:
     """Return a table of the variant's values, then start values per component."""
     given = ssp.system.parameter_sets[variant]
     connected = {(x.end_component, x.end_connector) for x in ssp.system.connections}
@@ -220,7 +302,7 @@ def _parameters(ssp: Ssp, variant: str) -> list[Table]:
     return own + others
 
 
-def _solvers(ssp: Ssp, run: ecos.Run) -> list[Table]:
+def _solvers(ssp: OpenedSystem, run: ecos.Run) -> list[Table]:
     """Return statistics of the components that integrate."""
     rows = []
     for component in ssp.models:
@@ -232,9 +314,15 @@ def _solvers(ssp: Ssp, run: ecos.Run) -> list[Table]:
     return [Table("Solvers", ("component", *ecos.STATISTICS.values()), rows, note)] if rows else []
 
 
-def _errors(ssp: Ssp, outcome: Outcome) -> Table:
+def _errors(ssp: OpenedSystem, outcome: Outcome) -> list[Table]:
     found = outcome.errors.items()
     rows = [(name, unit(ssp.variable(name).unit), f"{error:.2e}") for name, error in found]
     note = "Largest difference from the reference of Ecos's order, relative to the variable's "
     note += "largest value."
-    return Table("Errors of all variables", ("variable", "unit", "error"), rows, note, folded=True)
+    title = "Errors of all variables"
+    if outcome.is_estimate:
+        title = "Coupling errors of all variables"
+        note = "Twice the largest difference from a run with half the step, as of an error of "
+        note += "first order, relative to the largest value of all variables of this unit."
+    head = "variable", "unit", "error"
+    return [Table(title, head, rows, note, folded=True)] if rows else []

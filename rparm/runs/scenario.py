@@ -387,7 +387,7 @@ def _template_section(section: str, title: str, model: Model) -> Iterator[str]:
 
 def _template_line(variable: Variable) -> str:
     assert variable.start is not None
-    line = f"{_toml_key(variable.name)} = {_toml_value(variable.written(variable.start))}"
+    line = f"{_toml_key(variable.name)} = {toml_value(variable.written(variable.start))}"
     return f"{line}  # {variable.unit}" if variable.unit not in (None, "", "1") else line
 
 
@@ -408,7 +408,7 @@ def _toml_key(name: str) -> str:
     return name if re.fullmatch(r"[\w-]+", name, re.ASCII) else toml_text(name)
 
 
-def _toml_value(value: Value) -> str:
+def toml_value(value: Value) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     return toml_text(value) if isinstance(value, str) else repr(value)
@@ -417,7 +417,7 @@ def _toml_value(value: Value) -> str:
 def _template_input(variable: Variable) -> str:
     start = variable.start if variable.start is not None else 0.0
     unit = f"  # {variable.unit}" if variable.unit else ""
-    header = f"[{INPUTS}.{_toml_key(variable.name)}]\nconstant = {_toml_value(start)}{unit}\n"
+    header = f"[{INPUTS}.{_toml_key(variable.name)}]\nconstant = {toml_value(start)}{unit}\n"
     if variable.type not in ("Real", "Boolean"):
         return ""
     return f"{_template_comment(variable)}\n{header}"

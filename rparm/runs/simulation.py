@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
-from rparm.errors import StoppedError, UserError, placed
+from rparm.errors import StoppedError, UserError, WrongValueError, placed
 from rparm.files import difference
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
-from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, Model, Value
-from rparm.runs.scenario import MAX_STEPS, Scenario
+from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, Experiment, Model, Value
+from rparm.runs.scenario import MAX_STEPS, USUAL_STEPS, Scenario
 
 PROGRESS_EVERY = 0.1  # s
 # Steps of a process after which it pays to load the compiled loop: that takes 0.6 s, and saves
@@ -266,6 +266,20 @@ class _CompiledSteps:
 def is_finite_number(given: object) -> bool:
     """Return whether it is a real number, neither infinite nor nan; a Boolean is none."""
     return isinstance(given, Real) and not isinstance(given, bool) and bool(np.isfinite(given))
+
+
+def times_of(
+    usual: Experiment, start: float | None, stop: float | None, step: float | None
+) -> np.ndarray:
+    """Return communication points in s; what is None is that of the default experiment."""
+    start = usual.start or 0.0 if start is None else start
+    stop = usual.stop if stop is None else stop
+    if stop is None:
+        raise WrongValueError("has no default experiment with a stop time: give stop_time")
+    step = usual.step if step is None else step
+    if step is None and is_finite_number(start) and is_finite_number(stop):
+        step = difference(stop, start) / USUAL_STEPS
+    return communication_points(start, stop, step)
 
 
 def communication_points(start: float, stop: float, step: float) -> np.ndarray:

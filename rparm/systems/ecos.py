@@ -15,12 +15,13 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from importlib.metadata import PackageNotFoundError, files
 from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
+from threading import Event, Thread
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,9 +31,11 @@ from rparm.errors import StoppedError, UserError, one_line
 from rparm.interruption import run_group, temporary_folder
 
 if TYPE_CHECKING:
-    from rparm.systems.ssp import Ssp
+    from rparm.systems.structure import OpenedSystem
 
 PLAN, ROWS, DONE, LOG = "plan.json", "rows.npy", "done.json", "ecos.log"
+AT = "at"  # a byte for each hundredth of the steps that are done
+PARTS, LOOK = 100, 0.2  # of a run, and s between two looks at how far it is
 # of an instance: [path of its FMU] fmi2Status text, [its name] Status text in FMI 3.0
 MESSAGE = re.compile(
     r"(\[(?P<fmu>[^\]]*\.fmu)\] fmi2|\[debug\] \[(?P<component>[^\]]*)\] )"
@@ -73,9 +76,32 @@ def absent() -> str:
     return ""
 
 
-def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
+def unsuited(ssp: "OpenedSystem") -> str:
+    """Say why Ecos cannot run a system, or nothing."""
+    system = ssp.system
+    kinds = {ssp.variable(c.start).type for c in system.connections}
+    odd = sorted(kinds - {"Real", "Boolean"})
+    settings = [(c, n) for of in system.parameters.values() for c in of for n in of[c]]
+    if ssp.python:
+        return f"{next(iter(ssp.python))} is Python"
+    if system.inputs:
+        return f"{next(iter(system.inputs))} moves"
+    if odd:
+        return f"there are connections of type {odd[0]}"
+    if any(ssp.models[c].variables[n].type == "Enumeration" for c, n in settings):
+        return "Ecos sets no Enumeration"
+    return absent()
+
+
+def run(
+    ssp: "OpenedSystem",
+    variant: str,
+    names: Sequence[str],
+    progress: Callable[[int], object] = lambda _: None,
+) -> Run:
     """Run a system from start to stop with a parameter set; read variables ``component.variable``.
 
+    `progress` is called with the steps just done.
     UserError if a component fails or a value is not finite, with component, variable and time, or
     if Ecos itself fails; after the start it is a `StoppedError`.
     """
@@ -86,8 +112,8 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     statistics = said_at_end(ssp)
     with temporary_folder() as folder:
         plan = {
-            "ssp": str(_as_ecos_opens(ssp.path.resolve(), folder)),
-            "variant": variant if system.has_sets else None,
+            "ssp": str(_as_ecos_opens(ssp, variant, folder)),
+            "variant": variant if any(system.parameters[variant].values()) else None,
             "variables": _to_read(ssp, names),
             "statistics": _to_read(ssp, statistics),
             "start": system.start,
@@ -95,7 +121,8 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
             "steps": system.steps,
         }
         (folder / PLAN).write_text(json.dumps(plan), encoding="utf-8", newline="\n")
-        code = _start(folder)
+        with _watched(folder, system.steps, progress):
+            code = _start(folder)
         log = (folder / LOG).read_text(encoding="utf-8", errors="replace")
         if code != 0:
             last = next((line for line in reversed(log.splitlines()) if line.strip()), "no output")
@@ -117,14 +144,14 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     return result
 
 
-def said_at_end(ssp: "Ssp") -> list[str]:
+def said_at_end(ssp: "OpenedSystem") -> list[str]:
     """Return the statistics that components have, as ``component.variable``."""
     models = ssp.models.items()
     return [f"{c}.{name}" for c, model in models for name in STATISTICS if name in model.variables]
 
 
 def _check_messages(
-    ssp: "Ssp", variant: str, times: np.ndarray, messages: Sequence[re.Match[str]]
+    ssp: "OpenedSystem", variant: str, times: np.ndarray, messages: Sequence[re.Match[str]]
 ) -> None:
     """Refuse a run in which a component has failed, or that Ecos has stopped."""
     for match in messages:
@@ -136,12 +163,12 @@ def _check_messages(
         raise UserError(f"{ssp.path}: {variant}: Ecos stopped at t = {times[-1]:.6g} s")
 
 
-def _to_read(ssp: "Ssp", names: Sequence[str]) -> list[tuple[str, str]]:
+def _to_read(ssp: "OpenedSystem", names: Sequence[str]) -> list[tuple[str, str]]:
     """Return the names of variables as Ecos has them, each after the name of its reader."""
     return [(READERS[ssp.variable(name).type], name.replace(".", "::", 1)) for name in names]
 
 
-def _check_parameters(ssp: "Ssp", variant: str) -> None:
+def _check_parameters(ssp: "OpenedSystem", variant: str) -> None:
     """Refuse what Ecos would leave out with a warning in its log only: Enumerations."""
     for component, values in ssp.system.parameters[variant].items():
         model = ssp.models[component]
@@ -151,13 +178,42 @@ def _check_parameters(ssp: "Ssp", variant: str) -> None:
                 raise UserError(f"{where}: {name!r} is an Enumeration, which Ecos does not set")
 
 
-def _as_ecos_opens(path: Path, folder: Path) -> Path:
-    """Return the file, or a copy of it in a folder: Ecos opens no name that is not UTF-8."""
+def _as_ecos_opens(ssp: "OpenedSystem", variant: str, folder: Path) -> Path:
+    """Return the SSP, or make one in a folder: what Ecos reads, or a copy with a name in UTF-8."""
+    path = ssp.path.resolve()
+    if not (ssp.is_ssp and ssp.is_plain):
+        from rparm.systems import ssp_writer  # the child needs none of it
+
+        only = replace(ssp.system, parameters={variant: ssp.system.parameters[variant]})
+        ssp_writer.write(folder / "system.ssp", replace(ssp, system=only))
+        return folder / "system.ssp"
     try:
         str(path).encode()
     except UnicodeEncodeError:
         return Path(shutil.copy(path, folder / "system.ssp"))
     return path
+
+
+@contextmanager
+def _watched(folder: Path, steps: int, progress: Callable[[int], object]) -> Iterator[None]:
+    """Tell how far the child is, until the end."""
+    ended = Event()
+
+    def watch() -> None:
+        seen = 0
+        while not ended.wait(LOOK):
+            with suppress(OSError):  # not there yet
+                parts = (folder / AT).stat().st_size
+                progress((parts - seen) * steps // PARTS)
+                seen = parts
+
+    watcher = Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        watcher.join()
 
 
 def _start(folder: Path) -> int:
@@ -184,13 +240,13 @@ def _unzip(folder: Path) -> Path:
     return command.parent
 
 
-def _sender(ssp: "Ssp", message: re.Match[str]) -> str:
+def _sender(ssp: "OpenedSystem", message: re.Match[str]) -> str:
     """Return the name of the component that a message is of."""
     component = message["component"]
     return repr(component) if component is not None else _components(ssp, message["fmu"])
 
 
-def _components(ssp: "Ssp", fmu: str) -> str:
+def _components(ssp: "OpenedSystem", fmu: str) -> str:
     """Name of the component whose FMU it is: of FMI 2.0, Ecos's log names only the FMU."""
     fmu = fmu.replace("\\", "/")  # a path of Windows
     names = [c.name for c in ssp.system.components if fmu.endswith("/" + c.source)]
@@ -198,7 +254,7 @@ def _components(ssp: "Ssp", fmu: str) -> str:
 
 
 def _check_values(
-    ssp: "Ssp", variant: str, names: Sequence[str], times: np.ndarray, values: np.ndarray
+    ssp: "OpenedSystem", variant: str, names: Sequence[str], times: np.ndarray, values: np.ndarray
 ) -> None:
     """Refuse values (times, names) that are not finite, naming the first component that has one."""
     bad_rows = np.flatnonzero(~np.isfinite(values).all(axis=1))
@@ -247,9 +303,12 @@ def _child(folder: Path) -> None:
             raise RuntimeError(EcosLib.get_last_error())
         readers = [(getattr(simulation, reader), name) for reader, name in plan["variables"]]
         row, begin = 0, time.perf_counter()
-        while go_on(row) and row < steps:
-            simulation.step()
-            row += 1
+        with (folder / AT).open("wb", buffering=0) as at:
+            while go_on(row) and row < steps:
+                simulation.step()
+                row += 1
+                if row * PARTS // steps > (row - 1) * PARTS // steps:
+                    at.write(b".")
         wall_time = time.perf_counter() - begin
         statistics = [getattr(simulation, reader)(name) for reader, name in plan["statistics"]]
         simulation.terminate()

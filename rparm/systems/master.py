@@ -1,11 +1,11 @@
 """A master that steps connected FMUs.
 
-Every component is an instance of an FMU; connections lead from Real outputs to Real inputs, or from
-Boolean outputs to Boolean inputs. Other inputs keep their values from before initialization. In
-Jacobi order all components make a step, then all outputs are read; each step takes its inputs from
-what was read at its beginning. In Gauss-Seidel order the components step one after the other, and
-each takes the newest outputs: those of the end of the step from components before it, those of its
-beginning from itself and the components behind it.
+Every component is an instance of an FMU; connections lead from outputs to inputs of the same type,
+no String. Inputs may follow signals from outside, each held over a step; others keep their values
+from before initialization. In Jacobi order all components make a step, then all outputs are read;
+each step takes its inputs from what was read at its beginning. In Gauss-Seidel order the components
+step one after the other, and each takes the newest outputs: those of the end of the step from
+components before it, those of its beginning from itself and the components behind it.
 
 Inputs keep their values over a step, a zero-order hold ("held"), or are straight lines through the
 value of their source at the time at which it was read, with its slope there: in Jacobi order they
@@ -13,8 +13,8 @@ extrapolate from the beginning of the step, in Gauss-Seidel order those from com
 meet value and slope at the end of the step. FMI 3.0 knows slopes of inputs only within a step: at
 the start, those of outputs miss what they owe to the slopes of inputs.
 
-A Boolean that has changed in a step is passed on at the end of the step, in both orders. Then all
-values jump to what follows from it at this time, as at the start.
+A Boolean, Integer or Enumeration that has changed in a step is passed on at the end of the step, in
+both orders. Then all values jump to what follows from it at this time, as at the start.
 """
 
 import time
@@ -28,12 +28,15 @@ from fmpy.fmi1 import FMICallException
 from rparm.errors import UserError, placed
 from rparm.fmi.fmi_instance import Instance, Reals, UnpackedFmu
 from rparm.fmi.fmu_file import Fmu
-from rparm.fmi.model import INPUTS, Value
+from rparm.fmi.model import INPUTS, Model, Value
+from rparm.runs.inputs import Signal
 from rparm.systems.ecos import Run, said_at_end
-from rparm.systems.ssp import Connection, Ssp
+from rparm.systems.python_component import is_python
+from rparm.systems.structure import Connection, OpenedSystem
 
 ORDERS = ("jacobi", "gauss_seidel")
 INPUT_MODES = ("held", "extrapolated")
+DISCRETE = ("Boolean", "Integer", "Enumeration")  # types of what switches
 
 
 # ---- Components ----------------------------------------------------------------------------------
@@ -134,7 +137,8 @@ class Snapshot(AbstractContextManager["Snapshot"]):
         for component in master.components.values():
             fmu = component.instance.fmu
             if not fmu.model.saves_states:
-                raise UserError(f"{component.name}: {fmu.path} has no FMU state to go back to")
+                has = "save() and restore(state)" if is_python(fmu.path.name) else "FMU state"
+                raise UserError(f"{component.name}: {fmu.path} has no {has} to go back")
         self._states = [c.instance.saved_state() for c in master.components.values()]
 
     def __exit__(self, *_: object) -> None:
@@ -165,15 +169,17 @@ class Master(AbstractContextManager["Master"]):
     """A system of connected components; a context manager that frees their instances.
 
     In Gauss-Seidel order components step in the order of `fmus`. After each step all Real outputs
-    are read, and Real variables `also` (component, variable). UserError if names are unknown, an
-    input has several connections, or an FMU cannot do what is asked.
+    are read, and Real variables `also` (component, variable). Inputs of `signals`, by
+    "component.variable", take over each step the signal's value at its beginning. UserError if
+    names are unknown, an input has several sources, or an FMU cannot do what is asked.
 
     Attributes
     ----------
     names : tuple of str
-        "component.variable" of all that is read, by component, outputs first.
+        "component.variable" of all that is read, by component, outputs first; at the end Real
+        inputs of signals.
     values : ndarray, shape (len(names),)
-        As read right after the last step, and all that follows from a Boolean that changed.
+        As read right after the last step, and all that follows from what switched.
     slopes : ndarray, shape (len(names),)
         Derivatives by time of what is connected, if `inputs` is "extrapolated".
     time : float
@@ -189,13 +195,21 @@ class Master(AbstractContextManager["Master"]):
         order: str = "jacobi",
         inputs: str = "held",
         also: Sequence[tuple[str, str]] = (),
+        signals: Mapping[str, Signal] | None = None,
     ) -> None:
         if order not in ORDERS or inputs not in INPUT_MODES:
             raise UserError(f"expected an order of {ORDERS} and inputs of {INPUT_MODES}")
         self.extrapolates = inputs == "extrapolated"
         self.jacobi = order == "jacobi"
         self.time, self.do_steps = 0.0, 0
+        connections, signals = list(connections), signals or {}
         self._switches, real = _split(fmus, connections, self.extrapolates)
+        for name in signals:
+            if name in {c.end for c in connections}:
+                raise UserError(f"{name}: is connected, and cannot follow a signal, too")
+        driven = {name: _driven(fmus, name) for name in signals}
+        self._moved = {name: signals[name] for name, kind in driven.items() if kind == "Real"}
+        self._switched = {n: signals[n] for n, kind in driven.items() if kind in DISCRETE}
         for component, name in also:
             _find(fmus, component, name, None)
         self._stack = ExitStack()
@@ -228,6 +242,9 @@ class Master(AbstractContextManager["Master"]):
 
         # where it is among the system's values
         keys = [(name, output) for name, read in outputs.items() for output in read]
+        self._first_driven = len(keys)
+        driven = [tuple(name.split(".", 1)) for name in self._moved]
+        keys += driven
         index = {key: i for i, key in enumerate(keys)}
         self.names = tuple(f"{component}.{name}" for component, name in keys)
         memory = (c_double * max(len(keys), 1))()
@@ -240,14 +257,16 @@ class Master(AbstractContextManager["Master"]):
         for name, instance in instances.items():
             incoming = [c for c in connections if c.end_component == name]
             feeding = {c.start_connector for c in connections if c.start_component == name}
+            own = [key for key in driven if key[0] == name]
+            sources = [(c.start_component, c.start_connector) for c in incoming] + own
             self.components[name] = ConnectedInstance(
                 instance,
-                inputs=[c.end_connector for c in incoming],
+                inputs=[*(c.end_connector for c in incoming), *(variable for _, variable in own)],
                 outputs=outputs[name],
                 first=first,
                 feeding=feeding,
-                sources=[index[c.start_component, c.start_connector] for c in incoming],
-                ahead=[c.start_component in self.components and not self.jacobi for c in incoming],
+                sources=[index[source] for source in sources],
+                ahead=[x in self.components and not self.jacobi for x, _ in sources],
                 values=memory,
                 slopes=self.slopes,
             )
@@ -267,7 +286,8 @@ class Master(AbstractContextManager["Master"]):
             if name not in self.components:
                 known = ", ".join(self.components)
                 raise UserError(f"{name}: no such component (there are: {known})")
-        self.time = start
+        self.time = self._start = start
+        self._drive()
         for component in self.components.values():
             component.begin(start, stop, parameters.get(component.name, {}))
         self._propagate(self._read_early, "in initialization")
@@ -275,6 +295,12 @@ class Master(AbstractContextManager["Master"]):
             component.instance.exit_initialization()
         if self.extrapolates:
             self._propagate_slopes()
+
+    def _drive(self) -> None:
+        """Take the values that signals have now."""
+        elapsed = np.array([self.time - self._start])
+        for i, signal in enumerate(self._moved.values(), self._first_driven):
+            self.values[i] = signal.values(elapsed)[0]
 
     def _propagate(self, read: Callable[[ConnectedInstance], object], when: str) -> None:
         """Set inputs until no output follows any more: along direct feedthrough, once each."""
@@ -294,15 +320,19 @@ class Master(AbstractContextManager["Master"]):
         raise UserError(f"the connections form an algebraic loop: {names}")
 
     def _transfer_switches(self) -> list[str]:
-        """Set the Boolean inputs whose sources have another value; which these are."""
-        changed = []
+        """Set the discrete inputs whose sources have another value; which these are."""
+        elapsed = np.array([self.time - self._start])
+        wanted = {name: int(x.values(elapsed)[0]) for name, x in self._switched.items()}
         for c in self._switches:
             source = self.components[c.start_component].instance
-            target = self.components[c.end_component].instance
-            value = source.boolean(c.start_connector)
-            if value != target.boolean(c.end_connector):
-                target.set(c.end_connector, value)
-                changed.append(c.end)
+            wanted[c.end] = source.discrete(c.start_connector)
+        changed = []
+        for name, value in wanted.items():
+            component, variable = name.split(".", 1)
+            target = self.components[component].instance
+            if value != target.discrete(variable):
+                target.set(variable, value)
+                changed.append(name)
         return changed
 
     def _read_early(self, component: ConnectedInstance) -> None:
@@ -344,6 +374,7 @@ class Master(AbstractContextManager["Master"]):
             for component in group:
                 self._read(component, end)
         self.time = end
+        self._drive()
         if self._transfer_switches():
             self._propagate(lambda component: self._read(component, end), f"at t = {end!r} s")
             if self.extrapolates:
@@ -391,19 +422,29 @@ def _find(fmus: Mapping[str, Fmu], component: str, name: str, causality: str | N
         raise UserError(f"{component}: {fmus[component].path} has no {kind} {name!r}")
 
 
+def _driven(fmus: Mapping[str, Fmu], name: str) -> str:
+    """Return the type of an input that follows a signal."""
+    component, _, variable = name.partition(".")
+    kind = _type(fmus, component, variable, "input")
+    if kind not in DISCRETE:
+        _find(fmus, component, variable, "input")
+    return str(kind)
+
+
 def _split(
     fmus: Mapping[str, Fmu], connections: Iterable[Connection], sloped: bool
 ) -> tuple[list[Connection], list[Connection]]:
-    """Split connections into Booleans and Reals; no input has two."""
+    """Split connections into discrete ones and Reals; no input has two."""
     switches: list[Connection] = []
     reals: list[Connection] = []
     seen = set()
     for c in connections:
         end = c.end_component, c.end_connector
-        if _is_switch(fmus, c.start_component, c.start_connector, "output"):
+        kind = _type(fmus, c.start_component, c.start_connector, "output")
+        if kind in DISCRETE:
             switches.append(c)
-            if not _is_switch(fmus, *end, "input"):
-                raise UserError(f"{c}: a Boolean feeds a Boolean input only")
+            if _type(fmus, *end, "input") != kind:
+                raise UserError(f"{c}: a {kind} feeds a {kind} input only")
         else:
             reals.append(c)
             _find(fmus, c.start_component, c.start_connector, "output")
@@ -420,28 +461,57 @@ def _split(
     return switches, reals
 
 
-def _is_switch(fmus: Mapping[str, Fmu], component: str, name: str, causality: str) -> bool:
+def _type(fmus: Mapping[str, Fmu], component: str, name: str, causality: str) -> str | None:
     variable = fmus[component].model.variables.get(name) if component in fmus else None
-    return variable is not None and (variable.type, variable.causality) == ("Boolean", causality)
+    return variable.type if variable is not None and variable.causality == causality else None
+
+
+def ways(models: Mapping[str, Model], connections: Iterable[Connection]) -> list[tuple[str, str]]:
+    """Return the orders and inputs in which a master can step connected components."""
+    can = all(
+        models[c.start_component].gives_output_derivatives
+        and models[c.end_component].interpolates_inputs
+        for c in connections
+        if models[c.start_component].variables[c.start_connector].type == "Real"
+    )
+    return [(order, inputs) for inputs in INPUT_MODES[: 1 + can] for order in ORDERS]
 
 
 # ---- A variant -----------------------------------------------------------------------------------
-def run_in_master(ssp: Ssp, variant: str, names: Sequence[str]) -> Run:
-    """Run a variant in Jacobi order; read ``component.variable`` as Ecos would, all finite."""
+def run_in_master(
+    ssp: OpenedSystem,
+    variant: str,
+    names: Sequence[str],
+    progress: Callable[[int], object] = lambda _: None,
+) -> Run:
+    """Run a variant in Jacobi order; read ``component.variable`` as Ecos would, all finite.
+
+    `progress` is called with the steps just done.
+    """
     system = ssp.system
     times = system.times
     rows = np.empty((len(times), len(names)))
-    with ssp.unpacked_fmus() as fmus, Master(fmus, system.connections) as master:
+    with (
+        ssp.unpacked_fmus() as fmus,
+        Master(fmus, system.connections, signals=system.inputs) as master,
+    ):
         master.initialize(times[0], times[-1], system.parameter_sets[variant])
         readers = [_RowReader(ssp, c, names) for c in master.components.values()]
         begin = time.perf_counter()
         for row, end in enumerate(times.tolist()):
-            if row:
-                master.advance(end)
-            for reader in readers:
-                with reader.component.instance.explained(f"at t = {end!r} s"):
-                    reader.component.set_inputs(master.values[reader.component.sources])
-                    reader.read(rows[row])
+            try:
+                if row:
+                    master.advance(end)
+                for reader in readers:
+                    with reader.component.instance.explained(f"at t = {end!r} s"):
+                        reader.component.set_inputs(master.values[reader.component.sources])
+                        reader.read(rows[row])
+            except UserError as error:
+                if row > 1:
+                    error.result = Run(tuple(names), times[:row], rows[:row], 0.0, ())
+                raise
+            if row and row % 100 == 0:
+                progress(100)
         wall_time = time.perf_counter() - begin
         known = master.components.values()
         messages = [f"{c.name!r}: {text}" for c in known for text in c.instance.messages]
@@ -449,7 +519,7 @@ def run_in_master(ssp: Ssp, variant: str, names: Sequence[str]) -> Run:
     return Run(tuple(names), times, rows, wall_time, tuple(dict.fromkeys(messages)), said)
 
 
-def _value_at_end(master: Master, ssp: Ssp, name: str) -> float:
+def _value_at_end(master: Master, ssp: OpenedSystem, name: str) -> float:
     component, _, variable = name.partition(".")
     row = np.empty(1)
     _RowReader(ssp, master.components[component], [name]).read(row)
@@ -459,7 +529,9 @@ def _value_at_end(master: Master, ssp: Ssp, name: str) -> float:
 class _RowReader:
     """Reads the wanted variables of one component into a row of the system's."""
 
-    def __init__(self, ssp: Ssp, component: ConnectedInstance, names: Sequence[str]) -> None:
+    def __init__(
+        self, ssp: OpenedSystem, component: ConnectedInstance, names: Sequence[str]
+    ) -> None:
         self.component = component
         instance = component.instance
         own: dict[str, int] = {}
@@ -471,14 +543,11 @@ class _RowReader:
         real = [name for name in own if variables[name].type == "Real"]
         self._reals = instance.reals(real)
         self._real_columns = [own[name] for name in real]
-        self._others: list[tuple[int, Callable[[str], int | None], str]] = []
-        for name in own.keys() - set(real):
-            is_boolean = variables[name].type == "Boolean"
-            read = instance.boolean if is_boolean else instance.integer
-            self._others.append((own[name], read, name))
+        self._others = {own[name]: name for name in own.keys() - set(real)}
+        self._discrete = instance.discrete
 
     def read(self, row: np.ndarray) -> None:
         self._reals.get()
         row[self._real_columns] = self._reals.view
-        for column, read, name in self._others:
-            row[column] = read(name)
+        for column, name in self._others.items():
+            row[column] = self._discrete(name)

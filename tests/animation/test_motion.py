@@ -13,6 +13,7 @@ from rparm.report import motion
 from rparm.runs.comparison import Run, Runs
 from rparm.systems import comparison, ecos, ssp
 from rparm.systems.comparison import Outcome
+from rparm.systems.structure import OpenedSystem
 from tests.animation.player_page import show
 from tests.support.browser import Browser
 from tests.support.paths import ROOT
@@ -36,7 +37,9 @@ def grasp() -> Run:
 
 
 @pytest.fixture(scope="module", params=SYSTEMS)
-def variants(request: pytest.FixtureRequest) -> Iterator[tuple[str, ssp.Ssp, list[Outcome]]]:
+def variants(
+    request: pytest.FixtureRequest,
+) -> Iterator[tuple[str, OpenedSystem, list[Outcome]]]:
     """A system with its references in the place of runs: they have the same columns."""
     folder = ROOT / "models" / request.param
     with ssp.unpacked(BUILD / f"{SYSTEMS[request.param]}.ssp") as opened:
@@ -114,7 +117,7 @@ def test_a_folder_that_is_none_is_not_animated(grasp: Run, monkeypatch) -> None:
 
 
 def test_systems_show_arm_and_reference_motion(
-    variants: tuple[str, ssp.Ssp, list[Outcome]],
+    variants: tuple[str, OpenedSystem, list[Outcome]],
 ) -> None:
     system, opened, outcomes = variants
     arm = {"closed_loop": "arm", "machine": "plant"}[system]
@@ -131,7 +134,9 @@ def test_systems_show_arm_and_reference_motion(
         assert data["arm"]["l1"] == 0.5  # the start value in the FMU
 
 
-def test_the_machine_has_payload_and_wall(variants: tuple[str, ssp.Ssp, list[Outcome]]) -> None:
+def test_the_machine_has_payload_and_wall(
+    variants: tuple[str, OpenedSystem, list[Outcome]],
+) -> None:
     system, opened, outcomes = variants
     if system != "machine":
         assert all(motion.of_outcome(system, opened, x)["arm"]["wall"] is None for x in outcomes)

@@ -12,7 +12,7 @@ import pytest
 import rparm
 from rparm.errors import UserError
 from rparm.systems import ssp
-from rparm.systems.ssp import Connector
+from rparm.systems.structure import Connector
 from tests.support.rparm_project import MISTAKES, Console
 from tests.support.ssp_files import (
     ALGORITHM,

@@ -9,7 +9,7 @@ import pytest
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.systems.master import Master, Snapshot
-from rparm.systems.ssp import Connection
+from rparm.systems.structure import Connection
 from tests.support.paths import ROOT
 
 COMPONENTS = {"trajectory": "RPTrajectory", "controller": "RPController", "plant": "RPPlant"}

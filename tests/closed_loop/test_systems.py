@@ -7,7 +7,7 @@ import pytest
 
 from rparm import project
 from rparm.errors import UserError
-from rparm.systems import comparison
+from rparm.systems import comparison, ecos
 from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, Edit, edited, replace
 from tests.support.systems import CLOSED_LOOP
@@ -25,7 +25,7 @@ def add(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Add:
 
     def one(name: str, archive: str, suffix: str) -> Path:
         (tmp_path / "models" / name).mkdir(parents=True)
-        (tmp_path / "models" / name / STRUCTURE).touch()
+        (tmp_path / "models" / name / project.LOOP).touch()
         edits: dict[str, Edit] = {
             STRUCTURE: replace('System name="closed_loop"', f'System name="{name}"')
         }
@@ -94,11 +94,17 @@ def test_a_system_that_is_not_built_is_named(add: Add, console: Console) -> None
     assert listed(console, "loop") == {"loop": list(CLOSED_LOOP.variants)}
 
 
-def test_a_system_without_a_folder_is_refused(add: Add, tmp_path: Path, console: Console) -> None:
+def test_a_system_without_a_folder_has_no_references(
+    add: Add, tmp_path: Path, console: Console, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ecos, "absent", lambda: "no Ecos")
     path = add("loop", "Loop.ssp", "")
     other = edited(path, tmp_path / "x.ssp", {STRUCTURE: replace('name="loop"', 'name="lop"')})
-    wanted = f"{other}: no system 'lop' has references, did you mean 'loop'? (known: loop)\n"
-    assert console.refused("system", "--ssp", other) == f"error: {wanted}"
+    assert listed(console, "--ssp", other) == {"lop": list(CLOSED_LOOP.variants)}
+    given = ("nominal", "--step", "10ms", "--output", tmp_path / "report")
+    code, out, error = console("system", other, *given)
+    assert (code, error) == (0, "") and "no Ecos: the master of rparm steps lop" in out
+    assert "coupling error about" in out and "passed" not in out
 
 
 def test_one_system_has_a_study_of_its_coupling(monkeypatch: pytest.MonkeyPatch) -> None:

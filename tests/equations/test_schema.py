@@ -17,6 +17,7 @@ from jsonschema import Draft202012Validator
 from rparm import schemas
 from tests.campaign.test_campaign_file import MISTAKES as OF_CAMPAIGNS
 from tests.campaign.test_campaign_file import wrong
+from tests.closed_loop.test_loop_file import TABLES as OF_LOOPS
 from tests.equations.compiled import ModelFileError, read_text, value_of_toml
 from tests.equations.examples import MODELS
 from tests.equations.test_model_file import EXAMPLES, MISTAKES
@@ -28,6 +29,7 @@ FILES = {
     "model": [*EXAMPLES, ROOT / "models/rp_environment/rp_environment.toml"],
     "scenario": sorted(ROOT.glob("models/*/scenarios/*.toml")),
     "campaign": sorted(ROOT.glob("models/*/campaigns/*.toml")),
+    "loop": sorted(ROOT.glob("models/*/loop.toml")),
 }
 VALUES = (0, -1, 1e999, 1.5, True, "", "x", "1", "a b", [], [1, 2], ["x"], {}, {"x": "1"})
 # those of the mistakes that show without the meaning of texts
@@ -71,8 +73,11 @@ def test_files_of_the_project_are_valid(kind: str) -> None:
 def test_mistakes_that_show_without_meaning_are_refused(tmp_path: Path) -> None:
     found = {name for name, (text, _) in MISTAKES.items() if is_refused("model", text)}
     assert {*SHOWN.replace("\n", "|").split("|")} - found == set()
+    good, of_loops = OF_LOOPS["good"], OF_LOOPS["mistakes"]
+    assert not is_refused("loop", good)
     for kind, mistakes in (
         ("scenario", {message: text for text, message in OF_SCENARIOS}),
+        ("loop", {message: good.replace(old, new) for old, new, message in of_loops}),
         ("campaign", {m["message"]: wrong(tmp_path, m).read_text() for m in OF_CAMPAIGNS["arm"]}),
     ):
         shown = [text for message, text in mistakes.items() if SAID.search(message)]

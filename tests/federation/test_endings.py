@@ -62,7 +62,7 @@ def gone(children: list[psutil.Process]) -> bool:
             "heavy_payload",
             "its variant is 'heavy_payload', that of the federation is 'nominal'",
         ),
-        (None, "nominal", "its SSP is not that of the federation"),
+        (None, "nominal", "its file is not that of the federation"),
     ],
 )
 def test_something_else_elsewhere_is_refused_by_both(

@@ -15,7 +15,7 @@ from rparm.federation.component import parts, real_connections
 from rparm.fmi.fmu_file import Fmu
 from rparm.systems import ssp
 from rparm.systems.master import Master
-from rparm.systems.ssp import Ssp
+from rparm.systems.structure import OpenedSystem
 from tests.federation.processes import Start
 from tests.support.programs import RPARM, python
 from tests.support.rparm_project import MISTAKES, Console
@@ -30,14 +30,14 @@ TOLERANCE = (
 
 
 @pytest.fixture(scope="module")
-def short(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ssp]:
+def short(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OpenedSystem]:
     """The closed loop, of 1 s."""
     path = edited(SSP, tmp_path_factory.mktemp("ssp") / "Short.ssp", {STRUCTURE: SHORT})
     with ssp.unpacked(path) as opened:
         yield opened
 
 
-def by_the_master(system: Ssp, variant: str) -> tuple[tuple[str, ...], np.ndarray]:
+def by_the_master(system: OpenedSystem, variant: str) -> tuple[tuple[str, ...], np.ndarray]:
     """Names and values at all communication points of the Jacobi master, in this process."""
     fmus = {c.name: Fmu(system.fmu(c.name)) for c in system.system.components}
     try:
@@ -51,7 +51,7 @@ def by_the_master(system: Ssp, variant: str) -> tuple[tuple[str, ...], np.ndarra
 
 
 @pytest.mark.parametrize("variant", ["nominal", "heavy_payload_integral"])
-def test_values_are_those_of_the_master(short: Ssp, variant: str) -> None:
+def test_values_are_those_of_the_master(short: OpenedSystem, variant: str) -> None:
     record = federation.run(short, variant, network.free_address())
     names, rows = by_the_master(short, variant)
     assert set(record.names) == set(names)
@@ -62,7 +62,7 @@ def test_values_are_those_of_the_master(short: Ssp, variant: str) -> None:
     assert np.abs(rows[-1] - rows[0]).max() > 1e-3, "nothing has moved"
 
 
-def test_a_component_may_be_stepped_elsewhere(short: Ssp, start: Start) -> None:
+def test_a_component_may_be_stepped_elsewhere(short: OpenedSystem, start: Start) -> None:
     """By a command that is started first, as on another machine."""
     address = network.free_address()
     arguments = federation.arguments(short.path, "nominal", "arm", address)
@@ -88,7 +88,7 @@ def test_what_an_fmu_refuses_is_the_message(tmp_path: Path) -> None:
         federation.run(system, "nominal", network.free_address())
 
 
-def test_it_is_a_document(short: Ssp) -> None:
+def test_it_is_a_document(short: OpenedSystem) -> None:
     """Whatever the processes of the components print."""
     done = python(*RPARM, "federation", "nominal", "--json", "--ssp", short.path, check=True)
     (variant,) = json.loads(done.stdout)["variants"]

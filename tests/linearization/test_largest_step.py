@@ -22,7 +22,7 @@ from rparm.linearization.largest_step import (
 )
 from rparm.linearization.linear import Linear
 from rparm.systems.master import INPUT_MODES, ORDERS
-from rparm.systems.ssp import Connection
+from rparm.systems.structure import Connection
 from tests.support.paths import ROOT
 
 WAYS = [(order, inputs) for order in ORDERS for inputs in INPUT_MODES]

@@ -5,7 +5,7 @@ both sides of each margin.
 """
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import factorial
 from pathlib import Path
 
@@ -39,6 +39,44 @@ def rational(num: list[float], den: list[float]) -> Linear:
 
 
 # ---- Loops whose margins are known ---------------------------------------------------------------
+
+
+def sampled_radius(
+    A: np.ndarray, B: np.ndarray, C: np.ndarray, gain: float = 1.0, delay: int = 0
+) -> float:
+    """The largest pole of a closed sampled loop, with a delay of whole samples as a chain."""
+    n, chain = len(A), np.eye(delay, k=-1)
+    whole = np.block([[A, np.zeros((n, delay))], [np.zeros((delay, n)), chain]])
+    if delay:
+        whole[:n, -1:] = B
+        whole[n : n + 1, :n] = -gain * C
+    else:
+        whole -= gain * B @ C
+    return float(np.abs(np.linalg.eigvals(whole)).max())
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_sampled_loop_is_stable_up_to_its_margins_and_not_beyond(seed: int) -> None:
+    source = np.random.default_rng(1000 + seed)
+    while True:
+        n = int(source.integers(1, 5))
+        A, B = 0.7 * source.normal(size=(n, n)), source.normal(size=(n, 1))
+        C = source.normal(size=(1, n)) * source.choice([0.1, 1.0])
+        if sampled_radius(A, B, C) < 1:
+            break
+    found = margins(replace(linear(A, B, C), dt=0.01))
+    assert found.stable
+    up, down = min(found.gain_up, 1e5), max(found.gain_down, 1e-5)
+    for gain in np.geomspace(0.999 * up, 1.001 * down, 400):
+        assert sampled_radius(A, B, C, gain) < 1
+    assert found.gain_up == np.inf or sampled_radius(A, B, C, 1.001 * up) > 1
+    assert found.gain_down == 0 or sampled_radius(A, B, C, 0.999 * down) > 1
+    for delay in range(1, 6):
+        if 0.01 * delay < found.delay:
+            assert sampled_radius(A, B, C, delay=delay) < 1
+    first = int(np.ceil(found.delay / 0.01)) if np.isfinite(found.delay) else 0
+    if 0 < first <= 5 and len(found.gain_crossings) == 1:
+        assert sampled_radius(A, B, C, delay=first) > 1
 
 
 def test_margins_at_round_numbers() -> None:

@@ -14,7 +14,8 @@ from rparm.linearization.margins import margins, open_loop
 from rparm.linearization.study import Request, study
 from rparm.linearization.system import SystemSubject, connected, looped
 from rparm.systems import ssp
-from rparm.systems.ssp import Connection
+from rparm.systems.opened import opened as open_system
+from rparm.systems.structure import Connection
 
 
 @contextmanager
@@ -160,3 +161,112 @@ def test_margins_of_computed_torque_are_those_of_its_law(fmu: Path) -> None:
     lag = np.arctan(w / 10)
     assert found.phase == pytest.approx(np.degrees(lag), rel=1e-9)
     assert found.delay == pytest.approx(lag / w, rel=1e-9)
+
+
+# ---- With a component in Python ------------------------------------------------------------------
+MASS, KP, KI, KD = 2.0, 30.0, 12.0, 16.0
+PID = """
+import numpy as np
+
+class Pid:
+    inputs = ["q2"]
+    outputs = ["f2"]
+    gains = np.zeros(3)
+    integral = last = 0.0
+
+    def step(self, t, h, inputs):
+        kp, ki, kd = self.gains
+        self.integral += h * inputs["q2"]
+        speed = (inputs["q2"] - self.last) / h
+        self.last = inputs["q2"]
+        return {"f2": -kp * inputs["q2"] - ki * self.integral - kd * speed}
+
+    def save(self):
+        return self.integral, [self.last]
+
+    def restore(self, state):
+        self.integral, (self.last,) = state
+"""
+
+
+def python_loop(fmu: Path, folder: Path, code: str = PID, step: float = 0.05) -> Path:
+    """A file with the arm that lies flat: its slider alone is a double integrator."""
+    (folder / "pid.py").write_text(code, encoding="utf-8")
+    (folder / "gains.json").write_text(f'{{"pid": {{"gains": [{KP}, {KI}, {KD}]}}}}')
+    file = folder / "loop.toml"
+    file.write_text(
+        f'name = "Loop"\nstep = {step}\nstop = 1\n'
+        f'[components]\narm = "{fmu.as_posix()}"\npid = "pid.py"\n'
+        '[connections]\n"arm.f2" = "pid.f2"\n"pid.q2" = "arm.q2"\n'
+        f'[parameters]\nfile = "gains.json"\n"arm.m2" = {MASS}\n"arm.g" = 0\n"arm.a" = 0\n'
+    )
+    return file
+
+
+def pid_loop(h: float) -> control.TransferFunction:
+    """L by hand: held force on a mass, a delay of one step, sums and differences of positions."""
+    sums = np.polyadd([KP, -KP, 0.0], [KI * h, 0.0, 0.0])
+    law = np.polyadd(sums, KD / h * np.array([1.0, -2.0, 1.0]))  # over z (z - 1)
+    num = h * h / 2 / MASS * np.polymul([1.0, 1.0], law)
+    return control.tf(num, np.poly([1.0, 1.0, 1.0, 0.0, 0.0]), h)
+
+
+def test_a_law_in_python_has_poles_and_margins_of_its_z_transform(
+    fmu: Path, tmp_path: Path
+) -> None:
+    file, L = python_loop(fmu, tmp_path), pid_loop(0.05)
+    found = study(Request(file)).linear
+    assert found.dt == 0.05
+    expected = [1.0, 1.0, *control.feedback(L).poles()]  # of the joint that nothing moves
+
+    def size(pole: complex) -> tuple[float, float]:
+        return round(abs(pole), 6), pole.imag
+
+    assert sorted(found.poles, key=size) == pytest.approx(sorted(expected, key=size), abs=1e-8)
+    broken = study(Request(file, cut="arm.f2"))
+    up, lag, _, _, crossing, _ = control.stability_margins(L)
+    assert broken.margins.gain_up == pytest.approx(up, rel=1e-7)
+    assert broken.margins.phase == pytest.approx(lag, rel=1e-7)
+    assert broken.margins.delay == pytest.approx(np.radians(lag) / crossing, rel=1e-7)
+
+
+def test_the_largest_step_of_python_is_where_a_pole_leaves_the_circle(
+    fmu: Path, tmp_path: Path
+) -> None:
+    """In Jacobi order; the law is called once a step, so it changes with the step, too."""
+    (jacobi, _) = study(Request(python_loop(fmu, tmp_path))).largest
+    assert (jacobi.order, jacobi.inputs) == ("jacobi", "held")
+
+    def radius(h: float) -> float:
+        return float(np.abs(control.feedback(pid_loop(h)).poles()).max())
+
+    assert radius(0.999 * jacobi.step) < 1.0 < radius(1.001 * jacobi.step)
+
+
+@pytest.mark.parametrize(
+    "old, new, message",
+    [
+        ("def save", "def keep", r"pid\.py: has no save\(\) and restore\(state\), which a linear"),
+        ("speed}", "abs(speed)}", "pid: f2 has a corner or a jump over saved\\[1\\]\\[0\\] at the"),
+        ("speed}", "np.sign(speed)}", "pid: f2 has a corner or a jump over saved"),
+        ("[self.last]", "{self.last}", r"pid: save\(\) gives a set, expected numbers"),
+    ],
+)
+def test_a_law_without_a_linear_model_is_refused(
+    fmu: Path, tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    file = python_loop(fmu, tmp_path, PID.replace(old, new))
+    with pytest.raises(UserError, match=message):
+        study(Request(file))
+
+
+def test_a_law_that_bends_is_differentiated(fmu: Path, tmp_path: Path) -> None:
+    """exp(5 x) - 1 at x = 0.1, from another variant's point."""
+    text = PID.replace('-kp * inputs["q2"]', '-np.expm1(5.0 * inputs["q2"])')
+    with (
+        open_system(python_loop(fmu, tmp_path, text)) as system,
+        SystemSubject(system, "default") as subject,
+    ):
+        part = subject.parts({"arm.q2": 0.1})["pid"]
+    slope = -5.0 * np.exp(0.5) - KI * 0.05 - KD / 0.05
+    assert part.B[part.states.index("f2"), 0] == pytest.approx(slope, rel=1e-10)

@@ -7,7 +7,7 @@ from rparm.models.machine.continuous import BOUND, METHODS, SMALLEST, VARIANTS, 
 
 from rparm.fmi.fmu_file import Fmu
 from rparm.runs.convergence import slope
-from rparm.systems.ssp import Ssp
+from rparm.systems.structure import OpenedSystem
 
 
 @pytest.mark.parametrize("power", [1, 2])
@@ -28,7 +28,7 @@ def test_the_limit_of_a_polynomial_is_its_constant_term(power: int) -> None:
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_errors_fall_by_the_order_and_vanish_in_the_limit(
-    opened: Ssp, fmus: dict[str, Fmu], variant: str, method: Method
+    opened: OpenedSystem, fmus: dict[str, Fmu], variant: str, method: Method
 ) -> None:
     expected = continuous.reference(variant)
     runs = [continuous.run(opened, fmus, method, variant, n) for n in method.per_second]

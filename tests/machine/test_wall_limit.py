@@ -23,14 +23,14 @@ from rparm.models.machine.wall_limit import (
 )
 
 from rparm.fmi.fmu_file import Fmu
-from rparm.systems.ssp import Ssp
+from rparm.systems.structure import OpenedSystem
 from tests.importers.osp import libcosim
 
 STIFFNESS = 1e4  # N/m
 
 
 @pytest.fixture(scope="module")
-def fmus(opened: Ssp) -> Iterator[dict[str, Fmu]]:
+def fmus(opened: OpenedSystem) -> Iterator[dict[str, Fmu]]:
     with opened.unpacked_fmus(wall_limit.SEQUENCE) as found:
         yield found
 
@@ -44,11 +44,11 @@ def check(measure: Measure, stiffness: float, order: str, inputs: str) -> None:
 
 
 @pytest.mark.parametrize("stiffness", [2e3, STIFFNESS, 2e4])
-def test_ecos(opened: Ssp, stiffness: float) -> None:
+def test_ecos(opened: OpenedSystem, stiffness: float) -> None:
     check(wall_limit.in_ecos(opened), stiffness, "jacobi", "held")
 
 
-def test_libcosim(opened: Ssp, tmp_path: Path) -> None:
+def test_libcosim(opened: OpenedSystem, tmp_path: Path) -> None:
     def measure(stiffness: float, damping: float) -> np.ndarray:
         path = tmp_path / "Pressed.ssp"
         write_system(opened, path, pressed(stiffness, damping), STEPS * STEP, STEP)
@@ -58,11 +58,13 @@ def test_libcosim(opened: Ssp, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("order", "inputs"), CASES)
-def test_master(opened: Ssp, fmus: dict[str, Fmu], order: str, inputs: str) -> None:
+def test_master(opened: OpenedSystem, fmus: dict[str, Fmu], order: str, inputs: str) -> None:
     check(wall_limit.under_master(opened, fmus, order, inputs), STIFFNESS, order, inputs)
 
 
-def test_ecos_and_the_master_in_its_order_move_alike(opened: Ssp, fmus: dict[str, Fmu]) -> None:
+def test_ecos_and_the_master_in_its_order_move_alike(
+    opened: OpenedSystem, fmus: dict[str, Fmu]
+) -> None:
     """Depths are those of both engines, read after and before inputs are set."""
     master = wall_limit.under_master(opened, fmus, "jacobi", "held")(STIFFNESS, 30.0)
     engine = wall_limit.in_ecos(opened)(STIFFNESS, 30.0)

@@ -117,7 +117,7 @@ class Run:
         return (
             self._reals.view.tobytes(),
             [self.instance.integer(name) for name in self._others["Integer"]],
-            [self.instance.boolean(name) for name in self._others["Boolean"]],
+            [self.instance.discrete(name) for name in self._others["Boolean"]],
         )
 
 

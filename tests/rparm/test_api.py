@@ -2,20 +2,25 @@
 
 import inspect
 import re
+import tomllib
+import webbrowser
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import fmpy
 import numpy as np
 import pytest
+from lxml import etree
 
 import rparm
 from rparm import files, project
 from rparm.errors import UserError
-from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.fmu_file import Fmu, read_model
 from rparm.runs import scenario as scenarios
+from rparm.systems.opened import opened
 from tests.support.paths import ROOT
 from tests.support.programs import python
-from tests.support.rparm_project import MISTAKES
+from tests.support.rparm_project import MISTAKES, Console, repacked
 
 RUN = {"stop_time": 1.0, "step": 0.01}
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -94,12 +99,120 @@ def test_a_table_is_a_mapping_with_units(arm: Path, tmp_path: Path) -> None:
         table.to_csv(tmp_path / "none" / "run.csv")
 
 
+def test_the_default_experiment_is_the_usual_run(arm: Path, tmp_path: Path) -> None:
+    usual = fmpy.read_model_description(arm).defaultExperiment
+    table = rparm.simulate(arm, outputs=["q1"])
+    assert np.diff(table["time"]) == pytest.approx(float(usual.stepSize))
+    assert table["time"][[0, -1]].tolist() == [float(usual.startTime), float(usual.stopTime)]
+    none = repacked(arm, tmp_path / "none.fmu", lambda x: re.sub("<DefaultExp[^>]*>", "", x))
+    with pytest.raises(UserError, match=r"none\.fmu: .* give stop_time$"):
+        rparm.simulate(none)
+
+
+def test_a_table_draws_itself_and_its_page(
+    arm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table = rparm.simulate(arm, **RUN, start_values={"q1": 0.5})
+    picture = etree.fromstring(table._repr_html_())
+    assert picture.findtext("caption") == f"101 rows from 0 to 1 s, {len(table)} columns, 10 drawn"
+    assert len(picture.findall(".//path")) == 10 and picture.find(".//script") is None
+    shown: list[str] = []
+    monkeypatch.setattr(webbrowser, "open_new_tab", shown.append)
+    page = table.plot("q2", "q1", "ee_x", output=tmp_path)
+    assert shown == [page.as_uri()]
+    captions = re.findall("<figcaption>(.*)</figcaption>", page.read_text(encoding="utf-8"))
+    assert captions == ["q2, ee_x (m)", "q1 (rad)"]
+    loaded = re.findall('(?:src|href)="(assets/[^"]*)"', page.read_text(encoding="utf-8"))
+    assert loaded and all((tmp_path / file).is_file() for file in loaded)
+
+
 def test_a_scenario_is_within_its_bound() -> None:
     scenario = rparm.Scenario("free_fall")
     errors = scenario.errors(scenario.run(fmi=3))
     assert 0 < max(errors.values()) < 1e-7
     exact = scenario.errors(scenario.run(tolerance=1e-11))
     assert max(exact.values()) < 1e-2 * max(errors.values())
+
+
+# ---- systems of files
+
+LOOP = """
+name = "Pushed"
+step = 0.01
+stop = 1.0
+keep = ["arm.q2"]
+[components]
+arm = "RPManipulator"
+[inputs]
+"arm.f2" = { constant = 3.0 }
+[parameters]
+"arm.g" = 0.0
+"arm.a" = "0 mm"
+"arm.m2" = "2 kg"
+[variants.heavy]
+"arm.m2" = "4 kg"
+"""
+
+
+def test_a_system_of_a_file_runs_with_other_values_and_steps(tmp_path: Path) -> None:
+    """At rest without gravity the slide is pushed along a parabola: q2 = f2 t^2 / (2 m2)."""
+    file = tmp_path / "pushed.toml"
+    file.write_text(LOOP)
+    system = rparm.System(file)
+    assert system.variants == ("default", "heavy")
+    for expected, step, table in (
+        (0.75, 0.01, system.run()),
+        (0.375, 0.05, system.run("heavy", step=0.05)),
+        (0.25, 0.01, system.run("heavy", parameters={"arm.m2": "6 kg", "arm.f2": 3})),
+        (0.5, 0.01, system.run(parameters={"arm.f2": np.float64(2.0)})),
+    ):
+        assert list(table) == ["time", "arm.q2"] and table.units["arm.q2"] == "m"
+        assert np.diff(table["time"]) == pytest.approx(step)
+        assert table["arm.q2"] == pytest.approx(expected * table["time"] ** 2, abs=1e-9)
+    file.write_text(LOOP.replace("constant = 3.0", "constant = 6.0"))
+    assert system.run()["arm.q2"][-1] == pytest.approx(1.5, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"parameters": {"arn.m2": 1.0}}, "no component 'arn', did you mean 'arm'"),
+        ({"parameters": {"arm.m3": 1.0}}, "arm.m3: 'arm' has no variable 'm3'$"),
+        ({"parameters": {"arm.ee_x": 1.0}}, "arm.ee_x: is an output, which cannot be set"),
+        ({"parameters": {"arm.m2": "2 s"}}, "arm.m2: "),
+        ({"parameters": {"arm.m2": -1.0}}, "arm.m2: expected at least"),
+        ({"step": 0.03}, "step: expected a whole number of steps"),
+        ({"engine": "ecos", "step": 0.05}, "'ecos' takes neither parameters nor step"),
+    ],
+)
+def test_values_that_a_system_does_not_take_are_named(
+    tmp_path: Path, changes: dict[str, object], words: str
+) -> None:
+    (tmp_path / "pushed.toml").write_text(LOOP)
+    with pytest.raises(UserError, match=words):
+        rparm.System(tmp_path / "pushed.toml").run(**changes)
+
+
+def test_a_new_system_runs_and_guesses_the_connections_of_the_closed_loop(
+    tmp_path: Path, console: Console
+) -> None:
+    """It knows the three FMUs only; the connections are those of the closed loop."""
+    names = {"RPTrajectory": "trajectory", "RPController": "controller", "RPManipulator": "arm"}
+    ended, _, error = console("new-system", "Loop", *names, "--output", tmp_path)
+    file = tmp_path / "Loop.toml"
+    assert (ended, error) == (0, "")
+    alone = rparm.System(file).run()
+    step = min(read_model(rparm.fmu(name)).experiment.step for name in names)
+    assert np.diff(alone["time"]) == pytest.approx(step)
+    text = file.read_text(encoding="utf-8")
+    guessed = tomllib.loads(re.sub('(?m)^# (?=.* = ")', "", text))["connections"]
+    with opened(rparm.System("closed_loop").path) as loop:
+        expected = {c.end: c.start for c in loop.system.connections}
+    for known, name in names.items():
+        guessed = {x.replace(known, name): y.replace(known, name) for x, y in guessed.items()}
+    assert guessed == expected
+    assert "exists already" in console.refused("new-system", "Loop", *names, "--output", tmp_path)
+    assert file.read_text(encoding="utf-8") == text
 
 
 # ---- what is wrong

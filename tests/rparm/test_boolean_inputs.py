@@ -10,7 +10,7 @@ from rparm.errors import UserError
 from rparm.fmi.fmu_file import CO_SIMULATION, INSTANCES, Fmu
 from rparm.runs import scenario, simulation
 from rparm.systems.master import Master
-from rparm.systems.ssp import Connection
+from rparm.systems.structure import Connection
 from tests.support.rparm_project import BUILD, MISTAKES, fmi3_fmu
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, timed, toy
 

@@ -1,15 +1,18 @@
 """The master and its step-size control, on oscillators x'' = -omega^2 x + gain u."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rparm.errors import UserError
+from rparm.errors import CodeError, UserError
 from rparm.fmi.fmu_file import Fmu
+from rparm.runs.inputs import Table
 from rparm.systems import step_control
 from rparm.systems.master import Master, Snapshot
-from rparm.systems.ssp import Connection
+from rparm.systems.python_component import PythonComponent
+from rparm.systems.structure import Connection
 from tests.support.rparm_project import BUILD, MISTAKES, fmi3_fmu
 
 H, STEPS = 0.05, 40
@@ -306,3 +309,132 @@ def test_an_unknown_signal_is_refused(oscillator: Fmu) -> None:
         master.initialize(0.0, 3.0, PARAMETERS)
         with pytest.raises(UserError, match=r"a\.y: the system has no such value"):
             step_control.run(master, 3.0, control(scales={"a.y": 1.0}))
+
+
+# ---- Signals and components in Python -----------------------------------------------------------
+PID = """
+class Pid:
+    inputs = ["x", "v"]
+    outputs = ["u"]
+    kp, ki, kd = 1.0, 0.5, 0.2
+    start = {"u": 0.75}
+
+    def __init__(self):
+        self.integral = 0.0
+
+    def step(self, t, h, inputs):
+        self.integral += h * inputs["x"]
+        return {"u": -self.kp * inputs["x"] - self.ki * self.integral - self.kd * inputs["v"]}
+"""
+SAVES = """
+    def save(self):
+        return {"integral": self.integral}
+
+    def restore(self, state):
+        self.integral = state["integral"]
+"""
+LOOP = [
+    Connection("a", "x", "pid", "x"),
+    Connection("a", "v", "pid", "v"),
+    Connection("pid", "u", "a", "u"),
+]
+
+
+def python(folder: Path, text: str, name: str = "", **ends: list[str]) -> PythonComponent:
+    (folder / "code.py").write_text(text, encoding="utf-8")
+    return PythonComponent.read(f"code.py{name}", folder, **ends)
+
+
+def test_signals_are_held_over_each_step(oscillator: Fmu) -> None:
+    signal = Table(((0.0, 0.0), (0.5, 2.0), (1.0, -1.0)))
+    with Master({"a": oscillator}, [], signals={"a.u": signal}) as master:
+        master.initialize(3.0, None, {"a": PARAMETERS["a"]})
+        rows = master.run(3.0 + np.arange(STEPS + 1) * H)
+        columns = places(master, "a.x", "a.v", "a.u")
+    state = START["a"]
+    for k in range(STEPS):
+        u = float(np.interp(k * H, [0.0, 0.5, 1.0], [0.0, 2.0, -1.0]))
+        assert rows[k, columns] == pytest.approx([*state, u], abs=1e-8)
+        state = exact_step("a", state, u, 0.0)
+
+
+def test_python_steps_by_its_law_with_a_delay_of_one_step(oscillator: Fmu, tmp_path: Path) -> None:
+    fmus = {"a": oscillator, "pid": python(tmp_path, PID)}
+    with Master(fmus, LOOP) as master:
+        master.initialize(0.0, None, {"a": PARAMETERS["a"], "pid": {"kp": 3.0}})
+        rows = master.run(np.arange(STEPS + 1) * H)
+        columns = places(master, "a.x", "a.v", "pid.u")
+    state, u, integral = START["a"], 0.75, 0.0
+    for k in range(STEPS):
+        assert rows[k, columns] == pytest.approx([*state, u], abs=1e-8)
+        integral += H * state[0]
+        later = -3.0 * state[0] - 0.5 * integral - 0.2 * state[1]
+        state, u = exact_step("a", state, u, 0.0), later
+
+
+def test_python_goes_back_where_it_can_and_is_refused_elsewhere(
+    oscillator: Fmu, tmp_path: Path
+) -> None:
+    with Master({"a": oscillator, "pid": python(tmp_path, PID + SAVES)}, LOOP) as master:
+        master.initialize(0.0, None, {"a": PARAMETERS["a"]})
+        master.advance(0.1)
+        with Snapshot(master) as snapshot:
+            snapshot.take()
+            first = master.run([0.1, 0.15, 0.3])
+            snapshot.restore()
+            np.testing.assert_array_equal(master.run([0.1, 0.15, 0.3]), first)
+    settings = control(scales={"a.x": 1.0})
+    with Master({"a": oscillator, "pid": python(tmp_path, PID)}, LOOP) as master:
+        master.initialize(0.0, None, {"a": PARAMETERS["a"]})
+        with pytest.raises(UserError, match=r"^pid: .*code\.py has no save\(\) and restore"):
+            step_control.run(master, 1.0, settings)
+
+
+def test_a_function_has_the_names_of_its_connections(oscillator: Fmu, tmp_path: Path) -> None:
+    text = "def step(t, h, inputs):\n    return {'u': -2.0 * inputs['x'] + t}\n"
+    law = python(tmp_path, text, inputs=["x"], outputs=["u"])
+    with Master({"a": oscillator, "pid": law}, [LOOP[0], LOOP[2]]) as master:
+        master.initialize(0.0, None, {"a": PARAMETERS["a"]})
+        rows = master.run(np.arange(3) * H)
+        x, u = rows[:, places(master, "a.x", "pid.u")].T
+    assert u.tolist() == [0.0, -2.0 * x[0], -2.0 * x[1] + H]
+
+
+ENDS = "class C:\n    inputs = ['x']\n    outputs = ['u']\n"
+STEP = "    def step(self, t, h, inputs):\n        "
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "message", "code"),
+    [
+        ("class C:\n    inputs = [\n", "", r"code\.py, line 2: '\[' was never closed", 2),
+        ("import nonsense_\n", "", r"code\.py, line 1: ModuleNotFoundError: .*nonsense_", 1),
+        ("x = 1\n", "", r"code\.py: expected a class with step\(self, t, h, inputs\), or", 2),
+        (PID + PID.replace("Pid", "Pi"), "", r"write code\.py:Pid or code\.py:Pi$", 2),
+        (PID, ":Pdi", r"has no class 'Pdi', did you mean 'Pid'\?", 2),
+        (ENDS, ":C", r"class 'C' has no step\(self, t, h, inputs\)", 2),
+        (ENDS.replace("['x']", "'x'") + STEP + "pass", "", r"inputs: expected a list of", 2),
+        (ENDS.replace("'u'", "'x'") + STEP + "pass", "", r"'x' is both an input and an out", 2),
+        (ENDS + STEP + "return {'u': 1 / 0}", "", r"^c: .*code\.py, line 5: ZeroDivisionError", 1),
+        (ENDS + STEP + "return {'u': inputs['xx']}", "", r"line 5: .*'xx', did you mean 'x'\?", 1),
+        (ENDS + STEP + "return {}", "", r"line 4: step: returned no 'u' in the step from t = 0", 1),
+        (ENDS + STEP + "return {'u': 1, 'w': 2}", "", r"line 4: step: 'w' is no output", 1),
+        (ENDS + STEP + "return 1", "", r"line 4: step: expected a dict of outputs, got 1", 1),
+        (ENDS + STEP + "return {'u': float('nan')}", "", r"line 4: u is nan: expected a finite", 1),
+        (ENDS + STEP + "return {'u': 'much'}", "", r"line 4: u: expected a number, got", 1),
+        (ENDS + "    start = {'uu': 1}\n" + STEP + "pass", "", r"start: 'uu' is no output", 1),
+    ],
+)  # fmt: skip
+def test_mistakes_in_python_are_named_in_one_line(
+    tmp_path: Path, text: str, name: str, message: str, code: int
+) -> None:
+    def run() -> None:
+        with Master({"c": python(tmp_path, text, name)}, []) as master:
+            master.initialize(0.0)
+            master.advance(1.0)
+
+    with pytest.raises(UserError, match=message) as caught:
+        run()
+    assert "\n" not in str(caught.value)
+    assert caught.value.code == code
+    assert isinstance(caught.value, CodeError) == (code == 1)

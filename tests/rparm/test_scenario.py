@@ -210,11 +210,11 @@ def test_what_is_built_has_the_name_of_its_folder(root: Path) -> None:
 
 
 def test_systems_are_found_by_their_names(root: Path) -> None:
-    with pytest.raises(UserError, match=r"models: has no folder with SystemStructure\.ssd"):
+    with pytest.raises(UserError, match=r"models: has no folder with loop\.toml"):
         project.systems()
     for name in ("loop", "machine", "other"):
         (root / "models" / name).mkdir(parents=True)
     for name in ("machine", "loop"):
-        (root / "models" / name / "SystemStructure.ssd").touch()
+        (root / "models" / name / "loop.toml").touch()
     assert list(project.systems()) == ["loop", "machine"]
     assert project.systems()["loop"] == root / "models" / "loop"

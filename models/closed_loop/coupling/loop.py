@@ -19,7 +19,7 @@ from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value
 from rparm.systems import ssp
 from rparm.systems.master import Master
-from rparm.systems.ssp import Connection
+from rparm.systems.structure import Connection
 
 FOLDER = Path(__file__).resolve().parents[1]
 REFERENCES = FOLDER / "references"

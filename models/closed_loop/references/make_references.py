@@ -12,7 +12,7 @@ import numpy as np
 from rparm.models.closed_loop.coupling.loop import STATES
 from rparm.models.closed_loop.coupling.study import FAST, FAST_AND_SLOW, FAST_STOP
 from rparm.models.closed_loop.experiment import STEPS_PER_SECOND, STOP
-from rparm.models.closed_loop.references.closed_loop import COMPONENTS, Columns, monolithic, sampled
+from rparm.models.closed_loop.references.closed_loop import Columns, monolithic, sampled
 from rparm.models.reference_files import KEPT, Files, communication_points
 
 from rparm.fmi.model import Value
@@ -24,7 +24,7 @@ FAST_ROWS_PER_SECOND = 50
 
 def variants() -> dict[str, dict[str, Value]]:
     """Return parameters of every variant of the system, ``component.name``."""
-    return reference_files.variants(SYSTEM, COMPONENTS)
+    return reference_files.variants(SYSTEM)
 
 
 def make(

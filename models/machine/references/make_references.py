@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from rparm.models.machine.experiment import STEPS_PER_SECOND, STOP
 from rparm.models.machine.references.components import Sample
-from rparm.models.machine.references.machine import COMPONENTS, DISCRETE, Machine, columns
+from rparm.models.machine.references.machine import DISCRETE, Machine, columns
 from rparm.models.machine.references.monolithic import monolithic
 from rparm.models.reference_files import KEPT, Files, communication_points
 from rparm.models.rp_plant.references.solver import Solver
@@ -32,7 +32,7 @@ solver = cache(Solver)  # compiles the equations once
 
 def variants() -> dict[str, dict[str, Value]]:
     """Return parameters of every variant, ``component.name``."""
-    return reference_files.variants(SYSTEM, COMPONENTS)
+    return reference_files.variants(SYSTEM)
 
 
 def make(solver: Solver, parameters: Mapping[str, Value], stop: float = STOP) -> Files:

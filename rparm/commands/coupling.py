@@ -1,0 +1,186 @@
+"""`coupling`: what co-simulation of a system costs."""
+
+import argparse
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from rparm import console, project
+from rparm.command_line import (
+    Ended,
+    add_report,
+    add_step,
+    add_system,
+    file_or_name,
+    retyped,
+)
+from rparm.console import Progress
+from rparm.errors import UserError, hint
+from rparm.files import check_writable, from_here, written
+from rparm.report import pages
+from rparm.report.pages import Table
+from rparm.systems import comparison, master
+from rparm.systems.comparison import HALVINGS, Halved
+from rparm.systems.opened import SUFFIXES, opened
+from rparm.systems.structure import OpenedSystem
+from rparm.units import milliseconds, short
+
+ABOUT = "How far the system's co-simulation is from its limit for small communication steps."
+ERRORS = (
+    "An error is the largest distance of an output from the limit that the two smallest steps lead "
+    "to, relative to the largest value of outputs in its unit. The order is the power of the step "
+    "by which runs at three steps approach each other; the tolerance of the FMUs' integrators and "
+    "events end it."
+)
+
+
+def add_coupling_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Runs a system at its communication step and at halves of it, in all orders, with inputs "
+        "held and extrapolated, as far as its FMUs can: errors, their orders, largest stable "
+        "steps. Without a file, studies the project's closed loop in depth."
+    )
+    text = "a loop file, an SSP, or a name of the project"
+    parser.add_argument("what", nargs="?", metavar="FILE|NAME", help=text)
+    text = "parameter set (default: the first)"
+    parser.add_argument("variant", nargs="?", metavar="VARIANT", help=text)
+    add_step(parser)
+    add_system(parser)
+    add_report(parser, "system")
+
+
+def do_coupling(options: argparse.Namespace) -> Ended:
+    """Study the project's closed loop, or halve the step of the system that is named."""
+    studied, _ = comparison.coupling_study()
+    systems, what = project.systems(), options.what
+    if what is None or (what == studied.name and options.step is options.variant is None):
+        return _study(options)
+    if Path(what).suffix.lower() not in SUFFIXES:
+        if what not in systems:
+            known = hint(what, systems)
+            raise UserError(f"{what}: expected a file .toml or .ssp, or a system{known}")
+        path = project.built(systems[what], ".ssp", "--ssp", options.fmi)
+    else:
+        path = Path(what)
+    check_writable(options.report)
+    with opened(path, options.step, options.fmi) as system:
+        console.messages(str(path), system.notes)
+        variants = system.system.parameters
+        variant = options.variant or next(iter(variants))
+        if variant not in variants:
+            raise UserError(f"{path}: no variant {variant!r}{hint(variant, variants)}")
+        return _halved(system, variant, options)
+
+
+def _halved(system: OpenedSystem, variant: str, options: argparse.Namespace) -> Ended:
+    name = system.system.name
+    console.stage(f"halving the step of {name}, {variant}")
+    ways = master.ways(system.models, system.system.connections)
+    total = len(ways) * system.system.steps * (2 ** (HALVINGS + 1) - 1)
+    with Progress(name, total) as progress:
+        found = [comparison.halve(system, variant, way, progress) for way in ways]
+    parts = [(_table(found), ERRORS, [("coupling", "Errors over the step")])]
+    limits, note = _limits(system, variant)
+    if limits is not None:
+        from rparm.linearization.page import STEPS
+
+        parts.append((limits, STEPS, []))
+    for table, text, _ in parts:
+        console.plain_table(table.title, table.head, table.rows)
+        console.remark(text)
+    if note:
+        console.remark(note)
+    folder = options.report / f"coupling_{name}_{variant}"
+    given = {
+        "step": options.step,
+        "fmi": options.fmi if options.fmi != project.VERSIONS[0] else None,
+    }
+    again = retyped("coupling", [file_or_name(options.what, SUFFIXES), variant], given)
+    with written(folder):
+        pages.write_assets(folder)
+        _draw(found, folder / "coupling.png")
+        index = pages.write_page(
+            folder / pages.INDEX, "linearization.html", root="", parts=parts, again=again,
+            title=f"{name}, {variant}: the coupling", about=ABOUT, notes=[note] if note else [],
+        )  # fmt: skip
+    print(f"page: {from_here(index)}")
+    first = found[0]
+    order = f", order {first.orders[-1]:.2f}" if math.isfinite(first.orders[-1]) else ""
+    verdict = (
+        f"coupling: error {short(float(first.errors[0]), 1)} at {milliseconds(first.steps[0])}"
+    )
+    document = {
+        "variant": variant,
+        "ways": [
+            {"order": x.order, "inputs": x.inputs, "steps": x.steps.tolist(),
+             "errors": x.errors.tolist(), "orders": _finite(x.orders.tolist()), "worst": x.worst}
+            for x in found
+        ],
+        "page": index.absolute(),
+    }  # fmt: skip
+    return Ended(0, verdict + order, document, page=index)
+
+
+def _finite(numbers: Sequence[float]) -> list[float | None]:
+    return [x if math.isfinite(x) else None for x in numbers]
+
+
+def _table(found: Sequence[Halved]) -> Table:
+    rows = []
+    for x in found:
+        orders = [*(f"{p:.2f}" if math.isfinite(p) else "–" for p in x.orders), "", ""]
+        for i, (step, error) in enumerate(zip(x.steps.tolist(), x.errors.tolist(), strict=True)):
+            names = [x.order.replace("_", "-"), x.inputs] if i == 0 else ["", ""]
+            worst = x.worst if i == 0 else ""
+            rows.append([*names, milliseconds(step), short(error, 1), orders[i], worst])
+    head = ["order", "inputs", "step", "error", "of order", "largest of"]
+    return Table("Errors of the coupling", head, rows)
+
+
+def _limits(system: OpenedSystem, variant: str) -> tuple[Table | None, str]:
+    """Return the table of the largest stable steps, or why there is none."""
+    from rparm.linearization import page, study
+
+    try:
+        found = study.of_system(system, study.Request(system.path, variant=variant)).largest
+    except UserError as error:
+        return None, f"No largest stable step: {error}."
+    if not found:
+        return None, "No largest stable step: the connections form no loop."
+    return page.steps_table(list(found)), ""
+
+
+def _draw(found: Sequence[Halved], path: Path) -> None:
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context(pages.STYLE):
+        figure = Figure(figsize=(7, 4), layout="constrained")
+        axes = figure.subplots()
+        for x in found:
+            label = f"{x.order.replace('_', '-')}, {x.inputs}"
+            axes.loglog(1e3 * x.steps, x.errors, marker="o", label=label)
+        axes.set_xlabel("communication step (ms)")
+        axes.set_ylabel("error")
+        axes.legend(fontsize=8)
+        pages.save_figure(figure, path)
+
+
+def _study(options: argparse.Namespace) -> Ended:
+    """Study the closed loop in depth, as its study.py defines."""
+    from rparm.linearization.largest_step import study_steps
+
+    folder, known = comparison.coupling_study()
+    path = options.ssp or project.built(folder, ".ssp", "--ssp", options.fmi)
+    check_writable(options.report)
+    console.stage(f"studying the coupling of {folder.name}")
+    parts = known.study_coupling(path, options.report)
+    for other, rest in comparison.rests().items():
+        if other != folder and not options.ssp:
+            ssp = project.built(other, ".ssp", version=options.fmi)
+            parts[f"largest steps of {other.name}"] = study_steps(ssp, rest)
+    failed = [name for name, part in parts.items() if not part["passed"]]
+    picture = (options.report / known.COUPLING_PICTURE).absolute()
+    verdict = console.verdict_line(failed, parts, "part")
+    document = {"parts": parts, "picture": picture}
+    return Ended(1 if failed else 0, verdict, document, page=picture)

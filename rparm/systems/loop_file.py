@@ -1,0 +1,384 @@
+"""Systems in loop files: components, connections, inputs and parameters, read and checked.
+
+docs/systems.md explains the format. FMUs are copied to a folder, files with equations are built in
+it; then a system is the same as one in an SSP.
+"""
+
+import json
+import re
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+from typing import Any
+
+from rparm import building, project
+from rparm.errors import UserError, did_you_mean, hint
+from rparm.files import LARGEST_TOML, UnreadableError, is_file, missing, read_text, read_toml, show
+from rparm.fmi.fmu_file import read_model
+from rparm.fmi.model import INPUTS, PARAMETERS, Model, Variable
+from rparm.interruption import temporary_folder
+from rparm.project import VERSIONS
+from rparm.runs.inputs import Constant, InputReader, Reader, Switches
+from rparm.systems.python_component import PythonComponent, is_python
+from rparm.systems.structure import (
+    ALONE,
+    Component,
+    Connection,
+    Connector,
+    FmuReader,
+    OpenedSystem,
+    Parameter,
+    System,
+    check,
+    is_whole,
+    times,
+)
+from rparm.units import SECONDS, number
+
+COMPONENTS, CONNECTIONS, VARIANTS, KEEP = "components", "connections", "variants", "keep"
+TIMES = ("start", "stop", "step")
+REQUIRED = ("name", COMPONENTS)
+OPTIONAL = ("description", *TIMES, KEEP, CONNECTIONS, INPUTS, PARAMETERS, VARIANTS)
+NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
+VARIANT = re.compile(r"\w[\w-]{0,99}", re.ASCII)
+FMU, EQUATIONS = ".fmu", ".toml"
+RESOURCES = "resources"  # folder of the FMUs, as in an SSP
+
+
+@contextmanager
+def opened(
+    path: Path, step: float | None = None, version: str = VERSIONS[0], fmus: Path | None = None
+) -> Iterator[OpenedSystem]:
+    """Read a loop file and build what it names; a `step` in s replaces its own.
+
+    FMUs of the project, and built ones, are of this `version` of FMI; those in a folder `fmus`
+    need not run here. UserError if anything is wrong.
+    """
+    path = Path(path)
+    content = read_toml(path)
+    with temporary_folder() as folder:
+        yield LoopReader(path, folder, version, fmus).system(content, step)
+
+
+class LoopReader(Reader):
+    """Takes the sections of one file; errors name the file and the key."""
+
+    def __init__(self, path: Path, folder: Path, version: str, fmus: Path | None) -> None:
+        super().__init__(path)
+        self.folder, self.version, self.fmus = folder, version, fmus
+        self.models: dict[str, Model] = {}  # by component, as the rest
+        self.sources: dict[str, str] = {}  # in the folder
+        self.files: dict[str, Path] = {}  # FMUs that the user knows
+        self.python: dict[str, Any] = {}
+        self.notes: list[str] = []
+        self._fmus = FmuReader(path)
+        self._copied: dict[Path, str] = {}  # sources, by what they are made of
+
+    def system(self, content: dict[str, Any], step: float | None) -> OpenedSystem:
+        self.keys(content, "", REQUIRED, OPTIONAL)
+        name = self.name(content["name"], "name")
+        description = (
+            self.text(content["description"], "description") if "description" in content else ""
+        )
+        components = self.table(content[COMPONENTS], f"[{COMPONENTS}]")
+        if not components:
+            self.fail(f"[{COMPONENTS}]: expected a component")
+        self.moved = self.entries(content, INPUTS)
+        self.connections = connections = [
+            self.connection(end, start, components)
+            for end, start in self.entries(content, CONNECTIONS).items()
+        ]
+        for component, given in components.items():
+            where = f"[{COMPONENTS}] {component}"
+            self.name(component, f"[{COMPONENTS}]")
+            self.component(component, self.text(given, where), where)
+        start, stop, step = self.times(content, step)
+        parameters, descriptions = self.parameters(content)
+        system = System(
+            name=name,
+            components=tuple(self.connected(component) for component in components),
+            connections=tuple(connections),
+            start=start,
+            stop=stop,
+            step=step,
+            parameters=parameters,
+            descriptions=descriptions,
+            description=description,
+        )
+        check(self.path, system, self.models)
+        self.check_delays()
+        system = self.with_inputs(system, self.moved)
+        keep = None
+        if KEEP in content:
+            keep = tuple(map(self.kept, self.array(content[KEEP], KEEP, "component.variable")))
+            if twice := [name for i, name in enumerate(keep) if name in keep[:i]]:
+                self.fail(f"{KEEP}: {twice[0]} is there twice")
+        system = replace(system, keep=keep, notes=tuple(self.notes))
+        return OpenedSystem(
+            self.path, self.folder, system, self.models, files=self.files, python=self.python
+        )
+
+    # ---- Names -----------------------------------------------------------------------------------
+
+    def name(self, given: Any, key: str) -> str:
+        if not isinstance(given, str) or not NAME.fullmatch(given):
+            self.fail(
+                f"{key}: expected a name, a letter, then letters, digits, _, got {show(given)}"
+            )
+        return given
+
+    def entries(self, content: Mapping[str, Any], section: str) -> dict[str, Any]:
+        """Return a section by component.variable, which may also be written as tables."""
+        found: dict[str, Any] = {}
+
+        def add(table: Mapping[str, Any], begin: str) -> None:
+            for key, value in table.items():
+                name = f"{begin}{key}"
+                # an input is a table itself, whose values are none
+                nests = isinstance(value, dict) and (
+                    section != INPUTS or any(isinstance(x, dict) for x in value.values())
+                )
+                if nests:
+                    add(value, f"{name}.")
+                elif name in found:
+                    self.fail(f"[{section}] {name}: is there twice")
+                else:
+                    found[name] = value
+
+        add(self.table(content.get(section, {}), f"[{section}]"), "")
+        return found
+
+    def parts(self, given: Any, where: str, components: Mapping[str, Any]) -> tuple[str, str]:
+        """Return component and variable of a name "component.variable"."""
+        component, dot, variable = given.partition(".") if isinstance(given, str) else ("", "", "")
+        if not (component and dot and variable):
+            self.fail(f"{where}: expected COMPONENT.VARIABLE, got {show(given)}")
+        if component not in components:
+            self.fail(f"{where}: no component {component!r}{hint(component, components)}")
+        return component, variable
+
+    def variable(self, given: Any, where: str) -> tuple[str, Variable]:
+        """Return component and variable of a name."""
+        component, name = self.parts(given, where, self.models)
+        variables = self.models[component].variables
+        if name not in variables:
+            guess = did_you_mean(name, variables)
+            self.fail(f"{where}: {component!r} has no variable {name!r}{guess}")
+        return component, variables[name]
+
+    # ---- Components ------------------------------------------------------------------------------
+
+    def component(self, name: str, given: str, where: str) -> None:
+        """Find what a component is made of, and what it declares."""
+        if is_python(given):
+            self.code(name, given)
+            return
+        path, suffix = self.path.parent / given, Path(given).suffix.lower()
+        if suffix in (FMU, EQUATIONS) and not is_file(path):
+            self.fail(f"{where}: {given}: {missing(path)}")
+        try:
+            if suffix == EQUATIONS:
+                made = path
+                fmu = self.built(path)
+            elif suffix == FMU:
+                made = fmu = path
+            elif not NAME.fullmatch(given):
+                expected = "a file .fmu, .toml with equations or .py, or a name of the project"
+                self.fail(f"{where}: expected {expected}, got {show(given)}")
+            elif self.fmus:
+                made = fmu = self.fmus / f"{given}{FMU}"
+            else:
+                made = fmu = project.built(project.model(given), FMU, version=self.version)
+            if not self.fmus:
+                read_model(fmu)  # runs on this platform
+        except UserError as error:
+            self.fail(f"{where}: {error}")
+        self.files[name] = made
+        self.models[name] = self._fmus.read(name, fmu, made)
+        self.sources[name] = self.copied(name, fmu)
+
+    def code(self, name: str, given: str) -> None:
+        """Read a component in Python; a function has the inputs and outputs that are connected."""
+        outside = [
+            self.parts(x, INPUTS, {name: ""})[1] for x in self.moved if x.startswith(f"{name}.")
+        ]
+        inputs = [c.end_connector for c in self.connections if c.end_component == name] + outside
+        outputs = [c.start_connector for c in self.connections if c.start_component == name]
+        made = PythonComponent.read(
+            given, self.path.parent, list(dict.fromkeys(inputs)), list(dict.fromkeys(outputs))
+        )
+        self.python[name] = lambda: made
+        self.models[name], self.sources[name] = made.model, given
+
+    def built(self, path: Path) -> Path:
+        """Build an FMU of a file with equations, once."""
+        folder = self.folder / "built" / str(len(self._copied))
+        for made, source in self._copied.items():
+            if made == path.resolve():
+                return self.folder / source
+        fmus = building.build(path, output=folder)
+        fmu = fmus[VERSIONS.index(self.version)]
+        self._copied[path.resolve()] = fmu.relative_to(self.folder).as_posix()
+        return fmu
+
+    def copied(self, name: str, fmu: Path) -> str:
+        """Copy an FMU to the folder, once; return its path there."""
+        key = fmu.resolve()
+        if key not in self._copied:
+            source = f"{RESOURCES}/{fmu.name}"
+            if source in self._copied.values():
+                source = f"{RESOURCES}/{name}_{fmu.name}"
+            (self.folder / RESOURCES).mkdir(exist_ok=True)
+            shutil.copyfile(fmu, self.folder / source)
+            self._copied[key] = source
+        return self._copied[key]
+
+    def connected(self, name: str) -> Component:
+        """Return a component with all its inputs and outputs as connectors."""
+        known = self.models[name].variables.values()
+        ends = [v for v in known if v.causality in ("input", "output")]
+        connectors = {v.name: Connector(v.name, v.causality, v.type, v.unit) for v in ends}
+        return Component(name, self.sources[name], connectors)
+
+    def connection(self, end: str, start: Any, components: Mapping[str, Any]) -> Connection:
+        where = f"[{CONNECTIONS}] {end}"
+        return Connection(
+            *self.parts(start, where, components), *self.parts(end, where, components)
+        )
+
+    def check_delays(self) -> None:
+        """Refuse connections by which an output follows from itself at once, as FMUs declare."""
+        causes = {c.end: {c.start} for c in self.connections}
+        for component, model in self.models.items():
+            for output, known in model.dependencies.items():
+                inputs = {f"{component}.{x}" for x in known if model.variables[x].is_a(INPUTS)}
+                causes[f"{component}.{output}"] = inputs
+        try:
+            TopologicalSorter(causes).prepare()
+        except CycleError as error:
+            loop = " -> ".join(name for name in error.args[1])
+            way_out = "a state or a sampler must be in between"
+            self.fail(f"[{CONNECTIONS}]: a loop without delay, {loop}: {way_out}")
+
+    # ---- Times -----------------------------------------------------------------------------------
+
+    def times(self, content: Mapping[str, Any], step: float | None) -> tuple[float, float, float]:
+        given = {key: self.quantity(content[key], key, SECONDS) for key in TIMES if key in content}
+        begin = given.get("start", 0.0)
+        if "stop" in given and not given["stop"] > begin:
+            self.fail(f"stop: expected a time after start = {begin!r} s, got {given['stop']!r} s")
+        step = given.get("step") if step is None else step
+        if step is not None and step <= 0:
+            self.fail(f"step: expected more than 0 s, got {step!r} s")
+        with self.placed("times"):
+            start, stop, step, notes = times(begin, given.get("stop"), step, self.models)
+        self.notes += notes
+        if not is_whole((stop - start) / step):
+            span = f"{number(stop - start)} s"
+            self.fail(f"step: expected a whole number of steps in {span}, got {number(step)} s")
+        return start, stop, step
+
+    # ---- Parameters ------------------------------------------------------------------------------
+
+    def parameters(
+        self, content: Mapping[str, Any]
+    ) -> tuple[dict[str, dict[str, dict[str, Parameter]]], dict[str, str]]:
+        """Return values by variant, component and variable, and descriptions of variants."""
+        own = self.values(content, PARAMETERS, f"[{PARAMETERS}]")
+        found, descriptions = {ALONE: own}, {}
+        for name, given in self.table(content.get(VARIANTS, {}), f"[{VARIANTS}]").items():
+            where = f"[{VARIANTS}.{name}]"
+            if not VARIANT.fullmatch(name):
+                self.fail(f"{where}: expected a name of letters, digits, _ and -")
+            if name == ALONE:
+                self.fail(f"{where}: {ALONE!r} is [{PARAMETERS}] alone, choose another name")
+            table = dict(self.table(given, where))
+            if "description" in table:
+                descriptions[name] = self.text(table.pop("description"), f"{where} description")
+            changed = self.values({PARAMETERS: table}, PARAMETERS, where)
+            every = dict.fromkeys([*own, *changed])
+            found[name] = {c: own.get(c, {}) | changed.get(c, {}) for c in every}
+        return found, descriptions
+
+    def values(
+        self, content: Mapping[str, Any], section: str, where: str
+    ) -> dict[str, dict[str, Parameter]]:
+        """Return the values of a section by component and variable."""
+        given = self.entries(content, section)
+        if "file" in given:
+            given = self.numbers(given.pop("file"), f"{where} file") | given
+        found: dict[str, dict[str, Parameter]] = {}
+        for name, value in given.items():
+            component, variable = self.variable(name, where)
+            own = found.setdefault(component, {})
+            own[variable.name] = self.parameter(value, variable, f"{where} {name}")
+        return found
+
+    def parameter(self, given: Any, variable: Variable, where: str) -> Parameter:
+        if not (variable.can_start or variable.is_a(INPUTS)):
+            kind = f"is of causality {variable.causality}, and cannot be set"
+            self.fail(f"{where}: {variable.why_it_follows if variable.follows else kind}")
+        if variable.type == "String":
+            return Parameter("String", self.text(given, where), None)
+        with self.placed(where):
+            value = variable.checked(given)
+        if question := variable.question(given):
+            self.notes.append(f"{where}: {question}")
+        kind = "Integer" if variable.type == "Enumeration" else variable.type
+        return Parameter(kind, value, variable.unit if kind == "Real" else None)
+
+    def numbers(self, given: Any, where: str) -> dict[str, Any]:
+        """Read a JSON file of values by component.variable, or by component and variable."""
+        path = self.path.parent / self.text(given, where)
+        try:
+            content = json.loads(read_text(path, LARGEST_TOML))
+        except (UnreadableError, ValueError, RecursionError) as error:
+            self.fail(f"{where}: {path}: {error}")
+        return self.entries({PARAMETERS: content}, PARAMETERS)
+
+    # ---- Inputs ----------------------------------------------------------------------------------
+
+    def with_inputs(self, system: System, given: Mapping[str, Any]) -> System:
+        """Add inputs from outside; constants are parameters of all variants that give no other."""
+        known: dict[str, Variable] = {}
+        fed = {c.end: str(c) for c in system.connections}
+        for values in system.parameters.values():
+            for name in (f"{component}.{x}" for component in values for x in values[component]):
+                if name in fed:
+                    self.fail(f"{name}: the value is that of a connection, {fed[name]}")
+        for name in given:
+            _, variable = self.variable(name, f"[{INPUTS}]")
+            if name in fed:
+                self.fail(f"[{INPUTS}.{name}]: the input has a connection already, {fed[name]}")
+            known[name] = replace(variable, name=name)
+        whole = Model(system.name, self.version, known, (), False, False, False, False)
+        reader = InputReader(self, whole, system.times, system.elapsed)
+        signals = reader.inputs({INPUTS: given})
+        reader.sampled(signals)  # checks their values
+        self.notes += reader.warnings
+        moving, variants = {}, system.parameters
+        for name, signal in signals.items():
+            component, _, variable = name.partition(".")
+            if isinstance(signal, Constant):
+                held = Parameter("Real", signal.value, known[name].unit)
+            elif isinstance(signal, Switches) and len(signal.points) == 1:
+                held = Parameter("Boolean", signal.points[0][1], None)
+            else:
+                moving[name] = signal
+                if any(variable in values.get(component, {}) for values in variants.values()):
+                    self.fail(f"[{INPUTS}.{name}]: moves, but has a value among the parameters")
+                continue
+            for values in variants.values():
+                values.setdefault(component, {}).setdefault(variable, held)
+        return replace(system, inputs=moving)
+
+    # ---- Recording -------------------------------------------------------------------------------
+
+    def kept(self, given: Any) -> str:
+        component, variable = self.variable(given, KEEP)
+        if variable.type not in ("Real", "Integer", "Boolean"):
+            self.fail(f"{KEEP}: {given!r} is of type {variable.type}, which is not recorded")
+        return str(given)

@@ -1,0 +1,129 @@
+"""Packs a component in Python as an FMU of FMI 2.0, by pythonfmu.
+
+The FMU has the component's file, the modules beside it that this imports, and a class of pythonfmu
+that calls it. It needs a Python where it runs, with the packages that its description names.
+"""
+
+import json
+import keyword
+import shutil
+import subprocess
+import sys
+from collections.abc import Mapping
+from modulefinder import ModuleFinder
+from pathlib import Path
+from typing import Any
+
+from rparm import project
+from rparm.errors import UserError
+from rparm.interruption import temporary_folder
+from rparm.systems.python_component import ANY, PythonComponent
+
+CALLER = '''"""The component of component.json, as pythonfmu runs it."""
+
+import importlib.util
+import json
+from pathlib import Path
+
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real, String
+
+TYPES = {"Real": Real, "Boolean": Boolean, "String": String}
+
+
+class CLASS(Fmi2Slave):
+    def __init__(self, **arguments):
+        super().__init__(**arguments)
+        here = Path(self.resources)  # another one in each instance
+        given = json.loads((here / "CLASS.json").read_text(encoding="utf-8"))
+        self.description = given["description"]
+        spec = importlib.util.spec_from_file_location("CLASS_code", here / given["file"])
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        target = getattr(module, given["target"])
+        self.part = target() if isinstance(target, type) else None
+        self.law = self.part.step if self.part else target
+        for name, value in given["fixed"].items():
+            if type(getattr(self.part, name)).__module__ == "numpy":
+                import numpy
+
+                value = numpy.array(value, float)
+            setattr(self.part, name, value)
+        self.inputs = dict.fromkeys(given["inputs"], 0.0)
+        self.outputs = dict.fromkeys(given["outputs"], 0.0)
+        for kind, values in (("input", self.inputs), ("output", self.outputs)):
+            for name in values:
+                self.add(Real, name, kind, values.__getitem__, values.__setitem__)
+        for name, kind in given["parameters"].items():
+            get, put = self.part.__getattribute__, self.part.__setattr__
+            self.add(TYPES[kind], name, "parameter", get, put)
+
+    def add(self, kind, name, causality, get, put):
+        more = {"variability": Fmi2Variability.tunable} if causality == "parameter" else {}
+        self.register_variable(
+            kind(name, causality=Fmi2Causality[causality], getter=lambda: get(name),
+                 setter=lambda value: put(name, value), **more),
+            nested=False,
+        )
+
+    def enter_initialization_mode(self):
+        self.outputs.update(getattr(self.part, "start", {}))
+
+    def do_step(self, current_time, step_size):
+        for name, value in self.law(current_time, step_size, dict(self.inputs)).items():
+            self.outputs[name] = float(value.item() if hasattr(value, "item") else value)
+        return True
+'''
+
+
+def pack(name: str, component: PythonComponent, fixed: Mapping[str, Any], path: Path) -> str:
+    """Write the FMU of a component, and return what it needs to run.
+
+    Attributes that an FMU does not have as parameters, such as arrays, get the values in `fixed`.
+    UserError if pythonfmu is missing or fails.
+    """
+    project.check_installed(["pythonfmu"], "system")
+    beside, packages = imported(component.path)
+    needed = f"Python {sys.version_info.major}.{sys.version_info.minor}"
+    needed += f" with {', '.join(packages)}" if packages else ""
+    variables = component.model.variables.values()
+    of = {x: [v.name for v in variables if v.causality == x] for x in ("input", "output")}
+    parameters = [v for v in variables if v.causality == "parameter" and v.type != ANY]
+    given = {
+        "description": f"{component.path.name}, in Python: needs {needed}",
+        "file": component.path.name,
+        "target": component.target,
+        "inputs": of["input"],
+        "outputs": of["output"],
+        "parameters": {variable.name: variable.type for variable in parameters},
+        "fixed": fixed,
+    }
+    class_name = name + "_" * keyword.iskeyword(name)
+    with temporary_folder() as folder:
+        caller, data = folder / f"{class_name}_caller.py", folder / f"{class_name}.json"
+        caller.write_text(CALLER.replace("CLASS", class_name), encoding="utf-8")
+        data.write_text(json.dumps(given), encoding="utf-8")
+        files = [data, component.path.absolute(), *beside]
+        command = [sys.executable, "-m", "pythonfmu", "build", "-f", caller, "-d", folder, *files]
+        process = subprocess.run(
+            command, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, cwd=folder
+        )
+        if process.returncode != 0:
+            *_, last = process.stdout.decode(errors="replace").strip().splitlines() or [""]
+            raise UserError(f"{component.path}: pythonfmu fails: {last}")
+        shutil.copyfile(folder / f"{class_name}.fmu", path)
+    return needed
+
+
+def imported(path: Path) -> tuple[list[Path], list[str]]:
+    """Return modules and packages beside a file that it imports, and the names of others."""
+    folder = path.absolute().parent
+    finder = ModuleFinder([str(folder)])
+    finder.run_script(str(path))
+    found = {module.partition(".")[0] for module in finder.modules}.difference({"__main__"})
+    places = [
+        folder / name if (folder / name).is_dir() else folder / f"{name}.py" for name in found
+    ]
+    others = (
+        {name.partition(".")[0] for name in finder.badmodules} - sys.stdlib_module_names - found
+    )
+    return sorted(filter(Path.exists, places)), sorted(others)

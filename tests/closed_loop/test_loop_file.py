@@ -1,0 +1,188 @@
+"""Loop files: mistakes in them, and what loops of them do, against own simulations."""
+
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lxml import etree
+from scipy.integrate import solve_ivp
+
+from rparm.report import block_diagram
+from rparm.systems import comparison, ecos
+from rparm.systems.master import run_in_master
+from rparm.systems.opened import opened
+from rparm.systems.structure import OpenedSystem
+from tests.support.programs import python
+from tests.support.rparm_project import BUILD, Console, repacked
+from tests.support.tables import tables
+
+TABLES = tables(__file__)
+NAMES = ["plant.phi", "plant.omega", "law.torque"]
+FINE = {"rtol": 1e-12, "atol": 1e-13}
+MASSES = {"default": 1.0, "heavy": 2.0}
+WAVE = "{ sines = [{ amplitude = 0.5, frequency = 0.7 }], offset = 0.2 }"
+
+
+# ---- Mistakes ------------------------------------------------------------------------------------
+@pytest.mark.parametrize("mistake", TABLES["mistakes"], ids=lambda row: row[2][:40])
+def test_a_mistake_is_refused_in_a_line(
+    mistake: list[str], tmp_path: Path, console: Console
+) -> None:
+    old, new, message = mistake
+    assert TABLES["good"].count(old) == 1
+    path = tmp_path / "self.toml"
+    path.write_text(TABLES["good"].replace(old, new), encoding="utf-8")
+    (tmp_path / "TEXT.fmu").write_text("no archive", encoding="utf-8")
+    repacked(BUILD / "RPManipulator.fmu", tmp_path / "TOY.fmu", str, drop="binaries")
+    error = console.refused("system", path, "--output", tmp_path / "report")
+    assert error.startswith(f"error: {path}: ") and message in error
+
+
+# ---- A loop --------------------------------------------------------------------------------------
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The files of a loop, and one whose input moves, of FMUs that are built here once."""
+    found = tmp_path_factory.mktemp("loop")
+    for name, text in TABLES["loop"].items():
+        (found / name).write_text(text, encoding="utf-8")
+    with opened(found / "loop.toml") as system:
+        for component, name in (("plant", "pendulum.fmu"), ("law", "law.fmu")):
+            shutil.copy(system.fmu(component), found / name)
+    text = TABLES["loop"]["loop.toml"].replace('pendulum.toml"', 'pendulum.fmu"')
+    text = text.replace('law.toml"', 'law.fmu"')
+    (found / "loop.toml").write_text(text, encoding="utf-8")
+    (found / "wave.toml").write_text(text.replace("{ constant = 1.0 }", WAVE), encoding="utf-8")
+    return found
+
+
+@pytest.fixture
+def loop(folder: Path) -> Iterator[OpenedSystem]:
+    with opened(folder / "loop.toml") as system:
+        yield system
+
+
+def with_step(system: OpenedSystem, step: float) -> OpenedSystem:
+    return replace(system, system=replace(system.system, step=step))
+
+
+def wanted(file: str, time: float) -> float:
+    return 1.0 if file == "loop.toml" else 0.2 + 0.5 * np.sin(2 * np.pi * 0.7 * time)
+
+
+def held(file: str, mass: float, step: float, steps: int) -> np.ndarray:
+    """The loop in Jacobi order, by hand: rows of `NAMES`.
+
+    Over a step all inputs are those of its beginning. A torque follows the speed at once, so the
+    plant gets it a step later than its part by the error, which is a state.
+    """
+    phi, omega, error, torque = 0.5, 0.0, 0.0, 0.0
+    rows = [(phi, omega, torque)]
+    for i in range(steps):
+        plant = solve_ivp(
+            lambda _, x, u=torque: [x[1], u / mass - 9 * np.sin(x[0])],
+            (0, step), [phi, omega], **FINE,
+        )  # fmt: skip
+        limit = wanted(file, i * step) - phi
+        error = limit + (error - limit) * np.exp(-step / 0.2)
+        torque = 30 * error - 2 * omega
+        phi, omega = plant.y[:, -1]
+        rows.append((phi, omega, 30 * error - 2 * omega))
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("file", ["loop.toml", "wave.toml"])
+@pytest.mark.parametrize("variant", MASSES)
+def test_inputs_are_held_over_each_step(folder: Path, file: str, variant: str) -> None:
+    with opened(folder / file) as system:
+        step = system.system.step
+        run = run_in_master(system, variant, NAMES)
+        expected = held(file, MASSES[variant], step, system.system.steps)
+        np.testing.assert_allclose(run.values, expected, atol=1e-8)
+        if file == "loop.toml":
+            # Ecos adds up steps to times, which rounds
+            other = ecos.run(system, variant, NAMES).values
+            np.testing.assert_allclose(other, run.values, rtol=0, atol=1e-11)
+        else:
+            assert ecos.unsuited(system) == "law.wanted moves"
+
+
+def continuous(mass: float, stop: float) -> np.ndarray:
+    """Plant and law in one simulation: phi, omega and torque at each millisecond."""
+
+    def slopes(_: float, x: np.ndarray) -> list[float]:
+        phi, omega, error = x
+        torque = 30 * error - 2 * omega
+        return [omega, torque / mass - 9 * np.sin(phi), (1.0 - phi - error) / 0.2]
+
+    times = np.linspace(0, stop, round(1000 * stop) + 1)
+    phi, omega, error = solve_ivp(slopes, (0, stop), [0.5, 0, 0], t_eval=times, **FINE).y
+    return np.column_stack([phi, omega, 30 * error - 2 * omega])
+
+
+def test_the_coupling_error_is_of_first_order_and_as_estimated(loop: OpenedSystem) -> None:
+    exact = continuous(1.0, 2.0)
+    errors = {}
+    for milliseconds in (4, 2, 1):
+        finer = with_step(loop, milliseconds / 1000)
+        outcome = comparison.run_alone(finer, "default", NAMES, lambda _: None)
+        apart = np.abs(outcome.run.values - exact[::milliseconds]).max(axis=0)
+        errors[milliseconds] = apart
+        # one scale, since no variable has a unit
+        estimated = np.array([outcome.errors[name] for name in NAMES]) * np.abs(exact).max()
+        np.testing.assert_allclose(estimated, apart, rtol=0.05)
+    np.testing.assert_allclose(errors[4] / errors[2], 2.0, rtol=0.05)
+    np.testing.assert_allclose(errors[2] / errors[1], 2.0, rtol=0.03)
+
+
+def test_integers_go_from_component_to_component(tmp_path: Path) -> None:
+    """Each counter adds one to what the other has counted before the step."""
+    for name, text in TABLES["counters"].items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    build = ("-m", "pythonfmu", "build", "-f", tmp_path / "counter.py", "-d", tmp_path)
+    python(*build, check=True)
+    with opened(tmp_path / "loop.toml") as system:
+        assert ecos.unsuited(system) == "there are connections of type Integer"
+        run = run_in_master(system, "default", comparison.kept(system))
+    assert run.values.tolist() == [[i, i] for i in range(11)]
+
+
+# ---- The command ---------------------------------------------------------------------------------
+def test_the_command_runs_variants_and_writes_their_pages(
+    folder: Path, tmp_path: Path, console: Console
+) -> None:
+    given, output = ("system", folder / "loop.toml"), ("--output", tmp_path)
+    code, out, _ = console(*given, *output, "--json", "--step", "5ms")
+    document = json.loads(out)
+    assert code == 0 and [x["name"] for x in document["variants"]] == ["default", "heavy"]
+    for x in document["variants"]:
+        assert x["steps"] == 400 and x["coupling_worst"] == "law.torque"
+        assert 0.01 < x["coupling_error"] < 0.5 and "passed" not in x
+        page = (tmp_path / f"system/Swing_{x['name']}.html").read_text(encoding="utf-8")
+        assert "by half the step" in page and 'src="Swing.svg"' in page and "Ecos" in page
+        head = (tmp_path / f"system/Swing_{x['name']}.csv").read_text(encoding="utf-8")
+        assert head.startswith('"time","plant.phi","plant.omega","law.torque"\n')
+    assert "no variant 'heavi', did you mean 'heavy'?" in console.refused(*given, "heavi", *output)
+    code, out, _ = console("system", folder / "wave.toml", "heavy", *output)
+    assert code == 0 and "law.wanted moves: the master of rparm steps Swing" in out
+    assert out.count(" ran\n") == 1 and "ran: 1 variant" in out
+
+
+def test_each_signal_is_drawn_from_block_to_block(loop: OpenedSystem) -> None:
+    root = etree.fromstring(block_diagram.draw(loop).encode())
+    space = {"s": root.nsmap[None]}
+    blocks = root.findall("s:rect", space)
+    sides = [(float(b.get("x")), float(b.get("x")) + float(b.get("width"))) for b in blocks]
+    texts = [text.text for text in root.findall("s:text", space)]
+    assert len(blocks) == 2 and {"plant", "law", "Pendulum", "phi, omega", "torque"} <= {*texts}
+    ends = set()
+    for line in root.findall("s:path", space):
+        numbers = re.fullmatch(r"M(\d+) .* H(\d+)", line.get("d"))
+        assert numbers is not None
+        start, end = map(float, numbers.groups())
+        ends.add(([x[1] for x in sides].index(start), [x[0] for x in sides].index(end)))
+    assert ends == {(0, 1), (1, 0)}
