@@ -56,8 +56,8 @@ class CustomBuildHook(BuildHookInterface):
         for file in sorted(file for pattern in OF_FMU for file in root.glob(pattern)):
             if file.stem not in OF_RELEASES:
                 include[str(file)] = f"{SHARE}/{file.relative_to(root).as_posix()}"
-        page = "examples/models/README.md"
-        include[str(root / page)] = f"{SHARE}/{page}"
+        for page in ("examples/models/README.md", "docs/tutorial.md"):
+            include[str(root / page)] = f"{SHARE}/{page}"
         write_pieces(release, staging)
         shutil.copy(release / "built.tar.xz", staging)
         _add_plotly(root, staging)

@@ -111,7 +111,8 @@ class Table(Mapping[str, np.ndarray]):
         rows = run_data.thinned([values for plot in plots for values in plot.columns])
         drawn = [plot.at(rows) for plot in plots]
         data = run_data.RunData("table", "Run", self._times[rows], drawn)
-        page = pages.RunPage("Run", f"{self._size}.", overview.RAN, (), data, ())
+        about = "Run", f"{self._size}.", overview.RAN
+        page = pages.RunPage(*about, facts=(), data=data, tables=(), overview=False)
         folder = Path(output or project.report_folder("plots"))
         with written(folder):
             path = pages.write_alone(folder, page)
@@ -121,7 +122,8 @@ class Table(Mapping[str, np.ndarray]):
 
     @property
     def _size(self) -> str:
-        return f"{len(self._times)} rows, {len(self)} columns"
+        span = f"{self._times[0]:g} to {self._times[-1]:g} s"
+        return f"{len(self._times)} rows from {span}, {len(self)} columns"
 
     def _repr_html_(self) -> str:
         """Draw the first columns for notebooks, without scripts."""

@@ -267,9 +267,9 @@ def built_for_all() -> Path:
     return shipped.unpacked(archive, ROOT / "build" / "built")
 
 
-def page_of_models() -> Path:
-    """Return the page that explains files with equations."""
-    return from_root(ROOT / "examples" / "models" / "README.md")
+def page(name: str) -> Path:
+    """Return a page that also the wheel has, by its path in the project."""
+    return from_root(ROOT / name)
 
 
 def model_builder() -> Path:

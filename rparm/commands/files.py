@@ -20,6 +20,7 @@ from rparm.runs import scenario
 from rparm.systems.structure import times
 
 SUFFIX = ".toml"
+MODELS_PAGE, TUTORIAL = "examples/models/README.md", "docs/tutorial.md"
 MODEL_NAME = re.compile("[A-Za-z][A-Za-z0-9_]*", re.ASCII)
 MODEL_FILE = """\
 # A body on a spring: change it to what you simulate. examples/models/README.md explains the file.
@@ -157,7 +158,8 @@ def _own_file(options: argparse.Namespace, kind: str) -> Path:
 def add_new_system_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Writes NAME.toml, a system of FMUs that runs as it is. Connections that names and units "
-        f"suggest are comments in it. Run it by {project.PROGRAM} system NAME.toml."
+        f"suggest are comments in it. Run it by {project.PROGRAM} system NAME.toml; "
+        f"{project.page(TUTORIAL)} begins from equations and a controller in Python."
     )
     parser.add_argument("name", metavar="NAME", help="of the system: letters, digits and _")
     text = "files .fmu, or names of the project's; one may come several times"
@@ -262,7 +264,7 @@ def do_schema(options: argparse.Namespace) -> Ended:
 def add_build_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Makes FMUs of the equations in FILE.toml, for FMI 2.0 and 3.0: NAME.fmu and "
-        f"fmi3/NAME.fmu. {project.page_of_models()} explains the file. Beside it FILE.lock.toml "
+        f"fmi3/NAME.fmu. {project.page(MODELS_PAGE)} explains the file. Beside it FILE.lock.toml "
         "keeps the value references."
     )
     parser.add_argument("file", metavar="FILE.toml", type=Path, help="the file with the equations")
@@ -300,7 +302,8 @@ def do_ssp(options: argparse.Namespace) -> Ended:
             path.parent.mkdir(parents=True, exist_ok=True)
             needed = ssp_writer.write(path, opened)
         inputs = list(opened.system.inputs)
-    notes = [f"inputs of the system: {', '.join(inputs)}"] if inputs else []
+    few = "inputs of the system, which Ecos and libcosim do not load"
+    notes = [f"{few}: {', '.join(inputs)}"] if inputs else []
     notes += [f"{component} runs where there is {what}" for component, what in needed.items()]
     console.messages(str(path), [*opened.notes, *notes])
     document = {"file": path.absolute(), "inputs": inputs, "needs": needed}

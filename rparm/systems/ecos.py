@@ -80,7 +80,7 @@ def unsuited(ssp: "OpenedSystem") -> str:
     """Say why Ecos cannot run a system, or nothing."""
     system = ssp.system
     kinds = {ssp.variable(c.start).type for c in system.connections}
-    odd = sorted(kinds - {"Real", "Boolean"})
+    odd = sorted(kinds & {"Integer", "Enumeration"})
     settings = [(c, n) for of in system.parameters.values() for c in of for n in of[c]]
     if ssp.python:
         return f"{next(iter(ssp.python))} is Python"
@@ -179,9 +179,9 @@ def _check_parameters(ssp: "OpenedSystem", variant: str) -> None:
 
 
 def _as_ecos_opens(ssp: "OpenedSystem", variant: str, folder: Path) -> Path:
-    """Return the SSP, or make one in a folder: of a loop file, or a copy with a name in UTF-8."""
+    """Return the SSP, or make one in a folder: what Ecos reads, or a copy with a name in UTF-8."""
     path = ssp.path.resolve()
-    if not ssp.is_ssp:
+    if not (ssp.is_ssp and ssp.is_plain):
         from rparm.systems import ssp_writer  # the child needs none of it
 
         only = replace(ssp.system, parameters={variant: ssp.system.parameters[variant]})

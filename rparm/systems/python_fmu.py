@@ -27,16 +27,16 @@ from pathlib import Path
 
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real, String
 
-HERE = Path(__file__).parent
 TYPES = {"Real": Real, "Boolean": Boolean, "String": String}
 
 
 class CLASS(Fmi2Slave):
     def __init__(self, **arguments):
         super().__init__(**arguments)
-        given = json.loads((HERE / "CLASS.json").read_text(encoding="utf-8"))
+        here = Path(self.resources)  # another one in each instance
+        given = json.loads((here / "CLASS.json").read_text(encoding="utf-8"))
         self.description = given["description"]
-        spec = importlib.util.spec_from_file_location("CLASS_code", HERE / given["file"])
+        spec = importlib.util.spec_from_file_location("CLASS_code", here / given["file"])
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
         target = getattr(module, given["target"])

@@ -71,7 +71,7 @@ def unpacked(path: Path, step: float | None = None) -> Iterator[OpenedSystem]:
         reader = SspReader(path, folder)
         system = reader.system(step)
         check(path, system, reader.models)
-        yield OpenedSystem(path, folder, system, reader.models)
+        yield OpenedSystem(path, folder, system, reader.models, is_plain=reader.is_plain)
 
 
 # ---- Reader --------------------------------------------------------------------------------------
@@ -87,6 +87,7 @@ class SspReader:
         self.path = path
         self.folder = folder
         self.descriptions: dict[str, str] = {}  # of parameter sets, by name
+        self.is_plain = True  # Ecos knows one prefix, and no connections to the system's own
         self.own: dict[str, str] = {}  # kinds of the system's own connectors, by name
         self.models: dict[str, Model] = {}  # of the components
 
@@ -116,6 +117,7 @@ class SspReader:
     def system(self, step: float | None) -> System:
         root = self.parse(STRUCTURE, STRUCTURE_SCHEMA)
         system = root.find("ssd:System", NAMESPACES)
+        self.is_plain = root.prefix == "ssd"
         elements = system.find("ssd:Elements", NAMESPACES)
         for name, way_out in IGNORED.items():
             node = system.find(f"ssd:{name}", NAMESPACES)
@@ -198,6 +200,7 @@ class SspReader:
             self.fail(
                 STRUCTURE, f"{where} has no {kind} {name!r}{did_you_mean(name, self.own)}", node
             )
+        self.is_plain = False
         return None
 
     def experiment(

@@ -149,6 +149,7 @@ class OpenedSystem:
     models: Mapping[str, Model]  # description of each component
     # files of FMUs for messages, by component; an SSP has them inside
     files: Mapping[str, Path] = field(default_factory=dict)
+    is_plain: bool = True  # as an SSP, Ecos reads it
     # what opens a component that is no FMU, by its name: it gives what runs like an Fmu
     python: Mapping[str, Callable[[], Fmu]] = field(default_factory=dict)
 

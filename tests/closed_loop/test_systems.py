@@ -7,7 +7,7 @@ import pytest
 
 from rparm import project
 from rparm.errors import UserError
-from rparm.systems import comparison
+from rparm.systems import comparison, ecos
 from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, Edit, edited, replace
 from tests.support.systems import CLOSED_LOOP
@@ -94,11 +94,17 @@ def test_a_system_that_is_not_built_is_named(add: Add, console: Console) -> None
     assert listed(console, "loop") == {"loop": list(CLOSED_LOOP.variants)}
 
 
-def test_a_system_without_a_folder_is_refused(add: Add, tmp_path: Path, console: Console) -> None:
+def test_a_system_without_a_folder_has_no_references(
+    add: Add, tmp_path: Path, console: Console, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ecos, "absent", lambda: "no Ecos")
     path = add("loop", "Loop.ssp", "")
     other = edited(path, tmp_path / "x.ssp", {STRUCTURE: replace('name="loop"', 'name="lop"')})
-    wanted = f"{other}: no system 'lop' has references, did you mean 'loop'? (known: loop)\n"
-    assert console.refused("system", "--ssp", other) == f"error: {wanted}"
+    assert listed(console, "--ssp", other) == {"lop": list(CLOSED_LOOP.variants)}
+    given = ("nominal", "--step", "10ms", "--output", tmp_path / "report")
+    code, out, error = console("system", other, *given)
+    assert (code, error) == (0, "") and "no Ecos: the master of rparm steps lop" in out
+    assert "coupling error about" in out and "passed" not in out
 
 
 def test_one_system_has_a_study_of_its_coupling(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -114,7 +114,7 @@ def test_a_table_draws_itself_and_its_page(
 ) -> None:
     table = rparm.simulate(arm, **RUN, start_values={"q1": 0.5})
     picture = etree.fromstring(table._repr_html_())
-    assert picture.findtext("caption") == f"101 rows, {len(table)} columns, 10 drawn"
+    assert picture.findtext("caption") == f"101 rows from 0 to 1 s, {len(table)} columns, 10 drawn"
     assert len(picture.findall(".//path")) == 10 and picture.find(".//script") is None
     shown: list[str] = []
     monkeypatch.setattr(webbrowser, "open_new_tab", shown.append)

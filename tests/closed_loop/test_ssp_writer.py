@@ -1,0 +1,174 @@
+"""SSPs of loop files: valid, with what the file says, and run by engines as exact steps have it.
+
+The arm's slide alone: without gravity and offset it is a mass of m2, pushed by a law that is late.
+"""
+
+import subprocess
+import zipfile
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from lxml import etree
+
+import rparm
+from rparm.errors import UserError
+from rparm.systems import ecos, opened, ssp, ssp_writer
+from tests.importers.osp import libcosim
+from tests.importers.test_importers import CHECKER, folder_of
+from tests.support.rparm_project import Console
+from tests.support.ssp_files import edited
+
+STEP, STEPS, KP, KD, REFERENCE = 0.01, 100, 9.0, 4.0, 0.2
+LAW = """
+from lawyer import law
+
+
+class Law:
+    inputs = ["reference", "q2", "dq2"]
+    outputs = ["f2"]
+    start = {"f2": 0.5}
+    kd = 1.0
+    gains = [1.0]
+
+    def step(self, t, h, inputs):
+        return {"f2": law(self.gains[0], self.kd, inputs)}
+"""
+HELPER = """
+import json  # a module of Python, which needs nothing
+
+
+def law(kp, kd, given):
+    return kp * (given["reference"] - given["q2"]) - kd * given["dq2"]
+"""
+LOOP = f"""
+name = "Slide"
+description = "A slide & its law"
+step = {STEP}
+stop = 1.0
+[components]
+arm = "RPManipulator"
+class = "law.py"
+[connections]
+"arm.f2" = "class.f2"
+"class.q2" = "arm.q2"
+"class.dq2" = "arm.dq2"
+[inputs]
+"class.reference" = {{ constant = {REFERENCE} }}
+[parameters]
+"arm.a" = 0
+"arm.g" = 0
+"arm.m2" = "2 kg"
+"class.kd" = {KD}
+"class.gains" = [{KP}]
+[variants.light]
+description = 'Half of it, "light"'
+"arm.m2" = 1.0
+"""
+MOVING = ("constant = 0.2", "sines = [{ amplitude = 0.2, frequency = 1.0 }]")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("slide")
+    for name, text in {"law.py": LAW, "lawyer.py": HELPER, "loop.toml": LOOP}.items():
+        (made / name).write_text(text)
+    (made / "moving.toml").write_text(LOOP.replace(*MOVING))
+    return made
+
+
+@pytest.fixture(scope="module")
+def slide(folder: Path) -> Path:
+    with opened.opened(folder / "loop.toml") as system:
+        needed = ssp_writer.write(folder / "Slide.ssp", system)
+    assert list(needed) == ["class"] and needed["class"].startswith("Python 3.")
+    return folder / "Slide.ssp"
+
+
+def exact(mass: float) -> np.ndarray:
+    """Positions at the points, (STEPS + 1,): each step has the force of the one before it."""
+    q, v, force = 0.0, 0.0, 0.5
+    found = [q]
+    for _ in range(STEPS):
+        after = KP * (REFERENCE - q) - KD * v
+        q, v = q + v * STEP + force / mass * STEP**2 / 2, v + force / mass * STEP
+        found.append(q)
+        force = after
+    return np.array(found)
+
+
+def test_it_says_what_the_file_says(slide: Path) -> None:
+    with zipfile.ZipFile(slide) as archive:
+        for name in archive.namelist():
+            kinds = {".ssd": ssp.STRUCTURE_SCHEMA, ".ssv": ssp.VALUES_SCHEMA}
+            if Path(name).suffix in kinds:
+                schema = etree.XMLSchema(etree.parse(ssp.SCHEMAS / kinds[Path(name).suffix]))
+                schema.assertValid(etree.fromstring(archive.read(name)).getroottree())
+    with ssp.unpacked(slide) as found:
+        system = found.system
+        assert (system.name, system.stop, system.step) == ("Slide", 1.0, STEP)
+        assert system.descriptions == {"light": 'Half of it, "light"'}
+        law = {"kd": KD, "reference": REFERENCE}
+        assert system.parameter_sets == {
+            "default": {"arm": {"a": 0.0, "g": 0.0, "m2": 2.0}, "class": law},
+            "light": {"arm": {"a": 0.0, "g": 0.0, "m2": 1.0}, "class": law},
+        }
+        description = fmpy.read_model_description(found.fmu("class"))
+    assert description.fmiVersion == "2.0" and "needs Python 3." in description.description
+
+
+@pytest.mark.parametrize(("variant", "mass"), [("default", 2.0), ("light", 1.0)])
+def test_engines_step_as_the_equations_do(
+    slide: Path, folder: Path, variant: str, mass: float
+) -> None:
+    """The mass moves exactly under the forces that a step of delay gives."""
+    for path, engine in ((folder / "loop.toml", "master"), (slide, "master"), (slide, "ecos")):
+        table = rparm.System(path).run(variant, engine=engine)
+        assert np.abs(table["arm.q2"] - exact(mass)).max() < 1e-8, (path, engine)
+
+
+def test_libcosim_runs_its_first_variant(slide: Path, tmp_path: Path) -> None:
+    found = libcosim(slide, ["arm.q2"], STEPS, tmp_path)
+    assert np.abs(found["arm.q2"] - exact(2.0)[1:]).max() < 1e-8
+
+
+def test_what_moves_is_an_input_of_the_system(folder: Path, console: Console) -> None:
+    """Other tools see it; here it keeps its start value, and Ecos gets a system without it."""
+    path = folder / "Moving.ssp"
+    code, out, err = console("ssp", folder / "moving.toml", "-o", path)
+    assert (code, out) == (0, f"{path}: written\n")
+    assert "inputs of the system, which Ecos and libcosim do not load: class.reference" in err
+    assert "class runs where there is Python 3." in err
+    system = rparm.System(path)
+    assert "not connected, constant: arm.tau1, class.reference" in system.notes
+    with opened.opened(path) as found:
+        run = ecos.run(found, "light", ["arm.q2"])
+    held = system.run("light")["arm.q2"]
+    assert np.abs(run.values[:, 0] - held).max() < 1e-10 and np.abs(held).max() > 1e-4
+    program = folder_of(CHECKER) / "bin" / "fmucontainer"
+    command = [program, "-fmi", "2", "-fmu-directory", folder, "-container", f"{path.name}:{STEP}"]
+    process = subprocess.run(command, check=False, capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr
+    container = fmpy.read_model_description(folder / "Moving.fmu")
+    inputs = [v.name for v in container.modelVariables if v.causality == "input"]
+    assert inputs == ["class.reference"]
+
+
+def test_a_stranger_may_name_its_namespace_otherwise(slide: Path, tmp_path: Path) -> None:
+    """Ecos looks for the prefix ssd, and so gets a copy."""
+
+    def plain(content: bytes) -> bytes:
+        return content.replace(b"xmlns:ssd=", b"xmlns=").replace(b"ssd:", b"")
+
+    with ssp.unpacked(edited(slide, tmp_path / "x.ssp", {ssp.STRUCTURE: plain})) as found:
+        values = ecos.run(found, "light", ["arm.q2"]).values[:, 0]
+    assert np.abs(values - exact(1.0)).max() < 1e-8
+
+
+def test_variants_cannot_differ_in_what_no_fmu_has(folder: Path, tmp_path: Path) -> None:
+    loop = folder / "arrays.toml"
+    loop.write_text(f"{LOOP}'class.gains' = [3.0]\n")
+    with opened.opened(loop) as system, pytest.raises(UserError) as caught:
+        ssp_writer.write(tmp_path / "x.ssp", system)
+    assert "component 'class': variants give arrays or tables different" in str(caught.value)
