@@ -1,5 +1,5 @@
-"""rparm is not for Linux only: what other systems lack, or do in another way, is not used. It is not
-for some models only either.
+"""rparm is not for Linux only: what other systems lack, or do in another way, is not used. It
+is for all models, too.
 
 No test here runs on another system. Those that change this one change it to what is documented of
 the other.
