@@ -80,7 +80,7 @@ def unsuited(ssp: "OpenedSystem") -> str:
     """Say why Ecos cannot run a system, or nothing."""
     system = ssp.system
     kinds = {ssp.variable(c.start).type for c in system.connections}
-    odd = sorted(kinds - {"Real", "Boolean"})
+    odd = sorted(kinds & {"Integer", "Enumeration"})
     settings = [(c, n) for of in system.parameters.values() for c in of for n in of[c]]
     if ssp.python:
         return f"{next(iter(ssp.python))} is Python"
