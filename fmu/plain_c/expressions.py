@@ -169,8 +169,7 @@ class Expressions(Memory):
                 kind = self.declared_kind(node)
                 return kind, self.initialized(node.init, kind, scope, state)
             case c_ast.ExprList():
-                results = [self.value(item, scope, state) for item in node.exprs]
-                return results[-1]
+                raise refused(node, "the comma operator is not read: write two statements")
         raise refused(node, f"{type(node).__name__} is no part of the equations' C")
 
     def number(self, node: c_ast.Constant) -> tuple[Any, Any]:
@@ -302,17 +301,17 @@ class Expressions(Memory):
             return self.conditions.compare(op, a, b, state.known)
 
         def calculate(x: int, y: int) -> int:
-            if op in ("/", "%"):
+            if op == "/":
                 if y == 0:
                     raise refused(node, "division by 0")
                 quotient = abs(x) // abs(y) * (1 if (x < 0) == (y < 0) else -1)
-                if op == "/" and quotient * y != x:
+                if quotient * y != x:
                     place = f"{node.coord.file}:{node.coord.line}"
                     self.warn(
                         f"{place}: warning: {x} / {y} of whole numbers is {quotient}: "
                         f"write {x}.0 / {y}.0"
                     )
-                return quotient if op == "/" else x - quotient * y
+                return quotient
             if op not in ("+", "-", "*"):
                 raise refused(node, f"{op} is not read")
             return self.in_range({"+": x + y, "-": x - y, "*": x * y}[op], node)

@@ -13,12 +13,14 @@ from rparm.fmi.fmu_file import Fmu
 from rparm.runs.simulation import simulate
 from rparm.systems import ssp
 from rparm.systems.master import Master
+from rparm.systems.opened import opened
 from tests.campaign.files import ARM, FILES, HEAD, campaign
 from tests.campaign.runners import rows, runner
 from tests.support.paths import ROOT
 from tests.support.rparm_project import BUILD, FMUS, fmi3_fmu, load
 from tests.support.ssp_files import EXPERIMENT, FROM_TRAJECTORY, SETS, TYPES, without
 
+OSCILLATOR = BUILD / "tests" / "oscillator" / "Oscillator.fmu"
 OUTPUTS = ("q1", "q2", "dq1", "dq2", "total_energy", "ee_x")
 
 
@@ -286,3 +288,51 @@ def test_a_system_without_parameter_sets_varies_inputs_that_nothing_feeds(tmp_pa
     with runner(given, tmp_path, fmu=bare) as (runs, job, points):
         found = rows(runs, job, points, [0, 1]).measures[:, 0]
     assert found == pytest.approx([0.1, 0.2], rel=1e-6)
+
+
+LAW = """
+class Law:
+    inputs = ["x", "reference"]
+    outputs = ["u"]
+    kp = 1.0
+    integral = 0.0
+
+    def step(self, t, h, inputs):
+        if self.kp < 0:
+            raise ValueError("kp")
+        self.integral += h * (inputs["reference"] - inputs["x"])
+        return {"u": self.kp * self.integral}
+"""
+
+
+def test_a_loop_file_with_python_has_the_bits_of_the_master(tmp_path: Path) -> None:
+    """And a run whose code raises says where, and harms no other."""
+    (tmp_path / "law.py").write_text(LAW)
+    (tmp_path / "loop.toml").write_text(
+        f'name = "Loop"\nstep = 0.05\nstop = 1\n[components]\nplant = "{OSCILLATOR.as_posix()}"\n'
+        'law = "law.py"\n[connections]\n"plant.u" = "law.u"\n"law.x" = "plant.x"\n'
+        '[inputs]\n"law.reference" = { sines = [{ amplitude = 2, frequency = "1 Hz" }] }\n'
+        '[parameters]\n"plant.omega" = 3\n[variants.stiff]\n"plant.omega" = 9\n'
+    )
+    text = (
+        f'{HEAD}system = "loop.toml"\nsampling = "grid"\n[parameters."law.kp"]\n'
+        'values = [2.0, -1.0, 0.5]\n[parameters."plant.x"]\nvalues = ["10 cm", 1.0]\n'
+        '[keep]\nfinal = ["plant.x", "law.u"]\ntrajectories = [0, 5]\n'
+    )
+    given = campaign(tmp_path, text)
+    with bases.opened(given, None, tmp_path / "test.toml") as base:
+        given = bases.in_si(given, base, "test")
+    with runner(given, tmp_path, fmu=tmp_path / "loop.toml") as (runs, job, points):
+        found = rows(runs, job, points, range(6))
+    assert [bool(text) for text in found.failures] == [False, False, True, True, False, False]
+    assert f"law: {tmp_path / 'law.py'}, line 10: ValueError: kp (" in found.failures[2]
+    with opened(tmp_path / "loop.toml") as system, system.unpacked_fmus() as fmus:
+        signals = system.system.inputs
+        for run, kp, x in ((0, 2.0, 0.1), (5, 0.5, 1.0)):
+            with Master(fmus, system.system.connections, signals=signals) as master:
+                values = {"plant": {"omega": 3.0, "x": x}, "law": {"kp": kp}}
+                master.initialize(0.0, 1.0, values)
+                expected = master.run(job.times)
+            columns = [master.names.index(name) for name in job.watched]
+            assert np.array_equal(found.trajectories[run], expected[:, columns])
+    assert np.abs(expected).max() > 0.1

@@ -18,9 +18,12 @@ from rparm.models.closed_loop.coupling.study import (
     StepErrors,
     study_payload,
 )
+from scipy.linalg import expm
 
 from rparm.__main__ import main
 from rparm.errors import UserError
+from rparm.systems.master import Master
+from rparm.systems.opened import opened
 from tests.support.paths import ROOT
 from tests.support.systems import CLOSED_LOOP
 
@@ -210,6 +213,78 @@ def test_the_reference_of_the_motion_is_up_to_date(tmp_path: Path) -> None:
 def test_an_unknown_variant_is_named(loop: ClosedLoop) -> None:
     with pytest.raises(UserError, match="no variant 'light'.*nominal"):
         loop.run(METHODS[0], STEP, "light")
+
+
+def test_any_loop_has_the_errors_of_its_exact_solution(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """An oscillator that shakes another one, by the matrix exponential; orders 1, 1, 2 and 2."""
+    file, fmu = tmp_path / "pair.toml", ROOT / "build" / "tests" / "oscillator" / "Oscillator.fmu"
+    omega, start = (2.0, 3.0), np.array([1.0, 0.0, 0.2, -1.0])
+    lines = [
+        f'"{name}.{key}" = {value}'
+        for i, name in enumerate("ab")
+        for key, value in (
+            ("omega", omega[i]), ("x", start[2 * i]), ("v", start[2 * i + 1]),
+            ("relative_tolerance", 1e-11),
+        )
+    ]  # fmt: skip
+    file.write_text(
+        f'name = "Pair"\nstep = "40 ms"\nstop = 2\n[components]\na = "{fmu.as_posix()}"\n'
+        f'b = "{fmu.as_posix()}"\n[connections]\n"b.u" = "a.a"\n[parameters]\n' + "\n".join(lines)
+    )
+    assert main(["coupling", str(file), "--json", "--report", str(tmp_path)]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert Path(found["page"]).is_file() and Path(found["page"]).with_name("coupling.png").is_file()
+    a, b = omega
+    A = np.array([[0, 1, 0, 0], [-a * a, 0, 0, 0], [0, 0, 0, 1], [-a * a, 0, -b * b, 0]])
+    times = 0.04 * np.arange(51)
+    exact = np.array([expm(A * t) @ start for t in times])
+    assert len(found["ways"]) == 4
+    for way in found["ways"]:
+        order, inputs = way["order"], way["inputs"]
+        expected = 2.0 if inputs == "extrapolated" else 1.0
+        assert way["orders"][-1] == pytest.approx(expected, abs=0.1)
+        with (
+            opened(file) as system,
+            system.unpacked_fmus() as fmus,
+            Master(fmus, system.system.connections, order, inputs) as master,
+        ):
+            master.initialize(0.0, 2.0, system.system.parameter_sets["default"])
+            rows = master.run(times)
+        errors = []
+        for names, columns in (("xx", (0, 2)), ("vv", (1, 3))):
+            own = [master.names.index(f"{c}.{n}") for c, n in zip("ab", names, strict=True)]
+            apart = np.abs(rows[:, own] - exact[:, columns]).max()
+            errors.append(apart / np.abs(exact[:, columns]).max())
+        accelerations = exact @ A.T[:, [1, 3]]
+        own = [master.names.index(f"{c}.a") for c in "ab"]
+        errors.append(np.abs(rows[:, own] - accelerations).max() / np.abs(accelerations).max())
+        energies = [(exact[:, [2 * i + 1]] ** 2 + (w * exact[:, [2 * i]]) ** 2) / 2
+                    for i, w in enumerate(omega)]  # fmt: skip
+        own = [master.names.index(f"{c}.energy") for c in "ab"]
+        apart = np.abs(rows[:, own] - np.hstack(energies)).max()
+        errors.append(apart / np.abs(energies).max())
+        assert way["errors"][0] == pytest.approx(max(errors), rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["closed_lop"], "expected a file .toml or .ssp, or a system, did you mean 'closed_loop'"),
+        (["python.toml"], "halves of the step show no error of the coupling: law is Python"),
+        (["python.toml", "heavy"], "python.toml: no variant 'heavy' (known: default)"),
+    ],
+)
+def test_coupling_refuses(
+    arguments: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    Path("law.py").write_text("def step(t, h, inputs):\n    return {}\n")
+    Path("python.toml").write_text('name = "P"\nstep = 1\nstop = 2\ncomponents.law = "law.py"\n')
+    assert main(["coupling", *arguments, "--report", "report"]) == 2
+    assert message in capsys.readouterr().err
 
 
 def test_tables_and_picture(

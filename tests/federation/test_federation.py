@@ -15,10 +15,11 @@ from rparm.federation.component import parts, real_connections
 from rparm.fmi.fmu_file import Fmu
 from rparm.systems import ssp
 from rparm.systems.master import Master
+from rparm.systems.opened import opened
 from rparm.systems.structure import OpenedSystem
 from tests.federation.processes import Start
 from tests.support.programs import RPARM, python
-from tests.support.rparm_project import MISTAKES, Console
+from tests.support.rparm_project import BUILD, MISTAKES, Console
 from tests.support.ssp_files import SSP, edited, replace
 
 STRUCTURE = "SystemStructure.ssd"
@@ -33,8 +34,8 @@ TOLERANCE = (
 def short(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OpenedSystem]:
     """The closed loop, of 1 s."""
     path = edited(SSP, tmp_path_factory.mktemp("ssp") / "Short.ssp", {STRUCTURE: SHORT})
-    with ssp.unpacked(path) as opened:
-        yield opened
+    with ssp.unpacked(path) as system:
+        yield system
 
 
 def by_the_master(system: OpenedSystem, variant: str) -> tuple[tuple[str, ...], np.ndarray]:
@@ -60,6 +61,27 @@ def test_values_are_those_of_the_master(short: OpenedSystem, variant: str) -> No
     assert record.values.shape == (1001, len(names))
     assert np.abs((record.values - expected) / scale).max() <= 1e-12
     assert np.abs(rows[-1] - rows[0]).max() > 1e-3, "nothing has moved"
+
+
+def test_a_loop_file_with_python_and_a_signal_is_as_by_the_master(tmp_path: Path) -> None:
+    (tmp_path / "law.py").write_text(
+        "def step(t, h, inputs):\n    return {'u': inputs['r'] - 2 * inputs['x']}\n"
+    )
+    file = tmp_path / "loop.toml"
+    file.write_text(
+        f'name = "Loop"\nstep = 0.05\nstop = 1\n[components]\nlaw = "law.py"\n'
+        f'plant = "{(BUILD / "tests" / "oscillator" / "Oscillator.fmu").as_posix()}"\n'
+        '[connections]\n"plant.u" = "law.u"\n"law.x" = "plant.x"\n'
+        '[inputs]\n"law.r" = { table = [[0, 0], [0.5, 3]] }\n'
+    )
+    with opened(file) as system, system.unpacked_fmus() as fmus:
+        record = federation.run(system, "default", network.free_address())
+        with Master(fmus, system.system.connections, signals=system.system.inputs) as master:
+            master.initialize(0.0, 1.0)
+            expected = master.run(record.times)
+    columns = [master.names.index(name) for name in record.names]
+    assert np.array_equal(record.values, expected[:, columns])
+    assert np.abs(np.diff(record.values[:, record.names.index("law.u")])).max() > 0.1
 
 
 def test_a_component_may_be_stepped_elsewhere(short: OpenedSystem, start: Start) -> None:
