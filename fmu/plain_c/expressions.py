@@ -57,7 +57,7 @@ class Expressions(Memory):
         self.warn, self.doubles_move = warn, doubles_move
         self.operation = graph.value if is_exact else graph.simple
         self.still: dict[Value, bool] = {}
-        self.globals = Scope(None)
+        self.globals = Scope()
 
     def call(
         self, function: c_ast.FuncDef, arguments: list[Any], state: State, place: c_ast.Node
@@ -89,7 +89,7 @@ class Expressions(Memory):
         """Return the address of an assignable expression, or choices of addresses."""
         match node:
             case c_ast.ID():
-                found = scope.find(node.name) or self.constant(node)
+                found = scope.get(node.name) or self.constant(node)
                 return found[0]
             case c_ast.StructRef(type="."):
                 places = self.place(node.name, scope, state)
@@ -151,7 +151,7 @@ class Expressions(Memory):
                 return self.number(node)
             case c_ast.ID(name="true" | "false"):
                 return BOOL, int(node.name == "true")
-            case c_ast.ID() if node.name in self.program.enumerators and not scope.find(node.name):
+            case c_ast.ID() if node.name in self.program.enumerators and not scope.get(node.name):
                 return INT, self.enumerator(node.name)
             case c_ast.ID() | c_ast.StructRef() | c_ast.ArrayRef():
                 return self.load(self.place(node, scope, state), state, node)

@@ -147,7 +147,7 @@ def _run(chosen: Sequence[tuple[Section, Sequence[str]]], options: argparse.Name
             measures = {m.name: (m.value(outcome), m.unit) for m in section.measures}
             found = {"error": outcome.error, "worst": outcome.worst} if outcome.errors else {}
             if outcome.is_estimate:
-                console.remark(system_page.estimate(section, outcome))
+                console.remark(system_page.estimate(outcome))
                 found = {f"coupling_{key}": value for key, value in found.items()}
             else:
                 found |= {"bound": comparison.BOUND, "passed": outcome.passed}
@@ -196,4 +196,4 @@ def _simulated(
             return comparison.simulate(section.ssp, name, reference, engine, progress)
     estimates = not comparison.why_no_estimate(section.ssp)
     with Progress(name, 3 * steps if estimates else steps) as progress:
-        return comparison.run_alone(section.ssp, name, section.names, progress)
+        return comparison.run_alone(section.ssp, name, section.names, engine, progress)

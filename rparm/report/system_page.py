@@ -122,7 +122,7 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
     if not outcome.passed:
         error = f"{outcome.error:.1e}"
         failures = [f"the error of {outcome.worst}, {error}, is above its bound {short(BOUND)}"]
-    known = {"error": None, "bound": None, "detail": estimate(section, outcome)}
+    known = {"error": None, "bound": None, "detail": estimate(outcome)}
     if not outcome.is_estimate:
         error = float(outcome.error) if np.isfinite(outcome.error) else None
         known = {"error": error, "bound": BOUND, "detail": f"worst variable: {outcome.worst}"}
@@ -149,10 +149,10 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
     )
 
 
-def estimate(section: Section, outcome: Outcome) -> str:
+def estimate(outcome: Outcome) -> str:
     """Say how large the coupling error is, or why that is not known."""
     if not outcome.errors:
-        return f"coupling error not estimated: {comparison.why_no_estimate(section.ssp)}"
+        return f"coupling error not estimated: {outcome.why}"
     return f"coupling error about {outcome.error:.1e} ({outcome.worst}), by half the step"
 
 
@@ -252,15 +252,15 @@ def _facts(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
         ("system", section.title),
         ("time", f"{system.start:g} to {system.stop:g} s"),
         ("steps", str(outcome.steps)),
-        _error(section, outcome),
+        _error(outcome),
         *_measures(section, outcome),
         ("wall time", f"{outcome.run.wall_time:.3f} s"),
     ]
 
 
-def _error(section: Section, outcome: Outcome) -> tuple[str, str]:
+def _error(outcome: Outcome) -> tuple[str, str]:
     if outcome.is_estimate:
-        return "coupling error", estimate(section, outcome).removeprefix("coupling error ")
+        return "coupling error", estimate(outcome).removeprefix("coupling error ")
     return "worst error", f"{outcome.error:.1e} of {short(BOUND)} ({outcome.worst})"
 
 

@@ -17,7 +17,7 @@ from rparm.files import is_file
 from rparm.fmi.fmu_file import Fmu
 from rparm.runs import comparison
 from rparm.runs.comparison import Compared, Summed
-from rparm.systems import ecos, master
+from rparm.systems import ecos
 from rparm.systems.master import Master
 from rparm.systems.structure import OpenedSystem
 
@@ -48,7 +48,8 @@ class Outcome(Compared):
     variant: str
     steps: int
     run: ecos.Run
-    errors: dict[str, float]  # largest of each variable, relative; may be empty in an estimate
+    errors: dict[str, float]  # largest of each variable, relative
+    why: str = ""  # there are no errors, in an estimate
     is_estimate: bool = False
 
     @property
@@ -63,41 +64,36 @@ class Outcome(Compared):
 Engine = Callable[..., ecos.Run]  # of system, variant, names and progress
 
 
-def engine(ssp: OpenedSystem) -> tuple[Engine, str]:
-    """Return Ecos, or the master of rparm with the reason why it is not Ecos."""
-    why_not = ecos.unsuited(ssp)
-    return (master.run_in_master, why_not) if why_not else (ecos.run, "")
-
-
 def kept(ssp: OpenedSystem) -> list[str]:
     """Return what the file of a system wants to be recorded; all outputs and states without it."""
     return list(ssp.system.keep or [*recorded(ssp), *discrete(ssp)])
 
 
 def run_alone(
-    ssp: OpenedSystem, variant: str, names: Sequence[str], progress: Callable[[int], object]
+    ssp: OpenedSystem,
+    variant: str,
+    names: Sequence[str],
+    engine: Engine,
+    progress: Callable[[int], object] = lambda _: None,
 ) -> Outcome:
     """Run a variant that has no reference; estimate the coupling error by half the step.
 
     Inputs that are held over a step are late by half of it, on the average: an error of first
     order, twice the difference between both runs.
     """
-    run, _ = engine(ssp)
-    found = run(ssp, variant, names, progress)
-    errors: dict[str, float] = {}
-    if not why_no_estimate(ssp):
+    run = engine(ssp, variant, names, progress)
+    errors, why = {}, why_no_estimate(ssp)
+    if not why:
         half = replace(ssp, system=replace(ssp.system, step=ssp.system.step / 2))
-        finer = run(half, variant, names, progress)
         real = [name for name in kept(ssp) if ssp.variable(name).type == "Real"]
-        scales: dict[str | None, float] = {}
-        for name in real:
-            unit, values = ssp.variable(name).unit, finer.values[:, finer.names.index(name)]
-            scales[unit] = max(scales.get(unit, 0.0), float(np.abs(values).max()))
-        for name in real:
-            column, scale = names.index(name), scales[ssp.variable(name).unit]
-            apart = np.abs(found.values[:, column] - finer.values[::2, column]).max()
-            errors[name] = 2 * float(apart) / (scale or 1.0)
-    return Outcome(variant, ssp.system.steps, found, errors, is_estimate=True)
+        columns = [names.index(name) for name in real]
+        try:
+            finer = engine(half, variant, names, progress).values[::2, columns]
+            apart = np.abs(run.values[:, columns] - finer).max(axis=0)
+            errors = dict(zip(real, (2 * apart / _sizes(ssp, real, finer)).tolist(), strict=True))
+        except UserError as error:  # an FMU may allow one step only
+            why = f"half the step fails, {error}"
+    return Outcome(variant, ssp.system.steps, run, errors, why, is_estimate=True)
 
 
 def why_no_estimate(ssp: OpenedSystem) -> str:
@@ -110,6 +106,15 @@ def why_no_estimate(ssp: OpenedSystem) -> str:
     if not any(ssp.variable(name).type == "Real" for name in kept(ssp)):
         return "no Real is recorded"
     return "" if ssp.system.connections else "there are no connections"
+
+
+def _sizes(ssp: OpenedSystem, names: Sequence[str], values: np.ndarray) -> np.ndarray:
+    """Return the largest of all values (rows, names) in the unit of each name; 1 where it is 0."""
+    units = [ssp.variable(name).unit for name in names]
+    sizes: dict[str | None, float] = {}
+    for unit, largest in zip(units, np.abs(values).max(axis=0).tolist(), strict=True):
+        sizes[unit] = max(sizes.get(unit, 0.0), largest)
+    return np.array([sizes[unit] or 1.0 for unit in units])
 
 
 def recorded(ssp: OpenedSystem) -> list[str]:
@@ -251,11 +256,7 @@ def halve(
         for name in model.real_outputs
     ]
     values = np.array([rows[:, : len(names)] for rows in runs])
-    sizes: dict[str | None, float] = {}
-    units = [ssp.variable(name).unit for name in names]
-    for unit, largest in zip(units, np.abs(values[-1]).max(axis=0).tolist(), strict=True):
-        sizes[unit] = max(sizes.get(unit, 0.0), largest)
-    values = values / [sizes[unit] or 1.0 for unit in units]
+    values = values / _sizes(ssp, names, values[-1])
     found = Halved(*way, system.step / 2.0 ** np.arange(len(runs)), *[np.zeros(0)] * 2, "")
     limit = values[-1] + (values[-1] - values[-2]) / (2**found.expected - 1)
     errors = np.abs(values - limit)

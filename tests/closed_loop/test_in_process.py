@@ -42,7 +42,7 @@ def test_the_command_says_who_steps(
     monkeypatch.setattr(ecos, "run", None)  # nobody may call it
     code, out, _ = console("system", "nominal", "--report", tmp_path)
     assert code == 0
-    assert f"{ABSENT}: the master of rparm steps the systems" in out
+    assert f"{ABSENT}: the master of rparm steps closed_loop" in out
     assert "passed: 1 variant" in out
 
 

@@ -129,7 +129,7 @@ def test_the_coupling_error_is_of_first_order_and_as_estimated(loop: OpenedSyste
     errors = {}
     for milliseconds in (4, 2, 1):
         finer = with_step(loop, milliseconds / 1000)
-        outcome = comparison.run_alone(finer, "default", NAMES, lambda _: None)
+        outcome = comparison.run_alone(finer, "default", NAMES, run_in_master)
         apart = np.abs(outcome.run.values - exact[::milliseconds]).max(axis=0)
         errors[milliseconds] = apart
         # one scale, since no variable has a unit

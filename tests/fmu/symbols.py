@@ -3,12 +3,12 @@ library for Linux must be."""
 
 import ctypes
 import re
-import subprocess
 from pathlib import Path
 
 import lief
 
 from tests.support.paths import FMI_HEADERS
+from tests.support.programs import run_checked
 
 COUNTS = {"fmi2": 44, "fmi3": 75}
 GLIBC = (2, 17)  # as README.md says
@@ -16,9 +16,7 @@ GLIBC = (2, 17)  # as README.md says
 
 def listed(*arguments: object, tools: str = "") -> set[str]:
     """Names that nm lists, without their versions and the names of these; `tools`: its prefix."""
-    command = [f"{tools}nm", *map(str, arguments)]
-    text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    lines = (line.split() for line in text.splitlines())
+    lines = (line.split() for line in run_checked(f"{tools}nm", *arguments).splitlines())
     return {line[-1].partition("@")[0] for line in lines if len(line) > 1 and line[-2] != "A"}
 
 

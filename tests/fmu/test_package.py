@@ -26,8 +26,7 @@ def test_packing_again_gives_the_same_bytes(fmu: Path, tmp_path: Path) -> None:
     with zipfile.ZipFile(fmu) as archive:
         archive.extractall(tmp_path / "content")
     entries = [f"{path.name}={path}" for path in (tmp_path / "content").iterdir()]
-    command = [sys.executable, PACKAGE, tmp_path / "again.fmu", *entries]
-    subprocess.run(command, check=True)
+    run_checked(sys.executable, PACKAGE, tmp_path / "again.fmu", *entries)
     assert (tmp_path / "again.fmu").read_bytes() == fmu.read_bytes()
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rparm.models.machine import wall_limit
-from rparm.models.machine.systems import write_system
+from rparm.models.machine.systems import changed
 from rparm.models.machine.wall_limit import (
     CASES,
     DEPTH,
@@ -23,6 +23,7 @@ from rparm.models.machine.wall_limit import (
 )
 
 from rparm.fmi.fmu_file import Fmu
+from rparm.systems import ssp_writer
 from rparm.systems.structure import OpenedSystem
 from tests.importers.osp import libcosim
 
@@ -51,7 +52,7 @@ def test_ecos(opened: OpenedSystem, stiffness: float) -> None:
 def test_libcosim(opened: OpenedSystem, tmp_path: Path) -> None:
     def measure(stiffness: float, damping: float) -> np.ndarray:
         path = tmp_path / "Pressed.ssp"
-        write_system(opened, path, pressed(stiffness, damping), STEPS * STEP, STEP)
+        ssp_writer.write(path, changed(opened, pressed(stiffness, damping), STEPS * STEP, STEP))
         return libcosim(path, [DEPTH], STEPS, tmp_path)[DEPTH]
 
     check(measure, STIFFNESS, "jacobi", "held")

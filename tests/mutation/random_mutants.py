@@ -150,13 +150,15 @@ class Build:
         sanitize = f"-DSANITIZE={'ON' if self.kind == 'sanitized' else 'OFF'}"
         options = [*generator, *OPTIONS, sanitize, *settings]
         run_checked("cmake", "-S", copy, "-B", self.folder, *options)
-        listed = run_checked("ctest", "--show-only=json-v1", "-L", "^c$", folder=self.folder)
-        tests = json.loads(listed)["tests"]
-        self.targets = sorted({Path(test["command"][0]).name for test in tests})
-        if not self.make():
-            raise RuntimeError(f"the copy of the sources does not build ({self.kind})")
+        run_checked("cmake", "--build", self.folder, "--parallel", "2")
+        self.targets = self.programs()
         if failed := self.failed():
             raise RuntimeError(f"{failed} fails without any mutant ({self.kind})")
+
+    def programs(self) -> list[str]:
+        """Targets of all tests; ctest knows the commands of those that are built."""
+        listed = run_checked("ctest", "--show-only=json-v1", "-L", "^c$", folder=self.folder)
+        return sorted({Path(test["command"][0]).name for test in json.loads(listed)["tests"]})
 
     def make(self) -> bool:
         """Build the tests; whether that succeeds."""

@@ -22,16 +22,23 @@ void setUp(void) {
 
 /* ---- The payload ---------------------------------------------------------------------------- */
 
-static void test_without_a_grasp_there_is_no_event(void) {
-    const struct event end_of_initialization = {.t = 0.0};
+static void test_what_comes_next_after_a_start(void) {
     const struct model_events *events = rp_trajectory_model.events;
-    v.parameters.grasp_time = v.parameters.release_time = 1.25;
-    v.payload = RP_TRAJECTORY_UNDECIDED;
-    ASSERT_OK(events->update(&v, &end_of_initialization));
-    TEST_ASSERT_TRUE(events->next_time(&v) == INFINITY);
-    TEST_ASSERT_TRUE(events->modes_are_possible(&v, true));
-    ASSERT_OK(rp_trajectory_model.outputs(&v, 0.0));
-    TEST_ASSERT_EQUAL_INT(0, v.payload_attached);
+    const struct {
+        double release, start, next;
+    } cases[] = {{2.5, 0.0, 1.25}, {2.5, 1.25, 2.5}, {2.5, 2.5, INFINITY}, {1.25, 0.0, INFINITY}};
+    v.parameters.grasp_time = 1.25;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const struct event end_of_initialization = {.t = cases[i].start};
+        v.parameters.release_time = cases[i].release;
+        v.payload = RP_TRAJECTORY_UNDECIDED;
+        ASSERT_OK(events->update(&v, &end_of_initialization));
+        TEST_ASSERT_TRUE(events->next_time(&v) == cases[i].next);
+        TEST_ASSERT_TRUE(events->modes_are_possible(&v, true));
+        ASSERT_OK(rp_trajectory_model.outputs(&v, 0.0));
+        TEST_ASSERT_EQUAL_INT(cases[i].next == 2.5, v.payload_attached);
+    }
+    // the last one has no grasp
     v.payload = RP_TRAJECTORY_ATTACHED;
     TEST_ASSERT_FALSE(events->modes_are_possible(&v, true));
     v.payload = RP_TRAJECTORY_UNDECIDED;
