@@ -288,8 +288,8 @@ def add_ssp_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("file", metavar="FILE.toml", type=Path, help="the system")
     add_fmi(parser, VERSIONS[0], "version of FMI of the project's and of built FMUs (default: 2)")
-    text = "the file, or a folder for it (default: the current one)"
-    parser.add_argument("-o", "--output", type=Path, metavar="PATH", default=Path(), help=text)
+    text = "folder for the file (default: the current one), or the file .ssp"
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR|FILE", default=Path(), help=text)
 
 
 def do_ssp(options: argparse.Namespace) -> Ended:
