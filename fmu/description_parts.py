@@ -3,7 +3,16 @@
 import xml.etree.ElementTree as ET
 
 from declaration.load import Declaration
-from declaration.schema import Boolean, Display, Enumeration, Experiment, Float64, Unit, Variable
+from declaration.schema import (
+    Boolean,
+    Display,
+    Enumeration,
+    Experiment,
+    Float64,
+    Model,
+    Unit,
+    Variable,
+)
 from program import Provenance
 
 LOG_CATEGORIES = {
@@ -95,6 +104,17 @@ def add_experiment(root: ET.Element, experiment: Experiment) -> None:
     numbers = {"startTime": experiment.start, "stopTime": experiment.stop}
     numbers |= {"tolerance": experiment.tolerance, "stepSize": experiment.step}
     ET.SubElement(root, "DefaultExperiment", {key: repr(x) for key, x in numbers.items()})
+
+
+def add_annotation(root: ET.Element, names: tuple[str, str], key: str, model: Model) -> None:
+    """Write what `rparm linearize` should know; names and key: of the elements in this version."""
+    notes = {"flat": model.flat, "modulated": model.modulated}
+    if any(notes.values()):
+        annotation = ET.SubElement(ET.SubElement(root, names[0]), names[1], {key: "rparm"})
+        annotation = ET.SubElement(annotation, "linearize")  # FMI 2.0 allows a single element
+        for tag, texts in notes.items():
+            for text in texts:
+                ET.SubElement(annotation, tag, text=text)
 
 
 def document(root: ET.Element) -> str:

@@ -71,6 +71,8 @@ def every(file: ModelFile, text: object) -> list[dict[str, int]]:
             ]
             if len(found) > MOST_ELEMENTS:
                 raise ModelFileError(f"more than {MOST_ELEMENTS} elements")
+        if not found:
+            raise ModelFileError(f"{text!r} has no values")
     return found
 
 

@@ -24,11 +24,12 @@ LARGEST_FILE = 200_000  # bytes
 MOST_OPERATIONS = 10_000  # that a call stands for
 MOST_STEPS, MOST_STEPS_IN_ALL = 100_000, 500_000  # of the interpreter in a call, and in all
 MOST_RELATIONS = 1000  # of values that move, in the whole model
+HEADERS = "#include <math.h> and <stdbool.h>"
 NO_LINES = {  # of C, and what to write instead
-    r"#\s*include\s*<math\.h>\s*": "",
-    r"#\s*include\b.*": "only #include <math.h> is read: put all functions into this file",
+    r"#\s*include\s*<(math|stdbool)\.h>\s*": "",
+    r"#\s*include\b.*": f"only {HEADERS} are read: put all functions into this file",
     r"#\s*define\b.*": "macros are not read: write static const double NAME = ... or a function",
-    r"(%:|\?\?=|#|(.*\W)?_Pragma\b).*": "of directives, only #include <math.h> is read",
+    r"(%:|\?\?=|#|(.*\W)?_Pragma\b).*": f"of directives, only {HEADERS} are read",
     r"(.*\W)?(__)?asm(__)?\b.*": "assembly is not read: write the equation in C",
 }
 # functions of math.h that are no operations of the graph, as expressions of x and y

@@ -17,6 +17,7 @@ from equations_tables import Table
 from rparm.expressions.expression import (
     CONDITION,
     NUMBER,
+    ExpressionError,
     Function,
     Kind,
     Lookup,
@@ -186,6 +187,7 @@ class ModelFile:
     indexes: set[str] = field(default_factory=set)  # all that `for` gives
     parsed: dict[str, Node] = field(default_factory=dict)  # texts, before their indexes
     operations: int = 0  # of all expressions
+    happening: dict[str, str] = field(default_factory=dict)  # samplers and events: their sections
     modes: dict[str, bool] = field(default_factory=dict)  # with their values at the start
     variables: dict[str, Variable] = field(default_factory=dict)
     sampled: list[Sampler] = field(default_factory=list)
@@ -209,7 +211,15 @@ class ModelFile:
                 tree = at_indexes(self.parsed[text], self.sizes | element.indexes)
             except ValueError as error:
                 raise ModelFileError(f"{error}{instead_of(text)}") from None
-            self.operations += len(in_order([tree]))
+            nodes = in_order([tree])
+            self.operations += len(nodes)
+            for node in nodes:
+                if node.op == "/" and (node.arguments[1].op, node.arguments[1].value) == (
+                    "number",
+                    0,
+                ):
+                    at = ", ".join(f"{i} = {value}" for i, value in element.indexes.items())
+                    raise ExpressionError(node.column, f"division by 0{at and f' at {at}'}")
             if self.operations > MOST_OPERATIONS:
                 raise ModelFileError(f"the file has more than {MOST_OPERATIONS} operations")
         return Expression(place, text, tree, *more, **options)

@@ -367,6 +367,8 @@ def _check_name(name: str, file: ModelFile) -> None:
         raise ModelFileError("this name is in [sizes] already")
     if base in file.functions:
         raise ModelFileError("this name is a function or table already")
+    if name in file.happening:
+        raise ModelFileError(f"this name is in [{file.happening[name]}] already")
     if len(file.variables) + len(file.modes) + len(file.events) >= MOST_VARIABLES:
         raise ModelFileError(f"has more than {MOST_VARIABLES} variables, modes and events")
 
@@ -411,6 +413,7 @@ def _change(
     place = f"[{section}.{_named(element.shown)}]"
     with placed(place):
         _check_name(element.name, file)
+        file.happening[element.name] = section
         given = keys.entries(element.entry, known, known[0])
         if not (given.get("set") or given.get("reinit")):
             raise ModelFileError("expected set or reinit: what it does")

@@ -92,6 +92,13 @@ def plain_text(value: object) -> str:
     return " ".join(value.split())
 
 
+def _unit(value: object) -> str:
+    unit = plain_text(value)
+    if not unit:
+        raise ValueError("expected a unit, or leave the key out")
+    return unit
+
+
 TEXT = _expect(
     f"a text of at most {LONGEST_TEXT} characters", str, lambda text: len(text) <= LONGEST_TEXT
 )
@@ -133,7 +140,8 @@ READ = {
     **dict.fromkeys((*NUMBERS, *EXPERIMENT), finite_number),
     "start": lambda given: given if type(given) in (bool, str) else finite_number(given),
     "type": _type,
-    **dict.fromkeys(("unit", "description"), plain_text),
+    "description": plain_text,
+    "unit": _unit,
     **dict.fromkeys(TABLES, _expect("a table", dict, lambda _: True)),
     **dict.fromkeys((*BASE, ANGLE), _expect("a whole exponent", int, lambda e: abs(e) < 100)),
     "name": _expect("a letter, then letters, digits, _", str, NAME.fullmatch),

@@ -21,6 +21,7 @@ from rparm.expressions.units import BASE, Unit, times, unit_of, unit_of_exponent
 from rparm.expressions.units import shown as unit_shown
 
 SECOND = unit_of_exponents({"s": 1})
+SHORTEST = 1e-12  # s, of periods
 MOST_COMPARED = 1000  # names that may have been meant
 
 
@@ -104,8 +105,9 @@ def _check_periods(file: ModelFile) -> None:
     for sampler in file.sampled:
         every, offset = (_number(expression, starts) for expression in sampler.periods)
         with placed(*sampler.every.place):
-            if not 0 < every < math.inf:
-                raise ModelFileError(f"is {every:g} s at the start values, expected more than 0")
+            if not SHORTEST <= every < math.inf:
+                wanted = f"expected {SHORTEST:g} s or more"
+                raise ModelFileError(f"is {every:g} s at the start values, {wanted}")
         with placed(*sampler.offset.place):
             if not 0 <= offset < math.inf:
                 raise ModelFileError(f"is {offset:g} s at the start values, expected 0 or more")

@@ -51,6 +51,12 @@ class Table:
         """Return the name in C of an array: bounds, ends or origins of an axis, or coefficients."""
         return f"table_{self.name}_{kind}{number}"
 
+    @property
+    def ends(self) -> tuple[float, float] | None:
+        """Between what it has values, if others are errors."""
+        bounds = self.axes[0].bounds
+        return (bounds[1], bounds[-2]) if math.isnan(self.coefficients[0][0]) else None
+
     def arrays(self) -> Iterator[tuple[str, str, Sequence[float]]]:
         """Yield name, dimensions and numbers of each array in C."""
         for i, axis in enumerate(self.axes):
@@ -110,6 +116,8 @@ def _columns(given: dict[str, Any], folder: Path) -> dict[str, list[float]]:
     for key, column in names.items():
         if not isinstance(column, str):
             raise ValueError(f"{key}: expected the name of a column of {path.name}")
+    if names["x"] == names["y"]:
+        raise ValueError(f"y: expected another column than x, got {names['y']!r}")
     try:
         if not path.is_file():
             raise ValueError(f"file: {path.name}: no such file")
@@ -126,6 +134,9 @@ def _columns(given: dict[str, Any], folder: Path) -> dict[str, list[float]]:
                 places[key] = head.index(column)
             found: dict[str, list[float]] = {"x": [], "y": []}
             for row in rows:
+                if any(map(str.strip, row[len(head) :])):
+                    where = f"file: {path.name}: line {rows.line_num}"
+                    raise ValueError(f"{where}: has {len(row)} cells, expected {len(head)}")
                 for key, place in places.items() if row else ():
                     where = f"{key}: {path.name}: line {rows.line_num}"
                     found[key].append(_cell(row, place, where))

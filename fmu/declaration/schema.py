@@ -126,6 +126,9 @@ class Model(Table):
     event_indicators: list[str] = []
     time_events: bool = False
     naming: Literal["flat", "structured"] = "flat"
+    # for `rparm linearize`: functions without slope, and switches whose time inputs decide
+    flat: list[str] = []
+    modulated: list[str] = []
 
     @property
     def has_events(self) -> bool:

@@ -10,8 +10,9 @@ from itertools import groupby
 from pathlib import Path
 
 from equations_content import Expression
+from equations_tables import Table
 
-from equations.graph import CONDITIONS, LEAVES, Value
+from equations.graph import CONDITIONS, LEAVES, MOST_COUNTED, Value
 from rparm.expressions.expression import RELATIONS, in_order, written
 
 # what a formula of C is made of; that of a function is its call
@@ -75,11 +76,21 @@ def text(value: str) -> str:
     return '"' + "".join(_character(byte) for byte in value.encode()) + '"'
 
 
-def shortened(name: str, expression: Expression) -> str:
-    """A string of C of an assignment, in one line; indexes have their values."""
+def shortened(name: str, expression: Expression, tables: Mapping[str, Table]) -> str:
+    """A string of C of an assignment, in one line; indexes have their values.
+
+    Limits follow, beyond which it is not finite.
+    """
     has_indexes = "[" in expression.text
     value = f"{written(expression.tree):.{LONGEST}}" if has_indexes else expression.text
-    return text(" ".join(f"{name}{value}".split()))
+    limits = {}
+    for node in in_order([expression.tree]):
+        if node.op == "floor":
+            limits["floor"] = f"up to 2^{MOST_COUNTED.bit_length() - 1}"
+        elif node.op == "table" and (ends := tables[node.name].ends):
+            limits[f"table {node.name}"] = "{:.6g}..{:.6g}".format(*ends)
+    shown = "; ".join(f"{what}: {limit}" for what, limit in limits.items())
+    return text(" ".join(f"{name}{value}{shown and f' [{shown}]'}".split()))
 
 
 def _character(byte: int) -> str:

@@ -26,11 +26,11 @@ from equations.c_code import (
 from equations.errors import NONE, Errors
 from equations.graph import MOVING, Graph, Relation, Value, is_unknown
 from equations.rolled import rolled
-from rparm.expressions.expression import CONDITION, Kind, in_order
+from rparm.expressions.expression import CONDITION, WHOLE, Kind, in_order
 
 Guards = dict[Value, Value | None]  # conditions; None: always
 
-INDICATOR = "z_{}"
+INDICATOR = "z[{}]"  # in the order of located relations
 SECOND = {"s": 1}
 INDEXES = re.compile(r"\[([0-9,]+)\]")
 NEXT_TIME = [
@@ -81,6 +81,7 @@ class Tick:
 def ticks(file: ModelFile) -> list[Tick]:
     """When samplers tick, and what each would set now; the largest double is no finite value."""
     graph, found, taken = file.graph, [], {*file.variables, *file.modes}
+    uncoupled = _uncoupled(file)
     one, zero, largest = map(graph.number, (1.0, 0.0, sys.float_info.max))
     for i, sampler in enumerate(file.sampled, 1):
         every, offset = (period.value for period in sampler.periods)
@@ -95,7 +96,8 @@ def ticks(file: ModelFile) -> list[Tick]:
             if old.op in ("state", "discrete"):
                 meaning, unit = "new value", variable.exponents
             else:  # the change, which is 0 or not
-                meaning, new = "change", graph.value("-", new, old)
+                meaning = "count" if target in uncoupled else "change"
+                new = graph.value("-", new, old)
             new = graph.value("if", graph.value("isfinite", new), new, largest)
             own.append((target, new, unit, f"{meaning} of {target}"))
         for key, value, unit, meaning in own:
@@ -108,6 +110,19 @@ def ticks(file: ModelFile) -> list[Tick]:
             description = f"Sampler {i}, {sampler.name}: {meaning}"
             found.append(Tick(name + end, f"tick_{len(found)}", value, unit, description))
     return found
+
+
+def _uncoupled(file: ModelFile) -> set[str]:
+    """Counters from which nothing follows but themselves."""
+    graph, expressions = file.graph, [c for change in file.changes for c in change.conditions]
+    read = [v.value for v in file.of("states", "where", "outputs")]
+    read += [e.value for e in expressions] + [r.distance for r in graph.relations.values()]
+    read += [segment.argument for segment in graph.segments.values()]
+    used = {name for value in read for _, name in value.leaves}
+    for change in file.changes:
+        for target, new in change.given.items():
+            used |= {name for _, name in new.value.leaves if name != target}
+    return {v.name for v in file.of(COUNTS) if v.kind == WHOLE} - used
 
 
 def has_events(file: ModelFile) -> bool:
@@ -157,10 +172,10 @@ class Events:
     def indicators(self) -> dict[str, Value]:
         """Indicators by their fields: signed distances, or 1."""
         one, found = self.graph.number(1.0), {}
-        for relation in self.located:
+        for i, relation in enumerate(self.located):
             z, used = self.signed(relation), self.used[relation.name]
             z = z if used is None else self.graph.value("if", used, z, one)
-            found[INDICATOR.format(relation.name)] = z
+            found[INDICATOR.format(i)] = z
         return found
 
     def signed(self, relation: Relation) -> Value:
@@ -309,7 +324,7 @@ class Events:
             found += [(i, n, e) for n, e in change.given.items() if n not in counted]
         return [
             f"{{{i}, offsetof(struct equations_values, {self.file.fields.value(name)}), "
-            f"{shortened(f'{name} = ', expression)}}},"
+            f"{shortened(f'{name} = ', expression, self.file.tables)}}},"
             for i, name, expression in found
         ]
 
@@ -386,7 +401,7 @@ class Events:
             if used is not None:
                 found = f"{code.of(used)} ? {found} : unused"
             code.lines.append(f"indicator[{i}] = {found};")
-        return code.lines
+        return rolled(code.lines)[0]
 
     def _described(self, code: Code, relation: Relation) -> str:
         """How an indicator follows from the states: from one by a factor, if it can be."""
@@ -399,9 +414,9 @@ class Events:
             factor = self.graph.derivative(distance, x.leaf)
             if not factor.moves:
                 rate = zero if ("time", "") in x.value.leaves else x.value  # unknown here
-                at_zero = Code({**code.leaves, moving[0]: "0.0"}, f"o{len(code.lines)}_")
+                at_zero = Code({**code.leaves, moving[0]: "0.0"})
+                at_zero.lines = code.lines  # which number its constants, too
                 offset = at_zero.of(distance)
-                code.lines += at_zero.lines
                 holds, factor, rate = (code.of(v) for v in (relation.mode, factor, rate))
                 return f"relations_state_indicator({place}, {holds}, {factor}, {offset}, {rate})"
         limit = code.of(relation.limit or zero)

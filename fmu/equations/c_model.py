@@ -15,6 +15,18 @@ from rparm.expressions.expression import in_order
 STRUCTURE = "struct equations_values"
 SYMBOL = "equations_model"
 HERE = "/* tables */"  # the line where they stand
+BY_AVX2 = """
+BY_AVX2 static enum status extend_by_avx2(const struct series_origin *origin, int first, int last,
+                                          double row[][SERIES_LENGTH]) {
+    return extend_orders(origin, first, last, row);
+}
+
+static enum status extend(const struct series_origin *origin, int first, int last,
+                          double row[][SERIES_LENGTH]) {
+    return origin->has_avx2 ? extend_by_avx2(origin, first, last, row)
+                            : extend_orders(origin, first, last, row);
+}
+"""
 FOLLOWED = "relations_followed(&relations, ROOM, values, t, &copy)"
 
 
@@ -64,7 +76,7 @@ def _expressions(file: ModelFile) -> list[str]:
     fields = [(file.fields.rate(x.name), x) for x in file.of("states")]
     fields += [(file.fields.value(v.name), v) for v in file.calculated]
     return [
-        f"{{offsetof({STRUCTURE}, {name}), {shortened('', variable.expression)}}},"
+        f"{{offsetof({STRUCTURE}, {name}), {shortened('', variable.expression, file.tables)}}},"
         for name, variable in fields
     ] or ["{0},"]
 
@@ -149,6 +161,9 @@ def _series(series: Series, has_domains: bool) -> dict[str, object]:
     return {
         **series.parts(),
         "row_count": series.row_count + has_domains,
+        "storage_of_extend": "ALWAYS_INLINE" if series.is_wide else "static",
+        "extend": "extend_orders" if series.is_wide else "extend",
+        "extend_by_avx2": BY_AVX2.splitlines() if series.is_wide else [],
         "row_of_indicator": ", ".join(rows or ["0"]),
     }
 

@@ -289,7 +289,8 @@ def times(graph: Graph, a: Value, b: Value) -> Value:
 def scaled(graph: Graph, roots: list[Value], is_wide: bool) -> list[Value]:
     """The roots with factors that do not move in front of products: (a x) y as a (x y).
 
-    is_wide: signs are in front, too, and of two differences x - y and y - x there is one.
+    is_wide: signs and factors of quotients are in front, too, and of two differences x - y and
+    y - x there is one.
     """
     found: dict[Value, tuple[Value, Value]] = {}  # factor and what it is the factor of
     differences: dict[tuple[Value, Value], Value] = {}
@@ -307,7 +308,10 @@ def scaled(graph: Graph, roots: list[Value], is_wide: bool) -> list[Value]:
         elif value.op == "negative" and moving:
             found[value] = graph.negative(given[0][0]), given[0][1]
         elif moving:
-            op, whole, sign = value.op, [product(*pair) for pair in given], one
+            op, sign = value.op, one
+            if is_wide and op == "/" and value.arguments[0].moves:
+                sign, given[0] = given[0][0], (one, given[0][1])
+            whole = [product(*pair) for pair in given]
             last = whole[-1]
             if is_wide and op in ("+", "-") and last.op == "negative" and last.moves:
                 op, whole[-1] = "-" if op == "+" else "+", last.arguments[0]
@@ -315,8 +319,6 @@ def scaled(graph: Graph, roots: list[Value], is_wide: bool) -> list[Value]:
                 if (*reversed(whole),) in differences:
                     sign, whole = graph.negative(one), [*reversed(whole)]
                 differences[*whole] = last
-            if is_wide and op == "/" and whole[0].op == "negative":
-                sign, whole[0] = graph.negative(one), whole[0].arguments[0]
             found[value] = sign, graph.value(op, *whole, name=value.name)
         else:
             found[value] = one, value

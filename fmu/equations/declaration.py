@@ -13,7 +13,7 @@ from equations_keys import NUMBERS
 from equations import c_events, c_model
 from equations.c_events import INDICATOR
 from equations.graph import MOVING, Relation, Value
-from rparm.expressions.expression import CONDITION, WHOLE
+from rparm.expressions.expression import CONDITION, WHOLE, in_order
 from rparm.expressions.units import shown
 
 INSTANCE = UNITS.parents[2] / "src" / "instance"
@@ -22,6 +22,7 @@ SOLVER = INSTANCE / "solver_variables.toml"
 EVENTS = INSTANCE / "event_variables.toml"
 TIME_EVENTS = INSTANCE / "time_event_variables.toml"
 
+FLAT = re.compile(r"\b(floor|ceil|round|mod|sign)(?=\s*\()")
 Key = tuple[str, str]  # name and kind of a variable
 Leaf = tuple[str, str]  # of the graph: operation and name
 TYPES = {CONDITION: "boolean", WHOLE: "int32"}
@@ -93,9 +94,9 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
     for mode in file.modes if c_events.has_events(file) else ():
         own = {"type": "boolean", "variability": "discrete", "description": f"Mode {mode}"}
         tables[mode] = _local(file.fields.count(mode)) | own
-    for name, relation in indicators.items():
+    for i, (name, relation) in enumerate(indicators.items()):
         tables[name] = {
-            **_local(INDICATOR.format(relation.name)),
+            **_local(INDICATOR.format(i)),
             "unit": "1",
             **_dependencies(relation.distance, file),
             "description": "Distance from an event; 1 while it plays no role",
@@ -111,6 +112,8 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
         "symbol": c_model.SYMBOL,
         "event_indicators": [*indicators],
         "naming": "structured" if any(file.dimensions.values()) else "flat",
+        "flat": flat(file),
+        "modulated": modulated(file),
         "time_events": len(indicators) < len(relations) or bool(file.sampled),
     }
     includes = [TIME, *([EVENTS] if relations else [])]
@@ -127,6 +130,46 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
             if name in tables and (name, kind) in references
         },
     }
+
+
+def flat(file: ModelFile) -> list[str]:
+    """Return functions without slope of what moves or is set, with the variables that call them."""
+    called = [(v.name, v.expression) for v in file.of("states", "where", "outputs")]
+    called += [pair for change in file.changes for pair in change.given.items()]
+    found = {}
+    for name, expression in called:
+        known = set(FLAT.findall(expression.text))
+        known |= {
+            node.op for node in in_order([expression.tree]) if node.op == "floor" and not known
+        }
+        leaves = _reached(expression.value.leaves, file, ["discrete"]) if known else ()
+        if {op for op, _ in leaves} & {"state", "input", "discrete"}:
+            found |= {f"{function} in {name.partition('[')[0]}": None for function in sorted(known)}
+    return [*found]
+
+
+def modulated(file: ModelFile) -> list[str]:
+    """Return the relations that switch within a period at a time that inputs or states decide.
+
+    They compare with the time, with its part of a period, or with a state that samplers begin anew.
+    """
+    begun = {("state", name) for sampler in file.sampled for name in sampler.reinit}
+    saws = {
+        ("integer", name)
+        for name, segment in file.graph.segments.items()
+        if {op for op, _ in segment.argument.leaves} - {"parameter"} == {"time"}
+    }
+    found = []
+    relations = file.graph.relations.values()
+    for relation, text in zip(relations, file.relation_texts, strict=True):
+        leaves = relation.distance.leaves
+        carriers = leaves & (begun | saws)
+        others = {leaf for leaf in leaves - carriers if leaf[0] in ("input", "state", "discrete")}
+        is_timed = ("time", "") in leaves and not any(op == "state" for op, _ in others)
+        reached = {op for op, _ in _reached(others, file, ["discrete"])}
+        if (carriers or is_timed) and reached & {"input", "state"}:
+            found.append(text)
+    return found
 
 
 def page(file: ModelFile) -> str:

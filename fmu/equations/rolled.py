@@ -1,8 +1,8 @@
 """Statements that repeat with rising indexes as loops in C: compilers need more than linear time.
 
 Lines repeat if they are the same but for some numbers, which rise by the same steps from turn to
-turn: the number of a constant (n12), and the first one in a bracket. A constant that another turn
-reads is kept in an array.
+turn: the number of a constant (n12), the first one in a bracket, and that of a state. A constant
+that another turn reads is kept in an array.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ SHORTEST = 400  # lines of a function that gains by loops
 FEWEST_TURNS = 4
 MOST_TRIED = 40  # lengths of a turn
 STRING = r'"(?:\\.|[^"\\])*"'
-NUMBER = re.compile(rf"{STRING}|\b([nvzc])(\d+)\b|\[(\d+)")  # strings have none
+STATE = r"(?<=state_indicator\()"
+NUMBER = re.compile(rf"{STRING}|\b([nvzc])(\d+)\b|\[(\d+)|{STATE}(\d+)")  # strings have none
 LITERAL = re.compile(r"(?<![\w.])(?:\d+\.\d+(?:e[-+]?\d+)?|\d+e[-+]?\d+)(?![\w.])")
 RARE, FEWEST_LITERALS = 16, 20  # occurrences of a number, and such numbers, for a table of them
 TABLE = "numbers"
@@ -39,7 +40,7 @@ class Line:
             if not number.lastindex:
                 return number[0]
             numbers.append(int(number[number.lastindex]))
-            return f"{number[1] or '['}#"
+            return f"{number[1] or '[' * bool(number[3])}#"
 
         return cls(NUMBER.sub(hole, text), tuple(numbers))
 
@@ -51,11 +52,12 @@ class Line:
             if found[0].startswith('"'):
                 return found[0]
             value, term = next(given)
-            if found[0] == "[#":
-                return f"[{value}{term}" if value or not term else f"[{term.removeprefix(' + ')}"
+            if found[0] in ("[#", "#"):
+                shown = f"{value}{term}" if value or not term else term.removeprefix(" + ")
+                return found[0].replace("#", shown)
             return f"{found[0][:-1]}{value}"
 
-        yield re.sub(rf"{STRING}|(?:\b[nvzc]|\[)#", number, self.form)
+        yield re.sub(rf"{STRING}|(?:\b[nvzc]|\[|{STATE})#", number, self.form)
 
 
 @dataclass(frozen=True)

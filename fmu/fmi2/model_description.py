@@ -33,6 +33,7 @@ def model_description(
     add_types(root, variables, types)
     description_parts.add_log_categories(root, "fmi2")
     description_parts.add_experiment(root, declaration.experiment)
+    description_parts.add_annotation(root, ("VendorAnnotations", "Tool"), "name", model)
     scalars = ET.SubElement(root, "ModelVariables")
     for name, variable in variables.items():
         add_variable(scalars, name, variable, types.get(name), index, declaration.units)

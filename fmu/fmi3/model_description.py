@@ -37,6 +37,7 @@ def model_description(declaration: Declaration, provenance: Provenance) -> str:
     for name, variable in variables.items():
         add_variable(elements, name, variable, types.get(name), declaration)
     add_structure(root, declaration)
+    description_parts.add_annotation(root, ("Annotations", "Annotation"), "type", model)
     return description_parts.document(root)
 
 

@@ -238,6 +238,9 @@ class Function:
             for place, value in self.written.items()
             if not self.wanted.of or place[0] in self.wanted.of
         }
+        if not written:
+            reason = "writes no such argument: write what it returns to one, as in real *y"
+            raise refused(self.function.decl, f"{self.wanted.function} {reason}")
         for place, value in written.items():
             if not isinstance(value, Value):
                 name = shown(place, self.kinds[place[0]])

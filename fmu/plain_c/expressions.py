@@ -57,7 +57,7 @@ class Expressions(Memory):
         self.warn, self.doubles_move = warn, doubles_move
         self.operation = graph.value if is_exact else graph.simple
         self.still: dict[Value, bool] = {}
-        self.globals = Scope(None)
+        self.globals = Scope()
 
     def call(
         self, function: c_ast.FuncDef, arguments: list[Any], state: State, place: c_ast.Node
@@ -89,7 +89,7 @@ class Expressions(Memory):
         """Return the address of an assignable expression, or choices of addresses."""
         match node:
             case c_ast.ID():
-                found = scope.find(node.name) or self.constant(node)
+                found = scope.get(node.name) or self.constant(node)
                 return found[0]
             case c_ast.StructRef(type="."):
                 places = self.place(node.name, scope, state)
@@ -151,7 +151,7 @@ class Expressions(Memory):
                 return self.number(node)
             case c_ast.ID(name="true" | "false"):
                 return BOOL, int(node.name == "true")
-            case c_ast.ID() if node.name in self.program.enumerators and not scope.find(node.name):
+            case c_ast.ID() if node.name in self.program.enumerators and not scope.get(node.name):
                 return INT, self.enumerator(node.name)
             case c_ast.ID() | c_ast.StructRef() | c_ast.ArrayRef():
                 return self.load(self.place(node, scope, state), state, node)
@@ -169,8 +169,7 @@ class Expressions(Memory):
                 kind = self.declared_kind(node)
                 return kind, self.initialized(node.init, kind, scope, state)
             case c_ast.ExprList():
-                results = [self.value(item, scope, state) for item in node.exprs]
-                return results[-1]
+                raise refused(node, "the comma operator is not read: write two statements")
         raise refused(node, f"{type(node).__name__} is no part of the equations' C")
 
     def number(self, node: c_ast.Constant) -> tuple[Any, Any]:
@@ -302,17 +301,17 @@ class Expressions(Memory):
             return self.conditions.compare(op, a, b, state.known)
 
         def calculate(x: int, y: int) -> int:
-            if op in ("/", "%"):
+            if op == "/":
                 if y == 0:
                     raise refused(node, "division by 0")
                 quotient = abs(x) // abs(y) * (1 if (x < 0) == (y < 0) else -1)
-                if op == "/" and quotient * y != x:
+                if quotient * y != x:
                     place = f"{node.coord.file}:{node.coord.line}"
                     self.warn(
                         f"{place}: warning: {x} / {y} of whole numbers is {quotient}: "
                         f"write {x}.0 / {y}.0"
                     )
-                return quotient if op == "/" else x - quotient * y
+                return quotient
             if op not in ("+", "-", "*"):
                 raise refused(node, f"{op} is not read")
             return self.in_range({"+": x + y, "-": x - y, "*": x * y}[op], node)

@@ -107,7 +107,7 @@ class Interpreter(Expressions):
         parameters = self.parameters(function)
         if len(parameters) != len(arguments):
             raise refused(place, f"{name} has {len(parameters)} arguments, not {len(arguments)}")
-        scope = Scope(self.globals)
+        scope = self.globals.new_child()
         first = len(self.objects)
         for (parameter, kind), argument in zip(parameters, arguments, strict=True):
             kind = Pointer(kind.of) if isinstance(kind, Array) else kind
@@ -132,7 +132,7 @@ class Interpreter(Expressions):
             node, scope, after = todo.statement, todo.scope, todo.after
             match node:
                 case c_ast.Compound():
-                    inner = Scope(scope)
+                    inner = scope.new_child()
                     for item in (node.block_items or [])[::-1]:
                         after = Todo(item, inner, after)
                 case c_ast.DeclList():
@@ -173,7 +173,9 @@ class Interpreter(Expressions):
     ) -> Todo | None | tuple[State, Any]:
         """Return the statements after an if, or the end of the function."""
         condition = self.condition(node.cond, scope, state)
-        branches = [Todo(b, Scope(scope), None) if b else None for b in (node.iftrue, node.iffalse)]
+        branches = [
+            Todo(b, scope.new_child(), None) if b else None for b in (node.iftrue, node.iffalse)
+        ]
         if condition.op == "number":
             chosen = branches[0 if condition.number else 1]
             return after if chosen is None else replace(chosen, after=after)
@@ -230,7 +232,7 @@ class Interpreter(Expressions):
         """Return the statements after the head of a loop."""
         node, scope = todo.statement, todo.scope
         if not todo.is_round:
-            scope = Scope(scope)
+            scope = scope.new_child()
             if node.init is not None:
                 for item in getattr(node.init, "decls", [node.init]):
                     self.execute(Todo(item, scope, None), state)
@@ -245,7 +247,7 @@ class Interpreter(Expressions):
             )
         if not condition.number:
             return todo.after
-        return Todo(node.stmt, Scope(scope), replace(todo, scope=scope, is_round=True))
+        return Todo(node.stmt, scope.new_child(), replace(todo, scope=scope, is_round=True))
 
     def declaration(self, node: c_ast.Decl, scope: Scope, state: State) -> None:
         if node.name is None or isinstance(node.type, c_ast.FuncDecl):

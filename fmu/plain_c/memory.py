@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -125,20 +126,7 @@ class State:
     known: Known = field(default_factory=Known)
 
 
-@dataclass
-class Scope:
-    """Variables of a block by name."""
-
-    outer: Scope | None
-    own: dict[str, tuple[Address, Any]] = field(default_factory=dict)
-
-    def find(self, name: str) -> tuple[Address, Any] | None:
-        scope: Scope | None = self
-        while scope is not None:
-            if name in scope.own:
-                return scope.own[name]
-            scope = scope.outer
-        return None
+Scope = ChainMap[str, tuple[Address, Any]]  # variables of a block and those around it, by name
 
 
 class Memory:
@@ -177,7 +165,7 @@ class Memory:
         """Declare a new variable with a value, of its type."""
         address = self.new_object(kind)
         self.titles[address.object] = name
-        scope.own[name] = (address, kind)
+        scope[name] = (address, kind)
         if value is not UNSET:
             self.set_all(address, value, state)
 

@@ -269,5 +269,7 @@ def check_function(function: c_ast.FuncDef) -> None:
                 raise refused(node, f"{node.op} is not read")
             case c_ast.BinaryOp(op="&" | "|" | "^" | "<<" | ">>"):
                 raise refused(node, f"{node.op} is not read: use && || ! for conditions")
+            case c_ast.BinaryOp(op="%") | c_ast.Assignment(op="%="):
+                raise refused(node, "% is not read: write x - y * floor(x / y)")
             case _ if type(node) in INSTEAD:
                 raise refused(node, INSTEAD[type(node)])

@@ -223,6 +223,12 @@ class Fmu(AbstractContextManager["Fmu"]):
     def close(self) -> None:
         self._unpacked.close()
 
+    def notes(self, kind: str) -> list[str]:
+        """Return what an FMU of equations says for linear models: "flat" or "modulated"."""
+        tree = read_xml(self.folder / DESCRIPTION)
+        found = tree.xpath(f"/*/*/*[@name='rparm' or @type='rparm']/linearize/{kind}/@text")
+        return [str(text) for text in found]
+
     def instance(self, name: str, smooth_inputs: Sequence[str] = ()) -> Instance:
         """Return a new `Instance`, of the class for the FMU's kind and version."""
         return INSTANCES[self.model.fmi_version, self.kind](self, name, smooth_inputs)

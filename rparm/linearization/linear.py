@@ -50,6 +50,8 @@ class Linear:
         them. They are left out.
     left_out : tuple of str
         Discrete outputs: they have no derivatives.
+    flat : tuple of str
+        Functions without slope, with the variables that call them.
     intervals : dict of str to (float, float)
         Where dry friction lets what was trimmed lie anywhere in between.
     dropped : tuple of str
@@ -79,6 +81,7 @@ class Linear:
     at: Mapping[str, float] = field(default_factory=dict)
     held: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
+    flat: tuple[str, ...] = ()
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     dropped: tuple[str, ...] = ()
     hidden: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))
@@ -273,6 +276,9 @@ def linear_model(instance: Instance) -> Linear:
     Discrete variables that samplers set are states, too, which rest between ticks.
     """
     model = instance.fmu.model
+    if modulated := instance.fmu.notes("modulated"):
+        why = "when it switches depends on inputs or states, which no linear model shows"
+        raise UserError(f"{instance.name}: {modulated[0]}: {why}: give it the mean over a period")
     known, declared = model.variables, samplers(model)
     inputs = [n for n, v in known.items() if v.causality == "input" and v.type == "Real"]
     kept = held_numbers(model, declared)
@@ -302,7 +308,11 @@ def linear_model(instance: Instance) -> Linear:
         rates=np.append(rates, resting[:, :1]),
         at=dict(zip(knowns, [*x.tolist(), *u.tolist()], strict=True)),
         ticks=ticks(instance, declared, states, inputs),
-        left_out=tuple(name for name in model.real_outputs if name not in outputs),
+        flat=tuple(instance.fmu.notes("flat")),
+        left_out=(
+            *(name for name in model.real_outputs if name not in outputs),
+            *dict.fromkeys(name for sampler in declared for name in sampler.counts),
+        ),
     )
 
 

@@ -153,6 +153,11 @@ def notes(found: Study) -> list[str]:
         )
     if linear.left_out:
         texts.append(f"Left out, as they are discrete: {_names(linear.left_out)}.")
+    if linear.flat:
+        texts.append(
+            f"Without slope: {_names(linear.flat)}. These functions stay as they are at the point: "
+            "a loop through them looks open."
+        )
     if found.loop is not None and found.loop.dropped:
         texts.append(
             f"Not in the loop: {_names(found.loop.dropped)}. The break does not move them, or they "

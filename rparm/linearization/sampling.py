@@ -22,7 +22,7 @@ TERMS = 13  # of Taylor's series of an exponential
 SAME = 1e-12  # relative, of times that differ by rounding only
 UNDEFINED = sys.float_info.max  # in place of a new value that is not finite
 # description of a local variable, as fmu/equations writes it
-ABOUT = re.compile(r"Sampler (\d+), ([^:]+): (?:(period|offset)|(?:new value|change) of (.+))")
+ABOUT = re.compile(r"Sampler (\d+), ([^:]+): (?:(period|offset)|(new value|change|count) of (.+))")
 
 MOVED = 2.0**-12  # of a number, or of 1 if it is smaller: to differentiate by
 # ratios of differences over twice and once as much: 1 at a jump and 2 beside it; of second ones 2
@@ -38,6 +38,7 @@ class Sampler:
     times: dict[str, str] = field(default_factory=dict)  # period and offset
     # new value of each variable that it sets; of modes and others that are no reals, the change
     new: dict[str, str] = field(default_factory=dict)
+    counts: list[str] = field(default_factory=list)  # that it sets and nothing else follows from
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +60,12 @@ def samplers(model: Model) -> list[Sampler]:
     found: dict[int, Sampler] = {}
     for variable in model.variables.values():
         if variable.causality == "local" and (about := ABOUT.fullmatch(variable.description)):
-            number, name, time, target = about.groups()
+            number, name, time, meaning, target = about.groups()
             sampler = found.setdefault(int(number), Sampler(name))
-            (sampler.times if time else sampler.new)[time or target] = variable.name
+            if meaning == "count":
+                sampler.counts.append(target)
+            else:
+                (sampler.times if time else sampler.new)[time or target] = variable.name
     return [found[number] for number in sorted(found)]
 
 

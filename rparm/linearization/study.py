@@ -173,6 +173,7 @@ def document(found: Study, step: float | None) -> Document:
         "held": list(linear.held),
         "poles": pairs(linear.poles),
         "left_out": list(linear.left_out),
+        "without_slope": list(linear.flat),
         "intervals": {name: list(map(finite, ends)) for name, ends in linear.intervals.items()},
     }
     if linear.dt:

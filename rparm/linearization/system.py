@@ -222,6 +222,11 @@ def connected(
         },
         at={f"{name}.{v}": value for name, part in parts.items() for v, value in part.at.items()},
         held=tuple(f"{name}.{x}" for name, part in parts.items() for x in part.held),
+        flat=tuple(
+            text.replace(" in ", f" in {name}.")
+            for name, part in parts.items()
+            for text in part.flat
+        ),
         left_out=tuple(f"{name}.{y}" for name, part in parts.items() for y in part.left_out),
     )
 

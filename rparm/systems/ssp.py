@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from copy import deepcopy
 from functools import cache
 from pathlib import Path, PurePosixPath
 from typing import NoReturn
@@ -87,7 +88,8 @@ class SspReader:
         self.path = path
         self.folder = folder
         self.descriptions: dict[str, str] = {}  # of parameter sets, by name
-        self.is_plain = True  # Ecos knows one prefix, and no connections to the system's own
+        # Ecos reads one prefix, no sets in the structure, no connections to the system's own
+        self.is_plain = True
         self.own: dict[str, str] = {}  # kinds of the system's own connectors, by name
         self.models: dict[str, Model] = {}  # of the components
 
@@ -105,6 +107,9 @@ class SspReader:
         version = tree.getroot().get("version", VERSION)
         if not re.match(VERSION_1, version):
             self.fail(file, f"is of SSP {version}, expected {VERSION}", tree.getroot())
+        return self.validated(file, tree, schema)
+
+    def validated(self, file: str, tree: etree._ElementTree, schema: str) -> etree._Element:
         validator = _schema(schema)
         if not validator.validate(tree):
             first = validator.error_log[0]
@@ -227,17 +232,22 @@ class SspReader:
         for binding in node.iterfind("ssd:ParameterBindings/ssd:ParameterBinding", NAMESPACES):
             source = binding.get("source")
             plain = binding.get("prefix", "") == "" and binding.get("sourceBase", "SSD") == "SSD"
+            inside = binding.find("ssd:ParameterValues/ssv:ParameterSet", NAMESPACES)
             if (
-                not (source and plain)
+                not (plain and (source or inside is not None))
                 or binding.find("ssd:ParameterMapping", NAMESPACES) is not None
             ):
-                message = f"component {component!r}: bind parameters only by the path of an .ssv"
+                message = f"component {component!r}: bind only parameter sets, by path or within"
                 self.fail(STRUCTURE, message, binding)
             if source in sources:  # bound first and last: importers take one or the other
                 continue
-            sources.add(source)
-            self.check_source(source, component, binding)
-            root = self.parse(source, VALUES_SCHEMA)
+            if source:
+                sources.add(source)
+                self.check_source(source, component, binding)
+                root = self.parse(source, VALUES_SCHEMA)
+            else:
+                source, self.is_plain = STRUCTURE, False
+                root = self.validated(STRUCTURE, etree.ElementTree(deepcopy(inside)), VALUES_SCHEMA)
             name = root.get("name")
             if not PLAIN_NAME.fullmatch(name):
                 self.fail(source, f"name {name!r} of the set is no plain name, as of a file", root)

@@ -63,13 +63,12 @@ enum status instance_indicators(double t, const double x[], double z[], void *in
         instance->memory.restart_values, instance->state.restart_time.s + t, x, instance->u, z);
 }
 
-void instance_rounding(double rounding[], void *instance_pointer) {
+void instance_rounding(const double sizes[], double rounding[], void *instance_pointer) {
     const struct instance *instance = instance_pointer;
     const struct range states = instance->model->states;
-    const double *x = doubles_of(instance->memory.restart_values, states);
     double *errors = doubles_of(instance->second_derivatives, states);
     for (size_t i = 0; i < count_of(states); i++) {
-        errors[i] = 2.0 * DBL_EPSILON * fabs(x[i]);
+        errors[i] = 2.0 * DBL_EPSILON * sizes[i];
     }
     instance->model->events->errors(instance->memory.restart_values, instance->state.restart_time.s,
                                     errors, 2.0 * DBL_EPSILON, rounding);
@@ -104,6 +103,7 @@ enum status instance_series(double t, double time_scale, int first, int last,
         .t = instance->state.restart_time.s + t,
         .time_scale = time_scale,
         .inputs = (const double(*)[SERIES_INPUT_LENGTH])instance->input_series,
+        .has_avx2 = instance->has_avx2,
     };
     return instance->model->series->extend(&origin, first, last, rows);
 }

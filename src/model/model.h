@@ -132,6 +132,7 @@ struct series_origin {
     double t;                                    /* s */
     double time_scale;                           /* time scale of the coefficients, > 0, s */
     const double (*inputs)[SERIES_INPUT_LENGTH]; /* coefficients of each input */
+    bool has_avx2;                               /* the processor has it: the same bits, faster */
 };
 
 /* The Taylor series of a solution, which a model may offer beside its right-hand side. */

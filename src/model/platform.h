@@ -32,6 +32,28 @@
 #define INDEPENDENT_ITERATIONS _Pragma("GCC ivdep")
 #endif
 
+/* Compiles a function for AVX2, vectors of four doubles, without operations that fuse: the same
+ * bits in less time. To be called only where processor_has_avx2 is true. */
+#if defined(__x86_64__)
+#include <cpuid.h>
+#define BY_AVX2 __attribute__((target("avx2")))
+
+/* True if processor and operating system have AVX2. (gcc and clang would ask their own libraries,
+ * which zig leaves out.) */
+static inline _Bool processor_has_avx2(void) {
+    enum { XMM_AND_YMM = 6 };
+    unsigned a, b, c, d, saved;
+    if (!__get_cpuid(1, &a, &b, &c, &d) || (c & bit_OSXSAVE) == 0) {
+        return 0;
+    }
+    __asm__("xgetbv" : "=a"(saved), "=d"(d) : "c"(0));
+    return (saved & XMM_AND_YMM) == XMM_AND_YMM && __get_cpuid_count(7, 0, &a, &b, &c, &d) &&
+           (b & bit_AVX2) != 0;
+}
+#else
+#define NO_AVX2
+#endif
+
 /* Hides all symbols below from the shared object's users, unless one says so itself. */
 #define HIDE_SYMBOLS _Pragma("GCC visibility push(hidden)")
 
@@ -57,7 +79,13 @@
 #else
 #define NO_FUSED_OPERATIONS _Pragma("STDC FP_CONTRACT OFF")
 #endif
+#define NO_AVX2
 
+#endif
+
+#if defined(NO_AVX2)
+#define BY_AVX2
+#define processor_has_avx2() 0
 #endif
 
 /* Lets another thread run. */

@@ -10,6 +10,7 @@ import shlex
 import subprocess
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 Graph = dict[str, dict[str, set[str]]]
@@ -27,32 +28,18 @@ def add(graph: Graph, node: str, needed: str, reason: str) -> None:
 # ---- Circles -------------------------------------------------------------------------------------
 
 
-def reached_from(graph: Graph, start: str) -> set[str]:
-    found: set[str] = set()
-    waiting = [start]
-    while waiting:
-        new = graph.get(waiting.pop(), {}).keys() - found
-        found |= new
-        waiting += new
-    return found
-
-
 def circles(graph: Graph) -> list[str]:
-    """Strongly connected nodes, a text for each group of them: who needs whom, and why."""
-    reached = {node: reached_from(graph, node) for node in graph}
-    groups = {
-        frozenset(other for other in reached[node] if node in reached.get(other, ()))
-        for node in graph
-    }
-    return sorted(
-        "; ".join(
-            f"{node} -> {needed} ({', '.join(sorted(graph[node][needed]))})"
-            for node in sorted(group)
-            for needed in sorted(group & graph[node].keys())
-        )
-        for group in groups
-        if group
-    )
+    """A circle of nodes that need each other, if there is one: who needs whom, and why."""
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        nodes = error.args[1][:0:-1]  # each needs the next one
+        first = nodes.index(min(nodes))
+        nodes = nodes[first:] + nodes[:first]
+        pairs = zip(nodes, nodes[1:] + nodes[:1], strict=True)
+        texts = (f"{x} -> {y} ({', '.join(sorted(graph[x][y]))})" for x, y in pairs)
+        return ["; ".join(texts)]
+    return []
 
 
 # ---- C -------------------------------------------------------------------------------------------

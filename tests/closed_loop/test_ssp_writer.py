@@ -155,13 +155,22 @@ def test_what_moves_is_an_input_of_the_system(folder: Path, console: Console) ->
     assert inputs == ["class.reference"]
 
 
-def test_a_stranger_may_name_its_namespace_otherwise(slide: Path, tmp_path: Path) -> None:
-    """Ecos looks for the prefix ssd, and so gets a copy."""
+def test_strangers_write_what_ecos_does_not_read(slide: Path, tmp_path: Path) -> None:
+    """No prefix, and parameter sets within the structure; Ecos gets a copy of its kind."""
+    with zipfile.ZipFile(slide) as archive:
+        sets = {name: archive.read(name) for name in archive.namelist() if name.endswith(".ssv")}
 
-    def plain(content: bytes) -> bytes:
+    def other(content: bytes) -> bytes:
+        for name, text in sets.items():
+            old = f'<ssd:ParameterBinding source="{name}"/>'.encode()
+            assert old in content
+            inside = text[text.index(b"<ssv:") :]
+            new = b"<ssd:ParameterBinding><ssd:ParameterValues>" + inside
+            new += b"</ssd:ParameterValues></ssd:ParameterBinding>"
+            content = content.replace(old, new, 1).replace(old, b"")
         return content.replace(b"xmlns:ssd=", b"xmlns=").replace(b"ssd:", b"")
 
-    with ssp.unpacked(edited(slide, tmp_path / "x.ssp", {ssp.STRUCTURE: plain})) as found:
+    with ssp.unpacked(edited(slide, tmp_path / "x.ssp", {ssp.STRUCTURE: other})) as found:
         values = ecos.run(found, "light", ["arm.q2"]).values[:, 0]
     assert np.abs(values - exact(1.0)).max() < 1e-8
 

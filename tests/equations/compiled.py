@@ -47,6 +47,7 @@ class Origin(ctypes.Structure):
         ("t", ctypes.c_double),
         ("time_scale", ctypes.c_double),
         ("inputs", ctypes.c_void_p),
+        ("has_avx2", ctypes.c_bool),
     ]
 
 
@@ -60,13 +61,13 @@ def read_text(folder: Path, text: str) -> ModelFile:
 class Model:
     """The compiled model of a text; fields by name, `d_` in front of a state: its derivative."""
 
-    def __init__(self, folder: Path, text: str) -> None:
+    def __init__(self, folder: Path, text: str, level: str = "-O1") -> None:
         self.file = read_text(folder, text)
         (folder / "equations.h").write_text(c_model.header(self.file))
         (folder / "equations.c").write_text(c_model.source(self.file))
         library = folder / "model.so"
         warnings = ["-Wall", "-Wextra", "-Wconversion", "-Werror", "-Wno-unused-parameter"]
-        command = ["cc", "-std=c17", "-O1", "-ffp-contract=off", "-shared", "-fPIC", *warnings]
+        command = ["cc", "-std=c17", level, "-ffp-contract=off", "-shared", "-fPIC", *warnings]
         shared = ROOT / "src" / "model"
         sources = [folder / "equations.c", shared / "relations.c", shared / "domains.c"]
         subprocess.run([*command, f"-I{shared}", *sources, "-o", library, "-lm"], check=True)
@@ -117,7 +118,13 @@ class Model:
         return J
 
     def series(
-        self, values: np.ndarray, t: float, scale: float, inputs: np.ndarray, last: int
+        self,
+        values: np.ndarray,
+        t: float,
+        scale: float,
+        inputs: np.ndarray,
+        last: int,
+        has_avx2: bool = False,
     ) -> np.ndarray:
         """Coefficients of the states (states, last + 1)."""
         count, extend = ctypes.c_size_t * 3, self.words.series
@@ -125,7 +132,7 @@ class Model:
         states = [v.name for v in self.file.of("states")]
         rows = np.full((row_count, LENGTH), np.nan)
         rows[: len(states), 0] = [values[self.names.index(name)] for name in states]
-        origin = Origin(values.ctypes.data, t, scale, inputs.ctypes.data)
+        origin = Origin(values.ctypes.data, t, scale, inputs.ctypes.data, has_avx2)
         call = ctypes.CFUNCTYPE(
             ctypes.c_int, ctypes.c_void_p, ctypes.c_int, ctypes.c_int, ctypes.c_void_p
         )(function)

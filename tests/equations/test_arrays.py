@@ -75,6 +75,18 @@ def test_the_text_of_a_model_does_not_grow_with_its_arrays(tmp_path: Path) -> No
     assert lines[0] == lines[1] < 1500
 
 
+def test_indicators_of_arrays_are_loops(tmp_path: Path) -> None:
+    """Written out, 900 of them took 110 s to compile."""
+    lines = []
+    for n in (150, 300):
+        source = c_model.source(
+            read_text(tmp_path, MODELS["arrays"]["CELLS"].replace("300", f"{n}"))
+        )
+        parts = [source.split(f" {name}(")[-1] for name in ("describe", "propagate", "indicators")]
+        lines.append([part.split("\n}\n")[0].count("\n") for part in parts])
+    assert lines[0] == lines[1]
+
+
 def test_a_check_holds_for_each_element(folder: Path) -> None:
     instance = initializing(made(folder, chain(COUNT)))
     (m,) = (v for v in instance.loaded.description.modelVariables if v.name == "m[17]")

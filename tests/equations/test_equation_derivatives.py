@@ -203,6 +203,27 @@ def test_a_series_with_values_side_by_side_is_the_same(
     np.testing.assert_allclose(wide.series(*given), model.series(*given), rtol=1e-12, atol=1e-14)
 
 
+def test_avx2_gives_the_bits_of_sse2(tmp_path: Path) -> None:
+    """Of seven stars in a plane, the Pleiades problem."""
+    text, start = 'name = "Stars"\n[states]\n', {}
+    for i, (x, y) in enumerate(zip((3, 3, -1, -3, 2, -2, 2), (3, -3, 2, 0, 0, -4, 4), strict=True)):
+        start |= {f"x{i}": x, f"y{i}": y, f"u{i}": 0.3 * y, f"v{i}": -0.2 * x}
+        for place, velocity in ("xu", "yv"):
+            pulls = (
+                f"{j + 1} * ({place}{j} - {place}{i}) / ((x{j} - x{i})**2 + (y{j} - y{i})**2)**1.5"
+                for j in range(7)
+                if j != i
+            )
+            text += f'{place}{i} = {{ derivative = "{velocity}{i}" }}\n'
+            text += f'{velocity}{i} = {{ derivative = "{" + ".join(pulls)}" }}\n'
+    model = Model(tmp_path, text, "-O3")
+    given = model.values(**start), 0.0, 0.1, np.zeros((1, 4)), 20
+    found = model.series(*given)
+    assert np.abs(found[:, 20]).min() > 0.0
+    has_avx2 = " avx2 " in Path("/proc/cpuinfo").read_text()
+    np.testing.assert_array_equal(model.series(*given, has_avx2), found)
+
+
 @pytest.mark.parametrize(("rate", "point", "expected"), ENDS, ids=[text for text, *_ in ENDS])
 def test_derivatives_where_plain_rules_give_none(
     tmp_path: Path, rate: str, point: dict[str, float], expected: list[float]

@@ -72,12 +72,6 @@ def unit(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Unit]:
     return find
 
 
-IMPACTS = pytest.mark.parametrize(
-    ("when", "reinit"),
-    [(when, reinit + 'v = "-v"') for when in ("h < 0", "0 >= h") for reinit in ('h = "0", ', "")],
-)
-
-
 def ball(size: float = 1.0, when: str = "h < 0", reinit: str = 'h = "0", v = "-v"') -> str:
     """The file of a ball that falls from this height."""
     return TEXTS["BOUNCING"].format(unit=size, g=-G * size, when=when, reinit=reinit)
@@ -94,29 +88,18 @@ def bounces(run: Run, size: float = 1.0) -> None:
     assert np.max(np.abs(np.array(run.x)[:, 0] / size - expected)) < 1e-6
 
 
-@IMPACTS
-@EACH_METHOD
-def test_nine_impacts_are_nine_events(unit: Callable, method: str, when: str, reinit: str) -> None:
-    bouncing = unit(ball(1.0, when, reinit))
-    run = co_simulation(bouncing, method, 1e-8, 0.01, 800, {})
-    bounces(run)
-    assert run.counts[-1] == 9
-    run = early_return(bouncing, method, 1e-8, 0.01, 800)
-    bounces(run)
-    assert len(run.events) == 9
-
-
-@IMPACTS
-@pytest.mark.parametrize("size", [1.0, 1e-12])
-def test_impacts_are_events_in_model_exchange(
-    unit: Callable, size: float, when: str, reinit: str
-) -> None:
-    bounces(model_exchange(unit(ball(size, when, reinit)), 1e-8, 0.01, 250, {}), size)
-
-
-@EACH_METHOD
-def test_a_ball_as_small_as_its_nominal(unit: Callable, method: str) -> None:
-    bounces(co_simulation(unit(ball(1e-12)), method, 1e-8, 0.01, 800, {}), 1e-12)
+@pytest.mark.parametrize("size", [1.0, 1e-12])  # as small as its nominal
+@EACH_KIND
+def test_nine_impacts_are_nine_events(unit: Callable, kind: str, size: float) -> None:
+    bouncing = unit(ball(size))
+    count = 250 if kind == "model_exchange" else 800
+    run = run_of(bouncing, kind, 0.01, count)
+    bounces(run, size)
+    assert run.counts[-1] == (9 if count == 800 else 3)
+    if count == 800 and size == 1.0:
+        run = early_return(bouncing, kind, 1e-8, 0.01, count)
+        bounces(run)
+        assert len(run.events) == 9
 
 
 @pytest.mark.parametrize("reinit", ['h = "0", v = "-0.5 * v"', 'v = "-0.5 * v"'])

@@ -21,7 +21,7 @@ from tests.closed_loop.test_loop_file import TABLES as OF_LOOPS
 from tests.equations.compiled import ModelFileError, read_text, value_of_toml
 from tests.equations.examples import MODELS
 from tests.equations.test_model_file import EXAMPLES, MISTAKES
-from tests.rparm.test_scenario_mistakes import WRONG as OF_SCENARIOS
+from tests.rparm.test_scenario import WRONG as OF_SCENARIOS
 from tests.support.paths import ROOT
 from tests.support.rparm_project import Console
 

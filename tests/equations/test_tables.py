@@ -152,6 +152,7 @@ def test_a_hundred_thousand_rows_of_a_file(tmp_path: Path) -> None:
 def test_a_mistake_in_a_table_is_one_line(name: str, tmp_path: Path) -> None:
     (tmp_path / "f.csv").write_text("a,b,b\n1,2,3\n")
     (tmp_path / "g.csv").write_text("a,d\n1,2\n2,inf\n")
+    (tmp_path / "i.csv").write_text("a,d\n1,2,\n2,3,5\n")
     (tmp_path / "h.csv").write_bytes(b"a,d\n\xff\xfe\n")
     mistake = MISTAKES["tables"][name]
     with pytest.raises(ModelFileError) as refused:

@@ -77,22 +77,6 @@ static void test_inputs_are_those_of_the_time(void) {
     }
 }
 
-/* Strokes on the grid of the communication points, which the importer adds up with rounding errors:
- * each belongs to the step that it ends. */
-static void test_a_stroke_at_the_end_of_a_step(void) {
-    static const double steps[] = {0.1, 1e-3, 1.0 / 3.0};
-    for (int i = 0; i < 3; i++) {
-        const double h = steps[i];
-        double t = 10.0;
-        start_hammer(1, t, h, h);
-        for (int n = 1; n <= 1000; n++) {
-            ASSERT_OK(instance_do_step(instance, t, h));
-            t += h;
-            TEST_ASSERT_EQUAL_INT(n, hammer()->strokes);
-        }
-    }
-}
-
 /* A stroke behind a communication point belongs to the next step, however late it is: here by a
  * thousandth of a step at 1e5 s, in steps of two lengths. */
 static void test_a_stroke_behind_a_point_waits_for_the_next_step(void) {
@@ -117,26 +101,6 @@ static void test_strokes_close_to_each_other(void) {
     ASSERT_OK(instance_do_step(instance, 1.25, 0x1p-22));
     TEST_ASSERT_EQUAL_INT(1 + (1 << 16), hammer()->strokes);
     TEST_ASSERT_TRUE(get(TOY_LAST_EVENT) == 1.25 + 0x1p-22);
-}
-
-/* With the force held, the bits do not depend on the communication points. */
-static void test_later_points_do_not_change_the_motion(void) {
-    static const double steps[] = {0x1p-9, 0x1p-7, 0x1p-1};
-    for (int other = 1; other <= 4; other += other == 2 ? 2 : 1) {
-        double x[2];
-        for (int i = 0; i < 3; i++) {
-            start_hammer(other, 0.0, period, first);
-            run(0.0, 0x1p-10, 1); // the first point is the same
-            ASSERT_OK(instance_do_step(instance, 0x1p-10, steps[i] - 0x1p-10));
-            run(steps[i], steps[i], (int)(5.0 / steps[i]) - 1);
-            if (i == 0) {
-                x[0] = get(TOY_POSITION);
-                x[1] = get(TOY_SPEED);
-            }
-            TEST_ASSERT_EQUAL_MEMORY(&x[0], &(double){get(TOY_POSITION)}, sizeof(double));
-            TEST_ASSERT_EQUAL_MEMORY(&x[1], &(double){get(TOY_SPEED)}, sizeof(double));
-        }
-    }
 }
 
 /* v = -1 m/s from x = 1 m: the wall is hit after the stroke or before it. */
@@ -206,43 +170,6 @@ static void test_time_events_without_progress_are_refused(void) {
     last_text[0] = '\0';
     TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, instance_do_step(instance, 0.0, 1.0));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_text, "at t = 0.1 is followed by one"), last_text);
-}
-
-static void go_on(double t, double x[2]) {
-    run(t, 0.05, 3);
-    run(t + 0.15, 0.8, 1);
-    x[0] = get(TOY_POSITION);
-    x[1] = get(TOY_SPEED);
-}
-
-/* Back to before a stroke, between two strokes, and by bytes in another instance. */
-EACH_METHOD static void test_rollback_across_strokes(void) {
-    double straight[2];
-    double again[2];
-    for (int k = 0; k < 8; k++) {
-        struct instance_snapshot *snapshot = NULL;
-        struct instance_snapshot *read = NULL;
-        start_hammer(method, 0.0, period, first);
-        run(0.0, 0.05, k);
-        const double t = k * 0.05;
-        ASSERT_OK(instance_save(instance, 0, &snapshot));
-        go_on(t, straight);
-        const int strokes = hammer()->strokes;
-        ASSERT_OK(instance_restore(instance, snapshot));
-        go_on(t, again);
-        TEST_ASSERT_EQUAL_MEMORY(straight, again, sizeof straight);
-        TEST_ASSERT_EQUAL_INT(strokes, hammer()->strokes);
-
-        const size_t size = instance_serialized_size(instance);
-        unsigned char *bytes = malloc(size);
-        ASSERT_OK(instance_serialize(instance, snapshot, bytes, size));
-        create(&hammer_description);
-        ASSERT_OK(instance_deserialize(instance, bytes, size, &read));
-        ASSERT_OK(instance_restore(instance, read));
-        free(bytes);
-        go_on(t, again);
-        TEST_ASSERT_EQUAL_MEMORY(straight, again, sizeof straight);
-    }
 }
 
 /* A step that ends at the stroke, with the stroke still due. */

@@ -16,7 +16,7 @@ import sympy as sp
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 
 from tests.support.instances import INPUTS, STATES, Instance, LoadedFmu
-from tests.support.symbolic import KNOWNS, Exact, Model, Values, random_arm
+from tests.support.symbolic import KNOWNS, Model, Values, random_arm
 
 
 @pytest.fixture(scope="module")
@@ -166,23 +166,6 @@ def test_parameters_are_knowns_of_the_initialization(
         for known in KNOWNS:
             for unknown, value in directional(instance, unknowns, {known: 1.0}).items():
                 exact[unknown, known].assert_is(value, (unknown, known))
-
-
-@each_mode
-def test_a_call_with_many_knowns_gives_the_sums(
-    loaded: LoadedFmu, model: Model, enter: Callable
-) -> None:
-    source = random.Random(5)
-    for seed, count in itertools.product(SEEDS, (2, 3, 6)):
-        with enter(loaded, seed) as instance:
-            exact = model.jacobian(point_of(instance), (*INPUTS, *STATES))
-            knowns = source.sample((*INPUTS, *STATES), count)
-            unknowns = tuple(source.sample(tuple(model.expressions), 9))
-            direction = {known: source.uniform(-2.0, 2.0) for known in knowns}
-            for unknown, value in directional(instance, unknowns, direction).items():
-                terms = [exact[unknown, known].value * v for known, v in direction.items()]
-                row = exact[unknown, knowns[0]].scale
-                Exact(mpmath.fsum(terms), row).assert_is(value, (unknown, direction))
 
 
 def test_asking_changes_nothing(loaded: LoadedFmu, model: Model) -> None:

@@ -158,27 +158,6 @@ EACH_METHOD static void test_get_into_a_handle_reuses_it(void) {
     TEST_ASSERT_TRUE(q1 == fmu_get(c, RP_MANIPULATOR_q1));
 }
 
-EACH_METHOD static void test_a_restored_copy_stays_valid(void) {
-    const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
-    struct fmu_values expected;
-    struct fmu_values values;
-    fmi2FMUstate saved = fmu_save(c);
-    struct fmu_bytes before = fmu_serialize(c, saved);
-    step(c, 0.0);
-    ASSERT_OK(fmu_get_all(c, &expected));
-    for (int i = 0; i < 3; i++) {
-        fmu_restore(c, saved);
-        step(c, 0.0);
-        ASSERT_OK(fmu_get_all(c, &values));
-        fmu_assert_same_values(&expected, &values, "restored again");
-    }
-    struct fmu_bytes after = fmu_serialize(c, saved);
-    TEST_ASSERT_EQUAL_UINT(before.size, after.size);
-    TEST_ASSERT_EQUAL_MEMORY(before.data, after.data, before.size);
-    fmu_bytes_free(&before);
-    fmu_bytes_free(&after);
-}
-
 EACH_METHOD static void test_handles_survive_a_reset_and_an_error(void) {
     const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
     step(c, 0.0);

@@ -56,92 +56,6 @@ static void set_smooth_inputs(struct fmu3_importer *of, const struct fmu3_update
     }
 }
 
-/* x' of the arm at time t, with the inputs as functions of time: an instance for Model Exchange. */
-static void slope(fmi3Instance instance, double t, const double x[FMU3_STATES],
-                  double dx[FMU3_STATES]) {
-    double u[2];
-    smooth_inputs(t, u);
-    ASSERT_OK(fmu3.SetTime(instance, t));
-    ASSERT_OK(fmu3.SetContinuousStates(instance, x, FMU3_STATES));
-    ASSERT_OK(fmu3.SetFloat64(instance, inputs, 2, u, 2));
-    ASSERT_OK(fmu3.GetContinuousStateDerivatives(instance, dx, FMU3_STATES));
-}
-
-/* The reference: the classical Runge-Kutta method from 0 to end, at steps that leave 1e-13. */
-static void integrate_reference(double end, double x[FMU3_STATES]) {
-    enum { STEPS = 8192 };
-    const fmi3Instance instance = fmu3_model_exchange(&importer);
-    fmu3_initialize(instance, 0.0);
-    ASSERT_OK(fmu3.EnterContinuousTimeMode(instance));
-    const double h = end / STEPS;
-    for (int i = 0; i < STEPS; i++) {
-        static const double weights[] = {1.0, 2.0, 2.0, 1.0};
-        static const double nodes[] = {0.0, 0.5, 0.5, 1.0};
-        double sum[FMU3_STATES] = {0};
-        double k[FMU3_STATES] = {0};
-        for (int stage = 0; stage < 4; stage++) {
-            double at[FMU3_STATES];
-            for (int j = 0; j < FMU3_STATES; j++) {
-                at[j] = x[j] + h * nodes[stage] * k[j];
-            }
-            slope(instance, (i + nodes[stage]) * h, at, k);
-            for (int j = 0; j < FMU3_STATES; j++) {
-                sum[j] += weights[stage] * k[j];
-            }
-        }
-        for (int j = 0; j < FMU3_STATES; j++) {
-            x[j] += h / 6.0 * sum[j];
-        }
-    }
-    fmu3_free(instance);
-}
-
-static double error_of(const double reference[FMU3_STATES], int with_method, double end, int steps,
-                       bool held) {
-    struct asked asked = {.status = fmi3OK};
-    const double h = end / steps;
-    importer.update = set_smooth_inputs;
-    importer.data = &asked;
-    const fmi3Instance instance = swinging(held ? NULL : &with_inputs, with_method, 0.0);
-    for (int i = 0; i < steps; i++) {
-        if (held) {
-            double u[2];
-            smooth_inputs(i * h, u);
-            ASSERT_OK(fmu3.SetFloat64(instance, inputs, 2, u, 2));
-        }
-        fmu3_step(instance, i * h, h);
-    }
-    double x[FMU3_STATES];
-    double error = 0.0;
-    fmu3_get_states(instance, x);
-    for (int j = 0; j < FMU3_STATES; j++) {
-        error = fmax(error, fabs(x[j] - reference[j]));
-    }
-    ASSERT_OK(asked.status);
-    fmu3_free(instance);
-    return error;
-}
-
-/* Over three halvings of the step, down to 100 times the error of the integration. */
-EACH_METHOD static void test_the_order_is_four(void) {
-    const double end = 1.6;
-    double reference[FMU3_STATES] = {0.3, 0.0, 1.0, 0.0};
-    integrate_reference(end, reference);
-    const double coarse = error_of(reference, method, end, 16, false);
-    const double fine = error_of(reference, method, end, 128, false);
-    const double order = log2(coarse / fine) / 3.0;
-    char text[128];
-    snprintf(text, sizeof text, "errors %.2e and %.2e, order %.2f", coarse, fine, order);
-    TEST_ASSERT_TRUE_MESSAGE(fine > 100.0 * 1e-12, text);
-    TEST_ASSERT_TRUE_MESSAGE(fabs(order - 4.0) <= 0.2, text);
-
-    // held inputs are of order 1
-    const double held_order = log2(error_of(reference, method, end, 16, true) /
-                                   error_of(reference, method, end, 128, true)) /
-                              3.0;
-    TEST_ASSERT_TRUE(fabs(held_order - 1.0) <= 0.2);
-}
-
 static void test_inputs_are_asked_for_at_four_times(void) {
     struct asked asked = {.status = fmi3OK};
     importer.update = set_smooth_inputs;
@@ -344,37 +258,6 @@ EACH_METHOD static void test_an_early_return_is_obeyed(void) {
                                   fmu3_get(instance, RP_MANIPULATOR_q1));
         fmu3_free(instance);
     }
-}
-
-/* A state that was saved after an early return is complete. */
-EACH_METHOD static void test_an_early_return_can_be_gone_back_to(void) {
-    static fmi3Byte bytes[16384];
-    double x[3][FMU3_STATES];
-    struct request request = {.at_update = 8};
-    importer.update = ask_for_return;
-    importer.data = &request;
-    fmi3FMUState state = NULL;
-    size_t size = 0;
-    const fmi3Instance instance = swinging(&with_outputs, method, 0.0);
-    const struct fmu3_step early = fmu3_try_step(instance, 0.0, 0.6);
-    TEST_ASSERT_TRUE(early.early);
-    ASSERT_OK(fmu3.GetFMUState(instance, &state));
-    ASSERT_OK(fmu3.SerializedFMUStateSize(instance, state, &size));
-    TEST_ASSERT_TRUE(size <= sizeof bytes);
-    ASSERT_OK(fmu3.SerializeFMUState(instance, state, bytes, size));
-    for (int i = 0; i < 2; i++) {
-        fmu3_step(instance, early.reached, 0.2);
-        fmu3_get_states(instance, x[i]);
-        ASSERT_OK(fmu3.SetFMUState(instance, state));
-    }
-    TEST_ASSERT_EQUAL_MEMORY(x[0], x[1], sizeof x[0]);
-
-    const fmi3Instance other = swinging(NULL, method, 0.0);
-    ASSERT_OK(fmu3.DeserializeFMUState(other, bytes, size, &state));
-    ASSERT_OK(fmu3.SetFMUState(other, state));
-    fmu3_step(other, early.reached, 0.2);
-    fmu3_get_states(other, x[2]);
-    TEST_ASSERT_EQUAL_MEMORY(x[0], x[2], sizeof x[0]);
 }
 
 /* Nor at the end of the step, whatever the importer says there. */

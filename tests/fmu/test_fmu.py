@@ -1,7 +1,6 @@
 """The built FMU as its importers see it: archive, binary, model description, a run by fmpy."""
 
 import re
-import subprocess
 import sys
 import tomllib
 import zipfile
@@ -14,14 +13,9 @@ from fmpy.util import create_plotly_figure
 from fmpy.validation import validate_fmu
 
 from tests.support.paths import EVERY, FOLDERS, ROOT
+from tests.support.programs import run_checked
 
 CROSS_CHECK = ("_in.csv", "_ref.csv", "_ref.opt")  # endings of a reference's files
-
-
-def output_of(*command: object) -> str:
-    """Output of a command that must succeed."""
-    arguments = [str(argument) for argument in command]
-    return subprocess.run(arguments, capture_output=True, text=True, check=True).stdout
 
 
 def test_the_archive_holds_what_importers_look_for(fmu: Path) -> None:
@@ -65,7 +59,7 @@ def test_fmpy_finds_no_problem(fmu: Path, name: str) -> None:
 def test_the_command_of_fmpy_finds_no_problem(fmu: Path) -> None:
     command = Path(sys.executable).parent / "fmpy"
     for path in (fmu, fmu.parent / "fmi3" / fmu.name):
-        assert "No problems found." in output_of(command, "validate", path)
+        assert "No problems found." in run_checked(command, "validate", path)
 
 
 @pytest.mark.parametrize("folder", FOLDERS.values())
@@ -83,7 +77,7 @@ def test_the_page_of_a_model_names_the_variables_that_it_declares(folder: str) -
 def test_fmpy_simulates_it_by_default(fmu: Path, tmp_path: Path) -> None:
     result = tmp_path / "result.csv"
     command = Path(sys.executable).parent / "fmpy"
-    output_of(command, "simulate", fmu, "--output-file", result)
+    run_checked(command, "simulate", fmu, "--output-file", result)
     rows = np.genfromtxt(result, delimiter=",", names=True)
     assert rows["time"][0] == 0.0
     assert rows["time"][-1] == 2.0

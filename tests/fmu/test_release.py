@@ -12,7 +12,7 @@ import fmpy.validation
 import lief
 import pytest
 
-from tests.fmu.symbols import libm, standard
+from tests.fmu.symbols import check_elf, elementary_functions, standard
 from tests.support.missing import missing
 from tests.support.paths import NAMES, ROOT, SYSTEMS
 
@@ -54,11 +54,6 @@ def version_of(archive: zipfile.ZipFile) -> str:
 
 def binary(archive: zipfile.ZipFile, folders: dict[str, str], suffix: str) -> bytes:
     return archive.read(f"binaries/{folders[version_of(archive)]}/{name_of(archive)}{suffix}")
-
-
-def elementary_functions() -> set[str]:
-    """Names in the system's libm, and those that a compiler may call instead."""
-    return libm() | {"__sincos_stret", "__sincosf_stret", "__exp10"}
 
 
 # ---- The archives -------------------------------------------------------------------------------
@@ -153,29 +148,8 @@ def elf(request: pytest.FixtureRequest, archive) -> lief.ELF.Binary:
     return parsed
 
 
-def test_linux_exports_the_functions_of_the_standard_only(elf: lief.ELF.Binary, archive) -> None:
-    assert {symbol.name for symbol in elf.exported_symbols} == standard(version_of(archive))
-
-
-def test_linux_needs_glibc_2_17_and_no_libm(elf: lief.ELF.Binary) -> None:
-    assert list(elf.libraries) == ["libc.so.6"]
-    versions = [
-        v.name for need in elf.symbols_version_requirement for v in need.get_auxiliary_symbols()
-    ]
-    assert versions
-    for version in versions:
-        assert tuple(map(int, version.removeprefix("GLIBC_").split("."))) <= (2, 17)
-    assert not {symbol.name for symbol in elf.imported_symbols} & elementary_functions()
-
-
-def test_linux_is_read_only_where_it_can_be(elf: lief.ELF.Binary) -> None:
-    segments = {segment.type for segment in elf.segments}
-    assert lief.ELF.Segment.TYPE.GNU_RELRO in segments
-    assert elf.get(lief.ELF.DynamicEntry.TAG.FLAGS_1).has(lief.ELF.DynamicEntryFlags.FLAG.NOW)
-    assert elf.has_nx
-    assert not elf.has(lief.ELF.DynamicEntry.TAG.TEXTREL)
-    assert not elf.has(lief.ELF.DynamicEntry.TAG.RUNPATH)
-    assert not elf.has(lief.ELF.DynamicEntry.TAG.RPATH)
+def test_linux_library_is_as_it_must_be(elf: lief.ELF.Binary, archive) -> None:
+    check_elf(elf, version_of(archive))
 
 
 # ---- Windows ------------------------------------------------------------------------------------

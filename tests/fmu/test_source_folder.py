@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -174,80 +173,60 @@ def test_make_is_given_all_that_was_read(tmp_path: Path) -> None:
 # ---- Mistakes -----------------------------------------------------------------------------------
 
 
-def missing_source(toy: Toy) -> str:
-    toy.libraries[0]["sources"].append(str(toy.folder / "toy/missing.c"))
-    return "toy/missing.c: cannot be read: No such file or directory"
+# files, sources that join a library, what is said
+MISTAKES: dict[str, tuple[dict[str, str], dict[int, str], str]] = {
+    "source": ({}, {0: "toy/missing.c"}, "toy/missing.c: cannot be read: No such file"),
+    "header": (
+        {"toy/src/toy.c": '\n\n#include "missing.h"\n'}, {},
+        "toy/src/toy.c:3: header missing.h was not found",
+    ),
+    "header of a header": (
+        {"toy/include/plain.h": "#include <deep/missing.h>\n"}, {},
+        "toy/include/plain.h:1: header deep/missing.h was not found",
+    ),
+    "header that the prelude lacks": (
+        {"toy/src/toy.c": "#include <complex.h>\n"}, {},
+        "toy/src/toy.c:1: header complex.h was not found",
+    ),
+    "same name": (
+        {"toy/other/TOY.c": ""}, {0: "toy/other/TOY.c"},
+        "toy/other/TOY.c: would be sources/toy_TOY.c, as {folder}/toy/src/toy.c",
+    ),
+    "file from elsewhere": (
+        {"elsewhere.c": ""}, {0: "elsewhere.c"}, "elsewhere.c: is in no folder of the manifest",
+    ),
+    "function": (
+        {"math/sin.c": "double cos(double x)\n{\n}\n"}, {}, "math/sin.c: does not define sin",
+    ),
+    "manifest": ({"manifest.json": '{"libraries": 5}'}, {}, "manifest.json: is not a manifest: "),
+    "damaged manifest": (
+        {"manifest.json": '{"libraries": '}, {}, "manifest.json: is not a manifest: ",
+    ),
+}  # fmt: skip
 
 
-def missing_header(toy: Toy) -> str:
-    toy.write("toy/src/toy.c", '\n\n#include "missing.h"\n')
-    return "toy/src/toy.c:3: header missing.h was not found"
-
-
-def missing_header_of_a_header(toy: Toy) -> str:
-    toy.write("toy/include/plain.h", "#include <deep/missing.h>\n")
-    return "toy/include/plain.h:1: header deep/missing.h was not found"
-
-
-def header_that_the_prelude_lacks(toy: Toy) -> str:
-    toy.write("toy/src/toy.c", "#include <complex.h>\n")
-    return "toy/src/toy.c:1: header complex.h was not found"
-
-
-def same_name(toy: Toy) -> str:
-    toy.write("toy/other/TOY.c", "")
-    toy.libraries[0]["sources"].append(str(toy.folder / "toy/other/TOY.c"))
-    return f"toy/other/TOY.c: would be sources/toy_TOY.c, as {toy.folder}/toy/src/toy.c"
-
-
-def file_from_elsewhere(toy: Toy) -> str:
-    toy.write("elsewhere.c", "")
-    toy.libraries[0]["sources"].append(str(toy.folder / "elsewhere.c"))
-    return "elsewhere.c: is in no folder of the manifest"
-
-
-def function_that_is_not_there(toy: Toy) -> str:
-    toy.write("math/sin.c", "double cos(double x)\n{\n}\n")
-    return "math/sin.c: does not define sin"
-
-
-def no_elementary_functions(toy: Toy) -> str:
+def test_the_manifest_needs_the_elementary_functions(toy: Toy) -> None:
     toy.libraries.pop()
-    return "the manifest has no library elementary_functions"
+    assert "the manifest has no library elementary_functions" in refused(toy)
 
 
-def no_manifest(toy: Toy) -> str:
-    toy.write("manifest.json", '{"libraries": 5}')
-    return "manifest.json: is not a manifest: "
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_is_refused_in_one_line(toy: Toy, name: str) -> None:
+    files, sources, expected = MISTAKES[name]
+    for file, text in files.items():
+        toy.write(file, text)
+    for library, source in sources.items():
+        toy.libraries[library]["sources"].append(str(toy.folder / source))
+    assert expected.format(folder=toy.folder) in refused(toy)
 
 
-def damaged_manifest(toy: Toy) -> str:
-    toy.write("manifest.json", '{"libraries": ')
-    return "manifest.json: is not a manifest: "
-
-
-@pytest.mark.parametrize(
-    "mistake",
-    [
-        missing_source,
-        missing_header,
-        missing_header_of_a_header,
-        header_that_the_prelude_lacks,
-        same_name,
-        file_from_elsewhere,
-        function_that_is_not_there,
-        no_elementary_functions,
-        no_manifest,
-        damaged_manifest,
-    ],
-)
-def test_a_mistake_is_refused_in_one_line(toy: Toy, mistake: Callable[[Toy], str]) -> None:
-    expected = mistake(toy)
+def refused(toy: Toy) -> str:
+    """The one line that the program says."""
     result = toy.run()
     assert result.returncode == 2
     assert result.stderr.startswith("source_code.py: ") and result.stderr.count("\n") == 1
-    assert expected in result.stderr
     assert not toy.output.exists()
+    return result.stderr
 
 
 def test_what_was_written_before_stays_after_a_mistake(toy: Toy) -> None:

@@ -13,6 +13,7 @@
 
 unsigned long fuzz_call_count;
 unsigned long fuzz_instance_count;
+static const char *target_name;
 static unsigned long execution_count;
 static struct timespec began;
 
@@ -22,8 +23,7 @@ static void print_figures(int findings) {
     const double seconds =
         difftime(now.tv_sec, began.tv_sec) + 1e-9 * (double)(now.tv_nsec - began.tv_nsec);
     printf("figures: %s; executions %lu; calls %lu; instances %lu; seconds %.0f; findings %d\n",
-           fuzz_target_name, execution_count, fuzz_call_count, fuzz_instance_count, seconds,
-           findings);
+           target_name, execution_count, fuzz_call_count, fuzz_instance_count, seconds, findings);
     fflush(stdout);
 }
 
@@ -34,7 +34,7 @@ static void print_final_figures(void) {
 void fuzz_fail(const char *format, ...) {
     va_list arguments;
     va_start(arguments, format);
-    fprintf(stderr, "%s: finding: ", fuzz_target_name);
+    fprintf(stderr, "%s: finding: ", target_name);
     vfprintf(stderr, format, arguments);
     fprintf(stderr, "\n");
     va_end(arguments);
@@ -43,6 +43,7 @@ void fuzz_fail(const char *format, ...) {
 }
 
 int LLVMFuzzerInitialize(int *argc, char ***argv) {
+    target_name = (*argv)[0];
     timespec_get(&began, TIME_UTC);
     return atexit(print_final_figures);
 }

@@ -1,4 +1,4 @@
-/* What the fuzz targets share: how an input is read, how a finding ends the program, and the
+/* How an input is read, how a finding ends the program, and the
  * figures of a run. README.md says what each target checks. */
 #ifndef FUZZ_H
 #define FUZZ_H
@@ -11,9 +11,8 @@
 int LLVMFuzzerInitialize(int *argc, char ***argv);
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-/* Each target: one execution. */
+/* One execution. */
 struct fuzz_input;
-extern const char *const fuzz_target_name;
 void fuzz_target_run(struct fuzz_input *input);
 
 /* ---- Findings and figures -------------------------------------------------------------------- */

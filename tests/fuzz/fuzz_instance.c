@@ -50,15 +50,6 @@ static void log_text(fmi2ComponentEnvironment environment, fmi2String name, fmi2
 
 /* ---- Life ------------------------------------------------------------------------------------ */
 
-fmi2CallbackFunctions fuzz_callbacks(struct fuzz_instance *instance, bool has_logger) {
-    return (fmi2CallbackFunctions){
-        .logger = has_logger ? log_text : NULL,
-        .allocateMemory = calloc,
-        .freeMemory = free,
-        .componentEnvironment = instance,
-    };
-}
-
 static void choose(unsigned variety) {
     if (fuzz_choose_variety != NULL) {
         fuzz_choose_variety(variety);
@@ -69,7 +60,12 @@ struct fuzz_instance *fuzz_instance_create(fmi2Type kind, unsigned variety, bool
                                            bool logging_on) {
     struct fuzz_instance *instance = fuzz_array(1, sizeof *instance);
     fmi2CallbackFunctions *callbacks = fuzz_array(1, sizeof *callbacks);
-    *callbacks = fuzz_callbacks(instance, has_logger);
+    *callbacks = (fmi2CallbackFunctions){
+        .logger = has_logger ? log_text : NULL,
+        .allocateMemory = calloc,
+        .freeMemory = free,
+        .componentEnvironment = instance,
+    };
     if (fuzz_fmu.Instantiate == NULL && fmu_version_open(&fuzz_fmu) == NULL) {
         fuzz_fail("the functions of the FMU are not found");
     }

@@ -42,9 +42,6 @@ struct fuzz_instance *fuzz_instance_create(fmi2Type kind, unsigned variety, bool
                                            bool logging_on);
 void fuzz_instance_free(struct fuzz_instance *instance);
 
-/* Callbacks whose environment is the instance. */
-fmi2CallbackFunctions fuzz_callbacks(struct fuzz_instance *instance, bool has_logger);
-
 /* What holds for the status of every call: OK, Discard or Error; a text with the latter two; in
  * the error state Error from all but what the standard allows there. Returns the status. */
 fmi2Status fuzz_check(struct fuzz_instance *instance, enum fmu_function function,

@@ -54,4 +54,9 @@ bool fuzz_model_failed_inside(void);
 /* From the end of the initialization. */
 void fuzz_model_exchange(struct subject *subject);
 
+/* ---- Hostile calls (fuzz_hostile.c) ---------------------------------------------------------- */
+
+/* Some calls of any function, with any arguments. The instance is then where it was. */
+void fuzz_model_call_anything(struct subject *subject);
+
 #endif

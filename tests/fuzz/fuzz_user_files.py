@@ -1,7 +1,7 @@
 """Mutates the files that users write: each is read, or refused by a UserError of one line.
 
 python tests/fuzz/fuzz_user_files.py SECONDS [SEED]; 1 where something else was raised, or took
-too long.
+too long. tests/equations/test_model_file.py does it with files of equations.
 """
 
 import io
@@ -26,9 +26,6 @@ sys.path[:0] = [str(ROOT), str(ROOT / "fmu")]
 from declaration.c_tables import value_references, variable_table  # noqa: E402
 from declaration.load import DeclarationError  # noqa: E402
 from declaration.load import load as load_declaration  # noqa: E402
-from equations import c_model  # noqa: E402
-from equations.model_file import ModelFileError  # noqa: E402
-from equations.model_file import read as read_equations  # noqa: E402
 from fmi2.model_description import model_description  # noqa: E402
 from fmi3.model_description import model_description as fmi3_model_description  # noqa: E402
 from fmi3.model_description import terminals_and_icons  # noqa: E402
@@ -45,7 +42,6 @@ from rparm.systems import comparison, ssp  # noqa: E402
 SLOWEST = 5.0  # s of processor time, for one file
 MODEL = "rp_manipulator"
 SCENARIO = "constant_effort_single_step"
-EXAMPLES = ROOT / "examples" / "models"
 CLOSED_LOOP = ROOT / "models" / "closed_loop"
 LOGGED = """title = "A"
 description = "B"
@@ -202,7 +198,7 @@ class Fuzz:
         end = time.monotonic() + seconds
         kinds = (
             *(self.a_scenario, self.a_log, self.a_declaration, self.a_reference, self.an_fmu),
-            *(self.a_system, self.equations),
+            self.a_system,
         )
         while time.monotonic() < end:
             kinds[self.executions % len(kinds)]()
@@ -219,14 +215,6 @@ class Fuzz:
             self.either_way(self.chance.choice(self.scenario_texts)),
             lambda: scenarios.load(self.scenario, self.declared),
         )
-
-    def equations(self) -> None:
-        """Change an example, and read it and write its C."""
-        names = [p for p in EXAMPLES.glob("*.toml") if not p.name.endswith(".lock.toml")]
-        content = self.either_way(self.chance.choice(sorted(names)).read_text(encoding="utf-8"))
-        file = self.folder / "equations.toml"
-        file.write_bytes(b"")
-        self.with_file(file, content, lambda: c_model.source(read_equations(file)))
 
     def a_log(self) -> None:
         kept = self.scenario.read_bytes()
@@ -312,7 +300,7 @@ class Fuzz:
         error = raised_by(check)
         taken = time.process_time() - begin
         found = None
-        if isinstance(error, UserError | DeclarationError | ModelFileError):
+        if isinstance(error, UserError | DeclarationError):
             self.refused += 1
             text = str(error)
             if not text or "\n" in text or re.search(r"\w' object|^'|: '\w+'$", text):

@@ -1,4 +1,7 @@
-"""A, B, C and D of FMUs against exact ones, at random points: all versions and kinds of FMI."""
+"""A, B, C and D of FMUs against exact ones, at random points: all versions and kinds of FMI.
+
+tests/fmi2/test_derivatives.py has those of the arm.
+"""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -16,7 +19,6 @@ from tests.support.symbolic import ExactModel
 BOUND = 1e-12  # of the largest entry of a matrix
 POINTS = 25
 CASES = {
-    "arm": ("RPManipulator", symbolic.arm_point),
     "drives": ("RPActuator", symbolic.drives_point),
     "controller": ("RPController", symbolic.controller_point),
 } | {

@@ -143,6 +143,12 @@ RATES = "fast every 0.1 s, slow every 0.3 s, late every 0.1 s"
 REFUSED = {
     "several rates": ("COUNTERS", {}, f"Counters.fmu: samples at several rates, .* {RATES}$"),
     "modes": ("PWM", {}, "sampler end changes on at this point, expected a point at which"),
+    "a time that inputs decide": ("CHOPPER", {}, r"Chopper: event end \(time >= off\): when it"),
+    "a part of a period": (
+        "SAW",
+        {},
+        r"Saw: time - 0.01 \* floor.* of \[states\] i: when it switches",
+    ),
     "condition": ("TWO", {"at": {"x[1]": 2.0}}, r"sampler s\[1\] changes on, level at this point"),
     "no value": ("LIMITED", {"at": {"x": 1.5}}, "sampler s: the new value of u is not finite"),
     "no point": ("PID", {"trim": ["x", "u"]}, "found by x, u: sampler control changes sum by"),
@@ -176,6 +182,16 @@ def test_what_has_no_discrete_model_says_what_to_do(folder: Path, tmp_path: Path
         archive.write(made(folder, TEXTS["DEADBEAT"]), "resources/Deadbeat.fmu")
     with pytest.raises(UserError, match="'loop' is sampled by feedback, which [^:]*: take it as"):
         rparm.linearize(path)
+
+
+@pytest.mark.parametrize("version", ["", "fmi3"])
+def test_functions_without_slope_and_counts_are_named(folder: Path, version: str) -> None:
+    """r acts once, not twice, and x not at all; n counts, but nothing follows from it."""
+    fmu = made(folder, TEXTS["STEPS"])
+    found = rparm.linearize(fmu.parent / version / fmu.name)
+    assert found.flat == ("sign in y", "round in u") and found.left_out == ("n",)
+    assert_close(found.A, np.array([[np.exp(-0.1), 0], [0, 0]]))
+    assert_close(found.B, np.array([[1 - np.exp(-0.1)], [1]]))
 
 
 def test_files_and_page_say_that_it_is_sampled(

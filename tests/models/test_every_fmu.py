@@ -5,6 +5,7 @@ import math
 import random
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import product
 from pathlib import Path
 
 import fmpy
@@ -21,7 +22,7 @@ from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import initialize
 from tests.support.instances import instantiated, restore, serialized
 from tests.support.paths import EVERY
-from tests.support.rparm_project import FILES, FMUS, NAMES, fmi3_fmu, load
+from tests.support.rparm_project import FILES, FMUS, NAMES, fmi3_fmu, load, names_of
 
 each_version = pytest.mark.parametrize("version", ["fmi2", "fmi3"])
 
@@ -128,11 +129,18 @@ def running(fmu: Fmu, scenario: Scenario) -> Iterator[Run]:
         yield Run(instance, scenario)
 
 
-@each_version
-@pytest.mark.parametrize("name", NAMES)
-def test_rollback_leaves_no_trace(name: str, version: str) -> None:
+# across events, with each method in place of the scenario's
+BY_METHOD = [("fmi2", name, i) for name in names_of("rp_plant") for i in (1, 2, 3, 4)]
+
+
+@pytest.mark.parametrize(
+    ("version", "name", "method"), [*product(("fmi2", "fmi3"), NAMES, (None,)), *BY_METHOD]
+)
+def test_rollback_leaves_no_trace(version: str, name: str, method: int | None) -> None:
     """From saved states the same bits follow again, also in another instance, read from bytes."""
     scenario = load(name)
+    if method is not None:
+        scenario.parameters["solver_method"] = method
     steps = len(scenario.times) - 1
     chance = random.Random(name)
     jumps = {chance.randrange(steps) for _ in range(JUMPS)}

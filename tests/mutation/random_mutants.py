@@ -1,172 +1,237 @@
 """Breaks the C sources in places drawn by chance: the C tests must notice.
 
 random_mutants.py BUILD takes a sample of all mutants of src, fmu and models, builds each with the
-settings of the folder BUILD in a copy of the sources and runs the C tests until one fails; those
-that live run with sanitizers too. Mutants that do not compile, or of which the compiler makes the
-same code, are replaced by the next ones of the seed.
+settings of the folder BUILD in a copy of the sources and runs the C tests; those that live run with
+sanitizers too. Mutants that do not compile, or of which the compiler makes the same code, are
+replaced by the next ones of the seed: so the sources need not be parsed.
 """
 
 import argparse
+import contextlib
+import hashlib
 import json
 import random
+import re
+import shutil
 import signal
+import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor, wait
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
 
-from sites import Mutant, order, sources
-from workshop import Processes, Record, Workshop
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-ROOT = Path(__file__).resolve().parents[2]
-T = TypeVar("T")
-DEAD = ("killed", "timeout", "sanitizer")
-REPLACED = ("uncompilable", "same code")
+from tests.support.paths import ROOT
+from tests.support.programs import run_checked
+from tests.support.source_copy import copy_sources, settings_of
+
+FOLDERS = ("src", "fmu", "models")
+NO_CODE = re.compile(r'/\*.*?\*/|//[^\n]*|^#(?:\\\n|[^\n])*|"(?:\\.|[^"\\])*"', re.DOTALL | re.M)
+# clang-format sets spaces around operators of two values, and none behind those of one
+PLACES = {
+    "operator": r"(?<= )(?:[-+*/%&|^]|<<|>>|[-+*/|&]=|[<>=!]=|[<>]|&&|\|\|)(?= )",
+    "count": r"(?:\+\+|--)(?!\)\s\{)",  # a loop that counts the wrong way proves nothing
+    "negation": r"!(?=[\w(])",
+    "condition": r"(?:if|while) \([^;{}]*\)(?= \{\n)",
+    "sign": r"(?<![-\w])-(?=[\w(.])",
+    "constant": r"(?<![\w.])(?:\d+\.\d*(?:e-?\d+)?|\d+)(?![\w.])|\b(?:true|false|INFINITY)\b",
+    "removal": r"^ +(?!return|break|continue|goto|case|default|\(void\))\w[^;{}]*;(?=[ #]*$)",
+}
+TYPE = r"[\w\s]*\b(?:double|real|bool|char|int|size_t|uint\w+|(?:struct|enum) \w+) \**"
+DECLARED = re.compile(rf"{TYPE}[^=]*$")  # in front of a number: it is a length of an array
+DECLARATION = re.compile(rf"{TYPE}\w")
+OPERATORS = {
+    "+": "-", "-": "+", "*": "/", "/": "*", "%": "*", "&": "|", "|": "&", "^": "|",
+    "<<": ">>", ">>": "<<", "+=": "-=", "-=": "+=", "*=": "/=", "/=": "*=", "|=": "=", "&=": "=",
+    "<": ("<=", ">="), "<=": ("<", ">"), ">": (">=", "<="), ">=": (">", "<"),
+    "==": "!=", "!=": "==", "&&": "||", "||": "&&",
+}  # fmt: skip
+NAMES = {"true": "false", "false": "true", "INFINITY": "(-INFINITY)"}
+OPTIONS = ("-DCMAKE_BUILD_TYPE=Mutants", "-DCMAKE_C_FLAGS=-O1 -w", "-DBUILD_TESTING=ON")
+LIMITS = {"plain": "ulimit -c 0 -f 400000 -v 8000000; ", "sanitized": "ulimit -c 0 -f 400000; "}
+TEST_LIMIT = 100  # s, after which a test hangs; the slowest takes a tenth
+UNCOMPILABLE, SAME_CODE, LIVES = "do not compile", "same code", "lives"
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """Text of a source that another takes the place of."""
+
+    file: str
+    start: int
+    before: str
+    after: str
+
+    def of(self, text: str) -> str:
+        """The source with the mutant in it."""
+        return text[: self.start] + self.after + text[self.start + len(self.before) :]
+
+    def description(self, text: str) -> str:
+        """One line for a reader."""
+        line = text.count("\n", 0, self.start) + 1
+        code = text.splitlines()[line - 1].strip()
+        return f"{self.file}:{line}: {code}: {self.before.strip()} -> {self.after or '(removed)'}"
+
+
+def replacements(kind: str, before: str) -> tuple[str, ...]:
+    """What can take the place of a text."""
+    if kind == "operator":
+        after = OPERATORS[before]
+        return after if isinstance(after, tuple) else (after,)
+    if kind == "count":
+        return ("--" if before == "++" else "++",)
+    if kind == "condition":
+        head, _, condition = before.partition(" ")
+        return (f"{head} (!{condition})",)
+    if kind != "constant":
+        return ("",) if kind != "removal" else (";",)
+    if before in NAMES:
+        return (NAMES[before],)
+    if "." in before:
+        return ("1.0",) if float(before) == 0.0 else (f"(2.0 * {before})", f"(-{before})")
+    return (f"({before} + 1)",)
+
+
+def is_idle(kind: str, code: str, start: int) -> bool:
+    """Whether a mutant changes nothing, or never compiles, because something is declared there."""
+    if kind == "constant":
+        return bool(DECLARED.match(code[code.rindex("\n", 0, start) + 1 : start]))
+    return kind == "removal" and bool(DECLARATION.match(code, start))
+
+
+def mutants_of(file: str, text: str) -> list[tuple[Mutant, ...]]:
+    """All mutants of a source, by their places."""
+    code = NO_CODE.sub(lambda found: re.sub(r"[^\n]", "#", found[0]), text)
+    places = []
+    for kind, pattern in PLACES.items():
+        for found in re.finditer(pattern, code, re.MULTILINE):
+            if not is_idle(kind, code, found.start()):
+                before = text[slice(*found.span())]
+                alternatives = replacements(kind, before)
+                places.append(
+                    tuple(Mutant(file, found.start(), before, after) for after in alternatives)
+                )
+    return places
+
+
+def sources(root: Path) -> dict[str, str]:
+    """Text of every C file that mutants are made of, by its path from the root."""
+    return {
+        path.relative_to(root).as_posix(): path.read_text(encoding="utf-8")
+        for folder in FOLDERS
+        for path in sorted((root / folder).rglob("*.[ch]"))
+        if path.parent.name != "proof"  # has its own faults: tests/prove
+    }
+
+
+def order(texts: dict[str, str], seed: int) -> list[Mutant]:
+    """One mutant of every place in an order that follows from the seed."""
+    chance = random.Random(seed)
+    places = [place for file, text in texts.items() for place in mutants_of(file, text)]
+    chance.shuffle(places)
+    return [chance.choice(place) for place in places]
 
 
 @dataclass
-class Campaign:
-    """Mutants to judge in their order, and the verdicts so far.
+class Build:
+    """C tests of a copy of the sources."""
 
-    Attributes
-    ----------
-    wanted : int
-        How many verdicts count: those of REPLACED do not.
-    results : Path or None
-        File that is written after every verdict.
-    """
+    folder: Path
+    kind: str  # plain or sanitized
+    targets: list[str] = field(default_factory=list)
 
-    mutants: list[Mutant]
-    wanted: int
-    results: Path | None
-    processes: Processes = field(default_factory=Processes)
-    record: Record = field(default_factory=Record)
-    verdicts: dict[int, tuple[str, str, float]] = field(default_factory=dict)
-    taken: int = 0
-    lock: threading.Condition = field(default_factory=threading.Condition)
+    def prepare(self, copy: Path, settings: list[str]) -> None:
+        """Build everything without a mutant; all tests pass."""
+        generator = ["-G", "Ninja"] if shutil.which("ninja") else []
+        sanitize = f"-DSANITIZE={'ON' if self.kind == 'sanitized' else 'OFF'}"
+        options = [*generator, *OPTIONS, sanitize, *settings]
+        run_checked("cmake", "-S", copy, "-B", self.folder, *options)
+        run_checked("cmake", "--build", self.folder, "--parallel", "2")
+        self.targets = self.programs()
+        if failed := self.failed():
+            raise RuntimeError(f"{failed} fails without any mutant ({self.kind})")
 
-    def counted(self) -> list[int]:
-        """Mutants that have a verdict that counts, in their order."""
-        return sorted(i for i, verdict in self.verdicts.items() if verdict[0] not in REPLACED)
+    def programs(self) -> list[str]:
+        """Targets of all tests; ctest knows the commands of those that are built."""
+        listed = run_checked("ctest", "--show-only=json-v1", "-L", "^c$", folder=self.folder)
+        return sorted({Path(test["command"][0]).name for test in json.loads(listed)["tests"]})
 
-    def remaining(self) -> Iterator[int]:
-        """Mutants for one worker: a beginning of the order, as long as is needed."""
-        while True:
-            with self.lock:
-                while len(self.counted()) + self.taken - len(self.verdicts) >= self.wanted:
-                    if self.taken == len(self.verdicts) or self.processes.stopped.is_set():
-                        return
-                    self.lock.wait(1.0)
-                if self.taken == len(self.mutants):
-                    return
-                index = self.taken
-                self.taken += 1
-            yield index
+    def make(self) -> bool:
+        """Build the tests; whether that succeeds."""
+        command = ["cmake", "--build", self.folder, "--parallel", "2", "--target", *self.targets]
+        return subprocess.run(command, capture_output=True, check=False).returncode == 0
 
-    def judge(self, workshop: Workshop) -> None:
-        """Judge mutants without sanitizers until there are enough."""
-        for index in self.remaining():
-            self.judge_one(workshop, index, "plain")
+    def code(self) -> dict[str, bytes]:
+        """Hashes of all objects."""
+        objects = sorted(self.folder.rglob("*.o"))
+        return {str(path): hashlib.sha256(path.read_bytes()).digest() for path in objects}
 
-    def judge_again(self, workshop: Workshop, indices: Iterator[int]) -> None:
-        """Judge with sanitizers what has survived without."""
-        workshop.prepare("sanitized")
-        workshop.measure("sanitized", workshop.tests["sanitized"])
-        while True:
-            with self.lock:
-                index = next(indices, None)
-            if index is None:
-                return
-            self.judge_one(workshop, index, "sanitized")
-
-    def judge_one(self, workshop: Workshop, index: int, kind: str) -> None:
-        """Judge one mutant; print the verdict."""
-        started = time.monotonic()
-        verdict, test = workshop.judge(self.mutants[index], kind)
-        with self.lock:
-            self.verdicts[index] = (verdict, test, time.monotonic() - started)
-            self.note(index)
-            self.lock.notify_all()
-
-    def note(self, index: int) -> None:
-        """Print a verdict; write all verdicts to the file."""
-        verdict, test, _ = self.verdicts[index]
-        by = f" by {test}" if test else ""
-        print(f"{index}: {self.mutants[index].description()}: {verdict}{by}", flush=True)
-        if self.results is None:
-            return
-        lines = [
-            json.dumps(
-                {"index": i, **self.mutants[i].as_dict()}
-                | {"verdict": verdict, "test": test, "seconds": round(seconds, 1)}
-            )
-            for i, (verdict, test, seconds) in sorted(self.verdicts.items())
-        ]
-        new = self.results.with_suffix(".new")
-        new.write_text("[\n" + ",\n".join(lines) + "\n]\n", encoding="utf-8")
-        new.replace(self.results)
-
-    def in_parallel(self, work: Callable[..., T], items: Iterable[object]) -> list[T]:
-        """Results of the same work on several items at once; the first fault ends all."""
-
-        def guarded(item: object) -> T:
-            try:
-                return work(item)
-            except BaseException:
-                self.processes.stop()
-                raise
-
-        items = list(items)
-        with ThreadPoolExecutor(max(len(items), 1)) as pool:
-            futures = [pool.submit(guarded, item) for item in items]
-            try:
-                wait(futures)
-            except BaseException:
-                self.processes.stop()
-                raise
-        faults = [fault for future in futures if (fault := future.exception())]
-        for fault in sorted(faults, key=lambda fault: isinstance(fault, InterruptedError)):
-            raise fault
-        return [future.result() for future in futures]
-
-    def run(self, jobs: int, settings_from: Path) -> None:
-        """Judge the mutants in as many copies as there are jobs."""
-        with tempfile.TemporaryDirectory() as folder:
-
-            def prepared(job: int) -> Workshop:
-                place = Path(folder) / str(job)
-                workshop = Workshop(place, settings_from, self.processes, self.record)
-                workshop.measure("plain", workshop.tests["plain"])
-                return workshop
-
-            workshops = self.in_parallel(prepared, range(jobs))
-            self.in_parallel(self.judge, workshops)
-            living = [index for index in self.counted() if self.verdicts[index][0] == "survived"]
-            rest = iter(living)
-            if living:
-                self.in_parallel(lambda workshop: self.judge_again(workshop, rest), workshops)
+    def failed(self) -> str:
+        """The first test that does not pass, or nothing."""
+        tests = ["ctest", "-L", "^c$", "--stop-on-failure", "--timeout", str(TEST_LIMIT), "-j", "2"]
+        command = ["sh", "-c", LIMITS[self.kind] + 'exec "$@"', "sh", *tests]
+        done = subprocess.run(command, cwd=self.folder, capture_output=True, text=True, check=False)
+        failed = re.search(r"Test +#\d+: (\S+) .*\*\*\*", done.stdout)
+        return failed[1] if failed else "ctest" if done.returncode else ""
 
 
-def report(campaign: Campaign, seconds: float) -> float:
-    """Print the figures; the share in percent of those that die."""
-    counts = Counter(verdict for verdict, _, _ in campaign.verdicts.values())
-    judged = campaign.counted()
-    living = [index for index in judged if campaign.verdicts[index][0] not in DEAD]
-    died = len(judged) - len(living)
-    for index in living:
-        print(f"lives: {campaign.mutants[index].description()}")
-    print("; ".join(f"{verdict} {count}" for verdict, count in sorted(counts.items())))
-    print(
-        f"figures: random mutants of all C; executions {len(judged)}; seconds {seconds:.0f}; "
-        f"findings {len(living)}; {died} of {len(judged)} die"
-    )
-    return 100.0 * died / len(judged) if judged else 100.0
+class Workshop:
+    """A copy of the sources with a build without sanitizers and, once it is needed, one with."""
+
+    def __init__(self, folder: Path, settings: list[str]) -> None:
+        self.folder = folder
+        self.settings = settings
+        self.copy = copy_sources(folder / "sources")
+        self.builds: dict[str, Build] = {}
+        self.code = self.build("plain").code()
+
+    def build(self, kind: str) -> Build:
+        """A build, made when it is asked for the first time."""
+        if kind not in self.builds:
+            build = Build(self.folder / kind, kind)
+            build.prepare(self.copy, self.settings)
+            self.builds[kind] = build
+        return self.builds[kind]
+
+    def judge(self, mutant: Mutant) -> str:
+        """Verdict on a mutant: that of the tests without sanitizers, then of those with."""
+        for kind in LIMITS:
+            build = self.build(kind)
+            with self.broken(mutant):
+                if not build.make():
+                    return UNCOMPILABLE
+                if kind == "plain" and build.code() == self.code:
+                    return SAME_CODE
+                if failed := build.failed():
+                    return f"dies by {failed} ({kind})"
+        return LIVES
+
+    @contextlib.contextmanager
+    def broken(self, mutant: Mutant) -> Iterator[None]:
+        """The sources with the mutant in them, which is gone afterwards."""
+        source = self.copy / mutant.file
+        text = source.read_text(encoding="utf-8")
+        source.write_text(mutant.of(text), encoding="utf-8")
+        try:
+            yield
+        finally:
+            source.write_text(text, encoding="utf-8")
+
+
+def judged(workshop: Workshop, mutants: list[Mutant], texts: dict[str, str], count: int) -> Counter:
+    """How many of so many mutants live or die, and how many they replaced; printed one by one."""
+    verdicts: Counter[str] = Counter()
+    for mutant in mutants:
+        if verdicts[LIVES] + verdicts["dies"] == count:
+            break
+        verdict = workshop.judge(mutant)
+        verdicts["dies" if verdict.startswith("dies") else verdict] += 1
+        print(f"{mutant.description(texts[mutant.file])}: {verdict}", flush=True)
+    return verdicts
 
 
 def main() -> int:
@@ -174,28 +239,31 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("build", type=Path, metavar="BUILD")
     parser.add_argument("--seed", type=int, help="of the sample; a new one if it is not given")
-    parser.add_argument("--count", type=int, metavar="N", help="mutants of the sample, else all")
-    parser.add_argument("--jobs", type=int, default=2, metavar="N")
-    parser.add_argument("--results", type=Path, help="write all verdicts to this file")
+    parser.add_argument("--count", type=int, default=20, metavar="N", help="mutants of the sample")
     parser.add_argument(
-        "--at-least", type=float, default=0.0, metavar="PERCENT",
-        help="of them must die",
-    )  # fmt: skip
+        "--at-least", type=float, default=0.0, metavar="PERCENT", help="of them must die"
+    )
     arguments = parser.parse_args()
-    if arguments.seed is None:
-        arguments.seed = random.SystemRandom().randrange(1_000_000)
+    seed = arguments.seed or random.SystemRandom().randrange(1, 1_000_000)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(2))
     started = time.monotonic()
+    texts = sources(ROOT)
+    mutants = order(texts, seed)
+    print(f"seed {seed}: {len(mutants)} places", flush=True)
     try:
-        mutants = order(sources(ROOT), arguments.seed)
-        print(f"seed {arguments.seed}: {len(mutants)} places", flush=True)
-        campaign = Campaign(mutants, arguments.count or len(mutants), arguments.results)
-        campaign.run(arguments.jobs, arguments.build)
-    except (RuntimeError, LookupError) as error:
+        with tempfile.TemporaryDirectory() as folder:
+            workshop = Workshop(Path(folder), settings_of(arguments.build))
+            verdicts = judged(workshop, mutants, texts, arguments.count)
+    except RuntimeError as error:
         print(f"random_mutants.py: {error}", file=sys.stderr)
         return 2
-    share = report(campaign, time.monotonic() - started)
-    return 1 if share < arguments.at_least else 0
+    died = verdicts["dies"]
+    print(
+        f"figures: random mutants of all C; executions {died + verdicts[LIVES]}; "
+        f"seconds {time.monotonic() - started:.0f}; findings {verdicts[LIVES]}; "
+        f"{verdicts[UNCOMPILABLE]} {UNCOMPILABLE}; {verdicts[SAME_CODE]} {SAME_CODE}"
+    )
+    return 1 if 100.0 * died < arguments.at_least * (died + verdicts[LIVES]) else 0
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
-from tests.support.instances import Instance, LoadedFmu
+from tests.support.instances import Instance, LoadedFmu, set_value
 
 STEP = 1e-3  # s
 OUTPUTS = (
@@ -24,19 +24,12 @@ class Native:
 
     def __init__(self, path: Path, folder: Path) -> None:
         self.loaded = LoadedFmu(path, folder)
-        variables = self.loaded.description.modelVariables
-        self.types = {variable.name: variable.type for variable in variables}
+        self.variables = {v.name: v for v in self.loaded.description.modelVariables}
 
     def set(self, instance: Instance, values: Mapping[str, float]) -> None:
         """Set variables of any type, one by one."""
-        setters = {
-            "Real": instance.fmi.setReal,
-            "Boolean": instance.fmi.setBoolean,
-            "Integer": instance.fmi.setInteger,
-            "Enumeration": instance.fmi.setInteger,
-        }
         for name, value in values.items():
-            setters[self.types[name]]([self.loaded.references[name]], [value])
+            set_value(instance.fmi, self.variables[name], value)
 
     @contextmanager
     def started(self, values: Mapping[str, float]) -> Iterator[Instance]:

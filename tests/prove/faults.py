@@ -1,10 +1,6 @@
-"""Faults planted in the program that encloses motions: each has to be noticed by the checkers.
-
-python -m tests.prove.faults
-"""
+"""Faults planted in the program that encloses motions: each has to be noticed by the checkers."""
 
 import subprocess
-import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -93,16 +89,3 @@ def verdict(fault: Fault) -> str | None:
         source = fault.source((SOURCES / fault.file).read_text())
         program = built(Path(folder), fault.file, source)
         return UNCOMPILABLE if program is None else noticed(program)
-
-
-def main() -> int:
-    alive = 0
-    for fault in PLANTED:
-        how = verdict(fault)
-        alive += how is None
-        print(f"{'ALIVE' if how is None else 'dead '} {fault.name}: {how}", flush=True)
-    return int(alive > 0)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

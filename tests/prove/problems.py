@@ -17,6 +17,7 @@ SOURCES = ROOT / "models" / "rp_manipulator" / "proof"
 sys.path.insert(0, str(SOURCES))
 import check as check  # noqa: E402
 import check_operations as check_operations  # noqa: E402
+import motion_series as motion_series  # noqa: E402
 
 PARAMETERS = (2.0, 1.0, 0.1, 0.05, 0.5, 0.25, 0.1, 9.81)  # m1 m2 I1z I2z l1 lc1 a g
 Cubic = Sequence[float]  # value and derivatives, at the begin of a communication step

@@ -4,10 +4,11 @@ import json
 import random
 import re
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import product
 from pathlib import Path
 
+import flint
 import numpy as np
 import pytest
 from flint import arb
@@ -16,7 +17,6 @@ from rparm import project
 from rparm.fmi.fmu_file import read_model
 from rparm.runs import comparison, convergence
 from rparm.runs import scenario as scenarios
-from tests.prove.exact_motion import integrate, outputs, value_at
 from tests.prove.problems import (
     BUILD,
     PARAMETERS,
@@ -28,6 +28,7 @@ from tests.prove.problems import (
     check,
     check_operations,
     enclosures,
+    motion_series,
     run,
 )
 
@@ -89,6 +90,49 @@ def test_exact_states_of_convergence_are_nearly_nearest_doubles() -> None:
 
 # ---- Against 300 bits ----------------------------------------------------------------------------
 
+BITS, ORDER, STEP = 300, 31, 0.02  # of series over steps of so many s
+
+
+@pytest.fixture
+def precise() -> Iterator[None]:
+    flint.ctx.prec, before = BITS, flint.ctx.prec
+    yield
+    flint.ctx.prec = before
+
+
+def taylor(cubic: Sequence[float], time: arb, step: arb) -> list[arb]:
+    """Coefficients of (t / step)^k, at a time, of a cubic from its derivatives at the start."""
+
+    def derivative(k: int) -> arb:
+        terms = (arb(u) * time**j / arb.fac_ui(j) for j, u in enumerate(cubic[k:]))
+        return sum(terms, arb(0))
+
+    return [derivative(k) * step**k / arb.fac_ui(k) for k in range(ORDER)]
+
+
+def integrate(
+    states: Sequence[float], parameters: Sequence[arb], cubics: Sequence[Sequence[float]], end: arb
+) -> list[arb]:
+    """q1, q2, dq1, dq2 at the end, by the checker's series, whose equations test_same_equations.py
+    compares with the plain ones."""
+    count = int(float(end) / STEP) + 1
+    step, found = end / count, [arb(x) for x in states]
+    for i in range(count):
+        efforts = [taylor(cubic, i * step, step) for cubic in cubics]
+        rows = motion_series.coefficients(found, parameters, efforts, step, ORDER)
+        found = [arb(sum((x[0] for x in row), arb(0)).mid()) for row in rows]
+    return found
+
+
+def values_at(
+    states: Sequence[float], arm: Sequence[float], cubics: Sequence[Sequence[float]], time: float
+) -> list[arb]:
+    """States and outputs after a time in s."""
+    end, parameters = arb(time), [arb(p) for p in arm]
+    found = integrate(states, parameters, cubics, end)
+    efforts = [taylor(cubic, end, end)[0] for cubic in cubics]
+    return [*found, *motion_series.outputs(found, parameters, efforts)]
+
 
 def inside(states: Sequence[arb], balls: np.ndarray) -> bool:
     return all(
@@ -105,18 +149,18 @@ def random_problem(draw: random.Random) -> Problem:
     return Problem(states, [(draw.uniform(0.03, 0.1), *cubics)], parameters)
 
 
+@pytest.mark.usefixtures("precise")
 @pytest.mark.parametrize("seed", range(200))
 def test_random_arms_are_where_300_bits_say(seed: int) -> None:
     problem = random_problem(random.Random(seed))
     start, end = enclosures(problem.text)
     time, *cubics = problem.steps[0]
     assert end[:4, 2].max() < 1e-27 and end[4:, 2].max() < 1e-24
-    states = integrate(problem.states, problem.parameters, cubics, time)
-    for balls, at, after in ((start, [arb(x) for x in problem.states], 0.0), (end, states, time)):
-        efforts = [value_at(cubic, after) for cubic in cubics]
-        assert inside([*at, *outputs(at, problem.parameters, efforts)], balls)
+    for balls, at in ((start, 0.0), (end, time)):
+        assert inside(values_at(problem.states, problem.parameters, cubics, at), balls)
 
 
+@pytest.mark.usefixtures("precise")
 def test_uncertain_starts_and_parameters() -> None:
     """All corners of the starts, each with parameters at random ends, and points between."""
     radii, parameter_radii = (1e-3, 1e-3, 2e-3, 1e-3), (0.0, 1e-3, 0.0, 0.0, 1e-3, 0.0, 1e-3, 0.0)
@@ -133,9 +177,7 @@ def test_uncertain_starts_and_parameters() -> None:
             p + draw.choice((-0.999, 0.999)) * r
             for p, r in zip(PARAMETERS, parameter_radii, strict=True)
         ]
-        found = integrate(start, arm, cubics, 0.2)
-        efforts = [value_at(cubic, 0.2) for cubic in cubics]
-        assert inside([*found, *outputs(found, arm, efforts)], end)
+        assert inside(values_at(start, arm, cubics, 0.2), end)
 
 
 # ---- Certificates --------------------------------------------------------------------------------

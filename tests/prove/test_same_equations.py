@@ -24,11 +24,10 @@ from flint import arb, arb_series
 
 from rparm.expressions.expression import in_order
 from tests.prove.faults import COMPILE, Fault
-from tests.prove.problems import SOURCES
+from tests.prove.problems import SOURCES, motion_series
 from tests.support.paths import ROOT
 
 sys.path.insert(0, str(ROOT / "fmu"))
-import motion_series  # noqa: E402
 import operands  # noqa: E402
 from equations.graph import Graph, Value  # noqa: E402
 from plain_c.interpreter import Interpreter  # noqa: E402

@@ -235,7 +235,7 @@ def test_archives_that_grow(refuse: Callable[..., None], monkeypatch: pytest.Mon
 
 def test_a_system_whose_fmus_grow(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each within its limit: some commands unpack all of them."""
-    monkeypatch.setattr("rparm.systems.ssp.LARGEST_SYSTEM", SSP.stat().st_size // 2)
+    monkeypatch.setattr("rparm.systems.structure.LARGEST_SYSTEM", SSP.stat().st_size // 2)
     with pytest.raises(UserError, match="the FMUs up to component '.*' have more than"):
         ssp_opened(SSP)
 

@@ -159,26 +159,6 @@ def test_a_reference_cut_anywhere_is_refused(model: Path) -> None:
     comparison.load_reference(scenario, declared(MODEL))
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (b"\n\n", "expected a header"),
-        (b'"' + b"a" * 200_000 + b"\n", "line 1: not a header"),
-        (b'"time"\n' + b'"1\n' * 3, "line 2: expected numbers"),
-    ],
-)
-def test_a_reference_of_another_format(model: Path, content: bytes, message: str) -> None:
-    reference_file(model).write_bytes(content)
-    refused(lambda: read(model), message)
-
-
-def test_columns_exchanged(model: Path) -> None:
-    path = reference_file(model)
-    rows = [line.split(",") for line in path.read_text().splitlines()]
-    path.write_text("".join(",".join([row[1], row[0], *row[2:]]) + "\n" for row in rows))
-    refused(lambda: read(model), "line 1: expected a header whose first column is 'time'")
-
-
 # ---- archives ----------------------------------------------------------------------------------
 
 

@@ -1,9 +1,9 @@
-/* The events of the sampled form, one by one: their times, what each changes, which saved ones are
- * possible. test_controller_samples.py runs them in the FMU. */
+/* The events of the sampled form: the payload, rounding of their times, what is refused, which
+ * saved ones are possible. test_controller_samples.py runs them in the FMU, against the law in
+ * fractions. */
 #include "last_text.h"
 #include "rp_controller_events.h"
 
-#include <float.h>
 #include <math.h>
 #include <string.h>
 #include <unity.h>
@@ -41,33 +41,6 @@ void setUp(void) {
         p->Ki[i] = 1.0;
         p->limit[i] = 1e6;
         v.inputs.q_ref[i] = 1.0;
-    }
-}
-
-static void test_samples_and_efforts_alternate(void) {
-    v.parameters.sample_time = 0.25;
-    v.parameters.delay = 0.0625;
-    v.integral[0] = 3.0;
-    ASSERT_OK(begin(-1.0));
-    TEST_ASSERT_TRUE(effort() == 3.0 && v.integral[0] == 3.0);
-    for (int k = 1; k < 20; k++) {
-        TEST_ASSERT_TRUE(next_time() == -1.0 + 0.25 * k);
-        pass_event();
-        TEST_ASSERT_TRUE(effort() == 3.0 + 0.25 * (k - 1) && v.integral[0] == 3.0 + 0.25 * k);
-        TEST_ASSERT_TRUE(next_time() == -1.0 + 0.25 * k + 0.0625);
-        pass_event();
-        TEST_ASSERT_TRUE(effort() == 3.0 + 0.25 * k && v.integral[0] == 3.0 + 0.25 * k);
-        TEST_ASSERT_TRUE(v.dintegral[0] == 0.0);
-    }
-}
-
-static void test_without_delay_a_sample_takes_effect_at_once(void) {
-    v.parameters.sample_time = 0.25;
-    ASSERT_OK(begin(0.0));
-    for (int k = 1; k < 20; k++) {
-        TEST_ASSERT_TRUE(next_time() == 0.25 * k);
-        pass_event();
-        TEST_ASSERT_TRUE(effort() == 0.25 * k);
     }
 }
 
@@ -120,32 +93,6 @@ static void test_efforts_do_not_wait_longer_than_for_the_next_sample(void) {
     TEST_ASSERT_TRUE(count_late_sums(nextafter(0.1, 0.0), 1) > 10);
 }
 
-/* The time of a sample has one rounding error of a product and one of a sum, not one per sample. */
-static void test_times_do_not_drift(void) {
-    v.parameters.sample_time = 0.001;
-    ASSERT_OK(begin(100.0));
-    for (int k = 1; k <= 100000; k++) {
-        pass_event();
-    }
-    TEST_ASSERT_TRUE(fabs(next_time() - 200.001) <= 2.0 * DBL_EPSILON * 200.0);
-    v.samples.taken = v.samples.shown = 1e12;
-    TEST_ASSERT_TRUE(next_time() == 100.0 + 1e12 * 0.001);
-}
-
-static void test_between_events_nothing_changes(void) {
-    v.parameters.sample_time = 0.25;
-    ASSERT_OK(begin(0.0));
-    pass_event();
-    const struct rp_controller_values before = v;
-    v.inputs.q_ref[0] = 7.0;
-    v.payload_attached = 1;
-    const struct event no_event = {.t = 0.25};
-    ASSERT_OK(rp_controller_events.update(&v, &no_event));
-    TEST_ASSERT_EQUAL_MEMORY(&before.samples, &v.samples, sizeof v.samples);
-    TEST_ASSERT_TRUE(v.integral[0] == before.integral[0]);
-    TEST_ASSERT_TRUE(rp_controller_events.is_at_rest(&v));
-}
-
 static void test_the_continuous_form_has_no_events(void) {
     ASSERT_OK(begin(0.0));
     TEST_ASSERT_TRUE(next_time() == INFINITY);
@@ -153,13 +100,6 @@ static void test_the_continuous_form_has_no_events(void) {
     TEST_ASSERT_TRUE(rp_controller_events.modes_are_possible(&v, true));
     v.form = RP_CONTROLLER_SAMPLED;
     TEST_ASSERT_FALSE(rp_controller_events.modes_are_possible(&v, true));
-}
-
-static void test_a_start_without_room_for_samples_is_refused(void) {
-    v.parameters.sample_time = 1e-6;
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS, begin(1e12));
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS, begin(-1.2e6));
-    ASSERT_OK(begin(1e6)); // 2^-40 of it is below 1e-6
 }
 
 /* A sample that cannot be computed leaves all as it was. */

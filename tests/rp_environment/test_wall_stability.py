@@ -1,12 +1,9 @@
-"""Limits of the damping of a sampled wall: closed forms, and the FMUs of arm and wall in a loop."""
+"""Limits of the damping of a sampled wall: closed forms. tests/machine measures them with FMUs."""
 
 import math
 import re
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
-import numpy as np
 import pytest
 from rparm.models.machine.wall_limit import (
     AGE,
@@ -14,12 +11,9 @@ from rparm.models.machine.wall_limit import (
     exact_least_damping,
     growth,
     least_damping,
-    transition,
 )
 
-from tests.support.instances import Instance, LoadedFmu
 from tests.support.paths import ROOT
-from tests.support.rparm_project import FMUS
 
 ORDERS = tuple(AGE)
 INPUTS = ("held", "extrapolated")
@@ -29,7 +23,6 @@ each_case = pytest.mark.parametrize(("order", "inputs"), CASES)
 PAGE = ROOT / "models" / "machine" / "README.md"
 CONTACT = Contact(mass=1.6, stiffness=1e4)
 STEP = 1e-3  # s
-FORCE = 400.0  # N, presses the mass against the wall
 
 
 # ---- Closed forms --------------------------------------------------------------------------------
@@ -87,136 +80,3 @@ def test_figures_of_the_page() -> None:
     found = [least_damping(contact, 1e-3, *case) for case in (CASES[0], CASES[2], *CASES[1::2])]
     assert found == pytest.approx([15.0, 5.0, 0.125, 0.0083], rel=5e-3)
     assert "15, 5, 0.125 and 0.0083 N.s/m" in PAGE.read_text(encoding="utf-8")
-
-
-# ---- The FMUs ------------------------------------------------------------------------------------
-
-MOTION = ("ee_x", "ee_vx", "ee_y", "ee_vy", "ee_angle", "ee_rate")
-WRENCH = ("ee_fx", "ee_fy", "ee_mz")
-
-
-class Loop:
-    """Plant and wall, stepped as rparm/systems/master.py does, the plant first."""
-
-    def __init__(self, arm: Instance, wall: Instance, order: str, inputs: str) -> None:
-        self.arm, self.wall = arm, wall
-        self.jacobi, self.extrapolates = order == "jacobi", inputs == "extrapolated"
-        self.count = 0
-        self.arm_values, self.arm_slopes = self.read(arm, MOTION)
-        self.wall_values, self.wall_slopes = self.read(wall, WRENCH)
-
-    def read(self, instance: Instance, names: tuple[str, ...]) -> tuple[list[float], list[float]]:
-        slopes = [0.0] * len(names)
-        if self.extrapolates:
-            references = [instance.loaded.references[name] for name in names]
-            slopes = instance.fmi.getRealOutputDerivatives(references, [1] * len(names))
-        return instance.get(*names), list(slopes)
-
-    def move(
-        self,
-        instance: Instance,
-        names: tuple[str, ...],
-        values: list[float],
-        slopes: list[float],
-        ahead: bool = False,
-    ) -> None:
-        """Step an instance with lines of these values and slopes, at the end if `ahead`."""
-        back = STEP if ahead else 0.0
-        starts = [x - back * dx for x, dx in zip(values, slopes, strict=True)]
-        instance.set(**dict(zip(names, starts, strict=True)))
-        if self.extrapolates:
-            rates = {name: [dx] for name, dx in zip(names, slopes, strict=True)}
-            instance.set_input_derivatives(**rates)
-        instance.step(self.count * STEP, STEP)
-
-    def step(self) -> None:
-        """From one communication point to the next."""
-        before = self.arm_values, self.arm_slopes
-        self.move(self.arm, WRENCH, self.wall_values, self.wall_slopes)
-        self.arm_values, self.arm_slopes = self.read(self.arm, MOTION)
-        motion = before if self.jacobi else (self.arm_values, self.arm_slopes)
-        self.move(self.wall, MOTION, *motion, ahead=not self.jacobi)
-        self.wall_values, self.wall_slopes = self.read(self.wall, WRENCH)
-        self.count += 1
-
-
-@pytest.fixture(scope="module")
-def units(tmp_path_factory: pytest.TempPathFactory) -> tuple[LoadedFmu, LoadedFmu]:
-    folder: Path = tmp_path_factory.mktemp("stability")
-    return tuple(LoadedFmu(FMUS[name], folder / name) for name in ("rp_plant", "rp_environment"))
-
-
-def motion(
-    units: tuple[LoadedFmu, LoadedFmu], damping: float, order: str, inputs: str, count: int
-) -> Iterator[np.ndarray]:
-    """Deviations of the loop from its equilibrium: depth, velocity, force, slope, acceleration.
-
-    The slide at q1 = 0, a = 0, g = 0 is a mass m2. It starts 1 mm deeper, with the force of the
-    equilibrium.
-    """
-    equilibrium = FORCE / CONTACT.stiffness
-    start = {"a": 0.0, "g": 0.0, "m2": CONTACT.mass, "q2": 1e-3, "f2": FORCE}
-    # the surface is where the tip is at l1 + q2 = 0.5 - equilibrium
-    wall = {"stiffness": CONTACT.stiffness, "damping": damping, "angle": math.pi}
-    wall |= {"position": equilibrium - 0.5, "ee_x": 0.5}
-    with Instance(units[0]) as arm, Instance(units[1]) as surface:
-        arm.initialize(tolerance=1e-12, ee_fx=-FORCE, **start)
-        loop = Loop(arm, surface.initialize(**wall), order, inputs)
-        for _ in range(count):
-            yield np.array(
-                [
-                    loop.arm_values[0] - 0.5,
-                    loop.arm_values[1],
-                    -loop.wall_values[0] - FORCE,
-                    -loop.wall_slopes[0],
-                    loop.arm_slopes[1],
-                ]
-            )
-            loop.step()
-
-
-# places of the state of `transition` in the rows of `motion`
-STATE = {
-    ("jacobi", "held"): [0, 1, 2],
-    ("gauss_seidel", "held"): [0, 1],
-    ("jacobi", "extrapolated"): [0, 1, 4, 2, 3],
-    ("gauss_seidel", "extrapolated"): [0, 1, 2, 3],
-}
-
-
-@each_case
-def test_every_step_of_the_fmus_is_that_of_the_matrix(
-    units: tuple[LoadedFmu, LoadedFmu], order: str, inputs: str
-) -> None:
-    damping = 1.5 * least_damping(CONTACT, STEP, order, inputs)
-    matrix = transition(replace(CONTACT, damping=damping), STEP, order, inputs)
-    rows = np.array(list(motion(units, damping, order, inputs, 60)))[:, STATE[order, inputs]]
-    # the first values of the wall belong to no step
-    expected = rows[2:-1] @ matrix.T
-    scale = np.abs(rows).max(axis=0)
-    assert (scale > 0).all()
-    assert (np.abs(rows[3:] - expected) <= 1e-9 * scale).all()
-
-
-def fitted(depth: np.ndarray) -> complex:
-    """Eigenvalue z of depth_n+2 = 2 Re(z) depth_n+1 - |z|^2 depth_n."""
-    columns = np.column_stack([depth[1:-1], depth[:-2]])
-    (twice_real, minus_square), *_ = np.linalg.lstsq(columns, depth[2:], rcond=None)
-    return complex(twice_real / 2, math.sqrt(-minus_square - twice_real**2 / 4))
-
-
-@each_case
-def test_limit_of_the_fmus_is_that_of_the_theory(
-    units: tuple[LoadedFmu, LoadedFmu], order: str, inputs: str
-) -> None:
-    """Between two dampings, |z|^2 of the motion passes 1."""
-    theory = least_damping(CONTACT, STEP, order, inputs)
-    products = []
-    for share in (0.9, 1.1):
-        rows = np.array(list(motion(units, share * theory, order, inputs, 200)))
-        products.append(abs(fitted(rows[20:, 0])) ** 2)
-    assert products[0] > 1.0 > products[1]
-    measured = theory * (0.9 + 0.2 * (products[0] - 1) / (products[0] - products[1]))
-    assert measured == pytest.approx(theory, rel=0.02)
-    exact = exact_least_damping(CONTACT, STEP, order, inputs)
-    assert measured == pytest.approx(exact, rel=1e-3)

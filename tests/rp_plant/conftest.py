@@ -10,15 +10,6 @@ from tests.support.rparm_project import fmi3_fmu
 
 
 @pytest.fixture(scope="session")
-def program(fmu: Path) -> Path:
-    """The program plant_rows of the same build as the FMU."""
-    path = fmu.parent / "tests" / "plant_rows"
-    if not path.is_file():
-        pytest.fail(f"{path}: no such file, cmake --build builds it")
-    return path
-
-
-@pytest.fixture(scope="session")
 def fmi2_plant(fmu: Path) -> Iterator[Fmu]:
     """RPPlant of FMI 2.0."""
     with Fmu(fmu.with_name("RPPlant.fmu")) as opened:

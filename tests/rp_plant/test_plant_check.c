@@ -170,7 +170,7 @@ static void test_start_outside_the_stops(void) {
     assert_accepted();
 }
 
-/* While it runs a limit may pass the joint: test_plant_events.c. */
+/* While it runs a limit may pass the joint: test_plant_stops.c. */
 static void test_limit_past_a_joint_that_runs(void) {
     plant_test_update(&v, -1);
     v.q[1] = 2.5;

@@ -319,20 +319,6 @@ static void test_when_events_are_possible(void) {
     TEST_ASSERT_TRUE(events->are_possible(&v));
 }
 
-static void test_places_in_the_value_structure(void) {
-    TEST_ASSERT_EQUAL_size_t(RP_PLANT_INDICATORS, events->indicator_count);
-    TEST_ASSERT_EQUAL_size_t(offsetof(struct rp_plant_values, modes), events->modes.offset);
-    TEST_ASSERT_EQUAL_size_t(5 * sizeof(int), events->modes.size);
-    TEST_ASSERT_EQUAL_size_t(offsetof(struct rp_plant_values, sums),
-                             events->discrete_states.offset);
-    TEST_ASSERT_EQUAL_size_t(4 * sizeof(double), events->discrete_states.size);
-    TEST_ASSERT_EQUAL_size_t(offsetof(struct rp_plant_values, payload_attached),
-                             events->discrete_inputs.offset);
-    TEST_ASSERT_EQUAL_size_t(sizeof(int), events->discrete_inputs.size);
-    TEST_ASSERT_EQUAL_STRING("slip2_backward", events->indicator_names[BACKWARD2]);
-    TEST_ASSERT_EQUAL_STRING("stop2_push", events->indicator_names[PUSH2]);
-}
-
 static void test_modes_that_exist(void) {
     for (int mode = -2; mode <= 3; mode++) {
         const bool is_joint_mode = mode >= -1 && mode <= 2;

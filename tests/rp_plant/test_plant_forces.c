@@ -1,5 +1,5 @@
-/* The smooth part: friction law, balance of power, rates of the reactions. test_plant_lagrangian.py
- * compares motion and joint loads with the Lagrangian. */
+/* The smooth part: friction law, rates of the reactions. fmu/test_plant_fmu.py compares motion,
+ * energies and joint loads with the Lagrangian. */
 #include "last_text.h"
 #include "plant_test_support.h"
 #include "rp_plant_equations.h"
@@ -104,54 +104,6 @@ static void test_sliding_friction_is_smooth_past_zero(void) {
         for (int i = 0; i < 2; i++) {
             ASSERT_CLOSE(motion[0].ddq[i], motion[1].ddq[i], 1e-9 * (1 + fabs(motion[0].ddq[i])));
         }
-    }
-}
-
-/* ---- Motion --------------------------------------------------------------------------------- */
-
-/* The curve on which the state moves, by which propagate gives derivatives by time. */
-static void along_the_motion(struct rp_plant_values *first) {
-    memset(first, 0, sizeof *first);
-    memcpy(first->q, v.dq, sizeof v.dq);
-    memcpy(first->dq, v.ddq, sizeof v.ddq);
-    ASSERT_OK(rp_plant_model.propagate(&v, 3.0, 0.0, first, NULL));
-}
-
-/* (K + P)' = power of the drives and the wrench - what friction takes; stuck joints and closed
- * stops have no power. */
-static void test_power_is_balanced(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        struct rp_plant_values first;
-        next_sample();
-        plant_test_outputs(&v);
-        along_the_motion(&first);
-        const double *w = v.inputs.wrench;
-        const double wrench_power =
-            w[0] * v.ee_velocity[0] + w[1] * v.ee_velocity[1] + w[2] * v.dq[0];
-        const double scale = fabs(first.kinetic_energy) + fabs(first.potential_energy) +
-                             fabs(v.actuator_power) + fabs(wrench_power) + 1000.0;
-        const double expected = v.actuator_power + wrench_power - v.friction_power;
-        ASSERT_CLOSE(expected, first.total_energy, 1e-12 * scale);
-        TEST_ASSERT_TRUE(v.modes.joint[0] != RP_PLANT_STUCK || v.modes.joint[1] != RP_PLANT_STUCK ||
-                         expected == 0.0);
-    }
-}
-
-static void test_end_effector_moves_as_its_derivatives_say(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        struct rp_plant_values first;
-        next_sample();
-        plant_test_outputs(&v);
-        along_the_motion(&first);
-        const double scale = 10.0 * (1.0 + fabs(v.ddq[0]) + fabs(v.ddq[1])) + 1000.0;
-        for (int i = 0; i < 2; i++) {
-            ASSERT_CLOSE(first.ee_position[i], v.ee_velocity[i], EPS * scale);
-            ASSERT_CLOSE(first.ee_velocity[i], v.ee_acceleration[i], 4 * EPS * scale);
-        }
-        ASSERT_SAME(v.q[0], v.ee_angle);
-        ASSERT_SAME(v.dq[0], v.ee_rate);
-        ASSERT_SAME(v.ee_rate, first.ee_angle);
-        ASSERT_SAME(v.ddq[0], first.ee_rate);
     }
 }
 

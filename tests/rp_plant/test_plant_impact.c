@@ -1,4 +1,5 @@
-/* Impacts at one stop and at two: the law, momentum, energy. */
+/* Velocities that jump: impacts at one stop and at two by the law, momentum and energy; the grasp
+ * of a payload at rest by momenta and energy. */
 #include "plant_test_support.h"
 #include "rp_plant_impact.h"
 #include "unity.h"
@@ -15,6 +16,7 @@ static struct rp_plant_inertia inertia;
 static struct rp_plant_contacts contacts;
 static struct rp_plant_impact impact;
 static double before[2];
+static struct rp_plant_values v;
 
 void setUp(void) {
     random_source.state = 43;
@@ -166,4 +168,58 @@ static void test_a_joint_at_rest_on_its_stop(void) {
     ASSERT_SAME(-1.5, impact.impulse[0]);
     ASSERT_SAME(1.5, impact.impulse[1]);
     ASSERT_SAME(0.375, impact.loss);
+}
+
+/* ---- Grasp ---------------------------------------------------------------------------------- */
+
+static void test_momenta_of_the_joints_are_kept(void) {
+    for (int n = 0; n < 10 * RP_TEST_SAMPLES; n++) {
+        plant_test_random_plant(&random_source, &v);
+        double after[2];
+        struct rp_plant_inertia without;
+        struct rp_plant_inertia with;
+        const double loss = rp_plant_grasp_at_rest(&v.parameters, v.q, v.dq, after);
+        rp_plant_inertia(&v.parameters, false, v.q[1], &without);
+        rp_plant_inertia(&v.parameters, true, v.q[1], &with);
+        const double condition = with.D[0][0] * with.D[1][1] / with.determinant;
+        for (int i = 0; i < 2; i++) {
+            double kept = 0.0;
+            double scale = 0.0;
+            for (int j = 0; j < 2; j++) {
+                kept += with.D[i][j] * after[j] - without.D[i][j] * v.dq[j];
+                scale += fabs(with.D[i][j]) * (fabs(after[j]) + fabs(v.dq[j]));
+            }
+            ASSERT_CLOSE(0.0, kept, 32 * EPS * condition * scale);
+        }
+        const double before_energy = rp_plant_kinetic_energy(&v.parameters, false, v.q, v.dq);
+        const double after_energy = rp_plant_kinetic_energy(&v.parameters, true, v.q, after);
+        TEST_ASSERT_TRUE(loss >= 0.0);
+        const double scale = with.D[0][0] * v.dq[0] * v.dq[0] + with.D[1][1] * v.dq[1] * v.dq[1];
+        ASSERT_CLOSE(before_energy - after_energy, loss, 64 * EPS * condition * scale);
+    }
+}
+
+/* By choice; before the first event, as the payload then belongs to link 2; and where parameters
+ * change while it is attached, as those of the arm. */
+static void test_where_velocities_stay(void) {
+    const struct {
+        int grasp, mode;
+        double added; /* kg */
+    } cases[] = {{RP_PLANT_KEEP_VELOCITY, RP_PLANT_RELEASED, 0.0},
+                 {RP_PLANT_AT_REST, RP_PLANT_UNDECIDED, 0.0},
+                 {RP_PLANT_AT_REST, RP_PLANT_ATTACHED, 2.0}};
+    for (size_t n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        plant_test_random_plant(&random_source, &v);
+        v.parameters.grasp = cases[n].grasp;
+        v.modes.payload = cases[n].mode;
+        v.payload_attached = 1;
+        v.parameters.payload_mass += cases[n].added;
+        v.parameters.payload_x += 0.125 * cases[n].added;
+        const struct rp_plant_values kept = v;
+        plant_test_update(&v, -1);
+        TEST_ASSERT_EQUAL_INT(RP_PLANT_ATTACHED, v.modes.payload);
+        ASSERT_SAME(kept.dq[0], v.dq[0]);
+        ASSERT_SAME(kept.dq[1], v.dq[1]);
+        ASSERT_SAME(0.0, v.sums.grasp_loss);
+    }
 }

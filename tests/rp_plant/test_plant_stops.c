@@ -1,11 +1,14 @@
-/* Rigid stops: impacts, their end, rest and lift-off, limits that move. test_plant_impact.c has the
- * law of impact. */
+/* Stops: how an update changes what meets them. Rigid ones: the end of bouncing, limits that move,
+ * impacts in turn; test_plant_impact.c has their law. Compliant ones: where contacts begin and end.
+ * Forces and energies: fmu/test_plant_fmu.py, the references, the random motions. */
 #include "plant_test_support.h"
+#include "rp_plant_contact.h"
 #include "unity.h"
 
 #include <math.h>
+#include <stdlib.h>
 
-enum { LOWER2 = 6, FORWARD2 = 4, BACKWARD2 = 5 }; /* indicators of the slide */
+enum { LOWER2 = 6, UPPER2 = 7, PUSH2 = 9 }; /* indicators of the slide */
 
 static struct rp_plant_values v;
 
@@ -16,6 +19,8 @@ void setUp(void) {
     v.parameters.coulomb_friction[0] = v.parameters.coulomb_friction[1] = 3.0;
     plant_test_update(&v, -1);
 }
+
+/* ---- Rigid stops ---------------------------------------------------------------------------- */
 
 static void set_stops(int joint, double lower, double upper, double restitution) {
     v.parameters.stops[joint] = RP_PLANT_STOPS_RIGID;
@@ -44,20 +49,6 @@ static void set_falling_slide(double restitution, double height) {
     v.modes.joint[1] = RP_PLANT_FREE;
 }
 
-static void test_an_impact_reverses_the_velocity_and_puts_the_joint_on_its_stop(void) {
-    set_falling_slide(0.75, 0.5);
-    const double before = v.dq[1];
-    plant_test_update(&v, LOWER2);
-    assert_modes(RP_PLANT_STUCK, RP_PLANT_FREE);
-    ASSERT_SAME(0.25, v.q[1]);
-    ASSERT_SAME(-0.75 * before, v.dq[1]);
-    const double m2 = v.parameters.arm.m2;
-    const double g = v.parameters.arm.g;
-    ASSERT_CLOSE(-1.75 * m2 * before, v.sums.stop_impulse[1], 1e-15 * fabs(before) * 4);
-    ASSERT_CLOSE((1.0 - 0.75 * 0.75) * m2 * g * 0.5, v.sums.impact_loss, 1e-14);
-    ASSERT_SAME(0.0, v.sums.stop_impulse[0]);
-}
-
 static void test_bouncing_ends_where_a_bounce_is_below_the_tolerance(void) {
     // absolute tolerance 1e-10 (plant_test_update), heights after the impact
     for (int below = 0; below < 2; below++) {
@@ -67,28 +58,6 @@ static void test_bouncing_ends_where_a_bounce_is_below_the_tolerance(void) {
         assert_modes(RP_PLANT_STUCK, below ? RP_PLANT_STUCK : RP_PLANT_FREE);
         TEST_ASSERT_TRUE(below ? v.dq[1] == 0.0 : v.dq[1] > 0.0);
     }
-}
-
-static void test_a_slide_on_its_stop_is_carried_until_it_is_lifted(void) {
-    set_falling_slide(0.0, 0.5);
-    plant_test_update(&v, LOWER2);
-    assert_modes(RP_PLANT_STUCK, RP_PLANT_STUCK);
-    plant_test_outputs(&v);
-    const double weight = v.parameters.arm.m2 * v.parameters.arm.g;
-    ASSERT_CLOSE(weight, v.stop_force[1], 1e-14 * weight);
-    ASSERT_SAME(0.0, v.friction[1]);
-    ASSERT_SAME(1.0, v.indicators[BACKWARD2]);
-    ASSERT_CLOSE(weight, v.indicators[FORWARD2], 1e-14 * weight);
-
-    v.inputs.tau[1] = weight;
-    const double du[PLANT_INPUTS] = {0.0, 1.0};
-    bool triggered[RP_PLANT_INDICATORS] = {false};
-    triggered[FORWARD2] = true;
-    plant_test_update_with(&v, triggered, du);
-    assert_modes(RP_PLANT_STUCK, RP_PLANT_FREE);
-    plant_test_outputs(&v);
-    ASSERT_SAME(0.0, v.stop_force[1]);
-    ASSERT_SAME(0.0, v.indicators[LOWER2]);
 }
 
 static void test_a_joint_on_its_stop_at_the_start(void) {
@@ -137,24 +106,6 @@ static void test_a_stop_that_is_moved_away_at_the_event_is_not_met(void) {
     ASSERT_SAME(q2, v.q[1]);
     ASSERT_SAME(before, v.dq[1]);
     ASSERT_SAME(0.0, v.sums.impact_loss);
-}
-
-/* The same impact twice: twice the impulse and the loss, m2 v (1 + e) and m2 v^2 (1 - e^2) / 2. */
-static void test_impulses_and_losses_add_up(void) {
-    const double e = 0.5;
-    set_falling_slide(e, 0.1);
-    const struct rp_plant_values falling = v;
-    const double speed = -v.dq[1];
-    for (int count = 1; count <= 2; count++) {
-        v.q[1] = falling.q[1];
-        v.dq[1] = falling.dq[1];
-        plant_test_update(&v, LOWER2);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-14, count * v.parameters.arm.m2 * speed * (1.0 + e),
-                                  v.sums.stop_impulse[1]);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-14,
-                                  count * v.parameters.arm.m2 * speed * speed * (1.0 - e * e) / 2.0,
-                                  v.sums.impact_loss);
-    }
 }
 
 static void test_grazing_a_stop_changes_no_velocity(void) {
@@ -215,4 +166,180 @@ static void test_impacts_in_turn_end_with_both_joints_leaving(void) {
         in_turn += leaving && v.sums.stop_impulse[1] != 0.0;
     }
     TEST_ASSERT_GREATER_THAN_INT(100, in_turn);
+}
+
+/* ---- Compliant stops ------------------------------------------------------------------------ */
+
+static const double stiffness = 1000.0;
+static const double damping = 0.5;
+
+/* A slide without friction between -1 and 1, joint 1 held, no gravity, no offset; the first event
+ * has been. */
+static void set_slide_between_compliant_stops(void) {
+    plant_test_start(&v);
+    v.parameters.arm.g = v.parameters.arm.a = 0.0;
+    v.parameters.coulomb_friction[0] = 1000.0;
+    v.parameters.stops[1] = RP_PLANT_STOPS_COMPLIANT;
+    v.parameters.lower[1] = -1.0;
+    v.parameters.upper[1] = 1.0;
+    v.parameters.stop_stiffness[1] = stiffness;
+    v.parameters.stop_damping[1] = damping;
+    plant_test_update(&v, -1);
+}
+
+static void assert_contact(int expected) {
+    TEST_ASSERT_EQUAL_INT(expected, v.modes.contact[1]);
+    TEST_ASSERT_EQUAL_INT(RP_PLANT_APART, v.modes.contact[0]);
+}
+
+static void put(double q2, double dq2) {
+    v.q[1] = q2;
+    v.dq[1] = dq2;
+}
+
+static void test_a_contact_begins_and_ends_on_the_limit(void) {
+    for (int side = 1; side >= -1; side -= 2) {
+        set_slide_between_compliant_stops();
+        const int indicator = side > 0 ? LOWER2 : UPPER2;
+        put(nextafter(-side, 0.0), -0.3 * side);
+        plant_test_update(&v, indicator);
+        assert_contact(side * RP_PLANT_PUSHED);
+        TEST_ASSERT_TRUE(v.q[1] == -side && v.dq[1] == -0.3 * side);
+
+        put(-side * (1.0 + 1e-12), 0.2 * side);
+        plant_test_update(&v, indicator);
+        assert_contact(RP_PLANT_APART);
+        TEST_ASSERT_TRUE(v.q[1] == -side && v.dq[1] == 0.2 * side);
+        TEST_ASSERT_TRUE(v.sums.stop_impulse[1] == 0.0 && v.sums.impact_loss == 0.0);
+    }
+}
+
+static void test_contacts_follow_from_the_state_where_nothing_has_triggered(void) {
+    set_slide_between_compliant_stops();
+    const struct {
+        double q, dq;
+        int contact;
+    } cases[] = {
+        {0.5, 9.0, 0},   {-1.25, 0.0, 1},  {-1.25, 1.9, 1},  {-1.25, 2.1, 2},  {-1.0, 1.0, 0},
+        {-1.0, -1.0, 1}, {1.25, -1.9, -1}, {1.25, -2.1, -2}, {1.0, 0.001, -1}, {1.0, -9.0, 0},
+    };
+    for (size_t n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        put(cases[n].q, cases[n].dq);
+        plant_test_update(&v, -1);
+        assert_contact(cases[n].contact);
+        TEST_ASSERT_TRUE(v.q[1] == cases[n].q && v.dq[1] == cases[n].dq);
+    }
+}
+
+static void test_at_rest_on_the_limit_the_force_decides(void) {
+    set_slide_between_compliant_stops();
+    for (int direction = -1; direction <= 1; direction++) {
+        put(-1.0, 0.0);
+        v.inputs.tau[1] = 2.0 * direction;
+        plant_test_update(&v, -1);
+        assert_contact(direction < 0 ? RP_PLANT_PUSHED : RP_PLANT_APART);
+        TEST_ASSERT_EQUAL_INT(RP_PLANT_FREE, v.modes.joint[1]);
+    }
+    // friction that holds the joint leaves it apart, less of it lets it go into the stop
+    v.inputs.tau[1] = -2.0;
+    v.parameters.coulomb_friction[1] = 3.0;
+    plant_test_update(&v, -1);
+    assert_contact(RP_PLANT_APART);
+    TEST_ASSERT_EQUAL_INT(RP_PLANT_STUCK, v.modes.joint[1]);
+    v.parameters.coulomb_friction[1] = 1.0;
+    plant_test_update(&v, -1);
+    assert_contact(RP_PLANT_PUSHED);
+    TEST_ASSERT_EQUAL_INT(RP_PLANT_BACKWARD, v.modes.joint[1]);
+}
+
+/* Where it breaks away, the force equals the friction and gives no acceleration: the mode tells. */
+static void test_a_joint_that_breaks_away_on_the_limit_goes_where_its_mode_says(void) {
+    set_slide_between_compliant_stops();
+    static const struct {
+        int mode, contact;
+    } cases[] = {{RP_PLANT_BACKWARD, RP_PLANT_PUSHED}, {RP_PLANT_FORWARD, RP_PLANT_APART}};
+    v.parameters.coulomb_friction[1] = 2.0;
+    for (int i = 0; i < 2; i++) {
+        struct rp_plant_modes modes = v.modes;
+        put(-1.0, 0.0);
+        v.inputs.tau[1] = 2.0 * cases[i].mode;
+        modes.joint[1] = cases[i].mode;
+        rp_plant_begin_contacts(&v.parameters, v.q, v.dq, &v.inputs, &modes);
+        TEST_ASSERT_EQUAL_INT(cases[i].contact, modes.contact[1]);
+    }
+}
+
+/* The velocity 1 / c is written to the bit, so that the next search begins at 0. */
+static void test_a_stop_lets_go_and_pushes_again(void) {
+    set_slide_between_compliant_stops();
+    put(-1.25, 1.0);
+    plant_test_update(&v, -1);
+    assert_contact(RP_PLANT_PUSHED);
+    put(-1.125, 2.0 - 1e-13);
+    plant_test_update(&v, PUSH2);
+    assert_contact(RP_PLANT_LET_GO);
+    TEST_ASSERT_TRUE(v.dq[1] == 1.0 / damping);
+    plant_test_update(&v, -1);
+    assert_contact(RP_PLANT_LET_GO);
+
+    put(-1.0625, 2.0 + 1e-13);
+    plant_test_update(&v, PUSH2);
+    assert_contact(RP_PLANT_PUSHED);
+    TEST_ASSERT_TRUE(v.dq[1] == 1.0 / damping);
+    plant_test_outputs(&v);
+    TEST_ASSERT_TRUE(v.stop_force[1] == 0.0 && v.indicators[PUSH2] == 0.0);
+}
+
+/* Undamped stops let nothing go, however fast the joint is. */
+static void test_without_damping_the_stop_always_pushes(void) {
+    set_slide_between_compliant_stops();
+    v.parameters.stop_damping[1] = 0.0;
+    put(-1.25, 1e6);
+    plant_test_update(&v, -1);
+    assert_contact(RP_PLANT_PUSHED);
+    plant_test_outputs(&v);
+    ASSERT_SAME(0.25 * stiffness, v.stop_force[1]);
+    ASSERT_SAME(1.0, v.indicators[PUSH2]);
+}
+
+static void test_stops_that_are_switched_off_or_moved(void) {
+    set_slide_between_compliant_stops();
+    put(-1.25, 0.0);
+    plant_test_update(&v, -1);
+    v.parameters.lower[1] = -2.0;
+    plant_test_update(&v, -1);
+    assert_contact(RP_PLANT_APART);
+    v.parameters.upper[1] = -1.5;
+    plant_test_update(&v, -1);
+    assert_contact(-RP_PLANT_PUSHED);
+    v.parameters.stops[1] = RP_PLANT_STOPS_NONE;
+    plant_test_outputs(&v);
+    TEST_ASSERT_TRUE(v.stop_force[1] == 0.0 && v.ddq[1] == 0.0);
+    plant_test_update(&v, -1);
+    assert_contact(RP_PLANT_APART);
+    TEST_ASSERT_TRUE(v.q[1] == -1.25);
+}
+
+static void test_contacts_that_do_not_fit_the_state_are_impossible(void) {
+    set_slide_between_compliant_stops();
+    const struct {
+        double q, dq;
+        int contact;
+    } cases[] = {{0.0, 1.0, 0},   {-1.0, 1.0, 0},  {-1.25, 1.0, 1},
+                 {-1.25, 2.5, 2}, {1.25, 0.0, -1}, {1.25, -2.5, -2}};
+    const struct model_events *events = rp_plant_model.events;
+    for (size_t n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        put(cases[n].q, cases[n].dq);
+        plant_test_update(&v, -1);
+        for (int contact = -3; contact <= 3; contact++) {
+            v.modes.contact[1] = contact;
+            const bool could_be =
+                contact == cases[n].contact || (cases[n].q == -1.0 && contact == RP_PLANT_PUSHED);
+            TEST_ASSERT_EQUAL_INT(could_be, events->modes_are_possible(&v, true));
+            TEST_ASSERT_EQUAL_INT(abs(contact) < 3, events->modes_are_possible(&v, false));
+        }
+        v.modes.contact[1] = cases[n].contact;
+    }
+    v.modes.contact[0] = RP_PLANT_PUSHED;
+    TEST_ASSERT_FALSE(events->modes_are_possible(&v, true));
 }

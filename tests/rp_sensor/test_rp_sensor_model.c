@@ -1,4 +1,6 @@
-/* The sensor as the instance runs it: ticks, latency, what is shown, which modes are refused. */
+/* The sensor as the instance runs it: what is shown at the start and beyond all counts, which modes
+ * are refused. test_sensor_ticks.py compares samples, latency and noise with a sensor in fractions,
+ * test_rp_sensor_masters.c the times of ticks with whole numbers. */
 #include "last_text.h"
 #include "model_test.h"
 #include "rp_sensor_model.h"
@@ -38,66 +40,7 @@ static void assert_shown(int counts1, int counts2) {
     TEST_ASSERT_EQUAL_DOUBLE(counts2 * 0.5, v.q_measured[1]);
 }
 
-/* ---- Ticks ---------------------------------------------------------------------------------- */
-
-/* The time is that of an integer times the sample time, rounded twice, not a sum of many. */
-static void test_times_of_ticks_do_not_drift(void) {
-    v.parameters.sample_time = 0.1;
-    start(3.7);
-    for (int k = 1; k <= 100000; k++) {
-        TEST_ASSERT_EQUAL_DOUBLE(3.7 + k * 0.1, events->next_time(&v));
-        tick();
-    }
-}
-
-static void test_each_tick_samples_its_inputs(void) {
-    v.q[0] = 1.0;
-    v.q[1] = -3.0;
-    start(0.0);
-    assert_shown(4, -6);
-    for (int k = 1; k < 500; k++) {
-        v.q[0] = 0.25 * k * k;
-        v.q[1] = -0.5 * k;
-        tick();
-        assert_shown(k * k, -k);
-        const double expected =
-            k == 1 ? (1.0 - 4.0) * 0.25 / 0.001 : (2.0 * k - 1.0) * 0.25 / 0.001;
-        TEST_ASSERT_EQUAL_DOUBLE(expected, v.dq_measured[0]);
-        TEST_ASSERT_EQUAL_DOUBLE(k == 1 ? 5.0 * 0.5 / 0.001 : -0.5 / 0.001, v.dq_measured[1]);
-    }
-}
-
-static void test_what_is_no_tick_changes_nothing(void) {
-    v.q[0] = 1.0;
-    start(0.0);
-    tick();
-    const struct rp_sensor_values before = v;
-    v.q[0] = 2.0;
-    ASSERT_OK(update(0.0015, false));
-    TEST_ASSERT_EQUAL_MEMORY(before.samples, v.samples, sizeof v.samples);
-    TEST_ASSERT_EQUAL_DOUBLE(before.ticks, v.ticks);
-    TEST_ASSERT_EQUAL_DOUBLE(before.start, v.start);
-    assert_shown(4, 0);
-}
-
-static void test_each_sample_is_shown_after_the_latency(void) {
-    for (int latency = 0; latency <= RP_SENSOR_LATENCY_MAX; latency++) {
-        setUp();
-        v.parameters.latency = latency;
-        v.q[0] = 0.25 * 7;
-        start(0.0);
-        assert_shown(7, 0);
-        TEST_ASSERT_EQUAL_DOUBLE(0.0, v.dq_measured[0]);
-        for (int k = 1; k < 300; k++) {
-            v.q[0] = 0.25 * (7 + k * k);
-            tick();
-            const int of = k > latency ? k - latency : 0;
-            const int step = k > latency ? 2 * of - 1 : 0;
-            assert_shown(7 + of * of, 0);
-            TEST_ASSERT_EQUAL_DOUBLE(step * 0.25 / 0.001, v.dq_measured[0]);
-        }
-    }
-}
+/* ---- Samples -------------------------------------------------------------------------------- */
 
 /* Before the initialization ends outputs are those that the start will show. */
 static void test_outputs_during_initialization(void) {
@@ -112,18 +55,6 @@ static void test_outputs_during_initialization(void) {
         assert_shown(expected, 0);
         TEST_ASSERT_EQUAL_DOUBLE(before.dq_measured[0], v.dq_measured[0]);
         v = before;
-    }
-}
-
-static void test_noise_is_that_of_seed_joint_and_tick(void) {
-    v.parameters.noise[0] = 100.0;
-    v.parameters.noise[1] = 30.0;
-    v.parameters.seed = -5;
-    start(0.0);
-    for (uint64_t k = 0; k < 200; k++) {
-        assert_shown(rp_sensor_count(100.0 * rp_sensor_noise(-5, 0, k), 0.25),
-                     rp_sensor_count(30.0 * rp_sensor_noise(-5, 1, k), 0.5));
-        tick();
     }
 }
 

@@ -1,5 +1,6 @@
 /* The reference motions as the instance sees them: the payload, what is refused.
- * Derivatives by parameters are compared with 40 digits in test_trajectory.py. */
+ * test_trajectory_payload.py has grasp and release. Derivatives by parameters are compared with 40
+ * digits in test_trajectory.py. */
 #include "last_text.h"
 #include "model_test.h"
 #include "rp_trajectory_example.h"
@@ -21,60 +22,27 @@ void setUp(void) {
 
 /* ---- The payload ---------------------------------------------------------------------------- */
 
-/* Before initialization ends, from the time itself. */
-static void test_the_payload_is_attached_from_grasp_to_release(void) {
+static void test_what_comes_next_after_a_start(void) {
+    const struct model_events *events = rp_trajectory_model.events;
+    const struct {
+        double release, start, next;
+    } cases[] = {{2.5, 0.0, 1.25}, {2.5, 1.25, 2.5}, {2.5, 2.5, INFINITY}, {1.25, 0.0, INFINITY}};
     v.parameters.grasp_time = 1.25;
-    v.parameters.release_time = 2.5;
-    const double times[] = {-1.0, 1.2499, 1.25, 2.4999, 2.5, 1e9};
-    for (int i = 0; i < 6; i++) {
-        ASSERT_OK(rp_trajectory_model.outputs(&v, times[i]));
-        TEST_ASSERT_EQUAL_INT(i == 2 || i == 3, v.payload_attached);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const struct event end_of_initialization = {.t = cases[i].start};
+        v.parameters.release_time = cases[i].release;
+        v.payload = RP_TRAJECTORY_UNDECIDED;
+        ASSERT_OK(events->update(&v, &end_of_initialization));
+        TEST_ASSERT_TRUE(events->next_time(&v) == cases[i].next);
+        TEST_ASSERT_TRUE(events->modes_are_possible(&v, true));
+        ASSERT_OK(rp_trajectory_model.outputs(&v, 0.0));
+        TEST_ASSERT_EQUAL_INT(cases[i].next == 2.5, v.payload_attached);
     }
-    v.parameters.release_time = 1.25;
-    ASSERT_OK(rp_trajectory_model.outputs(&v, 1.25));
-    TEST_ASSERT_EQUAL_INT(0, v.payload_attached);
-}
-
-static void begin_at(double t) {
-    const struct event end_of_initialization = {.t = t};
-    v.payload = RP_TRAJECTORY_UNDECIDED;
-    ASSERT_OK(rp_trajectory_model.events->update(&v, &end_of_initialization));
-}
-
-static void assert_next(double expected_time, int expected_payload) {
-    TEST_ASSERT_TRUE(rp_trajectory_model.events->next_time(&v) == expected_time);
-    TEST_ASSERT_TRUE(rp_trajectory_model.events->modes_are_possible(&v, true));
-    ASSERT_OK(rp_trajectory_model.outputs(&v, 0.0));
-    TEST_ASSERT_EQUAL_INT(expected_payload, v.payload_attached);
-}
-
-static void test_grasp_and_release_are_time_events(void) {
-    v.parameters.grasp_time = 1.25;
-    v.parameters.release_time = 2.5;
-    begin_at(0.0);
-    const struct event no_event = {.t = 1.0};
-    const double times[] = {1.25, 2.5, INFINITY};
-    for (int i = 0; i < 3; i++) {
-        assert_next(times[i], i == 1);
-        ASSERT_OK(rp_trajectory_model.events->update(&v, &no_event));
-        assert_next(times[i], i == 1);
-        const struct event comes = {.t = times[i], .is_timed = true};
-        ASSERT_OK(rp_trajectory_model.events->update(&v, &comes));
-    }
-    begin_at(1.25);
-    assert_next(2.5, 1);
-    begin_at(2.5);
-    assert_next(INFINITY, 0);
-}
-
-static void test_without_a_grasp_there_is_no_event(void) {
-    v.parameters.grasp_time = v.parameters.release_time = 1.25;
-    begin_at(0.0);
-    assert_next(INFINITY, 0);
+    // the last one has no grasp
     v.payload = RP_TRAJECTORY_ATTACHED;
-    TEST_ASSERT_FALSE(rp_trajectory_model.events->modes_are_possible(&v, true));
+    TEST_ASSERT_FALSE(events->modes_are_possible(&v, true));
     v.payload = RP_TRAJECTORY_UNDECIDED;
-    TEST_ASSERT_FALSE(rp_trajectory_model.events->modes_are_possible(&v, true));
+    TEST_ASSERT_FALSE(events->modes_are_possible(&v, true));
 }
 
 /* ---- What is refused ------------------------------------------------------------------------ */

@@ -1,4 +1,5 @@
-"""rparm is not for Linux only: what other systems lack, or do in another way, is not used.
+"""rparm is not for Linux only: what other systems lack, or do in another way, is not used. It
+is for all models, too.
 
 No test here runs on another system. Those that change this one change it to what is documented of
 the other.
@@ -306,3 +307,34 @@ def test_components_are_found_by_paths_of_windows() -> None:
         path = "C:\\Temp\\x\\" + component.source.replace("/", "\\")
         assert ecos._components(opened, path) == repr(component.name)
         assert ecos._components(opened, "C:\\Temp\\other.fmu") == "'other.fmu'"
+
+
+# ---- Names of models -----------------------------------------------------------------------------
+
+# rparm drives any FMU: it names no model
+DRIVERS = sorted(x for x in (ROOT / "rparm").rglob("*") if x.suffix in (".py", ".html"))
+# of every model with states
+SOLVER = {"time", "solver_steps", "solver_rhs_evaluations", "solver_restarts"}
+SOLVER |= {"solver_failed_steps", "effective_relative_tolerance"}
+SOLVER |= {"solver_method", "relative_tolerance"}
+# words of English, letters and an argument of Ecos that are names of variables too
+WORDS = {"branch", "mode", "motion", "radius", "turns", "duration", "frequency", "a", "g"}
+WORDS |= {"start_time", "position"}
+WORDS |= {"delay"}  # an argument of tqdm
+WORDS |= {"seed"}  # of random numbers
+WORDS |= {"angle", "damping"}  # of complex numbers and of poles
+
+
+@pytest.fixture(scope="module")
+def of_models() -> set[str]:
+    """Names of models, FMUs, systems and variables."""
+    found = {*FMUS, *(fmu.stem for fmu in FMUS.values()), "closed_loop", "ClosedLoop", "Machine"}
+    for model in FMUS:
+        found |= set(declared(model).variables) - SOLVER - WORDS
+    assert {"q1", "tau1", "Kp1", "q1_ref", "kinetic_energy"} <= found
+    return found
+
+
+@pytest.mark.parametrize("path", DRIVERS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_model_is_named(path: Path, of_models: set[str]) -> None:
+    assert of_models.intersection(re.findall(r"\w+", path.read_text(encoding="utf-8"))) == set()

@@ -59,6 +59,13 @@ DAMAGE = {
         lambda lines: [f'{lines[0]},"D11"', *(f"{line},1.0" for line in lines[1:-1]), ""],
         "line 1: 'D11' is not an output of the model",
     ),
+    "columns exchanged": (
+        lambda lines: [",".join(reversed(line.split(","))) for line in lines],
+        "line 1: expected a header whose first column is 'time'",
+    ),
+    "empty lines": (lambda _: ["", "", ""], "expected a header"),
+    "an endless header": (lambda _: ['"' + "a" * 200_000, ""], "line 1: not a header"),
+    "quotes": (lambda _: ['"time"', *3 * ['"1'], ""], "line 2: expected numbers"),
 }
 
 

@@ -2,15 +2,15 @@
 
 Shares nothing with the C code: equations of motion and outputs are those of the references, from
 positions; joint loads are derived here by Newton's and Euler's laws. Tests compare values and
-derivatives of the arm (Model), the plant's smooth terms (SmoothPlant), the controller's laws (law)
-and linear models (ExactModel) with FMUs.
+derivatives of the arm (Model), the controller's laws (law), values of the plant and linear models
+(ExactModel) with FMUs.
 """
 
 import functools
 import itertools
 import random
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -77,42 +77,22 @@ def loads_by_newton() -> sp.Matrix:
     return sp.Matrix(loads).subs(list(plain))
 
 
-class SmoothPlant:
-    """Mass matrix, forces, energies, joint loads and end effector of the plant, in NAMES."""
-
-    def __init__(self) -> None:
-        equations = plant.derive()
-        q, dq = (sp.Matrix(sp.symbols(names)) for names in (STATES[:2], STATES[2:]))
-        kinetic, potential = (equations.outputs[f"{x}_energy"] for x in ("kinetic", "potential"))
-        coriolis = (equations.inertia * dq).jacobian(q) * dq - sp.Matrix([kinetic]).jacobian(q).T
-        gravity = sp.Matrix([potential]).jacobian(q).T
-        self.expressions = {
-            "mass_matrix": equations.inertia,
-            "coriolis": coriolis.expand(),
-            "gravity": gravity,
-            "applied": (equations.forces + coriolis + gravity).expand(),
-            "kinetic_energy": kinetic,
-            "potential_energy": potential,
-            "acceleration": sp.Matrix([equations.outputs[name] for name in ("ee_ax", "ee_ay")]),
-            "loads": loads_by_newton(),
-        }
-        self._functions = {
-            name: sp.lambdify(sp.symbols(NAMES), expression, "mpmath", cse=True)
-            for name, expression in self.expressions.items()
-        }
-
-    def evaluate(self, name: str, case: Mapping[str, float]) -> mpmath.matrix | mpmath.mpf:
-        """An expression at exact rationals."""
-        return self._functions[name](*(mpmath.mpf(case.get(key, 0.0)) for key in NAMES))
-
-
 @functools.cache
-def terms_of_the_motion(is_attached: bool = False) -> dict[str, sp.Expr]:
-    """D, C dq and g(q) of the arm, with or without the payload."""
-    e = SmoothPlant().expressions
-    D = e["mass_matrix"].subs(dict.fromkeys(DRIVES, 0))
-    terms = (D[0, 0], D[0, 1], D[1, 1], *e["coriolis"], *e["gravity"])
-    return {n: x.subs("attached", int(is_attached)) for n, x in zip(TERMS, terms, strict=True)}
+def terms_of_the_motion() -> dict[str, sp.Expr]:
+    """D, C dq and g(q) of the plant, in NAMES."""
+    e = plant.derive()
+    q, dq = (sp.Matrix(sp.symbols(names)) for names in (STATES[:2], STATES[2:]))
+    kinetic, potential = (sp.Matrix([e.outputs[f"{x}_energy"]]) for x in ("kinetic", "potential"))
+    coriolis = (e.inertia * dq).jacobian(q) * dq - kinetic.jacobian(q).T
+    D = e.inertia
+    terms = (D[0, 0], D[0, 1], D[1, 1], *coriolis.expand(), *potential.jacobian(q).T)
+    return dict(zip(TERMS, terms, strict=True))
+
+
+def terms_of_the_arm(is_attached: bool = False) -> dict[str, sp.Expr]:
+    """The same of the arm, with or without the payload."""
+    known = dict.fromkeys(DRIVES, 0) | {"attached": int(is_attached)}
+    return {name: term.subs(known) for name, term in terms_of_the_motion().items()}
 
 
 def random_arm(source: random.Random) -> Values:
@@ -152,7 +132,7 @@ class Model:
         arm |= dict(zip(ACCELERATIONS, equations.accelerations, strict=True))
         self.expressions = (
             equations.outputs
-            | terms_of_the_motion()
+            | terms_of_the_arm()
             | dict(zip(LOADS, loads_by_newton().subs(arm), strict=True))
         )
 
@@ -236,7 +216,7 @@ CASES = [Case(*case) for case in itertools.product(LAWS, SIDES, (False, True))]
 def law(case: Case) -> dict[str, sp.Expr]:
     """Every unknown, with each joint free or at the limit on the side that is given."""
     s = {name: sp.Symbol(name) for name in CONTROLLER_KNOWNS}
-    arm = terms_of_the_motion(case.is_attached)
+    arm = terms_of_the_arm(case.is_attached)
     e = [s[f"q{i}_ref"] - s[f"q{i}"] for i in (1, 2)]
     de = [s[f"dq{i}_ref"] - s[f"dq{i}"] for i in (1, 2)]
     v = [s[f"Kp{i}"] * e[i - 1] + s[f"Kd{i}"] * de[i - 1] + s[f"integral{i}"] for i in (1, 2)]
@@ -331,18 +311,27 @@ COMPLIANT, RIGID, NONE = 3, 2, 1  # items of stops
 
 @dataclass(frozen=True)
 class ExactModel:
-    """Entries of A, B, C and D by names, (unknowns, knowns); unknowns are derivatives by states."""
+    """Entries of A, B, C and D by names, (unknowns, knowns); unknowns are derivatives by states.
+
+    `found` has values of outputs and locals at the point.
+    """
 
     values: Values  # of the point, as the FMU takes them
     rates: Sequence[str]  # states whose derivatives are the first rows
     outputs: Sequence[str]  # the other rows
     knowns: Sequence[str]
     entries: np.ndarray
+    found: Values = field(default_factory=dict)
 
 
 @functools.cache
-def plant_rows(held: tuple[int, ...], side: tuple[int, int]) -> tuple[tuple[str, ...], Callable]:
-    """Names of outputs; all rows by numbers, with these joints held and pressed into stops."""
+def plant_rows(
+    held: tuple[int, ...], side: tuple[int, int], is_rigid: bool
+) -> tuple[tuple[str, ...], tuple[str, ...], Callable]:
+    """Names of outputs and of further values; all rows by numbers, and the values.
+
+    These joints are held, by a rigid stop or by friction, and pressed into compliant stops.
+    """
     e = plant.derive()
     dq = sp.symbols(STATES[2:])
     pushes = [contacts.force(i, side[i - 1]) for i in (1, 2)]
@@ -366,6 +355,11 @@ def plant_rows(held: tuple[int, ...], side: tuple[int, int]) -> tuple[tuple[str,
             outputs[f"stop_force{i}"] = pushes[i - 1]
         if i - 1 not in held:
             outputs[f"friction{i}"] = e.friction[i - 1]
+    further = terms_of_the_motion() | dict(zip(LOADS, loads_by_newton(), strict=True))
+    reaction = e.forces + sp.Matrix(pushes) - D * motion
+    for i in held:
+        further[f"friction{i + 1}"] = e.breakaway[i] if is_rigid else reaction[i]
+        further[f"stop_force{i + 1}"] = e.breakaway[i] - reaction[i] if is_rigid else sp.S.Zero
     knowns = sp.symbols((*STATES, *plant.INPUTS))
     rows = sp.Matrix([*dq, *motion, *outputs.values()])
     accelerations = dict(zip(sp.symbols(ACCELERATIONS), motion, strict=True))
@@ -375,8 +369,10 @@ def plant_rows(held: tuple[int, ...], side: tuple[int, int]) -> tuple[tuple[str,
     whole = rows.jacobian(knowns) + by_motion * motion.jacobian(knowns)
     still = dict.fromkeys([dq[i] for i in held], 0)
     names = (*plant.PARAMETERS, *STOPS, *STATES, *plant.INPUTS, *plant.SWITCHES)
-    chosen = whole.subs(accelerations).subs(still)
-    return tuple(outputs), sp.lambdify(sp.symbols(names), chosen, "mpmath", cse=True)
+    values = sp.Matrix([*outputs.values(), *further.values()])
+    chosen = [rows.subs(accelerations).subs(still) for rows in (whole, values)]
+    function = sp.lambdify(sp.symbols(names), chosen, "mpmath", cse=True)
+    return tuple(outputs), tuple(further), function
 
 
 STOPS = tuple(f"{side}{i}" for side in ("lower", "upper") for i in (1, 2)) + contacts.PARAMETERS
@@ -419,31 +415,16 @@ def plant_point(mode: str, seed: int) -> ExactModel:
             values |= {f"lower{i}": lower, f"upper{i}": lower + 1.0}
             values[f"stop_stiffness{i}"] = 10 ** source.uniform(1.0, 3.0)
             values[f"stop_damping{i}"] = source.uniform(0.01, 0.2)
-    outputs, function = plant_rows(held, side)
+    outputs, further, function = plant_rows(held, side, mode == "rigid stop")
     numbers = plant.prepared(values)
     numbers |= {name: values.get(name, 0.0) for name in (*STOPS, *STATES, *plant.INPUTS)}
     numbers |= {f"direction{i}": float(np.sign(values[f"dq{i}"])) for i in (1, 2)}
     numbers["attached"] = float(switches["payload_attached"])
     names = (*plant.PARAMETERS, *STOPS, *STATES, *plant.INPUTS, *plant.SWITCHES)
-    entries = function(*(mpmath.mpf(numbers[name]) for name in names))
-    return exact_model(
-        values | switches, STATES, outputs, (*STATES, *plant.INPUTS), entries.tolist()
-    )
-
-
-def arm_point(seed: int) -> ExactModel:
-    source = random.Random(f"arm {seed}")
-    values = dict(random_arm(source))
-    values |= {name: source.uniform(-2.0, 2.0) for name in STATES}
-    values |= {"tau1": source.uniform(-9.0, 9.0), "f2": source.uniform(-9.0, 9.0)}
-    arm, knowns = arm_model(), (*STATES, *INPUTS)
-    exact = arm.jacobian(values, knowns)
-    rows = (*STATES[2:], *ACCELERATIONS, *arm.outputs)
-    entries = [[exact[row, known].value for known in knowns] for row in rows]
-    return exact_model(values, STATES, arm.outputs, knowns, entries)
-
-
-arm_model = functools.cache(Model)
+    entries, found = function(*(mpmath.mpf(numbers[name]) for name in names))
+    knowns = (*STATES, *plant.INPUTS)
+    model = exact_model(values | switches, STATES, outputs, knowns, entries.tolist())
+    return replace(model, found=dict(zip((*outputs, *further), map(float, found), strict=True)))
 
 
 def drives_point(seed: int) -> ExactModel:

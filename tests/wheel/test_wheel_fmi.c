@@ -1,5 +1,4 @@
-/* Booleans, Integers that the model calculates and event indicators through either version of
- * FMI. */
+/* Events and their indicators in Model Exchange, through either version of FMI. */
 #include "fmu_version.h"
 #include "value_references.h"
 
@@ -40,62 +39,14 @@ void tearDown(void) {
     c = NULL;
 }
 
-static void assert_message(const char *text) {
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_message, text), last_message);
-}
-
-static fmi2Status set_boolean(fmi2ValueReference reference, fmi2Boolean value) {
-    return fmu.SetBoolean(c, &reference, 1, &value);
-}
-
 static void set_real(fmi2ValueReference reference, double value) {
     ASSERT_OK(fmu.SetReal(c, &reference, 1, &value));
-}
-
-static fmi2Boolean get_boolean(fmi2ValueReference reference) {
-    fmi2Boolean value = -1;
-    ASSERT_OK(fmu.GetBoolean(c, &reference, 1, &value));
-    return value;
 }
 
 static fmi2Integer get_integer(fmi2ValueReference reference) {
     fmi2Integer value = -1;
     ASSERT_OK(fmu.GetInteger(c, &reference, 1, &value));
     return value;
-}
-
-static void test_a_value_that_is_no_boolean_is_discarded(void) {
-    if (fmu_version == 3) {
-        TEST_IGNORE_MESSAGE("FMI 3.0 has a type of two values: test_wheel_fmi3.c");
-    }
-    instantiate(fmi2CoSimulation);
-    TEST_ASSERT_EQUAL_INT(fmi2Discard, set_boolean(WHEEL_is_counting, 2));
-    assert_message("is_counting = 2 is refused: a value from 0 to 1 is expected");
-    TEST_ASSERT_EQUAL_INT(fmi2True, get_boolean(WHEEL_is_counting));
-}
-
-/* In Model Exchange, a discrete input can be set in event mode only. */
-static void test_model_exchange(void) {
-    const fmi2ValueReference counting = WHEEL_is_counting;
-    const fmi2Boolean off = fmi2False;
-    double z[2] = {-1.0, -1.0};
-    double x = 20.0;
-    instantiate(fmi2ModelExchange);
-    set_real(WHEEL_stop, 30.0);
-    ASSERT_OK(fmu.ExitInitializationMode(c));
-    ASSERT_OK(fmu.EnterContinuousTimeMode(c));
-    ASSERT_OK(fmu.SetContinuousStates(c, &x, 1));
-    ASSERT_OK(fmu.GetEventIndicators(c, z, 2));
-    TEST_ASSERT_TRUE(z[0] > 10.0 && z[0] < 10.0 + 1e-11 && z[1] == 1.0);
-    TEST_ASSERT_EQUAL_INT(3, get_integer(WHEEL_turns));
-    ASSERT_OK(fmu.EnterEventMode(c));
-    ASSERT_OK(set_boolean(WHEEL_is_counting, fmi2False));
-    TEST_ASSERT_EQUAL_INT(0, get_integer(WHEEL_turns));
-    ASSERT_OK(fmu.EnterContinuousTimeMode(c));
-    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.SetBoolean(c, &counting, 1, &off));
-    assert_message(fmu_version == 2 ? "fmi2SetBoolean"
-                                    : "is_counting (value reference 21) cannot be set while the "
-                                      "time is continuous");
 }
 
 static double to_stop(void) {
@@ -154,33 +105,4 @@ static void test_an_indicator_falls_to_0_just_past_its_root(void) {
         ASSERT_OK(fmu.SetContinuousStates(c, &angles[i], 1));
         TEST_ASSERT_TRUE(i == 0 ? to_stop() > 0.0 : to_stop() < 0.0);
     }
-}
-
-static void test_a_wrong_number_of_indicators_is_refused(void) {
-    double z[3] = {-1.0, -1.0, -1.0};
-    for (size_t count = 0; count <= 3; count++) {
-        instantiate(fmi2ModelExchange);
-        const fmi2Status status = fmu.GetEventIndicators(c, z, count);
-        TEST_ASSERT_EQUAL_INT(count == 2 ? fmi2OK : fmi2Error, status);
-        if (count != 2) {
-            assert_message("event indicators are accessed: there are 2");
-        }
-        fmu.FreeInstance(c);
-    }
-    c = NULL;
-    TEST_ASSERT_TRUE(z[2] == -1.0);
-}
-
-static void test_states_hold_booleans(void) {
-    fmi2FMUstate state = NULL;
-    instantiate(fmi2CoSimulation);
-    ASSERT_OK(set_boolean(WHEEL_is_counting, fmi2False));
-    ASSERT_OK(fmu.GetFMUstate(c, &state));
-    ASSERT_OK(set_boolean(WHEEL_is_counting, fmi2True));
-    ASSERT_OK(fmu.SetFMUstate(c, state));
-    TEST_ASSERT_EQUAL_INT(fmi2False, get_boolean(WHEEL_is_counting));
-    ASSERT_OK(fmu.Reset(c));
-    ASSERT_OK(fmu.SetupExperiment(c, fmi2False, 0, 0, fmi2False, 0));
-    ASSERT_OK(fmu.EnterInitializationMode(c));
-    TEST_ASSERT_EQUAL_INT(fmi2True, get_boolean(WHEEL_is_counting));
 }

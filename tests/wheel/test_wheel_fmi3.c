@@ -1,6 +1,5 @@
 /* What only FMI 3.0 has: event mode and early return, that is what a step does at the event where
- * the stop catches the wheel, for each of the four ways in which importers instantiate; Booleans of
- * one byte, and counts of values. */
+ * the stop catches the wheel, for each of the four ways in which importers instantiate. */
 #include "fmu3_library.h"
 #include "value_references.h"
 
@@ -19,10 +18,6 @@ static void keep(fmi3InstanceEnvironment environment, fmi3Status status, fmi3Str
 }
 
 #define ASSERT_OK(call) TEST_ASSERT_EQUAL_INT_MESSAGE(fmi3OK, call, last_message)
-
-static void assert_message(const char *text) {
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_message, text), last_message);
-}
 
 static void set_speed(double value) {
     const fmi3ValueReference reference = WHEEL_speed;
@@ -237,99 +232,6 @@ static void test_an_event_at_the_beginning_of_a_step(void) {
 
 /* ---- FMU states ----------------------------------------------------------------------------- */
 
-/* What a second instance makes of the serialized state of the first one. */
-static void move_to_second(fmi3FMUState state) {
-    static fmi3Byte bytes[8192];
-    size_t size = 0;
-    fmi3FMUState copy = NULL;
-    ASSERT_OK(fmu3.SerializedFMUStateSize(wheel, state, &size));
-    TEST_ASSERT_LESS_OR_EQUAL_size_t(sizeof bytes, size);
-    ASSERT_OK(fmu3.SerializeFMUState(wheel, state, bytes, size));
-    release();
-    wheel = instantiate(true, true);
-    ASSERT_OK(fmu3.DeserializeFMUState(wheel, bytes, size, &copy));
-    ASSERT_OK(fmu3.SetFMUState(wheel, copy));
-}
-
-static double finish(double time) {
-    ASSERT_OK(fmu3.EnterEventMode(wheel));
-    update();
-    ASSERT_OK(fmu3.EnterStepMode(wheel));
-    assert_caught(true);
-    set_speed(-0.7);
-    assert_outcome(step(time, 6.0 - time), false, false);
-    return get_real(WHEEL_angle);
-}
-
-static void test_states_hold_an_event_that_is_due(void) {
-    fmi3FMUState state = NULL;
-    const double time = step_to_event();
-    ASSERT_OK(fmu3.GetFMUState(wheel, &state));
-    const double angle = finish(time);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.0 - 0.7 * 4.0, angle);
-    for (int again = 0; again < 2; again++) {
-        ASSERT_OK(fmu3.SetFMUState(wheel, state));
-        assert_caught(false);
-        TEST_ASSERT_TRUE(get_real(WHEEL_time) == time);
-        TEST_ASSERT_TRUE(finish(time) == angle);
-    }
-    move_to_second(state);
-    assert_caught(false);
-    TEST_ASSERT_TRUE(finish(time) == angle);
-}
-
 /* ---- Wrong states --------------------------------------------------------------------------- */
 
-static void test_calls_in_the_wrong_state(void) {
-    bool flag[5];
-    double number;
-    step_to_event();
-    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.UpdateDiscreteStates(wheel, &flag[0], &flag[1], &flag[2],
-                                                               &flag[3], &flag[4], &number));
-    assert_message("fmi3UpdateDiscreteStates is not allowed while the instance is between steps");
-    release();
-    step_to_event();
-    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.EnterStepMode(wheel));
-    release();
-    step_to_event();
-    ASSERT_OK(fmu3.EnterEventMode(wheel));
-    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.DoStep(wheel, get_real(WHEEL_time), 1.0, true, &flag[0],
-                                                 &flag[1], &flag[2], &number));
-    assert_message("fmi3DoStep is not allowed while the instance is in event mode");
-    release();
-    start(false, true);
-    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.EnterEventMode(wheel));
-    assert_message("Co-Simulation");
-}
-
 /* ---- Values ---------------------------------------------------------------------------------- */
-
-static void in_initialization(void) {
-    const fmi3String category = "logStatusDiscard";
-    wheel = instantiate(false, false);
-    ASSERT_OK(fmu3.EnterInitializationMode(wheel, false, 0.0, 0.0, false, 0.0));
-    ASSERT_OK(fmu3.SetDebugLogging(wheel, true, 1, &category));
-}
-
-/* Memory that holds no bool, as a wrong importer may pass. */
-static void test_a_byte_that_is_no_boolean_is_discarded(void) {
-    const fmi3ValueReference reference = WHEEL_is_counting;
-    const unsigned char byte = 2;
-    in_initialization();
-    TEST_ASSERT_EQUAL_INT(
-        fmi3Discard, fmu3.SetBoolean(wheel, &reference, 1, (const bool *)(const void *)&byte, 1));
-    assert_message("is_counting = 2 is refused: a value from 0 to 1 is expected");
-    bool values[2] = {false, false};
-    ASSERT_OK(fmu3.GetBoolean(wheel, &reference, 1, values, 1));
-    TEST_ASSERT_TRUE(values[0] && !values[1]);
-    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.GetBoolean(wheel, &reference, 1, values, 2));
-    assert_message("an array has 2 values: 1 are expected");
-}
-
-static void test_the_number_of_indicators(void) {
-    size_t count = 0;
-    wheel =
-        fmu3.InstantiateModelExchange("wheel", WHEEL_TOKEN_FMI3, NULL, false, false, NULL, keep);
-    ASSERT_OK(fmu3.GetNumberOfEventIndicators(wheel, &count));
-    TEST_ASSERT_EQUAL_size_t(2, count);
-}

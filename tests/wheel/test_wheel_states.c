@@ -1,43 +1,11 @@
-/* What events keep, in snapshots and serialized states, and which bindings and states are refused.
- */
+/* Which bindings and which serialized states of what events keep are refused. */
 #include "serialization.h"
 #include "stepping.h"
 #include "wheel_instance.h"
 
 #include <stdlib.h>
 
-/* ---- What events keep ----------------------------------------------------------------------- */
-
-/* The wheel arrives at its stop at 3 rad/s. */
-static void catch_wheel(void) {
-    const bool triggered[] = {true, false};
-    const struct event event = {.triggered = triggered};
-    set(WHEEL_stop, 1.0);
-    set(WHEEL_angle, 1.0);
-    set(WHEEL_speed, 3.0);
-    ASSERT_OK(wheel_model.events->update(values_of(instance), &event));
-}
-
-static void assert_caught(struct instance *caught, int catches) {
-    TEST_ASSERT_EQUAL_INT(catches > 0, get_boolean(caught, WHEEL_is_caught));
-    TEST_ASSERT_EQUAL_INT(catches, get_int32(caught, WHEEL_catches));
-    TEST_ASSERT_EQUAL_DOUBLE(3.0 * catches, get_of(caught, WHEEL_lost_speed));
-}
-
-static void test_snapshots_keep_modes_and_discrete_states(void) {
-    struct instance_snapshot *before = NULL;
-    struct instance_snapshot *after = NULL;
-    ASSERT_OK(instance_save(instance, 0, &before));
-    ASSERT_OK(set_boolean(WHEEL_is_counting, 0));
-    catch_wheel();
-    ASSERT_OK(instance_save(instance, 0, &after));
-    ASSERT_OK(instance_restore(instance, before));
-    assert_caught(instance, 0);
-    TEST_ASSERT_EQUAL_INT(1, get_boolean(instance, WHEEL_is_counting));
-    ASSERT_OK(instance_restore(instance, after));
-    assert_caught(instance, 1);
-    TEST_ASSERT_EQUAL_INT(0, get_boolean(instance, WHEEL_is_counting));
-}
+/* ---- States --------------------------------------------------------------------------------- */
 
 static struct wheel_values *held(void) {
     return (void *)instance->memory.restart_values;
@@ -62,22 +30,6 @@ static enum status transfer(struct instance **other) {
     }
     free(bytes);
     return status;
-}
-
-static void test_serialized_states_keep_modes_and_discrete_states(void) {
-    struct instance *other;
-    ASSERT_OK(set_boolean(WHEEL_is_counting, 0));
-    ASSERT_OK(set_boolean(WHEEL_is_reversed, 1));
-    catch_wheel();
-    held()->catches = 5;
-    ASSERT_OK(instance_exit_initialization(instance));
-    ASSERT_OK(transfer(&other));
-    assert_caught(other, 1);
-    TEST_ASSERT_EQUAL_INT(0, get_boolean(other, WHEEL_is_counting));
-    TEST_ASSERT_EQUAL_INT(1, get_boolean(other, WHEEL_is_reversed));
-    TEST_ASSERT_EQUAL_INT(5,
-                          ((struct wheel_values *)(void *)other->memory.restart_values)->catches);
-    instance_destroy(other);
 }
 
 static void assert_forged_is_refused(const char *text) {

@@ -1,5 +1,5 @@
 """The built FMU against closed forms, with every method: rest, steep friction and stiff stops.
-test_plant_random_motions.py has motions of all kinds, events/test_bouncing_ball.c endless bounces.
+test_plant_random_motions.py has motions of all kinds, events/test_state_events.c endless bounces.
 
 One joint is held by firm friction where the form is that of the other one.
 """
@@ -57,21 +57,6 @@ def test_a_block_stops_by_stribecks_law(
     with started(plant, method, **values, **friction) as instance:
         assert events(instance, h, 3.0) == [(1, near(time_to_rest(m, abs(v0), Fc, Fb, vs)))]
         assert modes(instance) == (0, 0)
-
-
-@each_method
-@pytest.mark.parametrize("h", [1.0, 10.0])
-def test_held_for_an_hour(plant: Fmu, method: str, h: float) -> None:
-    """Under gravity without efforts: not one bit of the positions changes."""
-    start = {"q1": 0.4, "q2": 0.123456789}
-    friction = {"coulomb_friction1": 12.0, "coulomb_friction2": 4.0}
-    with started(plant, method, tolerance=1e-8, **start, **friction) as instance:
-        reals = instance.reals(["q1", "q2", "dq1", "dq2"])
-        for i in range(round(3600 / h)):
-            instance.do_step(i * h, h)
-            reals.get()
-            assert reals.view.tolist() == [*start.values(), 0.0, 0.0]
-        assert last_event(instance) == (0, 0.0)
 
 
 @each_method

@@ -1,4 +1,5 @@
-"""RPPlant beside RPManipulator: the same interface, and with start values the same bits."""
+"""RPPlant beside RPManipulator: the same interface, and with start values the same bits; its values
+against its Lagrangian."""
 
 import xml.etree.ElementTree as ET
 from dataclasses import replace
@@ -12,8 +13,9 @@ from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import initialize
-from tests.rp_plant.fmu.plant_runs import METHODS, each_method
+from tests.rp_plant.fmu.plant_runs import METHODS, each_method, read, started
 from tests.support.rparm_project import load, names_of
+from tests.support.symbolic import PLANT_MODES, plant_point
 
 COUNTS = (
     "solver_steps",
@@ -22,6 +24,7 @@ COUNTS = (
     "solver_failed_steps",
     "solver_last_order",
 )
+POINTS = 60
 INDICATORS = [
     kind
     for i in (1, 2)
@@ -101,7 +104,25 @@ def test_with_start_values_it_is_the_arm(plant: Fmu, arm: Fmu, name: str, method
     assert counts[-1, 0] > 0
 
 
-# ---- Refused ---------------------------------------------------------------------------------
+# ---- Values ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", PLANT_MODES)
+def test_values_are_those_of_lagrange_and_newton(fmi2_plant: Fmu, mode: str) -> None:
+    """Outputs, terms of the motion and joint loads at random points, in modes of all kinds."""
+    for seed in range(POINTS):
+        exact = plant_point(mode, seed)
+        with started(fmi2_plant, **exact.values) as instance:
+            found = read(instance, *exact.found)
+        expected = np.array([*exact.found.values()])
+        errors = np.abs(np.array(found) - expected)
+        assert np.isfinite(found).all()
+        assert (errors <= 1e-13 * (np.abs(expected) + np.abs(expected).max())).all(), (
+            mode, seed, dict(zip(exact.found, errors, strict=True)),
+        )  # fmt: skip
+
+
+# ---- Terminals -------------------------------------------------------------------------------
 
 
 def test_terminals_fit_those_of_the_arm(fmu: Path) -> None:

@@ -1,40 +1,15 @@
-/* A ball that bounces: impacts at v1 / g + 2 v1 (e + ... + e^(k-1)) / g, rest at
- * v1 / g (1 + e) / (1 - e) from a height with v1 = sqrt(2 g h). */
+/* State events. A ball that bounces: rest at v1 / g (1 + e) / (1 - e) from a height with
+ * v1 = sqrt(2 g h). A block with dry friction: it stops after v m / F, and breaks away where the
+ * force has reached the breakaway friction. Times of impacts: test_events.py of files with
+ * equations; rollback: every FMU's, in test_every_fmu.py. */
 #include "continuous_states.h"
 #include "derivatives.h"
 #include "each_method.h"
 #include "toy_run.h"
 
+/* ---- Ball ----------------------------------------------------------------------------------- */
+
 static const double g = 9.81;
-
-/* Time of impact k, from 1 on. */
-static double impact_time(double height, double e, int k) {
-    const double first = sqrt(2.0 * height / g);
-    double time = first;
-    for (int i = 1; i < k; i++) {
-        time += 2.0 * first * pow(e, i);
-    }
-    return time;
-}
-
-EACH_METHOD static void test_times_of_impacts(void) {
-    static const double steps[] = {1e-3, 1e-2, 0.1};
-    for (int s = 0; s < 3; s++) {
-        int seen = 0;
-        prepare(&ball_description, method, 1e-10);
-        initialize();
-        for (int i = 0; i < (int)round(1.5 / steps[s]); i++) {
-            run(i * steps[s], steps[s], 1);
-            const int count = get_int(TOY_EVENTS);
-            if (count > seen) {
-                const double expected = impact_time(1.0, 0.8, count);
-                TEST_ASSERT_DOUBLE_WITHIN(1e-9, expected, get(TOY_LAST_EVENT));
-                seen = count;
-            }
-        }
-        TEST_ASSERT_EQUAL_INT(2, seen);
-    }
-}
 
 EACH_METHOD static void test_it_comes_to_rest_on_the_floor(void) {
     static const double steps[] = {1e-3, 1.0, 10.0};
@@ -72,26 +47,6 @@ EACH_METHOD static void test_low_bounces_come_to_rest(void) {
     }
 }
 
-/* With the same first communication point. */
-static void test_later_points_do_not_change_the_times(void) {
-    static const double steps[] = {0.125, 0.0625, 0.375, 1.125};
-    static const int methods[] = {1, 2, 4};
-    for (int m = 0; m < 3; m++) {
-        double first = NAN;
-        for (int s = 0; s < 4; s++) {
-            prepare(&ball_description, methods[m], 1e-8);
-            initialize();
-            run(0.0, 0.03125, 1);
-            run(0.03125, steps[s], (int)round(2.25 / steps[s]));
-            TEST_ASSERT_EQUAL_INT(4, get_int(TOY_EVENTS));
-            if (s == 0) {
-                first = get(TOY_LAST_EVENT);
-            }
-            TEST_ASSERT_EQUAL_DOUBLE(first, get(TOY_LAST_EVENT));
-        }
-    }
-}
-
 /* Thrown down and lifted, it passes the floor by this depth between two communication points. */
 EACH_METHOD static void test_a_short_dip_is_found(void) {
     static const double steps[] = {1e-3, 1e-2, 1.0, 4.0};
@@ -111,28 +66,6 @@ EACH_METHOD static void test_a_short_dip_is_found(void) {
     }
 }
 
-EACH_METHOD static void test_restitution_1_keeps_the_energy(void) {
-    prepare(&ball_description, method, 1e-10);
-    set(TOY_PARAMETER2, 1.0);
-    initialize();
-    run(0.0, 10.0, 100);
-    TEST_ASSERT_INT_WITHIN(1, 1107, get_int(TOY_EVENTS));
-    const double energy = g * get(TOY_POSITION) + 0.5 * get(TOY_SPEED) * get(TOY_SPEED);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, g, energy);
-}
-
-EACH_METHOD static void test_a_limit_of_events_ends_the_step(void) {
-    prepare(&ball_description, method, 1e-8);
-    set_int(TOY_MAX_EVENTS, 3);
-    initialize();
-    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_EVENTS, instance_do_step(instance, 0.0, 5.0));
-    TEST_ASSERT_EQUAL_INT(3, get_int(TOY_EVENTS));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, impact_time(1.0, 0.8, 4), instance_time(instance));
-    TEST_ASSERT_NOT_NULL(strstr(last_text, "ended"));
-    TEST_ASSERT_NOT_NULL(strstr(
-        last_text, "the height, the same 4 times in a row, is one event more than max_events = 3"));
-}
-
 /* The internal steps of all flights count together. */
 EACH_METHOD static void test_a_limit_of_internal_steps_ends_the_step(void) {
     prepare(&ball_description, method, 1e-8);
@@ -143,22 +76,10 @@ EACH_METHOD static void test_a_limit_of_internal_steps_ends_the_step(void) {
     TEST_ASSERT_GREATER_THAN_INT(0, get_int(TOY_EVENTS));
 }
 
-EACH_METHOD static void test_the_lift_takes_it_from_the_floor(void) {
-    prepare(&ball_description, method, 1e-10);
-    set(TOY_POSITION, 0.0);
-    initialize();
-    run(0.0, 1.0, 2);
-    TEST_ASSERT_EQUAL_INT(0, get_int(TOY_STEPS));
-    set(TOY_INPUT, g + 1.0);
-    run(2.0, 1.0, 1);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-8, 0.5, get(TOY_POSITION));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-8, 1.0, get(TOY_SPEED));
-}
-
 /* A step that leaves its event is followed by one that handles it. */
 EACH_METHOD static void test_an_impact_that_was_left_comes_with_the_next_step(void) {
     const struct step_options left = {.at_event = EVENTS_LEFT};
-    const double first = impact_time(1.0, 0.8, 1);
+    const double first = sqrt(2.0 / g);
     prepare(&ball_description, method, 1e-10);
     initialize();
     ASSERT_OK(instance_do_step_with(instance, 0.0, 1.0, &left));
@@ -270,5 +191,125 @@ static void test_a_ball_in_the_air_does_not_rest(void) {
     assert_forged(&now->is_resting, &held->is_resting, 2, "the modes are impossible");
     assert_forged(&now->is_resting, &held->is_resting, -1, "the modes are impossible");
     assert_forged(&now->is_resting, &held->is_resting, 1,
+                  "the modes since the restart are impossible");
+}
+
+/* ---- Block ---------------------------------------------------------------------------------- */
+
+EACH_METHOD static void test_it_stops_and_stays(void) {
+    static const double steps[] = {1e-3, 1e-2, 1.0};
+    for (int s = 0; s < 3; s++) {
+        prepare(&block_description, method, 1e-10);
+        set(TOY_SPEED, 1.5);
+        initialize();
+        run(0.0, steps[s], (int)round(3.0 / steps[s]));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.5, get(TOY_LAST_EVENT));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.125, get(TOY_POSITION));
+        TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_SPEED));
+        TEST_ASSERT_EQUAL_INT(1, get_int(TOY_EVENTS));
+    }
+}
+
+static void set_slope(double slope) {
+    const unsigned reference = TOY_INPUT;
+    const int order = 1;
+    ASSERT_OK(instance_set_input_derivatives(instance, &reference, 1, &order, &slope));
+}
+
+EACH_METHOD static void test_a_ramp_breaks_it_away(void) {
+    prepare(&block_description, method, 1e-10);
+    initialize();
+    set_slope(0.25);
+    run(0.0, 8.0, 1);
+    TEST_ASSERT_EQUAL_INT(1, get_int(TOY_EVENTS));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-14, 4.0, get(TOY_LAST_EVENT));
+    // v' = (t - 4) / 4
+    TEST_ASSERT_DOUBLE_WITHIN(1e-8, 2.0, get(TOY_SPEED));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-8, 64.0 / 24.0, get(TOY_POSITION));
+}
+
+/* The slope ends with its step. Then the force is again the one that was set, here enough to move a
+ * block which stopped while the force was small. */
+EACH_METHOD static void test_it_breaks_away_where_a_slope_ends(void) {
+    prepare(&block_description, method, 1e-10);
+    initialize();
+    set(TOY_INPUT, 2.0);
+    set_slope(-0.5);
+    run(0.0, 5.0, 1); // v = t - t^2 / 4 to the stop at t = 4
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_SPEED));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-8, 4.0, get(TOY_LAST_EVENT));
+    run(5.0, 1.0, 1);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-8, 1.0, get(TOY_SPEED));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-8, 8.0 / 3.0 + 0.5, get(TOY_POSITION));
+}
+
+/* The force touches the limit and falls again. */
+EACH_METHOD static void test_a_touch_does_not_break_it_away(void) {
+    const unsigned references[] = {TOY_INPUT, TOY_INPUT};
+    const int orders[] = {1, 2};
+    const double values[] = {1.0, -0.5}; // f = t - t^2 / 4, 1 at t = 2
+    prepare(&block_description, method, 1e-10);
+    initialize();
+    ASSERT_OK(instance_set_input_derivatives(instance, references, 2, orders, values));
+    run(0.0, 3.0, 1);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.0, get(TOY_SPEED));
+}
+
+/* In Event Mode the importer takes back the force that would have broken it away. */
+static void test_a_force_taken_back_in_event_mode_moves_nothing(void) {
+    const struct step_options left = {.at_event = EVENTS_LEFT};
+    struct discrete_update update;
+    prepare(&block_description, 1, 1e-10);
+    initialize();
+    set_slope(0.25);
+    ASSERT_OK(instance_do_step_with(instance, 0.0, 8.0, &left));
+    set(TOY_INPUT, 0.5);
+    ASSERT_OK(instance_update_discrete_states(instance, &update));
+    run(instance_time(instance), 1.0, 1);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_SPEED));
+}
+
+/* The same where the importer integrates: with the force set in Event Mode it sticks. */
+static void test_a_force_taken_back_moves_nothing_outside(void) {
+    struct discrete_update update;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        prepare(&block_description, 1, 1e-10);
+        instance_integrate_outside(instance);
+        initialize();
+        ASSERT_OK(instance_enter_continuous_time(instance));
+        set(TOY_INPUT, sign * 2.0);
+        instance_enter_event_mode(instance);
+        set(TOY_INPUT, sign * 0.5);
+        ASSERT_OK(instance_update_discrete_states(instance, &update));
+        const struct block_values *block = (const void *)instance->memory.values;
+        TEST_ASSERT_EQUAL_INT(0, block->direction);
+    }
+}
+
+/* A force exactly equal to the breakaway friction holds: outside, too. */
+static void test_a_force_equal_to_the_friction_triggers_nothing_outside(void) {
+    struct discrete_update update;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        prepare(&block_description, 1, 1e-10);
+        instance_integrate_outside(instance);
+        initialize();
+        ASSERT_OK(instance_enter_continuous_time(instance));
+        set(TOY_INPUT, sign * 1.0);
+        instance_enter_event_mode(instance);
+        ASSERT_OK(instance_update_discrete_states(instance, &update));
+        TEST_ASSERT_EQUAL_INT(0, get_int(TOY_EVENTS));
+        TEST_ASSERT_FALSE(update.states_changed);
+    }
+}
+
+static void test_a_block_slides_where_its_velocity_points(void) {
+    start_moving(&block_description);
+    struct block_values *now = (void *)instance->memory.values;
+    struct block_values *held = (void *)instance->memory.restart_values;
+    assert_forged(&now->direction, &held->direction, 2, "the modes are impossible");
+    assert_forged(&now->direction, &held->direction, -2, "the modes are impossible");
+    assert_forged(&now->direction, &held->direction, -1,
+                  "the modes since the restart are impossible");
+    assert_forged(&now->direction, &held->direction, 0,
                   "the modes since the restart are impossible");
 }
