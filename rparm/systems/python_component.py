@@ -332,11 +332,6 @@ class PythonInstance(Instance):
         if name in self._exchanged:
             self.numbers[self._exchanged.index(name)] = value
             return
-        if name not in self.made.attributes:
-            known = [*self.made.attributes, *self.made.inputs]
-            raise UserError(
-                f"{self.name}: {self.fmu.path} has no attribute {name!r}{did_you_mean(name, known)}"
-            )
         if isinstance(value, list) and isinstance(self.made.attributes[name], np.ndarray):
             try:
                 value = cast(Any, np.array(value, float))
