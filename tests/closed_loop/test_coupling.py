@@ -16,7 +16,6 @@ from rparm.models.closed_loop.coupling.study import (
     FAST_STOP,
     FastAndSlow,
     StepErrors,
-    study_payload,
 )
 from scipy.linalg import expm
 
@@ -168,15 +167,6 @@ def test_the_end_effectors_error_is_what_the_delays_predict(loop: ClosedLoop, st
     assert gauss_seidel.largest < jacobi.largest / 2
     assert ahead.largest > jacobi.largest
     assert closed_loop.tracking_passed(tracking)
-
-
-def test_integral_action_removes_what_the_payload_costs(loop: ClosedLoop) -> None:
-    payload = study_payload(loop, 2e-3)
-    assert payload.largest["heavy_payload"] > 10 * payload.largest["nominal"]
-    np.testing.assert_allclose(payload.held["heavy_payload"], payload.theory, rtol=1e-6)
-    assert np.abs(payload.held["heavy_payload_integral"]).max() < 1e-8
-    assert np.abs(payload.theory).min() > 1e-4
-    assert payload.passed
 
 
 # ---- Step doubling -------------------------------------------------------------------------------

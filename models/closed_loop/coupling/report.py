@@ -21,10 +21,8 @@ from rparm.models.closed_loop.coupling.loop import (
 from rparm.models.closed_loop.coupling.study import (
     LOCAL,
     Doubling,
-    Payload,
     StepErrors,
     study_doubling,
-    study_payload,
     study_step_errors,
 )
 from rparm.models.closed_loop.study import REST
@@ -46,8 +44,6 @@ def run(path: Path, ssp: Path) -> dict[str, dict[str, object]]:
         _print(step_error_lines(step_errors))
         tracking = study_tracking(loop)
         _print(tracking_lines(tracking))
-        payload = study_payload(loop)
-        _print(payload_lines(payload))
         doubling = study_doubling(loop)
         _print(doubling_lines(doubling))
         limits = largest_step.study_steps(ssp, REST)
@@ -65,11 +61,6 @@ def run(path: Path, ssp: Path) -> dict[str, dict[str, object]]:
             "errors": {t.method.name: t.largest for t in tracking},
             "predicted": {t.method.name: float(t.predicted.max()) for t in tracking},
             "passed": tracking_passed(tracking),
-        },
-        "payload": {
-            "errors": payload.largest,
-            "held": {name: held.tolist() for name, held in payload.held.items()},
-            "passed": payload.passed,
         },
         "step doubling": {
             "tolerances": [d.tolerance for d in doubling],
@@ -127,18 +118,6 @@ def tracking_lines(tracking: list[Tracking]) -> list[str]:
     passed = tracking_passed(tracking)
     text = f"Jacobi below {LARGEST_ERROR:g} m, Gauss-Seidel smaller, all as predicted"
     return [*lines, f"{text}: {verdict(passed)}"]
-
-
-def payload_lines(payload: Payload) -> list[str]:
-    title = "unknown payload, 1 ms, Jacobi"
-    head = f"{title:<34}  {'on circle':>11}  {'held: q1':>13}  {'q2':>13}"
-    lines = [head, "-" * len(head)]
-    for name, largest in payload.largest.items():
-        q1, q2 = payload.held[name]
-        lines.append(f"{name:<34}  {largest:>9.3e} m  {q1:>9.2e} rad  {q2:>11.2e} m")
-    q1, q2 = payload.theory
-    lines.append(f"{'theory without integral action':<34}  {'':>11}  {q1:>9.2e} rad  {q2:>11.2e} m")
-    return [*lines, f"constant as in theory, removed: {verdict(payload.passed)}"]
 
 
 def doubling_lines(doubling: list[Doubling]) -> list[str]:

@@ -1,4 +1,4 @@
-"""Studies of the coupling: errors against step, an unknown payload, step doubling."""
+"""Studies of the coupling: errors against step, step doubling."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,11 +9,9 @@ from rparm.models.closed_loop.coupling.loop import (
     METHODS,
     REFERENCES,
     STATES,
-    VARIANTS,
     ClosedLoop,
     Columns,
     Method,
-    path_error,
     read_reference,
 )
 
@@ -110,54 +108,6 @@ def simpson(values: np.ndarray, step: float) -> float:
     """Return the integral over an even number of equal steps."""
     inner = 4 * values[1:-1:2].sum() + 2 * values[2:-1:2].sum()
     return float((values[0] + inner + values[-1]) * step / 3)
-
-
-# ---- An unknown payload --------------------------------------------------------------------------
-HOLD = 9.0  # s: the circle ends at 5.5 s, what is left of the motion has died out
-
-
-@dataclass(frozen=True, eq=False)
-class Payload:
-    """Errors of the variants with the wrong payload in the controller."""
-
-    largest: dict[str, float]  # m, end effector on the circle
-    held: dict[str, np.ndarray]  # (2,) rad, m: errors of the joints at the end of the hold
-    theory: np.ndarray  # (2,) of the one without integral action
-
-    @property
-    def passed(self) -> bool:
-        """Whether the payload costs what theory gives, and integral action takes that away."""
-        left, helped = self.held["heavy_payload"], self.held["heavy_payload_integral"]
-        return bool(
-            self.largest["heavy_payload"] > 10 * self.largest["nominal"]
-            and np.abs(left - self.theory).max() <= 1e-6 * np.abs(self.theory).max()
-            and np.abs(helped).max() <= 1e-6 * np.abs(left).max()
-        )
-
-
-def study_payload(loop: ClosedLoop, step: float = 1e-3) -> Payload:
-    """A payload that the controller does not know, with and without integral action."""
-    largest, held = {}, {}
-    for variant in VARIANTS:
-        columns = loop.run(METHODS[0], step, variant, stop=HOLD)[0]
-        largest[variant] = float(path_error(columns).max())
-        ends = [(columns[f"trajectory.q{i}_ref"][-1], columns[f"arm.q{i}"][-1]) for i in (1, 2)]
-        held[variant] = np.array([wanted - found for wanted, found in ends])
-        if variant == "heavy_payload":
-            theory = _held_error(loop, columns)
-    return Payload(largest, held, theory)
-
-
-def _held_error(loop: ClosedLoop, columns: Columns) -> np.ndarray:
-    """D^-1 (g_arm - g_controller) / Kp at the end, with the controller's D."""
-    arm = {name: float(loop.fmus["arm"].model.variables[name].start) for name in ("m2", "a", "g")}
-    excess = loop.parameters("heavy_payload")["arm"]["m2"] - arm["m2"]
-    last = {name: float(column[-1]) for name, column in columns.items()}
-    x, y, q1 = last["arm.ee_x"], last["arm.ee_y"], last["arm.q1"]
-    mass = np.array([[last["arm.D11"], last["arm.D12"]], [last["arm.D12"], last["arm.D22"]]])
-    mass -= excess * np.array([[x * x + y * y, -arm["a"]], [-arm["a"], 1.0]])
-    weight = excess * arm["g"] * np.array([x, np.sin(q1)])
-    return np.linalg.solve(mass, weight) / [loop.gain("Kp1"), loop.gain("Kp2")]
 
 
 # ---- Step doubling on a motion with a fast and a slow part, against fixed steps ------------------
