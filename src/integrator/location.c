@@ -7,11 +7,12 @@
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-bool location_create(const struct ode *ode, const struct integrator_settings *settings,
+bool location_create(const struct ode *ode, const double absolute_tolerances[],
                      struct location *location) {
     const size_t states = ode->state_count;
     const size_t count = ode->indicator_count;
-    *location = (struct location){.ode = ode, .settings = settings, .time = INFINITY};
+    *location =
+        (struct location){.ode = ode, .absolute_tolerances = absolute_tolerances, .time = INFINITY};
     if (count == 0) {
         return true;
     }
@@ -80,24 +81,12 @@ static enum status evaluate_one(struct location *location, size_t i, double t, c
     return status;
 }
 
-/* Returns the usual size of a state, in its unit. However small it is at a restart, it has the
- * rounding of that from before. Absolute tolerances are relative ones of a hundredth of it. */
-static double usual_size_of(const struct location *location, size_t state) {
-    const struct integrator_settings *settings = location->settings;
-    return 100.0 * settings->absolute_tolerances[state] / settings->relative_tolerance;
-}
-
 /* Restarts the indicators of the model, whose noise follows from their limits so far. */
 static enum status restart_model(struct location *location, const double x[]) {
     const struct ode *ode = location->ode;
     const enum status status = evaluate(location, 0.0, x);
     if (ode->rounding != NULL) {
-        for (size_t i = 0; i < ode->state_count; i++) {
-            location->x[i] = fabs(x[i]);
-            location->dx[i] = larger(fabs(x[i]), usual_size_of(location, i));
-        }
-        ode->rounding(location->dx, location->touch, ode->context);
-        ode->rounding(location->x, location->first, ode->context);
+        ode->rounding(location->first, ode->context);
     }
     for (size_t k = 0; status == STATUS_OK && k < location->used_count; k++) {
         const size_t i = location->used[k];
@@ -107,7 +96,7 @@ static enum status restart_model(struct location *location, const double x[]) {
         location->is_armed[i] = location->z[i] > 0.0;
         if (ode->rounding != NULL) {
             location->noise[i] = larger(location->first[i], DBL_MIN);
-            location->touch[i] *= 4.0;
+            location->touch[i] = 4.0 * location->first[i];
             location->rounding[i] = location->noise[i];
             location->is_armed[i] = location->z[i] > location->noise[i];
         }
@@ -144,12 +133,10 @@ enum status location_restart(struct location *location, const struct indicator *
             const bool is_sure = indicator->rises || z > 0.0;
             location->is_armed[i] = is_sure && (z > rounding || (rounding == 0.0 && z >= 0.0));
             const double miss =
-                fabs(indicator->factor) * location->settings->absolute_tolerances[indicator->state];
+                fabs(indicator->factor) * location->absolute_tolerances[indicator->state];
             location->noise[i] = is_sure ? rounding : larger(rounding, miss);
             const double size = fabs(indicator->offset) + fabs(z - indicator->offset);
-            const double usual =
-                fabs(indicator->factor) * usual_size_of(location, indicator->state);
-            location->touch[i] = 8.0 * DBL_EPSILON * larger(size, usual);
+            location->touch[i] = 8.0 * DBL_EPSILON * size;
         }
     }
     return needs_model ? restart_model(location, x) : STATUS_OK;

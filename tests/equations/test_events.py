@@ -57,16 +57,6 @@ def test_the_ball_bounces_eleven_times_and_rests(folder: Path, method: int) -> N
 
 
 @EACH_METHOD
-@pytest.mark.parametrize("tolerance", [1e-5, 1e-8, 1e-10])
-def test_an_exact_touch_is_no_event(folder: Path, method: int, tolerance: float) -> None:
-    """(t - 1)^2 < 0 never holds, wherever steps end."""
-    fmu, options = made(folder / "touch", TEXTS["TOUCH"]), {"solver_method": method}
-    for count in (3, 7, 12, 14, 20, 25, 42, 60):
-        run = simulated(fmu, 2.1, 2.1 / count, options, relative_tolerance=tolerance)
-        assert run["hits"][-1] == 0, count
-
-
-@EACH_METHOD
 def test_the_thermostat_switches_when_its_exponentials_do(folder: Path, method: int) -> None:
     run = simulated(
         example("thermostat", folder), 7200.0, 10.0, {"solver_method": method},
