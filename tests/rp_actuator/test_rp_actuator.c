@@ -1,4 +1,4 @@
-/* The drives: step response, braking, limited currents, ends of the numbers and refusals.
+/* The drives: step response, braking, ends of the numbers and refusals.
  * test_actuator.py compares values with the equations. */
 #include "model_test.h"
 #include "rp_actuator_equations.h"
@@ -10,12 +10,10 @@
 #include <float.h>
 #include <stdio.h>
 
-static struct rp_test_random random_source;
 static struct rp_actuator_values at;
 
 void setUp(void) {
     create_instance();
-    random_source.state = 16;
     at = (struct rp_actuator_values){
         .parameters = {{1.0, 1.5}, {0.5, 1.5}, {1.0, 2.0}, {32.0, 48.0}, {1e3, 2e3}, {1.0, 0.5}},
         .inputs = {{1.5, 0.5}, {1.0, 2.0}},
@@ -81,40 +79,6 @@ static void test_beyond_the_no_load_speed_the_drive_brakes(void) {
         step_to(80.0 * T);
         ASSERT_CLOSE(-i_max, get(RP_ACTUATOR_current1), 1e-9);
         ASSERT_CLOSE(2.0 * u_max + R * i_max, get(RP_ACTUATOR_voltage1), 1e-8);
-    }
-}
-
-/* By trial of 513 currents within i_max: first the excess of the voltage counts, then the distance
- * from the command. */
-static void test_limited_currents_are_the_nearest_that_are_allowed(void) {
-    for (int sample = 0; sample < RP_TEST_SAMPLES; sample++) {
-        struct rp_actuator_parameters p;
-        struct rp_actuator_inputs in;
-        for (int i = 0; i < 2; i++) {
-            p.torque_constant[i] = rp_test_uniform(&random_source, 0.25, 1.0);
-            p.gear_ratio[i] = rp_test_uniform(&random_source, 1.0, 3.0) * (i == 0 ? 1.0 : -1.0);
-            p.resistance[i] = rp_test_uniform(&random_source, 0.25, 2.0);
-            p.current_max[i] = rp_test_uniform(&random_source, 0.5, 8.0);
-            p.voltage_max[i] = rp_test_uniform(&random_source, 1.0, 8.0);
-            p.time_constant[i] = 1.0;
-            in.effort_cmd[i] = rp_test_uniform(&random_source, -40.0, 40.0);
-            in.dq[i] = rp_test_uniform(&random_source, -10.0, 10.0);
-        }
-        for (int i = 0; i < 2; i++) {
-            const double constant = p.gear_ratio[i] * p.torque_constant[i];
-            const double commanded = in.effort_cmd[i] / constant;
-            double best = 0.0, best_over = INFINITY, best_miss = INFINITY;
-            for (int step = -256; step <= 256; step++) {
-                const double current = p.current_max[i] * step / 256.0;
-                const double voltage = p.resistance[i] * current + constant * in.dq[i];
-                const double over = fmax(fabs(voltage) - p.voltage_max[i], 0.0);
-                const double miss = fabs(current - commanded);
-                if (over < best_over || (over == best_over && miss < best_miss)) {
-                    best = current, best_over = over, best_miss = miss;
-                }
-            }
-            ASSERT_CLOSE(best, drive_limited_current(&p, &in, i), p.current_max[i] / 256.0);
-        }
     }
 }
 
