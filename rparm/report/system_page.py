@@ -308,7 +308,7 @@ def _solvers(ssp: OpenedSystem, run: ecos.Run) -> list[Table]:
     for component in ssp.models:
         values = [run.statistics.get(f"{component}.{name}") for name in ecos.STATISTICS]
         if any(value is not None for value in values):
-            cells = ("–" if x is None else short(x) if isinstance(x, float) else x for x in values)
+            cells = ("–" if x is None else int(x) if x == int(x) else short(x) for x in values)
             rows.append((component, *cells))
     note = "Of components with a solver, from the start to the end of the run."
     return [Table("Solvers", ("component", *ecos.STATISTICS.values()), rows, note)] if rows else []
