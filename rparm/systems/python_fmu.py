@@ -100,8 +100,8 @@ def pack(name: str, component: PythonComponent, fixed: Mapping[str, Any], path: 
     class_name = name + "_" * keyword.iskeyword(name)
     with temporary_folder() as folder:
         caller, data = folder / f"{class_name}_caller.py", folder / f"{class_name}.json"
-        caller.write_text(CALLER.replace("CLASS", class_name), encoding="utf-8")
-        data.write_text(json.dumps(given), encoding="utf-8")
+        caller.write_text(CALLER.replace("CLASS", class_name), encoding="utf-8", newline="\n")
+        data.write_text(json.dumps(given), encoding="utf-8", newline="\n")
         files = [data, component.path.absolute(), *beside]
         command = [sys.executable, "-m", "pythonfmu", "build", "-f", caller, "-d", folder, *files]
         process = subprocess.run(
