@@ -213,11 +213,10 @@ class ModelFile:
                 raise ModelFileError(f"{error}{instead_of(text)}") from None
             nodes = in_order([tree])
             self.operations += len(nodes)
-            for node in nodes:
-                if node.op == "/" and (node.arguments[1].op, node.arguments[1].value) == (
-                    "number",
-                    0,
-                ):
+            always = [tree]  # what is calculated whatever holds; a branch need not have a value
+            for node in always:
+                always += node.arguments[:1] if node.op == "if" else node.arguments
+                if node.op == "/" and (by := node.arguments[1]).op == "number" and by.value == 0:
                     at = ", ".join(f"{i} = {value}" for i, value in element.indexes.items())
                     raise ExpressionError(node.column, f"division by 0{at and f' at {at}'}")
             if self.operations > MOST_OPERATIONS:
