@@ -18,7 +18,7 @@ NEEDED = ("latex2mathml", "markdown_it", "mdit_py_plugins", "pycparser", "pydant
 
 
 def build(
-    file: str | Path, *, output: str | Path = "", platforms: bool = False
+    file: str | Path, *, output: str | Path = "", platforms: bool = False, lock: bool = True
 ) -> tuple[Path, Path]:
     """Make FMUs of the equations in a file; examples/models/README.md explains it.
 
@@ -32,6 +32,8 @@ def build(
         Folder for the FMUs; default: the current one.
     platforms : bool
         For all platforms, by zig; else for this machine, by gcc, clang or zig.
+    lock : bool
+        Whether the lock file is written.
 
     Returns
     -------
@@ -41,10 +43,10 @@ def build(
     project.check_installed(NEEDED, "build")
     runtimes = project.runtimes(platforms)
     with temporary_folder() as work:
-        lock, fmi2, fmi3 = _made(Path(file), runtimes, not platforms, work)
-        paths = Path(output) / fmi2, Path(output) / fmi3
-        targets = (Path(file).with_name(lock), *paths)
-        _put(dict(zip(targets, (work / name for name in (lock, fmi2, fmi3)), strict=True)))
+        kept, *fmus = _made(Path(file), runtimes, not platforms, work)
+        paths = Path(output) / fmus[0], Path(output) / fmus[1]
+        made = {Path(file).with_name(kept): work / kept} if lock else {}
+        _put(made | dict(zip(paths, (work / name for name in fmus), strict=True)))
     return paths
 
 

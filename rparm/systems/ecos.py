@@ -86,6 +86,8 @@ def unsuited(ssp: "OpenedSystem") -> str:
         return f"{next(iter(ssp.python))} is Python"
     if system.inputs:
         return f"{next(iter(system.inputs))} moves"
+    if system.start < 0.0:
+        return "Ecos starts at 0 s or later"
     if odd:
         return f"there are connections of type {odd[0]}"
     if any(ssp.models[c].variables[n].type == "Enumeration" for c, n in settings):

@@ -219,7 +219,7 @@ class LoopReader(Reader):
         for made, source in self._copied.items():
             if made == path.resolve():
                 return self.folder / source
-        fmus = building.build(path, output=folder)
+        fmus = building.build(path, output=folder, lock=False)
         fmu = fmus[VERSIONS.index(self.version)]
         self._copied[path.resolve()] = fmu.relative_to(self.folder).as_posix()
         return fmu

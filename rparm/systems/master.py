@@ -495,7 +495,7 @@ def run_in_master(
         ssp.unpacked_fmus() as fmus,
         Master(fmus, system.connections, signals=system.inputs) as master,
     ):
-        master.initialize(times[0], times[-1], system.parameter_sets[variant])
+        master.initialize(system.start, float(times[-1]), system.parameter_sets[variant])
         readers = [_RowReader(ssp, c, names) for c in master.components.values()]
         begin = time.perf_counter()
         for row, end in enumerate(times.tolist()):

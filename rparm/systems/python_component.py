@@ -208,13 +208,14 @@ class PythonComponent(AbstractContextManager["PythonComponent"]):
             yield
         except UserError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise self.failure(error, when, name) from error
 
     def failure(self, error: BaseException, when: str, name: str = "") -> CodeError:
         frames = traceback.extract_tb(error.__traceback__)
-        lines = [frame.lineno for frame in frames if frame.filename == str(self.path)]
-        where = f"{self.path}, line {lines[-1]}" if lines else str(self.path)
+        own = [frame for frame in frames if frame.filename == str(self.path)]
+        known = own or [frame for frame in frames[-1:] if frame.filename != __file__]
+        where = f"{known[-1].filename}, line {known[-1].lineno}" if known else str(self.path)
         where = f"{name}: {where}" if name else where
         text = error.args[0] if isinstance(error, KeyError) and error.args else error
         said = f": {one_line(text)}" if str(text) else ""
@@ -338,6 +339,8 @@ class PythonInstance(Instance):
             except ValueError as error:
                 wrong = f"{name}: expected an array of numbers, got {show(value)}"
                 raise UserError(f"{self.name}: {wrong}") from error
+        if type(self.made.attributes[name]) is int and float(cast(float, value)).is_integer():
+            value = int(cast(float, value))  # a length, or the number of an element
         with self.fmu.explained(f"{name} = {show(value)}", self.name):
             setattr(self.made.object, name, copy.deepcopy(value))
 

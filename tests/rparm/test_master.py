@@ -400,6 +400,13 @@ def test_a_function_has_the_names_of_its_connections(oscillator: Fmu, tmp_path: 
     assert u.tolist() == [0.0, -2.0 * x[0], -2.0 * x[1] + H]
 
 
+def test_whole_numbers_of_python_stay_whole(tmp_path: Path) -> None:
+    text = "class C:\n    inputs, outputs, n = [], ['u'], 3\n"
+    with Master({"c": python(tmp_path, text + STEP + "return {'u': len([0] * self.n)}")}, []) as c:
+        c.initialize(0.0, None, {"c": {"n": 4.0}})
+        assert c.run([0.0, 1.0])[1].tolist() == [4.0]
+
+
 ENDS = "class C:\n    inputs = ['x']\n    outputs = ['u']\n"
 STEP = "    def step(self, t, h, inputs):\n        "
 
@@ -416,6 +423,7 @@ STEP = "    def step(self, t, h, inputs):\n        "
         (ENDS.replace("['x']", "'x'") + STEP + "pass", "", r"inputs: expected a list of", 2),
         (ENDS.replace("'u'", "'x'") + STEP + "pass", "", r"'x' is both an input and an out", 2),
         (ENDS + STEP + "return {'u': 1 / 0}", "", r"^c: .*code\.py, line 5: ZeroDivisionError", 1),
+        (ENDS + STEP + "raise SystemExit(0)", "", r"^c: .*code\.py, line 5: SystemExit: 0", 1),
         (ENDS + STEP + "return {'u': inputs['xx']}", "", r"line 5: .*'xx', did you mean 'x'\?", 1),
         (ENDS + STEP + "return {}", "", r"line 4: step: returned no 'u' in the step from t = 0", 1),
         (ENDS + STEP + "return {'u': 1, 'w': 2}", "", r"line 4: step: 'w' is no output", 1),
