@@ -295,6 +295,9 @@ class SspReader:
         if not any(bound.values()):
             return {ALONE: {}}
         names = list(dict.fromkeys(name for sets in bound.values() for name in sets))
+        if len(names) > 1 and all(len(sets) <= 1 for sets in bound.values()):  # each has its own
+            self.is_plain = False
+            return {ALONE: {c: next(iter(sets.values()), {}) for c, sets in bound.items()}}
         for component, sets in bound.items():
             missing = [name for name in names if name not in sets]
             if sets and missing:

@@ -11,7 +11,7 @@ import pytest
 
 import rparm
 from rparm.errors import UserError
-from rparm.systems import ssp
+from rparm.systems import ecos, ssp
 from rparm.systems.structure import Connector
 from tests.support.rparm_project import MISTAKES, Console
 from tests.support.ssp_files import (
@@ -131,6 +131,16 @@ def test_what_an_ssp_leaves_out_is_taken_from_its_fmus(tmp_path: Path) -> None:
     assert ours["time"].tolist() == theirs["time"].tolist()
     for name in ("arm.q1", "arm.q2", "controller.tau1"):
         assert ours[name] == pytest.approx(theirs[name], abs=1e-6 * np.abs(theirs[name]).max())
+
+
+def test_sets_of_one_component_each_are_one_variant(tmp_path: Path) -> None:
+    others = r'<ssd:ParameterBinding source="\w+/[a-z]+_(?!nominal)\w+\.ssv"/>'
+    own = {NOMINAL_ARM: replace('name="nominal"', 'name="arm"')}
+    path = without(tmp_path / "own.ssp", others, more=own)
+    with ssp.unpacked(path) as found, ssp.unpacked(SSP) as whole:
+        sets = found.system.parameter_sets
+        assert sets == {"default": whole.system.parameter_sets["nominal"]}
+        assert ecos.run(found, "default", ["arm.q1"]).values[-1] != 0.0
 
 
 def test_an_input_that_is_not_connected_keeps_its_start(tmp_path: Path) -> None:
