@@ -358,7 +358,7 @@ class System:
         Returns
         -------
         Table
-            Columns "component.variable": what the file keeps, else all Real outputs and states,
+            Columns "component.variable": what the file keeps, else all outputs and states,
             read after the inputs of the next step have been set. With "helics": all Real outputs,
             read after the step.
         """
@@ -381,7 +381,7 @@ class System:
             times = changed.system.start, changed.system.stop, step
             simulation.communication_points(*times)  # checks them
             changed = replace(changed, system=replace(changed.system, step=step))
-        names = changed.system.keep or comparison.recorded(changed)
+        names = comparison.kept(changed)
         run = engines[engine](changed, variant, names)
         units = {name: changed.variable(name).unit for name in run.names}
         return Table(run.times, run.names, run.values, units)
