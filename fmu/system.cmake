@@ -22,7 +22,8 @@ function(add_ssp name)
   endforeach()
 endfunction()
 
-# In add_ssp: the system, of the FMUs beside it, which the targets FMU_kind make.
+# Writes the SSP from the FMUs in its folder. kind: fmu or release, of the targets that make them.
+# It uses the variables loop, version, writer and ARG_FMUS of add_ssp.
 function(write_ssp ssp kind)
   cmake_path(GET ssp PARENT_PATH folder)
   set(fmus "")

@@ -1,4 +1,4 @@
-"""`new`, `new-model`, `build`, `schema`, `fmu`, `list`, `playground`: write or name files."""
+"""`new`, `new-model`, `new-system`, `build`, `ssp`, `schema`, `fmu`, `list`, ...: files."""
 
 import argparse
 import json
@@ -62,7 +62,7 @@ stop = {stop!r}  # s
 
 [connections]  # "component.input" = "component.output"
 {guesses}
-[inputs]  # an input that neither this nor a connection feeds has its start value
+[inputs]  # other unconnected inputs keep their start values
 {inputs}
 [parameters]  # other values than those of the FMUs, as numbers or with a unit: "12 kg"
 """
@@ -302,9 +302,9 @@ def do_ssp(options: argparse.Namespace) -> Ended:
             path.parent.mkdir(parents=True, exist_ok=True)
             needed = ssp_writer.write(path, opened)
         inputs = list(opened.system.inputs)
-    few = "inputs of the system, which Ecos and libcosim do not load"
-    notes = [f"{few}: {', '.join(inputs)}"] if inputs else []
-    notes += [f"{component} runs where there is {what}" for component, what in needed.items()]
+    unread = "inputs of the system, which Ecos and libcosim do not load"
+    notes = [f"{unread}: {', '.join(inputs)}"] if inputs else []
+    notes += [f"{component} needs {what}" for component, what in needed.items()]
     console.messages(str(path), [*opened.notes, *notes])
     document = {"file": path.absolute(), "inputs": inputs, "needs": needed}
     return Ended(0, f"{path}: written", document, page=path)

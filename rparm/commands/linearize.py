@@ -71,9 +71,10 @@ def do_linearize(options: argparse.Namespace) -> Ended:
         raise UserError("--variant: a variant is given already")
     options.variant = options.variant or options.given_variant
     request = study.Request(
-        options.what, pairs("--at", options.at), options.time, names(options.trim or ()),
-        options.inputs and names(options.inputs), options.outputs and names(options.outputs),
-        options.variant, options.cut, names(options.without or ()), options.fmi,
+        options.what, pairs("--at", options.at), options.time, free=names(options.trim or ()),
+        inputs=options.inputs and names(options.inputs), variant=options.variant, cut=options.cut,
+        outputs=options.outputs and names(options.outputs), without=names(options.without or ()),
+        version=options.fmi,
     )  # fmt: skip
     found = study.study(request)
     if options.step is not None:

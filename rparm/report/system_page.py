@@ -115,7 +115,7 @@ def remove(report: Path, system: str, names: Sequence[str]) -> None:
 
 
 def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
-    """Write the page and the values of a run, complete or not at all; its line in the overview."""
+    """Write page and values of a run, complete or not at all; return its line of the overview."""
     run, ssp, folder = outcome.run, section.ssp, _folder(report, section)
     rows, data = _data(section, outcome)
     failures = []
@@ -224,7 +224,7 @@ def _data(section: Section, outcome: Outcome) -> tuple[np.ndarray, RunData]:
 
 
 def _values(section: Section, folder: Path, outcome: Outcome, rows: np.ndarray) -> dict[str, str]:
-    """Write the file of values; what the page says of it."""
+    """Write the file of values, and return what the page says of it."""
     run, csv = outcome.run, f"{section.page(outcome.variant)}.csv"
     names = run.names if section.folder else comparison.kept(section.ssp)
     values = run.values[np.ix_(rows, [run.names.index(name) for name in names])]

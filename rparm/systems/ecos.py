@@ -219,7 +219,7 @@ def _watched(folder: Path, steps: int, progress: Callable[[int], object]) -> Ite
 
 
 def _start(folder: Path) -> int:
-    """Run the child; its exit code."""
+    """Run the child, and return its exit code."""
     temporary = dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(folder))  # the last two: on Windows
     environment = project.child_environment() | temporary | {"PYTHONUNBUFFERED": "1"}
     if os.name == "posix" and shutil.which("unzip") is None:

@@ -294,7 +294,7 @@ class LoopReader(Reader):
             if not VARIANT.fullmatch(name):
                 self.fail(f"{where}: expected a name of letters, digits, _ and -")
             if name == ALONE:
-                self.fail(f"{where}: {ALONE!r} is [{PARAMETERS}] alone, choose another name")
+                self.fail(f"{where}: {ALONE!r} stands for [{PARAMETERS}]; choose another name")
             table = dict(self.table(given, where))
             if "description" in table:
                 descriptions[name] = self.text(table.pop("description"), f"{where} description")

@@ -10,11 +10,11 @@ components before it, those of its beginning from itself and the components behi
 Inputs keep their values over a step, a zero-order hold ("held"), or are straight lines through the
 value of their source at the time at which it was read, with its slope there: in Jacobi order they
 extrapolate from the beginning of the step, in Gauss-Seidel order those from components before it
-meet value and slope at the end of the step. FMI 3.0 knows slopes of inputs only within a step: at
-the start, those of outputs miss what they owe to the slopes of inputs.
+meet value and slope at the end of the step. In FMI 3.0 inputs get slopes only within a step: at
+the start, the slopes of outputs lack the part due to the slopes of inputs.
 
 A Boolean, Integer or Enumeration that has changed in a step is passed on at the end of the step, in
-both orders. Then all values jump to what follows from it at this time, as at the start.
+both orders. Then all outputs are computed again at this time, as at the start.
 """
 
 import time
@@ -43,9 +43,9 @@ DISCRETE = ("Boolean", "Integer", "Enumeration")  # types of what switches
 class ConnectedInstance:
     """An instance, its place among the system's values, and the sources of its inputs.
 
-    Of `values` and their derivatives with respect to time, `slopes`, those from `first` on belong
-    to its outputs, of which some are `feeding` inputs. Each input has a source, an index among
-    them, which steps `ahead` of this component or not.
+    From index `first` on, `values` and `slopes`, their derivatives with respect to time, are those
+    of its outputs; `feeding` names the outputs that are connected. Each input has a source, an
+    index of `values`, whose component steps `ahead` of this one or not.
     """
 
     def __init__(
@@ -320,7 +320,7 @@ class Master(AbstractContextManager["Master"]):
         raise UserError(f"the connections form an algebraic loop: {names}")
 
     def _transfer_switches(self) -> list[str]:
-        """Set the discrete inputs whose sources have another value; which these are."""
+        """Set the discrete inputs whose sources have another value, and return their names."""
         elapsed = np.array([self.time - self._start])
         wanted = {name: int(x.values(elapsed)[0]) for name, x in self._switched.items()}
         for c in self._switches:

@@ -1,11 +1,10 @@
 """Components in Python: a class, or a plain function, that is stepped like an FMU.
 
 A class has the attributes `inputs` and `outputs`, lists of names, and `step(self, t, h, inputs)`. A
-step gets the inputs at t; the outputs that it returns hold from t + h on. Before they are 0, or
-those of an attribute `start`. Further attributes are parameters. With `save()` and `restore(state)`
-a master can go back. A function `step(t, h, inputs)` has the inputs and outputs of its connections.
-
-Each instance runs the file anew, so that no run sees what another one has left behind.
+step gets the inputs at t; the outputs that it returns hold from t + h on. Until then they have the
+values of the attribute `start`, else 0. Further attributes are parameters. With `save()` and
+`restore(state)` a master can go back. The inputs and outputs of a function `step(t, h, inputs)` are
+those of its connections. Each instance runs the file again, so no run sees another's state.
 """
 
 import copy
@@ -368,7 +367,7 @@ class PythonInstance(Instance):
         self.numbers[places] = numbers
 
     def _derivative_call(self, references: Array, orders: Array, values: Array) -> Call:
-        return no_call  # no master asks: it has none
+        return no_call  # its outputs have no derivatives, so masters do not ask
 
     def input_polynomials(self, names: Sequence[str], order: int) -> InputPolynomials:
         return InputPolynomials(np.zeros((order + 1, len(names))), no_call)  # nor sets any

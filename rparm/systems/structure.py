@@ -94,7 +94,7 @@ class System:
     start: float  # s
     stop: float  # s
     step: float  # s, communication step
-    # variant -> component -> variable; a component without a binding has no values, and without
+    # variant -> component -> variable -> value; {} for a component without values; without
     # parameter sets ALONE is the only variant
     parameters: dict[str, dict[str, dict[str, Parameter]]]
     descriptions: Mapping[str, str] = field(default_factory=dict)  # of variants that have one
@@ -161,7 +161,7 @@ class OpenedSystem:
         return self.folder / self.system.component(component).source
 
     def unpacked_fmu(self, component: str) -> Fmu:
-        """Return FMU of a component, unpacked; messages name the file that the user gave."""
+        """Return the FMU of a component, unpacked; messages name the file that the user gave."""
         if component in self.python:
             return self.python[component]()
         inside = self.path / self.system.component(component).source
@@ -169,7 +169,7 @@ class OpenedSystem:
 
     @contextmanager
     def unpacked_fmus(self, names: Iterable[str] | None = None) -> Iterator[dict[str, Fmu]]:
-        """Return FMUs of all components, or of those named, in this order."""
+        """Return the FMUs of all components, or of those named, in this order."""
         with ExitStack() as stack:
             wanted = self.models if names is None else names
             yield {name: stack.enter_context(self.unpacked_fmu(name)) for name in wanted}

@@ -21,7 +21,8 @@ WRITTEN = {"value_references.h", "benchmark.md"}  # by the generator and the ben
 # what the reader makes
 PLACEHOLDERS = {"my_scenario", "my_model", "MyModel", "Name", "name"}
 # names in programs of others
-ELSEWHERE = {"step_until", "SystemGeometry", "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES"}
+ELSEWHERE = {"LD_PRELOAD", "step_until", "SystemGeometry"}
+ELSEWHERE |= {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES"}
 ELSEWHERE |= {"OMSimulator", "system_sc", "system_wc", "importFMU", "load_fmu", "final_time"}
 HISTORY = ROOT / "CHANGELOG.md"  # names what is gone, too
 

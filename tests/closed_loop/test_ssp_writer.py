@@ -139,7 +139,7 @@ def test_what_moves_is_an_input_of_the_system(folder: Path, console: Console) ->
     code, out, err = console("ssp", folder / "moving.toml", "-o", path)
     assert (code, out) == (0, f"{path}: written\n")
     assert "inputs of the system, which Ecos and libcosim do not load: class.reference" in err
-    assert "class runs where there is Python 3." in err
+    assert "class needs Python 3." in err
     system = rparm.System(path)
     assert "not connected, constant: arm.tau1, class.reference" in system.notes
     with opened.opened(path) as found:

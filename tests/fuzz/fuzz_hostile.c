@@ -107,7 +107,7 @@ static void SetDebugLogging(struct fuzz_input *input, struct fuzz_instance *inst
     }
 }
 
-/* In FMI 3.0 the arguments are those of EnterInitializationMode. */
+/* Calls SetupExperiment, then mostly EnterInitializationMode: in FMI 3.0 they are one call. */
 static void EnterInitializationMode(struct fuzz_input *input, struct fuzz_instance *instance) {
     const int tolerance_defined = fuzz_byte(input) % 3;
     const double tolerance = fuzz_real(input);
@@ -125,7 +125,7 @@ static void EnterInitializationMode(struct fuzz_input *input, struct fuzz_instan
     }
 }
 
-/* To one of the states on the way to the first step. */
+/* Resets, then may enter initialization mode, and may exit it. */
 static void Reset(struct fuzz_input *input, struct fuzz_instance *instance) {
     fuzz_reset(instance);
     const unsigned steps = fuzz_below(input, 4);
@@ -201,7 +201,7 @@ static void SetReal(struct fuzz_input *input, struct fuzz_instance *instance) {
     }
 GETTER_OF_VALUES(Integer, VARIABLE_INT32)
 GETTER_OF_VALUES(Boolean, VARIABLE_BOOLEAN)
-GETTER_OF_VALUES(String, VARIABLE_FLOAT64)
+GETTER_OF_VALUES(String, VARIABLE_FLOAT64) // no variable is a String
 
 /* Limits of the work stay low, and most items of enumerations exist. */
 static int any_integer(struct fuzz_input *input, fmi2ValueReference reference) {
@@ -229,7 +229,7 @@ static int any_integer(struct fuzz_input *input, fmi2ValueReference reference) {
     }
 SETTER_OF_VALUES(Integer, VARIABLE_INT32, any_integer(input, some.at[i]))
 SETTER_OF_VALUES(Boolean, VARIABLE_BOOLEAN, fuzz_integer(input))
-SETTER_OF_VALUES(String, VARIABLE_FLOAT64, "%s%n")
+SETTER_OF_VALUES(String, VARIABLE_FLOAT64, "%s%n") // no variable is a String
 
 /* ---- States and derivatives ------------------------------------------------------------------ */
 
@@ -279,7 +279,7 @@ static void GetRealOutputDerivatives(struct fuzz_input *input, struct fuzz_insta
     fuzz_assert_written(status, values, some.count, "fmi2GetRealOutputDerivatives");
 }
 
-/* The instance as it is is accepted from its bytes, and no part of them is. */
+/* All bytes of a serialized state are accepted, a part of them never. */
 static void DeSerializeFMUstate(struct fuzz_input *input, struct fuzz_instance *instance) {
     static struct fuzz_bytes bytes;
     fmi2FMUstate state = NULL;

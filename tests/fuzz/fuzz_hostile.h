@@ -19,7 +19,7 @@ extern const struct fuzz_hostile_calls fuzz_version_calls;
 /* An array with nothing behind it that may be touched; valid until the call is over. */
 void *fuzz_argument(size_t count, size_t size);
 
-/* Mostly few, mostly not none. */
+/* 0 to 7 references, mostly 1. */
 struct fuzz_references {
     size_t count;
     size_t size; /* of the values in FMI 3.0: mostly the same */
@@ -35,7 +35,7 @@ double *fuzz_any_reals(struct fuzz_input *input, size_t count);
 /* Of derivatives, mostly small. */
 fmi2Integer *fuzz_any_orders(struct fuzz_input *input, size_t count);
 
-/* Poisoned. */
+/* An array of poison, to see what a call writes. */
 double *fuzz_unwritten(size_t count);
 
 /* Where a step begins, mostly where the instance is, and its length (s). */

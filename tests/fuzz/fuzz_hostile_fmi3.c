@@ -48,8 +48,7 @@ NUMBER_CALL(GetNumberOfContinuousStates, fuzz_state_count())
 
 /* ---- Values ---------------------------------------------------------------------------------- */
 
-/* Nothing can be had of a type that no variable has, nor any other number of values than of
- * variables. */
+/* A call succeeds only for types that variables have, and with one value for each variable. */
 static void check_values(fmi2Status status, const struct fuzz_references *some, bool exist,
                          const char *name) {
     if (status == fmi2OK && (some->size != some->count || (some->count > 0 && !exist))) {
@@ -82,7 +81,7 @@ VALUES_OF_TYPE(UInt32, VARIABLE_INT32, false, 1)
 VALUES_OF_TYPE(Int64, VARIABLE_ENUMERATION, true, (fmi3Int64)fuzz_word(input) % 6)
 VALUES_OF_TYPE(UInt64, VARIABLE_ENUMERATION, false, 1)
 VALUES_OF_TYPE(Boolean, VARIABLE_BOOLEAN, true, fuzz_below(input, 2) != 0)
-VALUES_OF_TYPE(String, VARIABLE_FLOAT64, false, "%s%n")
+VALUES_OF_TYPE(String, VARIABLE_FLOAT64, false, "%s%n") // no variable is a String
 
 #define BINARIES(name, sets)                                                                       \
     static void name(struct fuzz_input *input, struct fuzz_instance *instance) {                   \
