@@ -520,7 +520,7 @@ def run_in_master(
 
 
 def _value_at_end(master: Master, ssp: OpenedSystem, name: str) -> float:
-    component, _, variable = name.partition(".")
+    component = name.partition(".")[0]
     row = np.empty(1)
     _RowReader(ssp, master.components[component], [name]).read(row)
     return float(row[0])
