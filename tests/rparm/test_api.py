@@ -2,6 +2,7 @@
 
 import inspect
 import re
+import shutil
 import tomllib
 import webbrowser
 from collections.abc import Callable, Iterator
