@@ -121,7 +121,7 @@ def _write(path: Path, record: Record) -> None:
 def _command(system: OpenedSystem, variant: str, component: str, address: str) -> str:
     """Write the command that steps a component in the project's folder of another machine."""
     place = project.from_root(system.path)
-    arguments = federation.arguments(place, system.version, variant, component, address)
+    arguments = federation.arguments(place, variant, component, address, system.version)
     return f"{KEY}={key()} {project.PROGRAM} {shlex.join(arguments)}"
 
 

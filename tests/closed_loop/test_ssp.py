@@ -3,6 +3,7 @@
 What holds for every SSP: test_ssp_archives.py.
 """
 
+from dataclasses import replace as replaced
 from pathlib import Path
 
 import fmpy
@@ -96,6 +97,9 @@ def test_variants() -> None:
             }
             for component in FMUS
         }
+        other = replaced(opened.system, parameters={"last": {}, "default": {}})
+        assert opened.variant(None) == "nominal"
+        assert replaced(opened, system=other).variant(None) == "default"
     assert list(sets) == list(VARIANTS)  # nominal first: libcosim takes the first
     for variant, changes in VARIANTS.items():
         for component in FMUS:
