@@ -129,7 +129,7 @@ class SystemSubject(ExitStack):
             component, _, variable = name.partition(".")
             fed = {c.end for c in self.connections}
             if name in fed and self.variable(name).type == "Real":
-                raise UserError(f"{name}: is fed by a connection, which says its value")
+                raise UserError(f"{name}: is connected and cannot be set")
             merged[component][variable] = value
         return merged
 

@@ -346,17 +346,17 @@ class LoopReader(Reader):
     def with_inputs(self, system: System, given: Mapping[str, Any]) -> System:
         """Add inputs from outside; constants are parameters of all variants that give no other."""
         known: dict[str, Variable] = {}
-        fed = {c.end: str(c) for c in system.connections}
+        fed = {c.end: c.start for c in system.connections}
         for values in system.parameters.values():
             for name in (f"{component}.{x}" for component in values for x in values[component]):
                 if name in fed:
-                    self.fail(f"{name}: the value is that of a connection, {fed[name]}")
+                    self.fail(f"{name}: is connected to {fed[name]} and cannot be set")
         for name in given:
             component, variable = self.variable(name, f"[{INPUTS}]")
             if not variable.is_a(INPUTS):
                 self.fail(f"[{INPUTS}]: {name!r} is {causality(variable)} of {component!r}")
             if name in fed:
-                self.fail(f"[{INPUTS}.{name}]: the input has a connection already, {fed[name]}")
+                self.fail(f"[{INPUTS}.{name}]: is connected to {fed[name]} already")
             known[name] = replace(variable, name=name)
         whole = Model(system.name, self.version, known, (), False, False, False, False)
         reader = InputReader(self, whole, system.times, system.elapsed)

@@ -79,7 +79,7 @@ class ConnectedInstance:
     def begin(self, start: float, stop: float | None, parameters: Mapping[str, Value]) -> None:
         for name in self.inputs.names:
             if name in parameters:
-                raise UserError(f"{self.name}.{name}: is fed by a connection, which says its value")
+                raise UserError(f"{self.name}.{name}: is connected and cannot be set")
         begin_instance(self.instance, start, stop, parameters)
 
     def set_inputs(self, values: np.ndarray) -> None:

@@ -232,7 +232,7 @@ class OpenedSystem:
             )
         feeding = [c.start for c in self.system.connections if c.end == f"{component}.{name}"]
         if feeding:
-            raise WrongValueError(f"is connected, to {feeding[0]}")
+            raise WrongValueError(f"is connected to {feeding[0]} and cannot be set")
         if f"{component}.{name}" in self.system.inputs:
             raise WrongValueError("is an input that moves")
         return Parameter.of(variable, given)
