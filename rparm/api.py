@@ -312,25 +312,22 @@ class System:
     """
 
     def __init__(self, name: str | Path, *, fmi: int = 2) -> None:
-        self.path, self._version = Path(name), version(fmi)
-        if self.path.suffix.lower() not in opened.SUFFIXES:
-            known = project.systems()
-            if name not in known:
-                raise UserError(f"no system {str(name)!r}{hint(str(name), known)}")
-            self.path = project.built(known[str(name)], ".ssp", version=self._version)
+        self._version = version(fmi)
+        self.path = opened.system_file(name, self._version, "")
         self._stack = ExitStack()
         weakref.finalize(self, self._stack.close)
-        system = self._open()
-        self.variants = tuple(system.system.parameters)
-        self.notes = tuple(system.notes)
+        self._opened: OpenedSystem | None = None
+        self._open()
 
     def _open(self) -> OpenedSystem:
-        if not hasattr(self, "_opened") or self._files != _changes(self._opened):
+        system = self._opened
+        if system is None or self._files != _changes(system):
             self._stack.close()
-            door = opened.opened(self.path, version=self._version)
-            self._opened = self._stack.enter_context(door)
-            self._files = _changes(self._opened)
-        return self._opened
+            self._opened = None  # while opening may fail
+            system = self._stack.enter_context(opened.opened(self.path, version=self._version))
+            self._opened, self._files = system, _changes(system)
+            self.variants, self.notes = tuple(system.system.parameters), tuple(system.notes)
+        return system
 
     def run(
         self,
@@ -345,7 +342,7 @@ class System:
         Parameters
         ----------
         variant : str, optional
-            Default: the first one.
+            Default: "default" if there is one, else the first.
         parameters : mapping, optional
             Values in place of the variant's by "component.variable": of parameters, states at the
             start, inputs that nothing feeds; numbers, or texts with a unit ("12 kg").
@@ -363,10 +360,7 @@ class System:
             read after the step.
         """
         system = self._open()
-        known = tuple(system.system.parameters)
-        variant = known[0] if variant is None else variant
-        if variant not in known:
-            raise UserError(f"{self.path}: has no variant {variant!r}{hint(variant, known)}")
+        variant = system.variant(variant)
         engines = {
             "master": master.run_in_master,
             "ecos": ecos.run,
@@ -406,10 +400,9 @@ class System:
 
 
 def _changes(system: OpenedSystem) -> dict[Path, int]:
-    """Return the times of change of all files beside those of a system."""
-    folders = {file.absolute().parent for file in (system.path, *system.files.values())}
-    files_there = (file for folder in folders if folder.is_dir() for file in folder.iterdir())
-    return {file: file.stat().st_mtime_ns for file in files_there if files.is_file(file)}
+    """Return when each file of a system was last changed."""
+    known = {system.path, *system.files.values(), *system.read}
+    return {file: file.stat().st_mtime_ns for file in known if files.is_file(file)}
 
 
 def version(fmi: int) -> str:
@@ -455,8 +448,8 @@ def linearize(
     inputs, outputs : sequence of str, optional
         Those of the model; default: all.
     variant, break_at, without
-        Of a system: its parameter set (default: the first), an input whose connection is cut, and
-        components that are taken as ideal.
+        Of a system: its parameter set (default: that of System.run), an input whose connection is
+        cut, and components that are taken as ideal.
 
     Returns
     -------

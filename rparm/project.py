@@ -228,6 +228,12 @@ def built(folder: Path, suffix: str, option: str = "", version: str = VERSIONS[0
     raise UserError(f"{build}: has no {kind} of {folder.name}: {way_out}")
 
 
+def is_built(path: Path, folder: Path) -> bool:
+    """Return whether a file of this build is built from the folder of a model or system."""
+    is_here = path.resolve().parent in [ROOT.resolve() / name for name in BUILD_FOLDERS.values()]
+    return is_here and is_built_from(path.stem, folder)
+
+
 def fmu_of(subject: Path, option: str = "", version: str = VERSIONS[0]) -> Path:
     """Return the FMU of a scenario's subject: a file itself, or built from a model's folder."""
     return built(subject, ".fmu", option, version) if subject.is_dir() else subject

@@ -16,17 +16,17 @@ import numpy as np
 from rparm import project
 from rparm.campaign.campaign_file import Campaign, checked
 from rparm.campaign.job import Archive, Component, HeldInputs
-from rparm.errors import UserError, WrongValueError, did_you_mean, hint, placed
+from rparm.errors import UserError, WrongValueError, did_you_mean, placed
 from rparm.fmi.compiled_loop import Part
 from rparm.fmi.fmu_file import describe, read_model
 from rparm.fmi.model import INPUTS, Model, Value, Variable
 from rparm.runs import scenario
 from rparm.runs.scenario import MAX_STEPS, Scenario
 from rparm.systems.master import start_value
-from rparm.systems.opened import SUFFIXES
 from rparm.systems.opened import opened as open_system
+from rparm.systems.opened import system_file
 from rparm.systems.python_component import PythonComponent
-from rparm.systems.structure import ALONE, Connection, OpenedSystem
+from rparm.systems.structure import Connection, OpenedSystem
 from rparm.units import quantity
 
 
@@ -279,25 +279,13 @@ def opened(
         yield ScenarioBase(path, loaded, model)
         return
     assert campaign.system is not None
-    with open_system(given or _system_file(campaign.system, where)) as system:
-        variants = system.system.parameters
-        variant = campaign.variant or (ALONE if ALONE in variants else None)
-        if variant not in variants:
-            wrong = f"missing key {'variant'!r}" if variant is None else f"no variant {variant!r}"
-            raise UserError(f"{where}: variant: {wrong}{hint(variant or '', variants)}")
+    with _said_of(where):
+        path = given or system_file(campaign.system, option="--fmu")
+    with open_system(given or where.parent / path) as system:
         with _said_of(where):
+            variant = system.variant(campaign.variant)
             given_times = _system_times(system, times)
         yield SystemBase(campaign.system, system, variant, given_times)
-
-
-def _system_file(name: str, where: Path) -> Path:
-    """Return the SSP of a system of the project, or a file beside the campaign's."""
-    if Path(name).suffix.lower() in SUFFIXES:
-        return where.parent / name
-    folders = project.systems()
-    if name not in folders:
-        raise UserError(f"{where}: system: no system {name!r}{hint(name, folders)}")
-    return project.built(folders[name], ".ssp", "--fmu")
 
 
 @contextmanager

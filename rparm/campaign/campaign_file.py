@@ -169,7 +169,7 @@ class Campaign(_Table):
     description: Text
     scenario: Name | None = None  # or a file FILE.toml, beside this one
     system: Name | None = None  # or a loop file FILE.toml, or FILE.ssp, beside this one
-    variant: Name | None = None  # of a system with parameter sets; without it "default"
+    variant: Name | None = None  # of a system; without it "default", else the first
     sampling: Literal["random", "sobol", "latin", "grid", "indices"]
     seed: NonNegativeInt = 0
     runs: PositiveInt | None = None

@@ -15,13 +15,13 @@ from rparm.command_line import (
     retyped,
 )
 from rparm.console import Progress
-from rparm.errors import UserError, hint
+from rparm.errors import UserError
 from rparm.files import check_writable, from_here, written
 from rparm.report import pages
 from rparm.report.pages import Table
 from rparm.systems import comparison, master
-from rparm.systems.comparison import HALVINGS, Halved
-from rparm.systems.opened import SUFFIXES, opened
+from rparm.systems.comparison import HALVINGS, CouplingStudy, Halved
+from rparm.systems.opened import SUFFIXES, given_file, opened, system_file
 from rparm.systems.structure import OpenedSystem
 from rparm.units import milliseconds, short
 
@@ -42,7 +42,7 @@ def add_coupling_options(parser: argparse.ArgumentParser) -> None:
     )
     text = "a loop file, an SSP, or a name of the project"
     parser.add_argument("what", nargs="?", metavar="FILE|NAME", help=text)
-    text = "parameter set (default: the first)"
+    text = "parameter set (default: 'default' if there is one, else the first)"
     parser.add_argument("variant", nargs="?", metavar="VARIANT", help=text)
     add_step(parser)
     add_system(parser)
@@ -51,25 +51,16 @@ def add_coupling_options(parser: argparse.ArgumentParser) -> None:
 
 def do_coupling(options: argparse.Namespace) -> Ended:
     """Study the project's closed loop, or halve the step of the system that is named."""
-    studied, _ = comparison.coupling_study()
-    systems, what = project.systems(), options.what
-    if what is None or (what == studied.name and options.step is options.variant is None):
-        return _study(options)
-    if Path(what).suffix.lower() not in SUFFIXES:
-        if what not in systems:
-            known = hint(what, systems)
-            raise UserError(f"{what}: expected a file .toml or .ssp, or a system{known}")
-        path = project.built(systems[what], ".ssp", "--ssp", options.fmi)
-    else:
-        path = Path(what)
+    studied, known = comparison.coupling_study()
+    what = options.what
+    is_changed = options.step is not None or options.variant is not None
+    if what is None or (what == studied.name and not is_changed):
+        return _study(options, studied, known)
+    path = given_file(what, options.ssp) or system_file(what, options.fmi)
     check_writable(options.report)
     with opened(path, options.step, options.fmi) as system:
         console.messages(str(path), system.notes)
-        variants = system.system.parameters
-        variant = options.variant or next(iter(variants))
-        if variant not in variants:
-            raise UserError(f"{path}: no variant {variant!r}{hint(variant, variants)}")
-        return _halved(system, variant, options)
+        return _halved(system, system.variant(options.variant), options)
 
 
 def _halved(system: OpenedSystem, variant: str, options: argparse.Namespace) -> Ended:
@@ -92,6 +83,7 @@ def _halved(system: OpenedSystem, variant: str, options: argparse.Namespace) -> 
         console.remark(note)
     folder = options.report / f"coupling_{name}_{variant}"
     given = {
+        "ssp": options.ssp,
         "step": options.step,
         "fmi": options.fmi if options.fmi != project.VERSIONS[0] else None,
     }
@@ -166,11 +158,10 @@ def _draw(found: Sequence[Halved], path: Path) -> None:
         pages.save_figure(figure, path)
 
 
-def _study(options: argparse.Namespace) -> Ended:
+def _study(options: argparse.Namespace, folder: Path, known: CouplingStudy) -> Ended:
     """Study the closed loop in depth, as its study.py defines."""
     from rparm.linearization.largest_step import study_steps
 
-    folder, known = comparison.coupling_study()
     path = options.ssp or project.built(folder, ".ssp", "--ssp", options.fmi)
     check_writable(options.report)
     console.stage(f"studying the coupling of {folder.name}")

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rparm import console, files, project
-from rparm.command_line import Ended, add_document, add_output, add_silence, add_system
+from rparm.command_line import Ended, add_document, add_fmi, add_output, add_silence, add_system
 from rparm.console import Progress
 from rparm.errors import UserError, hint
 from rparm.federation import SILENCE, component, federation, network
@@ -18,10 +18,11 @@ from rparm.federation.component import parts, real_connections
 from rparm.federation.federation import Record
 from rparm.federation.network import KEY, key
 from rparm.files import check_writable, written
+from rparm.project import VERSIONS
 from rparm.result_tables import FederationTable
 from rparm.systems import comparison, ecos
 from rparm.systems.master import Master
-from rparm.systems.opened import SUFFIXES, opened
+from rparm.systems.opened import given_file, opened
 from rparm.systems.structure import OpenedSystem
 from rparm.units import counted
 
@@ -61,9 +62,9 @@ def add_federation_options(parser: argparse.ArgumentParser) -> None:
 def do_federation(options: argparse.Namespace) -> Ended:
     """Run the variants; compare each with the master that steps all in one process."""
     network.separate_messages()
-    path = options.ssp
-    if path is None and options.names and Path(options.names[0]).suffix.lower() in SUFFIXES:
-        path = Path(options.names.pop(0))
+    path = given_file(next(iter(options.names), None), options.ssp)
+    if path != options.ssp:
+        options.names.pop(0)
     if path is None:
         folder, _ = comparison.coupling_study()
         path = project.built(folder, ".ssp", "--ssp", options.fmi)
@@ -72,12 +73,13 @@ def do_federation(options: argparse.Namespace) -> Ended:
     if options.output:
         check_writable(options.output)
     key()  # a wrong one is refused before anything runs
-    with opened(path) as system:
+    with opened(path, version=options.fmi) as system:
         _check_names(system, options)
         console.messages(str(path), system.notes)
         names = options.names or list(system.system.parameters)
         for component in options.elsewhere:
-            print(f"waiting for: {_command(path, names[0], component, address)}", flush=True)
+            command = _command(system, names[0], component, address)
+            print(f"waiting for: {command}", flush=True)
 
         def connected() -> None:
             if options.elsewhere:
@@ -116,22 +118,20 @@ def _write(path: Path, record: Record) -> None:
         files.write_trajectory(path, record.times, record.names, record.values)
 
 
-def _command(path: Path, variant: str, component: str, address: str) -> str:
+def _command(system: OpenedSystem, variant: str, component: str, address: str) -> str:
     """Write the command that steps a component in the project's folder of another machine."""
-    place = project.from_root(path)
-    arguments = federation.arguments(place, variant, component, address)
+    place = project.from_root(system.path)
+    arguments = federation.arguments(place, variant, component, address, system.version)
     return f"{KEY}={key()} {project.PROGRAM} {shlex.join(arguments)}"
 
 
 def _check_names(system: OpenedSystem, options: argparse.Namespace) -> None:
-    for kind, given, known in (
-        ("variant", options.names, system.system.parameters),
-        ("component", options.elsewhere, system.models),
-    ):
-        for name in given:
-            if name not in known:
-                known = hint(name, known, "there are")
-                raise UserError(f"{system.path}: has no {kind} {name!r}{known}")
+    for name in options.names:
+        system.variant(name)
+    for name in options.elsewhere:
+        if name not in system.models:
+            known = hint(name, system.models, "there are")
+            raise UserError(f"{system.path}: has no component {name!r}{known}")
     if options.elsewhere and len(options.names) != 1:
         raise UserError("--elsewhere: name one variant, which the other machine steps too")
 
@@ -159,6 +159,7 @@ def add_federate_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("ssp", type=Path, metavar="FILE", help="the system: a loop file or an SSP")
     parser.add_argument("variant", metavar="VARIANT")
     parser.add_argument("component", metavar="COMPONENT")
+    add_fmi(parser, VERSIONS[0], "version of FMI of the project's and of built FMUs (default: 2)")
     parser.add_argument(
         "--broker", required=True, metavar="ADDRESS", help="of the federation, as --listen there"
     )
@@ -176,7 +177,7 @@ def do_federate(options: argparse.Namespace) -> Ended:
     if KEY not in os.environ:
         raise UserError(f"{KEY}: not in the environment, copy the whole line of the federation")
     key()
-    with opened(options.ssp) as system:
+    with opened(options.ssp, version=options.fmi) as system:
         made = parts(system, options.variant)
         if options.component not in made:
             known = hint(options.component, made, "there are")

@@ -17,11 +17,11 @@ from rparm.files import check_for_windows, copied, create, from_folder, from_her
 from rparm.fmi.model import INPUTS, Model, Variable
 from rparm.project import VERSIONS
 from rparm.runs import scenario
+from rparm.systems.loop_file import NAME
 from rparm.systems.structure import times
 
 SUFFIX = ".toml"
 MODELS_PAGE, TUTORIAL = "examples/models/README.md", "docs/tutorial.md"
-MODEL_NAME = re.compile("[A-Za-z][A-Za-z0-9_]*", re.ASCII)
 MODEL_FILE = """\
 # A body on a spring: change it to what you simulate. examples/models/README.md explains the file.
 name = "{name}"
@@ -148,7 +148,7 @@ def do_new_model(options: argparse.Namespace) -> Ended:
 
 def _own_file(options: argparse.Namespace, kind: str) -> Path:
     """Return the file for a new model or system; UserError for an impossible name."""
-    if not MODEL_NAME.fullmatch(options.name):
+    if not NAME.fullmatch(options.name):
         wrong = f"{options.name!r} is no name for a {kind}"
         raise UserError(f"{wrong}: a letter, then letters, digits, _")
     check_for_windows(options.name)
@@ -191,6 +191,7 @@ def _components(given: Sequence[str], folder: Path) -> dict[str, tuple[str, Mode
             path = project.built(project.model(text), ".fmu")
             source = path.stem
         first = re.sub(r"\W", "_", path.stem, flags=re.ASCII)
+        first = first if NAME.match(first) else f"c_{first}"
         names = (first if n == 1 else f"{first}{n}" for n in count(1))
         name = next(name for name in names if name not in found)
         found[name] = source, read_model(path)
@@ -295,6 +296,8 @@ def add_ssp_options(parser: argparse.ArgumentParser) -> None:
 def do_ssp(options: argparse.Namespace) -> Ended:
     from rparm.systems import loop_file, ssp_writer  # take long
 
+    if options.file.suffix.lower() != SUFFIX:
+        raise UserError(f"{options.file}: expected a loop file {SUFFIX}")
     with loop_file.opened(options.file, version=options.fmi) as opened:
         path, name = options.output, f"{opened.system.name}.ssp"
         path = path if path.suffix.lower() == ".ssp" else path / name

@@ -17,7 +17,7 @@ from rparm.report.system_page import Section
 from rparm.result_tables import VariantTable
 from rparm.systems import comparison, ecos, master
 from rparm.systems.comparison import Outcome, Reference
-from rparm.systems.opened import SUFFIXES, opened
+from rparm.systems.opened import given_file, opened
 from rparm.units import counted
 
 
@@ -64,12 +64,12 @@ def do_system(options: argparse.Namespace) -> Ended:
 
 def _paths(options: argparse.Namespace) -> list[Path]:
     """Return the SSPs to open: the given one, or all that the names may be of."""
-    if options.names and Path(options.names[0]).suffix.lower() in SUFFIXES:
-        if options.ssp:
-            raise UserError(f"{options.names[0]}: --ssp names another file, {options.ssp}")
-        options.ssp = Path(options.names.pop(0))
-    if options.ssp:
-        return [options.ssp]
+    file = given_file(next(iter(options.names), None), options.ssp)
+    options.own = file != options.ssp
+    if options.own:
+        options.names.pop(0)
+    if file:
+        return [file]
     folders = project.systems()
     if options.names and set(options.names) <= set(folders):
         folders = {name: folders[name] for name in dict.fromkeys(options.names)}
@@ -80,6 +80,8 @@ def _opened(path: Path, options: argparse.Namespace, stack: ExitStack) -> Sectio
     """Open the system in a file, with the folder that it is from, if it is the project's."""
     system = stack.enter_context(opened(path, options.step, options.fmi))
     folder = project.systems().get(system.system.name)
+    if folder and options.own and not project.is_built(path, folder):
+        folder = None  # a user's file may have the name of a system of the project
     if folder is None and options.pictures:
         raise UserError(f"--pictures: {path} is no system of the project, which has pictures")
     console.messages(str(path), system.notes)

@@ -15,7 +15,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from rparm.errors import UserError, hint
+from rparm.errors import UserError
 from rparm.federation.network import Federate, mute_libraries
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
@@ -69,10 +69,7 @@ class Part:
 
 def parts(ssp: OpenedSystem, variant: str) -> dict[str, Part]:
     """Return the parts of a variant, by component; UserError if it is unknown."""
-    system = ssp.system
-    if variant not in system.parameters:
-        known = hint(variant, system.parameters, "there are")
-        raise UserError(f"{ssp.path}: has no variant {variant!r}{known}")
+    system, variant = ssp.system, ssp.variant(variant)
     published = {name: model.real_outputs for name, model in ssp.models.items()}
     whole = f"{variant} {hashlib.sha256(ssp.path.read_bytes()).hexdigest()}"
 

@@ -17,6 +17,7 @@ from rparm.federation import SILENCE
 from rparm.federation.component import LEAVE, POLL, Part, Silence, parts, run_watched
 from rparm.federation.network import ABSENT, ANSWER, ENDED, Broker, Federate
 from rparm.interruption import temporary_folder, uninterrupted
+from rparm.project import VERSIONS
 from rparm.systems.structure import OpenedSystem
 
 RECORDER = "recorder"
@@ -32,9 +33,12 @@ class Record:
     wall_time: float  # s, of all steps
 
 
-def arguments(ssp: Path, variant: str, component: str, address: str) -> list[str]:
+def arguments(
+    ssp: Path, variant: str, component: str, address: str, fmi: str = VERSIONS[0]
+) -> list[str]:
     """Return the arguments that step a component on this machine or on another one."""
-    return ["federate", ssp.as_posix(), variant, component, "--broker", address]
+    names = [ssp.as_posix(), variant, component]
+    return ["federate", *names, "--fmi", fmi, "--broker", address]
 
 
 def run(
@@ -56,7 +60,7 @@ def run(
     whole = next(iter(made.values())).system
     local = [component for component in made if component not in elsewhere]
     further = ["--silence", str(silence), "--owned"]
-    started = {c: [*arguments(ssp.path, variant, c, address), *further] for c in local}
+    started = {c: [*arguments(ssp.path, variant, c, address, ssp.version), *further] for c in local}
     recorder = Federate(RECORDER, address, list(made), publishes=False)
     with (
         temporary_folder() as folder,

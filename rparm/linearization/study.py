@@ -91,7 +91,7 @@ def of_system(opened: OpenedSystem, request: Request) -> Study:
     """Linearize a system that is open."""
     path = opened.path
     with ExitStack() as stack:
-        variant = request.variant or next(iter(opened.system.parameters), "")
+        variant = opened.variant(request.variant)
         made = SystemSubject(opened, variant, request.time, request.without, request.cut)
         subject = stack.enter_context(made)
         trimmed = _point(subject, request)

@@ -38,8 +38,6 @@ class SystemSubject(ExitStack):
     ) -> None:
         super().__init__()
         system = ssp.system
-        if variant not in system.parameters:
-            raise UserError(f"{ssp.path}: no variant {variant!r}{hint(variant, system.parameters)}")
         names = [component.name for component in system.components]
         for name in without:
             if name not in names:
@@ -51,7 +49,7 @@ class SystemSubject(ExitStack):
         for name in without:
             self.connections = bypassed(ssp, self.connections, name)
         self.cut = self._found(cut) if cut else None
-        self._parameters = system.parameter_sets[variant]
+        self._parameters = system.parameter_sets[ssp.variant(variant)]
         with ExitStack() as stack:  # closes what is open if one of them is refused
             self.fmus = {name: stack.enter_context(ssp.unpacked_fmu(name)) for name in self.names}
             for fmu in self.fmus.values():
@@ -131,7 +129,7 @@ class SystemSubject(ExitStack):
             component, _, variable = name.partition(".")
             fed = {c.end for c in self.connections}
             if name in fed and self.variable(name).type == "Real":
-                raise UserError(f"{name}: is fed by a connection, which says its value")
+                raise UserError(f"{name}: is connected and cannot be set")
             merged[component][variable] = value
         return merged
 

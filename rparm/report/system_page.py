@@ -83,7 +83,7 @@ class Section:
 
     def page(self, variant: str) -> str:
         """Name the page of a variant, and its file of values."""
-        return variant if self.folder else re.sub(r"[^\w.-]", "_", f"{self.name}_{variant}")
+        return variant if self.folder else _file_name(f"{self.name}_{variant}")
 
     @property
     def variants(self) -> list[str]:
@@ -94,11 +94,15 @@ class Section:
         return self.folder.name if self.folder else self.ssp.system.name
 
     @property
+    def shown(self) -> str:
+        """Its name on pages."""
+        return self.ssp.path.stem if self.folder else self.name
+
+    @property
     def title(self) -> str:
         """The system and the version of FMI of its components."""
         versions = sorted({model.fmi_version for model in self.ssp.models.values()})
-        name = self.ssp.path.stem if self.folder else self.name
-        return f"{name} (FMI {' and '.join(versions)})"
+        return f"{self.shown} (FMI {' and '.join(versions)})"
 
 
 def remove(report: Path, system: str, names: Sequence[str]) -> None:
@@ -106,7 +110,7 @@ def remove(report: Path, system: str, names: Sequence[str]) -> None:
     folder = report / SYSTEM
     overview.forget(report, SYSTEM, names)
     if not overview.read(report, SYSTEM):
-        (folder / f"{system}.svg").unlink(missing_ok=True)
+        (folder / _file_name(f"{system}.svg")).unlink(missing_ok=True)
     for name in names:
         for suffix in (".csv", ".html"):
             (folder / f"{name}{suffix}").unlink(missing_ok=True)
@@ -186,25 +190,25 @@ def _folder(report: Path, section: Section) -> Path:
     folder = report / SYSTEM
     folder.mkdir(parents=True, exist_ok=True)
     if section.folder is None:
-        write_text(folder / _diagram(section), block_diagram.draw(section.ssp))
+        write_text(folder / _file_name(f"{section.name}.svg"), block_diagram.draw(section.ssp))
         return folder
-    with whole(folder / _diagram(section)) as path:
+    with whole(folder / _file_name(f"{section.name}.svg")) as path:
         path.write_bytes((section.folder / project.DIAGRAM).read_bytes())
     return folder
 
 
-def _diagram(section: Section) -> str:
-    return re.sub(r"[^\w.-]", "_", f"{section.name}.svg")
+def _file_name(text: str) -> str:
+    return re.sub(r"[^\w.-]", "_", text)
 
 
 def _texts(section: Section, variant: str) -> dict[str, Any]:
     """Return the texts of a variant's page, however its run ended."""
-    stem = section.ssp.path.stem if section.folder else section.name
+    name = section.shown
     of_file = "" if section.folder else f"{shlex.quote(str(from_here(section.ssp.path)))} "
     return {
-        "title": f"{stem}: {variant}",
+        "title": f"{name}: {variant}",
         "description": _description(section, variant),
-        "diagram": (_diagram(section), f"Components of {stem} and the signals between them"),
+        "diagram": (_file_name(f"{section.name}.svg"), f"Components of {name} and their signals"),
         "again": f"{project.PROGRAM} system {of_file}{variant}",
     }
 

@@ -226,10 +226,10 @@ class Halved:
     orders: np.ndarray  # (runs - 2,) by differences of three runs each
     worst: str  # output with the largest error at the first step
 
-    @property
-    def expected(self) -> int:
-        """Power of the step by which errors fall, of smooth systems."""
-        return 2 if self.inputs == "extrapolated" else 1
+
+def order_of(inputs: str) -> int:
+    """Return the power of the step by which errors of smooth systems fall."""
+    return 2 if inputs == "extrapolated" else 1
 
 
 def halve(
@@ -247,7 +247,7 @@ def halve(
     system = ssp.system
     with ssp.unpacked_fmus() as fmus:
         runs = [
-            _every(fmus, ssp, variant, way, 2**halvings, progress)
+            _rows_at_whole_steps(fmus, ssp, variant, way, 2**halvings, progress)
             for halvings in range(HALVINGS + 1)
         ]
     names = [
@@ -257,17 +257,17 @@ def halve(
     ]
     values = np.array([rows[:, : len(names)] for rows in runs])
     values = values / _sizes(ssp, names, values[-1])
-    found = Halved(*way, system.step / 2.0 ** np.arange(len(runs)), *[np.zeros(0)] * 2, "")
-    limit = values[-1] + (values[-1] - values[-2]) / (2**found.expected - 1)
+    limit = values[-1] + (values[-1] - values[-2]) / (2 ** order_of(way[1]) - 1)
     errors = np.abs(values - limit)
     differences = np.abs(np.diff(values, axis=0)).max(axis=(1, 2), initial=0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         orders = np.log2(differences[:-1] / differences[1:])
     place = int(errors[0].max(axis=0).argmax())
-    return replace(found, errors=errors.max(axis=(1, 2)), orders=orders, worst=names[place])
+    steps = system.step / 2.0 ** np.arange(len(runs))
+    return Halved(*way, steps, errors.max(axis=(1, 2)), orders, names[place])
 
 
-def _every(
+def _rows_at_whole_steps(
     fmus: Mapping[str, Fmu],
     ssp: OpenedSystem,
     variant: str,

@@ -15,14 +15,14 @@ from pathlib import Path
 from typing import Any
 
 from rparm import building, project
-from rparm.errors import UserError, did_you_mean, hint
+from rparm.errors import CodeError, UserError, did_you_mean, hint
 from rparm.files import LARGEST_TOML, UnreadableError, is_file, missing, read_text, read_toml, show
 from rparm.fmi.fmu_file import read_model
 from rparm.fmi.model import INPUTS, PARAMETERS, Model, Variable
 from rparm.interruption import temporary_folder
 from rparm.project import VERSIONS
 from rparm.runs.inputs import Constant, InputReader, Reader, Switches
-from rparm.systems.python_component import PythonComponent, is_python
+from rparm.systems.python_component import SUFFIX, PythonComponent, split
 from rparm.systems.structure import (
     ALONE,
     Component,
@@ -32,6 +32,7 @@ from rparm.systems.structure import (
     OpenedSystem,
     Parameter,
     System,
+    causality,
     check,
     is_whole,
     times,
@@ -73,6 +74,7 @@ class LoopReader(Reader):
         self.sources: dict[str, str] = {}  # in the folder
         self.files: dict[str, Path] = {}  # FMUs that the user knows
         self.python: dict[str, Any] = {}
+        self.read: list[Path] = []
         self.notes: list[str] = []
         self._fmus = FmuReader(path)
         self._copied: dict[Path, str] = {}  # sources, by what they are made of
@@ -118,8 +120,9 @@ class LoopReader(Reader):
                 self.fail(f"{KEEP}: {twice[0]} is there twice")
         system = replace(system, keep=keep, notes=tuple(self.notes))
         return OpenedSystem(
-            self.path, self.folder, system, self.models, files=self.files, python=self.python
-        )
+            self.path, self.folder, system, self.models, files=self.files, python=self.python,
+            version=self.version, read=self.read,
+        )  # fmt: skip
 
     # ---- Names -----------------------------------------------------------------------------------
 
@@ -173,13 +176,14 @@ class LoopReader(Reader):
 
     def component(self, name: str, given: str, where: str) -> None:
         """Find what a component is made of, and what it declares."""
-        if is_python(given):
-            self.code(name, given)
-            return
-        path, suffix = self.path.parent / given, Path(given).suffix.lower()
-        if suffix in (FMU, EQUATIONS) and not is_file(path):
-            self.fail(f"{where}: {given}: {missing(path)}")
+        file, _ = split(given)
+        path, suffix = self.path.parent / file, Path(file).suffix.lower()
+        if suffix in (FMU, EQUATIONS, SUFFIX) and not is_file(path):
+            self.fail(f"{where}: {file}: {missing(path)}")
         try:
+            if suffix == SUFFIX:
+                self.code(name, given)
+                return
             if suffix == EQUATIONS:
                 made = path
                 fmu = self.built(path)
@@ -194,6 +198,8 @@ class LoopReader(Reader):
                 made = fmu = project.built(project.model(given), FMU, version=self.version)
             if not self.fmus:
                 read_model(fmu)  # runs on this platform
+        except CodeError:
+            raise  # has its place
         except UserError as error:
             self.fail(f"{where}: {error}")
         self.files[name] = made
@@ -211,6 +217,7 @@ class LoopReader(Reader):
             given, self.path.parent, list(dict.fromkeys(inputs)), list(dict.fromkeys(outputs))
         )
         self.python[name] = lambda: made
+        self.read += self.path.parent.glob(f"*{SUFFIX}")  # it may import others
         self.models[name], self.sources[name] = made.model, given
 
     def built(self, path: Path) -> Path:
@@ -261,7 +268,7 @@ class LoopReader(Reader):
         except CycleError as error:
             loop = " -> ".join(name for name in error.args[1])
             way_out = "a state or a sampler must be in between"
-            self.fail(f"[{CONNECTIONS}]: a loop without delay, {loop}: {way_out}")
+            self.fail(f"[{CONNECTIONS}]: algebraic loop, {loop}: {way_out}")
 
     # ---- Times -----------------------------------------------------------------------------------
 
@@ -318,21 +325,16 @@ class LoopReader(Reader):
         return found
 
     def parameter(self, given: Any, variable: Variable, where: str) -> Parameter:
-        if not (variable.can_start or variable.is_a(INPUTS)):
-            kind = f"is of causality {variable.causality}, and cannot be set"
-            self.fail(f"{where}: {variable.why_it_follows if variable.follows else kind}")
-        if variable.type == "String":
-            return Parameter("String", self.text(given, where), None)
         with self.placed(where):
-            value = variable.checked(given)
+            parameter = Parameter.of(variable, given)
         if question := variable.question(given):
             self.notes.append(f"{where}: {question}")
-        kind = "Integer" if variable.type == "Enumeration" else variable.type
-        return Parameter(kind, value, variable.unit if kind == "Real" else None)
+        return parameter
 
     def numbers(self, given: Any, where: str) -> dict[str, Any]:
         """Read a JSON file of values by component.variable, or by component and variable."""
         path = self.path.parent / self.text(given, where)
+        self.read.append(path)
         try:
             content = json.loads(read_text(path, LARGEST_TOML))
         except (UnreadableError, ValueError, RecursionError) as error:
@@ -344,19 +346,22 @@ class LoopReader(Reader):
     def with_inputs(self, system: System, given: Mapping[str, Any]) -> System:
         """Add inputs from outside; constants are parameters of all variants that give no other."""
         known: dict[str, Variable] = {}
-        fed = {c.end: str(c) for c in system.connections}
+        fed = {c.end: c.start for c in system.connections}
         for values in system.parameters.values():
             for name in (f"{component}.{x}" for component in values for x in values[component]):
                 if name in fed:
-                    self.fail(f"{name}: the value is that of a connection, {fed[name]}")
+                    self.fail(f"{name}: is connected to {fed[name]} and cannot be set")
         for name in given:
-            _, variable = self.variable(name, f"[{INPUTS}]")
+            component, variable = self.variable(name, f"[{INPUTS}]")
+            if not variable.is_a(INPUTS):
+                self.fail(f"[{INPUTS}]: {name!r} is {causality(variable)} of {component!r}")
             if name in fed:
-                self.fail(f"[{INPUTS}.{name}]: the input has a connection already, {fed[name]}")
+                self.fail(f"[{INPUTS}.{name}]: is connected to {fed[name]} already")
             known[name] = replace(variable, name=name)
         whole = Model(system.name, self.version, known, (), False, False, False, False)
         reader = InputReader(self, whole, system.times, system.elapsed)
         signals = reader.inputs({INPUTS: given})
+        self.read += [self.path.parent / file for file in reader.hashes]
         reader.sampled(signals)  # checks their values
         self.notes += reader.warnings
         moving, variants = {}, system.parameters

@@ -79,7 +79,7 @@ class ConnectedInstance:
     def begin(self, start: float, stop: float | None, parameters: Mapping[str, Value]) -> None:
         for name in self.inputs.names:
             if name in parameters:
-                raise UserError(f"{self.name}.{name}: is fed by a connection, which says its value")
+                raise UserError(f"{self.name}.{name}: is connected and cannot be set")
         begin_instance(self.instance, start, stop, parameters)
 
     def set_inputs(self, values: np.ndarray) -> None:
@@ -520,7 +520,7 @@ def run_in_master(
 
 
 def _value_at_end(master: Master, ssp: OpenedSystem, name: str) -> float:
-    component, _, variable = name.partition(".")
+    component = name.partition(".")[0]
     row = np.empty(1)
     _RowReader(ssp, master.components[component], [name]).read(row)
     return float(row[0])

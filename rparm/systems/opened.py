@@ -4,13 +4,33 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from rparm.errors import UserError
+from rparm import project
+from rparm.errors import UserError, hint
 from rparm.project import VERSIONS
 from rparm.systems import loop_file, ssp
 from rparm.systems.structure import OpenedSystem
 
 LOOP, SSP = ".toml", ".ssp"  # suffixes of files with systems
 SUFFIXES = (LOOP, SSP)
+
+
+def given_file(first: str | None, ssp: Path | None) -> Path | None:
+    """Return the system's file: the first argument, if it names one, or that of --ssp."""
+    if first is None or Path(first).suffix.lower() not in SUFFIXES:
+        return ssp
+    if ssp:
+        raise UserError(f"{first}: --ssp names another file, {ssp}")
+    return Path(first)
+
+
+def system_file(given: str | Path, version: str = VERSIONS[0], option: str = "--ssp") -> Path:
+    """Return a system's file: a file itself, or the SSP of a system of the project."""
+    if Path(given).suffix.lower() in SUFFIXES:
+        return Path(given)
+    name, known = str(given), project.systems()
+    if name not in known:
+        raise UserError(f"no system {name!r}{hint(name, known)}, expected a name or .toml or .ssp")
+    return project.built(known[name], SSP, option, version)
 
 
 @contextmanager

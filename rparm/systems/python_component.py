@@ -86,7 +86,7 @@ class PythonComponent(AbstractContextManager["PythonComponent"]):
         except (OSError, UnicodeError) as error:
             raise UserError(f"{path}: cannot be read: {reason(error)}") from error
         found = PythonComponent(path, text, name, (tuple(inputs), tuple(outputs)))
-        assert found.model
+        _ = found.model  # runs the file: mistakes show here
         return found
 
     def __exit__(self, *_: object) -> None:

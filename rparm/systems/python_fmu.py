@@ -19,60 +19,7 @@ from rparm.errors import UserError
 from rparm.interruption import temporary_folder
 from rparm.systems.python_component import ANY, PythonComponent
 
-CALLER = '''"""The component of component.json, as pythonfmu runs it."""
-
-import importlib.util
-import json
-from pathlib import Path
-
-from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real, String
-
-TYPES = {"Real": Real, "Boolean": Boolean, "String": String}
-
-
-class CLASS(Fmi2Slave):
-    def __init__(self, **arguments):
-        super().__init__(**arguments)
-        here = Path(self.resources)  # another one in each instance
-        given = json.loads((here / "CLASS.json").read_text(encoding="utf-8"))
-        self.description = given["description"]
-        spec = importlib.util.spec_from_file_location("CLASS_code", here / given["file"])
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-        target = getattr(module, given["target"])
-        self.part = target() if isinstance(target, type) else None
-        self.law = self.part.step if self.part else target
-        for name, value in given["fixed"].items():
-            if type(getattr(self.part, name)).__module__ == "numpy":
-                import numpy
-
-                value = numpy.array(value, float)
-            setattr(self.part, name, value)
-        self.inputs = dict.fromkeys(given["inputs"], 0.0)
-        self.outputs = dict.fromkeys(given["outputs"], 0.0)
-        for kind, values in (("input", self.inputs), ("output", self.outputs)):
-            for name in values:
-                self.add(Real, name, kind, values.__getitem__, values.__setitem__)
-        for name, kind in given["parameters"].items():
-            get, put = self.part.__getattribute__, self.part.__setattr__
-            self.add(TYPES[kind], name, "parameter", get, put)
-
-    def add(self, kind, name, causality, get, put):
-        more = {"variability": Fmi2Variability.tunable} if causality == "parameter" else {}
-        self.register_variable(
-            kind(name, causality=Fmi2Causality[causality], getter=lambda: get(name),
-                 setter=lambda value: put(name, value), **more),
-            nested=False,
-        )
-
-    def enter_initialization_mode(self):
-        self.outputs.update(getattr(self.part, "start", {}))
-
-    def do_step(self, current_time, step_size):
-        for name, value in self.law(current_time, step_size, dict(self.inputs)).items():
-            self.outputs[name] = float(value.item() if hasattr(value, "item") else value)
-        return True
-'''
+CALLER = "python_fmu_caller.py.in"  # beside this file; CLASS stands for the name
 
 
 def pack(name: str, component: PythonComponent, fixed: Mapping[str, Any], path: Path) -> str:
@@ -100,7 +47,8 @@ def pack(name: str, component: PythonComponent, fixed: Mapping[str, Any], path: 
     class_name = name + "_" * keyword.iskeyword(name)
     with temporary_folder() as folder:
         caller, data = folder / f"{class_name}_caller.py", folder / f"{class_name}.json"
-        caller.write_text(CALLER.replace("CLASS", class_name), encoding="utf-8", newline="\n")
+        text = Path(__file__).with_name(CALLER).read_text(encoding="utf-8")
+        caller.write_text(text.replace("CLASS", class_name), encoding="utf-8", newline="\n")
         data.write_text(json.dumps(given), encoding="utf-8", newline="\n")
         files = [data, component.path.absolute(), *beside]
         command = [sys.executable, "-m", "pythonfmu", "build", "-f", caller, "-d", folder, *files]

@@ -1,7 +1,7 @@
 """Systems of connected components, however a file describes them, checked against their FMUs."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -10,9 +10,10 @@ from typing import Any, NoReturn
 import numpy as np
 
 from rparm.errors import UserError, WrongValueError, did_you_mean, hint, placed
-from rparm.files import difference
+from rparm.files import difference, show
 from rparm.fmi.fmu_file import LARGEST_SYSTEM, Fmu, describe
 from rparm.fmi.model import INPUTS, TOLERANCE, Model, Value, Variable
+from rparm.project import VERSIONS
 from rparm.runs.inputs import Signal
 from rparm.runs.scenario import MAX_STEPS
 from rparm.systems.python_component import ANY
@@ -83,6 +84,19 @@ class Parameter:
     value: Value
     unit: str | None
 
+    @staticmethod
+    def of(variable: Variable, given: Any) -> "Parameter":
+        """Return a value to start from; WrongValueError if the variable does not take it."""
+        if not (variable.can_start or variable.is_a(INPUTS)):
+            wrong = f"is {causality(variable)} and cannot be set"
+            raise WrongValueError(variable.why_it_follows if variable.follows else wrong)
+        given = given.item() if isinstance(given, np.generic) else given
+        if variable.type == "String" and not isinstance(given, str):
+            raise WrongValueError(f"expected a text, got {show(given)}")
+        value = given if variable.type == "String" else variable.checked(given)
+        kind = "Integer" if variable.type == "Enumeration" else variable.type
+        return Parameter(kind, value, variable.unit if kind == "Real" else None)
+
 
 @dataclass(frozen=True)
 class System:
@@ -124,11 +138,6 @@ class System:
         """Communication points, (steps + 1,) s."""
         return self.start + self.step * np.arange(self.steps + 1)
 
-    @property
-    def has_sets(self) -> bool:
-        """Whether its variants are parameter sets."""
-        return any(self.parameters.values())
-
     def component(self, name: str) -> Component:
         return next(component for component in self.components if component.name == name)
 
@@ -152,6 +161,16 @@ class OpenedSystem:
     is_plain: bool = True  # as an SSP, Ecos reads it
     # what opens a component that is no FMU, by its name: it gives what runs like an Fmu
     python: Mapping[str, Callable[[], Fmu]] = field(default_factory=dict)
+    version: str = VERSIONS[0]  # of FMI, of the project's FMUs and built ones
+    read: Sequence[Path] = ()  # files, beside those of FMUs
+
+    def variant(self, given: str | None) -> str:
+        """Return the variant that is given; else "default" if there is one, else the first."""
+        known = self.system.parameters
+        name = given or (ALONE if ALONE in known else next(iter(known)))
+        if name not in known:
+            raise UserError(f"{self.path}: no variant {name!r}{hint(name, known)}")
+        return name
 
     @property
     def is_ssp(self) -> bool:
@@ -213,18 +232,10 @@ class OpenedSystem:
             )
         feeding = [c.start for c in self.system.connections if c.end == f"{component}.{name}"]
         if feeding:
-            raise WrongValueError(f"is connected, to {feeding[0]}")
+            raise WrongValueError(f"is connected to {feeding[0]} and cannot be set")
         if f"{component}.{name}" in self.system.inputs:
             raise WrongValueError("is an input that moves")
-        if not (variable.can_start or variable.is_a(INPUTS)):
-            raise WrongValueError(
-                variable.why_it_follows
-                if variable.follows
-                else f"is {_causality(variable)}, which cannot be set"
-            )
-        value = variable.checked(given.item() if isinstance(given, np.generic) else given)
-        kind = "Integer" if variable.type == "Enumeration" else variable.type
-        return Parameter(kind, value, variable.unit if kind == "Real" else None)
+        return Parameter.of(variable, given)
 
     def variable(self, name: str) -> Variable:
         """Return the variable ``component.variable`` as the FMU declares it."""
@@ -245,15 +256,18 @@ def times(
         ends = {name: model.experiment.stop for name, model in models.items()}
         later = {name: end for name, end in ends.items() if end is not None and end > start}
         if not later:
-            raise WrongValueError("there is no stop time, nor have its FMUs a later one than start")
+            raise WrongValueError("expected stop: no FMU has a default stop time after start")
         longest = max(later, key=lambda name: later[name])
         stop = later[longest]
         notes.append(f"stop time {number(stop)} s: the largest of its FMUs ({longest})")
     if step is None and math.isfinite(stop - start):
         step, reason = _chosen_step(difference(stop, start), models)
         notes.append(f"communication step {number(step)} s: {reason}")
-    if step is None or not (math.isfinite(stop - start) and 0 < step <= stop - start):
-        raise WrongValueError(f"start {start!r} s, stop {stop!r} s, step {step!r} s")
+    if step is None or not start < stop or not math.isfinite(stop - start):
+        raise WrongValueError(f"start {start!r} s, stop {stop!r} s: expected a later stop")
+    if not 0 < step <= stop - start:
+        span = f"stop - start = {number(difference(stop, start))} s"
+        raise WrongValueError(f"expected a step from 0 s to {span}, got {step!r} s")
     if (stop - start) / step > MAX_STEPS:
         raise WrongValueError(f"step {step!r} s makes more than {MAX_STEPS} steps")
     return start, stop, step, notes
@@ -328,7 +342,7 @@ class _Checker:
         where = f"component {component.name!r}: connector {connector.name!r}"
         variable = self.variable(component.name, connector.name, where, "such variable")
         if variable.causality != connector.kind:
-            self.fail(f"{where} is an {connector.kind}, in its FMU {_causality(variable)}")
+            self.fail(f"{where} is an {connector.kind}, in its FMU {causality(variable)}")
         if connector.type is not None and variable.type != connector.type:
             self.fail(f"{where} is of type {connector.type}, in its FMU {variable.type}")
         if connector.unit is not None and variable.unit != connector.unit:
@@ -369,7 +383,7 @@ class _Checker:
         if connector not in connectors:
             known = self.models[component].variables.get(connector)
             hint = did_you_mean(connector, connectors)
-            hint = f": it is {_causality(known)}" if known else hint
+            hint = f": it is {causality(known)}" if known else hint
             self.fail(f"{where}: component {component!r} has no connector {connector!r}{hint}")
         return self.models[component].variables[connector]
 
@@ -378,7 +392,7 @@ class _Checker:
         variable = self.variable(component, name, where, f"variable {name!r}")
         where = f"{where}: {name!r}"
         if variable.causality not in PARAMETERS or variable.start is None:
-            self.fail(f"{where} is {_causality(variable)} and cannot be set")
+            self.fail(f"{where} is {causality(variable)} and cannot be set")
         if parameter.type not in SETTABLE[variable.type]:
             self.fail(f"{where} is of type {parameter.type}, in its FMU {variable.type}")
         if parameter.unit is not None and parameter.unit != variable.unit:
@@ -401,6 +415,7 @@ def _unit(unit: str | None) -> str:
     return "no unit" if unit is None else repr(unit)
 
 
-def _causality(variable: Variable) -> str:
+def causality(variable: Variable) -> str:
+    """Return "an input" and the like."""
     article = "an" if variable.causality[0] in "aeiou" else "a"
     return f"{article} {variable.causality}"

@@ -261,7 +261,7 @@ def test_any_loop_has_the_errors_of_its_exact_solution(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["closed_lop"], "expected a file .toml or .ssp, or a system, did you mean 'closed_loop'"),
+        (["closed_lop"], "no system 'closed_lop', did you mean 'closed_loop'"),
         (["python.toml"], "halves of the step show no error of the coupling: law is Python"),
         (["python.toml", "heavy"], "python.toml: no variant 'heavy' (known: default)"),
     ],

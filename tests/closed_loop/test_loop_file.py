@@ -37,6 +37,7 @@ def test_a_mistake_is_refused_in_a_line(
     assert TABLES["good"].count(old) == 1
     path = tmp_path / "self.toml"
     path.write_text(TABLES["good"].replace(old, new), encoding="utf-8")
+    (tmp_path / "law.py").write_text("def law(t, h, inputs): ...", encoding="utf-8")
     (tmp_path / "TEXT.fmu").write_text("no archive", encoding="utf-8")
     repacked(BUILD / "RPManipulator.fmu", tmp_path / "TOY.fmu", str, drop="binaries")
     error = console.refused("system", path, "--output", tmp_path / "report")

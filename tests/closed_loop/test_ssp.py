@@ -3,6 +3,7 @@
 What holds for every SSP: test_ssp_archives.py.
 """
 
+from dataclasses import replace as replaced
 from pathlib import Path
 
 import fmpy
@@ -96,6 +97,9 @@ def test_variants() -> None:
             }
             for component in FMUS
         }
+        other = replaced(opened.system, parameters={"last": {}, "default": {}})
+        assert opened.variant(None) == "nominal"
+        assert replaced(opened, system=other).variant(None) == "default"
     assert list(sets) == list(VARIANTS)  # nominal first: libcosim takes the first
     for variant, changes in VARIANTS.items():
         for component in FMUS:
@@ -162,7 +166,7 @@ def test_an_input_that_is_not_connected_keeps_its_start(tmp_path: Path) -> None:
     assert np.abs(table["arm.q1"] - exact)[time < 2].max() < 2e-3 * 0.3 * 20 / np.e
     found = rparm.linearize(path, at={"controller.q1_ref": 0.2})
     assert found.poles == pytest.approx([-20.0] * 4, abs=1e-4)
-    with pytest.raises(UserError, match="arm.tau1: is fed by a connection"):
+    with pytest.raises(UserError, match="arm.tau1: is connected"):
         rparm.linearize(path, at={"arm.tau1": 0.2})
 
 

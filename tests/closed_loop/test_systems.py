@@ -1,5 +1,6 @@
 """Several systems in one project: which variants the names of `system` stand for."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -105,6 +106,9 @@ def test_a_system_without_a_folder_has_no_references(
     code, out, error = console("system", other, *given)
     assert (code, error) == (0, "") and "no Ecos: the master of rparm steps lop" in out
     assert "coupling error about" in out and "passed" not in out
+    same = shutil.copy(path, tmp_path / "same.ssp")  # a user's file with the project's name
+    code, out, error = console("system", same, *given)
+    assert (code, error) == (0, "") and "coupling error about" in out and "passed" not in out
 
 
 def test_one_system_has_a_study_of_its_coupling(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rparm import project
 from rparm.errors import UserError
 from rparm.federation import federation, network
 from rparm.federation.component import parts, real_connections
@@ -82,6 +83,16 @@ def test_a_loop_file_with_python_and_a_signal_is_as_by_the_master(tmp_path: Path
     columns = [master.names.index(name) for name in record.names]
     assert np.array_equal(record.values, expected[:, columns])
     assert np.abs(np.diff(record.values[:, record.names.index("law.u")])).max() > 0.1
+
+
+def test_components_are_of_the_version_that_is_asked_for(
+    tmp_path: Path, console: Console, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(project.BUILD_FOLDERS, "3.0", str(tmp_path))
+    file = tmp_path / "loop.toml"
+    file.write_text('name = "Loop"\n[components]\nplant = "RPPlant"\n')
+    error = console.refused("federation", file, "--fmi", "3")
+    assert f"[components] plant: {tmp_path}: has no FMU of rp_plant" in error
 
 
 def test_a_component_may_be_stepped_elsewhere(short: OpenedSystem, start: Start) -> None:

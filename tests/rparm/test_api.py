@@ -2,6 +2,7 @@
 
 import inspect
 import re
+import shutil
 import tomllib
 import webbrowser
 from collections.abc import Callable, Iterator
@@ -169,8 +170,9 @@ def test_a_system_of_a_file_runs_with_other_values_and_steps(tmp_path: Path) -> 
         assert list(table) == ["time", "arm.q2"] and table.units["arm.q2"] == "m"
         assert np.diff(table["time"]) == pytest.approx(step)
         assert table["arm.q2"] == pytest.approx(expected * table["time"] ** 2, abs=1e-9)
-    file.write_text(LOOP.replace("constant = 3.0", "constant = 6.0"))
+    file.write_text(LOOP.replace("constant = 3.0", "constant = 6.0").replace("heavy", "light"))
     assert system.run()["arm.q2"][-1] == pytest.approx(1.5, abs=1e-9)
+    assert system.variants == ("default", "light")
 
 
 @pytest.mark.parametrize(
@@ -178,7 +180,7 @@ def test_a_system_of_a_file_runs_with_other_values_and_steps(tmp_path: Path) -> 
     [
         ({"parameters": {"arn.m2": 1.0}}, "no component 'arn', did you mean 'arm'"),
         ({"parameters": {"arm.m3": 1.0}}, "arm.m3: 'arm' has no variable 'm3'$"),
-        ({"parameters": {"arm.ee_x": 1.0}}, "arm.ee_x: is an output, which cannot be set"),
+        ({"parameters": {"arm.ee_x": 1.0}}, "arm.ee_x: is an output and cannot be set"),
         ({"parameters": {"arm.m2": "2 s"}}, "arm.m2: "),
         ({"parameters": {"arm.m2": -1.0}}, "arm.m2: expected at least"),
         ({"step": 0.03}, "step: expected a whole number of steps"),
@@ -198,6 +200,10 @@ def test_a_new_system_runs_and_guesses_the_connections_of_the_closed_loop(
 ) -> None:
     """It knows the three FMUs only; the connections are those of the closed loop."""
     names = {"RPTrajectory": "trajectory", "RPController": "controller", "RPManipulator": "arm"}
+    two = tmp_path / "2dof.fmu"
+    shutil.copy(rparm.fmu("RPManipulator"), two)
+    console("new-system", "Two", two, "--output", tmp_path)
+    assert "c_2dof.q1" in list(rparm.System(tmp_path / "Two.toml").run())
     ended, _, error = console("new-system", "Loop", *names, "--output", tmp_path)
     file = tmp_path / "Loop.toml"
     assert (ended, error) == (0, "")
@@ -242,7 +248,7 @@ def test_what_is_not_there_is_named(tmp_path: Path) -> None:
         (lambda: rparm.simulate(tmp_path / "none.fmu", **RUN), "none.fmu"),
         (lambda: rparm.Scenario("sine_effort"), "did you mean 'sine_efforts'"),
         (lambda: rparm.System("closed"), "no system 'closed'"),
-        (lambda: rparm.System("machine").run("nominl"), "has no variant 'nominl'"),
+        (lambda: rparm.System("machine").run("nominl"), "no variant 'nominl'"),
         (lambda: rparm.System("machine").run("pick_and_place", engine="x"), "engine: expected"),
     ):
         with pytest.raises(UserError, match=words):
