@@ -1,4 +1,4 @@
-/* The drives: step response, braking, ends of the numbers and refusals.
+/* The drives: braking, ends of the numbers and refusals.
  * test_actuator.py compares values with the equations. */
 #include "model_test.h"
 #include "rp_actuator_equations.h"
@@ -33,28 +33,6 @@ static void start_at(double current) {
     set(RP_ACTUATOR_time_constant1, T);
     set(RP_ACTUATOR_current1, current);
     initialize(1e-11);
-}
-
-/* The current a time t after `current`, while the limited current rests. */
-static double first_order(double current, double limited, double t) {
-    return limited + (current - limited) * exp(-t / T);
-}
-
-/* ---- Current loop --------------------------------------------------------------------------- */
-
-static void test_steps_of_the_command_are_answered_in_first_order(void) {
-    for (int method = 1; method <= 3; method++) {
-        instance_reset(instance);
-        set_integer(RP_ACTUATOR_solver_method, method);
-        set(RP_ACTUATOR_tau1_cmd, nk * 5.0);
-        start_at(-3.0);
-        for (int i = 1; i <= 60; i++) {
-            step_to(i * 0.37e-3);
-            const double expected = first_order(-3.0, 5.0, instance_time(instance));
-            ASSERT_CLOSE(expected, get(RP_ACTUATOR_current1), 1e-9);
-            ASSERT_CLOSE(nk * expected, get(RP_ACTUATOR_tau1), 4e-9);
-        }
-    }
 }
 
 /* ---- Limits --------------------------------------------------------------------------------- */
