@@ -38,8 +38,7 @@
 #include <cpuid.h>
 #define BY_AVX2 __attribute__((target("avx2")))
 
-/* True if processor and operating system have AVX2. (gcc and clang would ask their own libraries,
- * which zig leaves out.) */
+/* True if processor and system have AVX2. Compilers would ask libraries that zig leaves out. */
 static inline _Bool processor_has_avx2(void) {
     enum { XMM_AND_YMM = 6 };
     unsigned a, b, c, d, saved;
@@ -50,8 +49,6 @@ static inline _Bool processor_has_avx2(void) {
     return (saved & XMM_AND_YMM) == XMM_AND_YMM && __get_cpuid_count(7, 0, &a, &b, &c, &d) &&
            (b & bit_AVX2) != 0;
 }
-#else
-#define NO_AVX2
 #endif
 
 /* Hides all symbols below from the shared object's users, unless one says so itself. */
@@ -79,11 +76,10 @@ static inline _Bool processor_has_avx2(void) {
 #else
 #define NO_FUSED_OPERATIONS _Pragma("STDC FP_CONTRACT OFF")
 #endif
-#define NO_AVX2
 
 #endif
 
-#if defined(NO_AVX2)
+#if !defined(BY_AVX2)
 #define BY_AVX2
 #define processor_has_avx2() 0
 #endif

@@ -118,14 +118,9 @@ class Model:
         return J
 
     def series(
-        self,
-        values: np.ndarray,
-        t: float,
-        scale: float,
-        inputs: np.ndarray,
-        last: int,
+        self, values: np.ndarray, t: float, scale: float, inputs: np.ndarray, last: int,
         has_avx2: bool = False,
-    ) -> np.ndarray:
+    ) -> np.ndarray:  # fmt: skip
         """Coefficients of the states (states, last + 1)."""
         count, extend = ctypes.c_size_t * 3, self.words.series
         row_count, _, function = count.from_address(extend)
