@@ -314,7 +314,8 @@ def bode_figure(model: Linear, step: float | None, found: Margins | None = None)
         phase.set_ylabel("phase (degrees)")
         phase.set_xlabel("frequency (Hz)")
         gain.set_xlim(grid[0] / (2 * math.pi), grid[-1] / (2 * math.pi))
-        gain.legend(fontsize=8)
+        if gain.get_legend_handles_labels()[0]:
+            gain.legend(fontsize=8)
     return figure
 
 
