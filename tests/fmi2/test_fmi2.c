@@ -138,18 +138,3 @@ static void test_reset_brings_back_start_values_and_no_experiment(void) {
         fmu_assert_reset_is_fresh(c, "after an initialization without experiment");
     }
 }
-
-static void test_reset_right_after_instantiate_and_twice(void) {
-    const fmi2Component c = fmu_instantiate(&messages, false);
-    ASSERT_OK(fmu.Reset(c));
-    ASSERT_OK(fmu.Reset(c));
-    fmu_assert_reset_is_fresh(c, "after two resets");
-}
-
-/* Masters free badly: in any state, without Terminate. The leak check sees what stays behind. */
-static void test_free_works_in_the_middle_of_a_run(void) {
-    static struct fmu_run run;
-    const fmi2Component c = fmu_instantiate(&messages, true);
-    ASSERT_OK(fmu_run(c, 0, &run));
-    fmu_free(c);
-}

@@ -133,85 +133,6 @@ static void test_the_order_of_calls_does_not_matter(void) {
     }
 }
 
-/* ---- The whole manipulator ------------------------------------------------------------------ */
-
-static struct fmu_polynomial shifted(const struct fmu_polynomial *p, double s) {
-    struct fmu_polynomial q;
-    for (int k = 0; k < 4; k++) {
-        q.d[k] = fmu_polynomial_integral(p, -k, s);
-    }
-    return q;
-}
-
-static void assert_states_within(double tolerance, fmi2Component expected, fmi2Component actual) {
-    double x[2][FMU_STATES];
-    fmu_get_states(expected, x[0]);
-    fmu_get_states(actual, x[1]);
-    for (int i = 0; i < FMU_STATES; i++) {
-        TEST_ASSERT_DOUBLE_WITHIN(tolerance, x[0][i], x[1][i]);
-    }
-}
-
-/* One step gives the same result as many in which the same polynomials are set again. */
-static void test_a_polynomial_may_be_told_in_parts(void) {
-    enum { PARTS = 16 };
-    const double length = 0.25;
-    const fmi2Component whole = fmu_swinging(&messages);
-    const fmi2Component parts = fmu_swinging(&messages);
-    fmu_set_polynomial(whole, RP_MANIPULATOR_tau1, &fmu_torque);
-    fmu_set_polynomial(whole, RP_MANIPULATOR_f2, &fmu_force);
-    step(whole, 0.0, length);
-    for (int i = 0; i < PARTS; i++) {
-        const double time = length * i / PARTS;
-        const struct fmu_polynomial torque_here = shifted(&fmu_torque, time);
-        const struct fmu_polynomial force_here = shifted(&fmu_force, time);
-        fmu_set_polynomial(parts, RP_MANIPULATOR_tau1, &torque_here);
-        fmu_set_polynomial(parts, RP_MANIPULATOR_f2, &force_here);
-        step(parts, time, length / PARTS);
-    }
-    assert_states_within(1e-10, whole, parts);
-}
-
-/* Held at its value in the middle of each of many small steps: second order in their length. */
-static void test_a_polynomial_is_what_many_held_values_tend_to(void) {
-    enum { PARTS = 2048 };
-    const double length = 0.25;
-    const double h = length / PARTS;
-    const fmi2Component whole = fmu_swinging(&messages);
-    const fmi2Component held = fmu_swinging(&messages);
-    fmu_set_polynomial(whole, RP_MANIPULATOR_tau1, &fmu_torque);
-    fmu_set_polynomial(whole, RP_MANIPULATOR_f2, &fmu_force);
-    step(whole, 0.0, length);
-    for (int i = 0; i < PARTS; i++) {
-        fmu_set(held, RP_MANIPULATOR_tau1, fmu_polynomial_integral(&fmu_torque, 0, (i + 0.5) * h));
-        fmu_set(held, RP_MANIPULATOR_f2, fmu_polynomial_integral(&fmu_force, 0, (i + 0.5) * h));
-        step(held, i * h, h);
-    }
-    assert_states_within(1e-6, whole, held);
-    fmu_free(held);
-    const fmi2Component constant = fmu_swinging(&messages);
-    fmu_set(constant, RP_MANIPULATOR_tau1, fmu_torque.d[0]);
-    fmu_set(constant, RP_MANIPULATOR_f2, fmu_force.d[0]);
-    step(constant, 0.0, length);
-    const double difference =
-        fmu_get(constant, RP_MANIPULATOR_q2) - fmu_get(whole, RP_MANIPULATOR_q2);
-    TEST_ASSERT_TRUE(fabs(difference) > 0.05); // the derivatives matter
-}
-
-/* The integrator never evaluates inputs beyond the step, though one large internal step could reach
- * there. */
-static void test_no_internal_step_passes_the_end(void) {
-    const double h = 0.01;
-    const fmi2Component c = fmu_slide(&messages, 0.0);
-    fmu_set(c, RP_MANIPULATOR_relative_tolerance, 1e-4);
-    fmu_slide_begin(c);
-    step(c, 0.0, h);
-    TEST_ASSERT_TRUE(fmu_get(c, RP_MANIPULATOR_solver_last_step) > h);
-    ASSERT_OK(derive(c, RP_MANIPULATOR_f2, 1, 1e-6));
-    step(c, h, h);
-    TEST_ASSERT_TRUE(fmu_get(c, RP_MANIPULATOR_solver_last_step) <= h);
-}
-
 /* ---- Outputs after such a step -------------------------------------------------------------- */
 
 static void test_outputs_use_the_polynomials_at_the_end(void) {
@@ -246,8 +167,6 @@ static void test_setting_the_value_again_ends_the_polynomial(void) {
                               fmu_get(c, RP_MANIPULATOR_ddq2));
 }
 
-/* ---- Arguments that are refused ------------------------------------------------------------- */
-
 static void test_a_polynomial_that_was_saved_applies_again(void) {
     const struct fmu_polynomial *force = &fmu_slide_forces[4];
     const fmi2Component c = fmu_slide(&messages, 0.0);
@@ -266,6 +185,8 @@ static void test_a_polynomial_that_was_saved_applies_again(void) {
     ASSERT_OK(fmu.FreeFMUstate(c, &saved));
     fmu_free(c);
 }
+
+/* ---- Arguments that are refused ------------------------------------------------------------- */
 
 static void test_input_derivatives_that_are_refused(void) {
     fmu_only_in(2, "FMI 3.0 has no derivatives of inputs");

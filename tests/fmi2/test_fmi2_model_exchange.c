@@ -13,42 +13,6 @@ static fmi2Component in_event_mode(void) {
     return c;
 }
 
-/* ---- A whole run ---------------------------------------------------------------------------- */
-
-static void test_the_trajectory_is_that_of_co_simulation(void) {
-    enum { STEPS = 2000 };
-    static const fmi2ValueReference references[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_dq2,
-                                                    RP_MANIPULATOR_relative_tolerance};
-    static const double values[] = {0.4, -0.3, 1e-11};
-    const double h = 1e-3;
-    const fmi2Component own = fmu_instantiate(&messages, false);
-    const fmi2Component c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    ASSERT_OK(fmu.SetReal(own, references, 3, values));
-    ASSERT_OK(fmu.SetReal(c, references, 3, values));
-    fmu_initialize(own, 0.0, 0.0);
-    ASSERT_OK(fmu_me_enter_continuous_time(c, 0.0));
-    for (int i = 0; i < STEPS; i++) {
-        const double inputs[] = {8.0 * cos(5.0 * i * h), 12.0 * sin(3.0 * i * h)};
-        const fmi2ValueReference input_references[] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_f2};
-        ASSERT_OK(fmu.SetReal(own, input_references, 2, inputs));
-        ASSERT_OK(fmu.SetReal(c, input_references, 2, inputs));
-        ASSERT_OK(fmu.DoStep(own, i * h, h, fmi2True));
-        ASSERT_OK(fmu_me_step(c, i * h, h));
-    }
-    for (size_t i = 0; i < fmu_variable_count; i++) {
-        const fmi2ValueReference reference = fmu_variables[i].reference;
-        const bool is_of_solver = reference >= RP_MANIPULATOR_solver_steps;
-        if (fmu_variables[i].is_real && !is_of_solver) {
-            const double expected = fmu_get(own, reference);
-            TEST_ASSERT_DOUBLE_WITHIN(1e-8 * fmax(1.0, fabs(expected)), expected,
-                                      fmu_get(c, reference));
-        }
-    }
-    TEST_ASSERT_TRUE(fabs(fmu_get(c, RP_MANIPULATOR_q1) - 0.4) > 0.1); // it has moved
-    ASSERT_OK(fmu.Terminate(c));
-    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, fmu_log_total(&messages), messages.texts);
-}
-
 /* ---- States and derivatives ----------------------------------------------------------------- */
 
 static void test_states_are_the_variables(void) {
@@ -101,21 +65,6 @@ static void test_setting_reals_is_setting_states(void) {
         TEST_ASSERT_EQUAL_MEMORY(expected, dx, sizeof dx);
     }
     ASSERT_DISCARD(fmu_try_set(c, RP_MANIPULATOR_q2, NAN));
-}
-
-/* As ModelStructure lists them: the attribute derivative= of der_q1, der_q2, ddq1 and ddq2. */
-static void test_the_description_declares_the_states(void) {
-    TEST_ASSERT_NOT_NULL(
-        strstr(fmu_description, "<ModelExchange modelIdentifier=\"RPManipulator\""));
-    TEST_ASSERT_NOT_NULL(strstr(fmu_description, "numberOfEventIndicators=\"0\""));
-    const char *at = strstr(fmu_description, "<Derivatives>");
-    const char *end = strstr(fmu_description, "</Derivatives>");
-    TEST_ASSERT_TRUE(at != NULL && end != NULL);
-    int count = 0;
-    while ((at = strstr(at + 1, "<Unknown ")) != NULL && at < end) {
-        count++;
-    }
-    TEST_ASSERT_EQUAL_INT(FMU_STATES, count);
 }
 
 static void test_start_values_are_the_first_states(void) {

@@ -1,5 +1,5 @@
-/* Model Exchange: what may be set in which mode, and instances of both kinds side by side.
- * Rollback: test_fmi2_snapshots.c and test_faults_memory.c. FMI 2.0, section 3.2.3. */
+/* What may be set in which mode, and what is checked where a mode ends. FMI 2.0, sections 3.2.3 and
+ * 4.2.4. */
 #include "fmu_harness.h"
 #include "fmu_states.h"
 
@@ -8,23 +8,40 @@
 
 /* ---- What may be set ------------------------------------------------------------------------ */
 
-/* Letters of the modes in which the variable can be set: notes of the table of section 3.2.3. */
+/* Letters of the states in which the variable can be set, by kind: notes of the tables of sections
+ * 4.2.4 and 3.2.3. Before initialization inputs, too, as importers set them. */
 static const struct {
     fmi2ValueReference reference;
-    const char *modes;
+    const char *co_simulation, *model_exchange;
     const char *name;
 } settable[] = {
-    {RP_MANIPULATOR_tau1, "IMVN", "tau1"},
-    {RP_MANIPULATOR_f2, "IMVN", "f2"},
-    {RP_MANIPULATOR_m1, "IMV", "m1"}, // tunable
-    {RP_MANIPULATOR_g, "IMV", "g"},
-    {RP_MANIPULATOR_q1, "IMN", "q1"}, // a start value, then a state
-    {RP_MANIPULATOR_dq2, "IMN", "dq2"},
-    {RP_MANIPULATOR_relative_tolerance, "IM", "relative_tolerance"}, // fixed
-    {RP_MANIPULATOR_ddq1, "", "ddq1"},
-    {RP_MANIPULATOR_time, "", "time"},
-    {RP_MANIPULATOR_total_energy, "", "total_energy"},
-    {RP_MANIPULATOR_D11, "", "D11"},
+    {RP_MANIPULATOR_tau1, "IMC", "IMVN", "tau1"},
+    {RP_MANIPULATOR_f2, "IMC", "IMVN", "f2"},
+    {RP_MANIPULATOR_m1, "IMC", "IMV", "m1"}, // tunable
+    {RP_MANIPULATOR_m2, "IMC", "IMV", "m2"},
+    {RP_MANIPULATOR_I1z, "IMC", "IMV", "I1z"},
+    {RP_MANIPULATOR_I2z, "IMC", "IMV", "I2z"},
+    {RP_MANIPULATOR_l1, "IMC", "IMV", "l1"},
+    {RP_MANIPULATOR_lc1, "IMC", "IMV", "lc1"},
+    {RP_MANIPULATOR_a, "IMC", "IMV", "a"},
+    {RP_MANIPULATOR_g, "IMC", "IMV", "g"},
+    {RP_MANIPULATOR_q1, "IM", "IMN", "q1"}, // a start value, then a state
+    {RP_MANIPULATOR_q2, "IM", "IMN", "q2"},
+    {RP_MANIPULATOR_dq1, "IM", "IMN", "dq1"},
+    {RP_MANIPULATOR_dq2, "IM", "IMN", "dq2"},
+    {RP_MANIPULATOR_relative_tolerance, "IM", "IM", "relative_tolerance"}, // fixed
+    {RP_MANIPULATOR_max_step, "IM", "IM", "max_step"},
+    {RP_MANIPULATOR_max_internal_steps, "IM", "IM", "max_internal_steps"},
+    {RP_MANIPULATOR_solver_method, "IM", "IM", "solver_method"},
+    {RP_MANIPULATOR_solver_steps, "", "", "solver_steps"},
+    {RP_MANIPULATOR_ddq1, "", "", "ddq1"},
+    {RP_MANIPULATOR_time, "", "", "time"},
+    {RP_MANIPULATOR_ee_x, "", "", "ee_x"},
+    {RP_MANIPULATOR_total_energy, "", "", "total_energy"},
+    {RP_MANIPULATOR_D11, "", "", "D11"},
+    {RP_MANIPULATOR_coriolis1, "", "", "coriolis1"},
+    {RP_MANIPULATOR_tau1_y, "", "", "tau1_y"},
+    {RP_MANIPULATOR_effective_relative_tolerance, "", "", "effective_relative_tolerance"},
 };
 
 /* FMI 3.0 sets states by this function in event mode, too. */
@@ -32,23 +49,54 @@ static bool is_state(fmi2ValueReference reference) {
     return reference >= RP_MANIPULATOR_q1 && reference <= RP_MANIPULATOR_dq2;
 }
 
+static bool is_integer(size_t row) {
+    size_t i = 0;
+    while (fmu_variables[i].reference != settable[row].reference) {
+        i++;
+    }
+    return !fmu_variables[i].is_real;
+}
+
+static double get(fmi2Component c, size_t row) {
+    return is_integer(row) ? fmu_get_integer(c, settable[row].reference)
+                           : fmu_get(c, settable[row].reference);
+}
+
+static void check_settable(fmi2Type type, size_t row, char letter) {
+    const fmi2ValueReference reference = settable[row].reference;
+    const char *states =
+        type == fmi2CoSimulation ? settable[row].co_simulation : settable[row].model_exchange;
+    const bool allowed = strchr(states, letter) != NULL ||
+                         (fmu_version == 3 && type == fmi2ModelExchange && is_state(reference));
+    const double value = is_integer(row) ? 3.0 : 0.5;
+    const fmi2Integer integer = 3;
+    const fmi2Component c = fmu_reach(type, fmu_state_of(type, letter), &messages);
+    const double expected = allowed || letter == 'I' ? value : get(c, row);
+    const fmi2Status status = is_integer(row) ? fmu.SetInteger(c, &reference, 1, &integer)
+                                              : fmu_try_set(c, reference, value);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(allowed ? fmi2OK : fmi2Error, status, settable[row].name);
+    if (letter != 'I') {
+        TEST_ASSERT_EQUAL_DOUBLE(expected, get(c, row));
+    }
+    if (!allowed) {
+        const bool is_call_refused = is_integer(row) && letter == 'N'; // FMI 2.0
+        fmu_assert_logged(&messages, is_call_refused ? "" : settable[row].name);
+        fmu_assert_in_error(c);
+    } else if (letter == 'I') {
+        fmu_enter_initialization(c, 0);
+        TEST_ASSERT_EQUAL_DOUBLE(value, get(c, row));
+    }
+    fmu_assert_reset_is_fresh_as(type, c, settable[row].name);
+    fmu_free(c);
+}
+
 static void test_what_may_be_set_in_which_mode(void) {
-    static const char modes[] = "IMVN";
-    for (size_t i = 0; i < FMU_COUNT(settable); i++) {
-        for (const char *mode = modes; *mode != '\0'; mode++) {
-            const fmi2Component c =
-                fmu_reach(fmi2ModelExchange, fmu_state_of(fmi2ModelExchange, *mode), &messages);
-            const bool allowed = strchr(settable[i].modes, *mode) != NULL ||
-                                 (fmu_version == 3 && is_state(settable[i].reference));
-            const fmi2Status status = fmu_try_set(c, settable[i].reference, 0.5);
-            TEST_ASSERT_EQUAL_INT_MESSAGE(allowed ? fmi2OK : fmi2Error, status, settable[i].name);
-            if (!allowed) {
-                fmu_assert_logged(&messages, settable[i].name);
-                fmu_assert_in_error(c);
-            } else if (*mode != 'I') {
-                TEST_ASSERT_EQUAL_DOUBLE(0.5, fmu_get(c, settable[i].reference));
-            }
-            fmu_free(c);
+    for (size_t row = 0; row < FMU_COUNT(settable); row++) {
+        for (const char *letter = "IMC"; *letter != '\0'; letter++) {
+            check_settable(fmi2CoSimulation, row, *letter);
+        }
+        for (const char *letter = "IMVN"; *letter != '\0'; letter++) {
+            check_settable(fmi2ModelExchange, row, *letter);
         }
     }
 }
@@ -83,52 +131,35 @@ static void set_no_inertia(fmi2Component c) {
     ASSERT_OK(fmu.SetReal(c, references, 3, zeros));
 }
 
-/* The sum of the inertias is checked where a mode ends in which it can be set. */
-static void test_parameters_without_inertia_are_refused(void) {
-    fmi2Component c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    set_no_inertia(c);
-    fmu_enter_initialization(c, 0);
-    ASSERT_ERROR(fmu.ExitInitializationMode(c));
-    fmu_assert_logged(&messages, "lc1 = 0");
-    fmu_assert_reset_is_fresh_as(fmi2ModelExchange, c, "after an initialization without inertia");
-
-    fmu_log_clear(&messages);
-    c = fmu_me_initialized(&messages, 0.0);
-    ASSERT_OK(fmu.EnterEventMode(c));
-    set_no_inertia(c);
-    ASSERT_ERROR(fmu.EnterContinuousTimeMode(c));
-    fmu_assert_logged(&messages, "lc1 = 0");
-    fmu_assert_reset_is_fresh_as(fmi2ModelExchange, c, "after an event without inertia");
-}
-
-/* ---- Both kinds ----------------------------------------------------------------------------- */
-
-static void test_both_kinds_side_by_side(void) {
-    static struct fmu_run alone[2];
-    static struct fmu_run together[2];
-    const fmi2Component own = fmu_instantiate(&messages, false);
-    const fmi2Component other = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    ASSERT_OK(fmu_run(own, 2, &alone[0]));
-    ASSERT_OK(fmu_run_as(fmi2ModelExchange, other, 2, &alone[1]));
-    fmu_free(own);
-    fmu_free(other);
-
-    memset(together, 0, sizeof together);
-    const fmi2Component c = fmu_instantiate(&messages, false);
-    const fmi2Component m = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    ASSERT_OK(fmu_run_start(fmi2CoSimulation, c, 2));
-    ASSERT_OK(fmu_run_start(fmi2ModelExchange, m, 2));
-    for (unsigned i = 0; i < FMU_RUN_STEPS; i++) {
-        ASSERT_OK(fmu_run_step(fmi2CoSimulation, c, i, &together[0]));
-        ASSERT_OK(fmu_run_step(fmi2ModelExchange, m, i, &together[1]));
+static void assert_massless_is_told(fmi2Type type, fmi2Component c, const char *about) {
+    static const char *const words[] = {"m1 = 2", "lc1 = 0", "I1z = 0", "I2z = 0"};
+    for (size_t i = 0; i < FMU_COUNT(words); i++) {
+        fmu_assert_logged(&messages, words[i]);
     }
-    TEST_ASSERT_EQUAL_MEMORY(alone, together, sizeof alone);
+    fmu_assert_in_error(c);
+    fmu_assert_reset_is_fresh_as(type, c, about);
+    fmu_log_clear(&messages);
 }
 
-static void test_reset_keeps_the_kind(void) {
-    const fmi2Component c = fmu_me_initialized(&messages, 0.0);
-    ASSERT_OK(fmu.Reset(c));
-    ASSERT_OK(fmu_me_enter_continuous_time(c, 0.0));
-    ASSERT_ERROR(fmu.DoStep(c, 0.0, 0.1, fmi2True));
-    fmu_assert_reset_is_fresh_as(fmi2ModelExchange, c, "after a reset");
+/* The sum of the inertias is checked where a mode ends in which it can be set, and by a step. */
+static void test_parameters_without_inertia_are_refused(void) {
+    static const fmi2Type types[] = {fmi2CoSimulation, fmi2ModelExchange};
+    for (size_t i = 0; i < FMU_COUNT(types); i++) {
+        const fmi2Component c = fmu_instantiate_as(types[i], &messages, false);
+        set_no_inertia(c);
+        fmu_enter_initialization(c, 0);
+        ASSERT_ERROR(fmu.ExitInitializationMode(c));
+        assert_massless_is_told(types[i], c, "after an initialization without inertia");
+    }
+    const fmi2Component c = fmu_initialized(&messages, 0.0);
+    ASSERT_OK(fmu.DoStep(c, 0.0, 0.1, fmi2True));
+    set_no_inertia(c);
+    ASSERT_ERROR(fmu.DoStep(c, 0.1, 0.1, fmi2True));
+    assert_massless_is_told(fmi2CoSimulation, c, "after a step without inertia");
+
+    const fmi2Component m = fmu_me_initialized(&messages, 0.0);
+    ASSERT_OK(fmu.EnterEventMode(m));
+    set_no_inertia(m);
+    ASSERT_ERROR(fmu.EnterContinuousTimeMode(m));
+    assert_massless_is_told(fmi2ModelExchange, m, "after an event without inertia");
 }

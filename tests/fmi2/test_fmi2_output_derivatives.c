@@ -51,62 +51,6 @@ static void test_output_derivatives_of_the_slide(void) {
     }
 }
 
-/* E' = power, and the derivatives of states are outputs themselves. */
-static void test_output_derivatives_agree_with_each_other(void) {
-    const fmi2Component c = fmu_swinging(&messages);
-    fmu_set_polynomial(c, RP_MANIPULATOR_tau1, &fmu_torque);
-    fmu_set_polynomial(c, RP_MANIPULATOR_f2, &fmu_force);
-    step(c, 0.0, 0.25);
-    static const fmi2ValueReference pairs[][2] = {
-        {RP_MANIPULATOR_q1, RP_MANIPULATOR_dq1},
-        {RP_MANIPULATOR_q2, RP_MANIPULATOR_dq2},
-        {RP_MANIPULATOR_dq1, RP_MANIPULATOR_ddq1},
-        {RP_MANIPULATOR_dq2, RP_MANIPULATOR_ddq2},
-        {RP_MANIPULATOR_ee_x, RP_MANIPULATOR_ee_vx},
-        {RP_MANIPULATOR_ee_y, RP_MANIPULATOR_ee_vy},
-        {RP_MANIPULATOR_total_energy, RP_MANIPULATOR_actuator_power}};
-    for (size_t i = 0; i < FMU_COUNT(pairs); i++) {
-        const double value = fmu_get(c, pairs[i][1]);
-        const double slope = output_derivative(c, pairs[i][1], 1);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-11 * (1.0 + fabs(value)), value,
-                                  output_derivative(c, pairs[i][0], 1));
-        TEST_ASSERT_DOUBLE_WITHIN(1e-11 * (1.0 + fabs(slope)), slope,
-                                  output_derivative(c, pairs[i][0], 2));
-    }
-}
-
-/* Once the input is set, they are those of the next step: before the first step and after another
- * one, in either order of calls. Derivatives that are not set again are 0. */
-static void test_output_derivatives_follow_what_is_set(void) {
-    fmu_only_in(2, "FMI 3.0 has no derivatives of inputs");
-    const fmi2ValueReference f2 = RP_MANIPULATOR_f2;
-    const fmi2Integer first = 1;
-    const double value = 3.0;
-    const double slope = -7.0;
-    for (int variant = 0; variant < 4; variant++) {
-        const bool after_step = variant % 2 == 1;
-        const bool value_first = variant / 2 == 1;
-        const fmi2Component c = fmu_slide(&messages, 0.0);
-        fmu_slide_begin(c);
-        if (after_step) {
-            fmu_set_polynomial(c, f2, &fmu_slide_forces[FMU_SLIDE_FORCES - 1]);
-            step(c, 0.0, 0.5);
-        }
-        if (value_first) {
-            fmu_set(c, f2, value);
-        }
-        ASSERT_OK(fmu.SetRealInputDerivatives(c, &f2, 1, &first, &slope));
-        if (!value_first) {
-            fmu_set(c, f2, value);
-        }
-        TEST_ASSERT_DOUBLE_WITHIN(1e-14, value / fmu_slide_mass, fmu_get(c, RP_MANIPULATOR_ddq2));
-        TEST_ASSERT_DOUBLE_WITHIN(1e-14, slope / fmu_slide_mass,
-                                  output_derivative(c, RP_MANIPULATOR_ddq2, 1));
-        TEST_ASSERT_DOUBLE_WITHIN(1e-14, 0.0, output_derivative(c, RP_MANIPULATOR_ddq2, 2));
-        fmu_free(c);
-    }
-}
-
 static void test_output_derivatives_that_are_refused(void) {
     static const struct {
         fmi2ValueReference reference;

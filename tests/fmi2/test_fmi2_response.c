@@ -24,24 +24,6 @@ static void test_get_after_set_answers_for_the_new_inputs(void) {
     }
 }
 
-/* Reading in between, and inputs that are set and taken back, leave no trace. */
-static void test_only_the_inputs_at_the_step_count(void) {
-    double x[2][4];
-    for (int with_detour = 0; with_detour < 2; with_detour++) {
-        const fmi2Component c = fmu_initialized(&messages, 0.0);
-        for (int step = 0; step < 10; step++) {
-            if (with_detour) {
-                fmu_set(c, RP_MANIPULATOR_tau1, 100.0);
-                (void)fmu_get(c, RP_MANIPULATOR_ddq1);
-            }
-            fmu_set(c, RP_MANIPULATOR_tau1, 2.0);
-            ASSERT_OK(fmu.DoStep(c, step / 8.0, 0.125, fmi2True));
-        }
-        fmu_get_states(c, x[with_detour]);
-    }
-    TEST_ASSERT_EQUAL_MEMORY(x[0], x[1], sizeof x[0]);
-}
-
 static void test_tunable_parameters_keep_the_states(void) {
     static const fmi2ValueReference references[] = {RP_MANIPULATOR_m1, RP_MANIPULATOR_l1,
                                                     RP_MANIPULATOR_g};

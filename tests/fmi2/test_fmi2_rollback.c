@@ -18,30 +18,6 @@ static void run_plainly(unsigned seed) {
     fmu_free(c);
 }
 
-/* ---- Only saving ---------------------------------------------------------------------------- */
-
-static void run_saving_everywhere(unsigned seed) {
-    char text[64];
-    snprintf(text, sizeof text, "saved everywhere, seed %u", seed);
-    fmi2FMUstate reused = NULL;
-    const fmi2Component c = fmu_instantiate(&messages, false);
-    for (size_t at = 0; at < expected.count; at++) {
-        ASSERT_OK(fmu.GetFMUstate(c, &reused));
-        (void)fmu_save(c); // FreeInstance frees it
-        struct fmu_bytes bytes = fmu_serialize(c, reused);
-        fmu_bytes_free(&bytes);
-        fmu_sequence_check(c, &sequence, at, &expected, text);
-    }
-    fmu_free(c);
-}
-
-static void test_saving_at_every_step_changes_nothing(void) {
-    for (unsigned seed = 0; seed < 200; seed++) {
-        run_plainly(seed);
-        run_saving_everywhere(seed);
-    }
-}
-
 /* ---- Going back ----------------------------------------------------------------------------- */
 
 struct saved {

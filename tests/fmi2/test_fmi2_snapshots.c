@@ -171,19 +171,6 @@ EACH_METHOD static void test_handles_survive_a_reset_and_an_error(void) {
     ASSERT_OK(fmu.Reset(c));
 }
 
-static void test_free_sets_null_and_takes_null(void) {
-    const fmi2Component c = fmu_initialized(&messages, 0.0);
-    fmi2FMUstate a = fmu_save(c);
-    fmi2FMUstate b = fmu_save(c);
-    TEST_ASSERT_TRUE(a != b);
-    fmu_forget(c, &a);
-    fmu_forget(c, &a); // it is NULL now
-    ASSERT_OK(fmu.FreeFMUstate(c, NULL));
-    fmu_restore(c, b); // the other one is still there
-    fmu_forget(c, &b);
-    TEST_ASSERT_EQUAL_UINT(0, fmu_log_total(&messages));
-}
-
 /* Every function that takes a handle, by one signature. */
 static const enum fmu_function handle_functions[] = {
     FMU_GetFMUstate,       FMU_SetFMUstate,  FMU_SerializedFMUstateSize,

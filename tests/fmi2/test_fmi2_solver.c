@@ -3,54 +3,8 @@
 #include "each_method.h"
 #include "fmu_harness.h"
 
-#include <limits.h>
 #include <math.h>
 #include <unity.h>
-
-/* ---- What is refused ------------------------------------------------------------------------ */
-
-static void test_methods_that_do_not_exist_are_refused(void) {
-    static const fmi2Integer wrong[] = {0, 5, -1, INT_MAX, INT_MIN};
-    const fmi2ValueReference reference = RP_MANIPULATOR_solver_method;
-    const double real = 2.0;
-    const fmi2Component c = fmu_instantiate(&messages, false);
-    fmu_set_integer(c, reference, FMU_CVODE_BDF);
-    for (size_t i = 0; i < FMU_COUNT(wrong); i++) {
-        fmu_log_clear(&messages);
-        ASSERT_DISCARD(fmu.SetInteger(c, &reference, 1, &wrong[i]));
-        fmu_assert_logged(&messages, "solver_method");
-    }
-    fmu_initialize(c, 0.0, 0.0);
-    TEST_ASSERT_EQUAL_INT(FMU_CVODE_BDF, fmu_get_integer(c, reference));
-    fmu_assert_reset_is_fresh(c, "after methods that do not exist");
-    ASSERT_OK(fmu.Reset(c));
-    ASSERT_ERROR(fmu.SetReal(c, &reference, 1, &real));
-}
-
-static void test_limits_that_make_no_sense_are_refused(void) {
-    static const double wrong[] = {-1e-3, -1e-300, -INFINITY, INFINITY, NAN};
-    const fmi2Component c = fmu_instantiate(&messages, false);
-    for (size_t i = 0; i < FMU_COUNT(wrong); i++) {
-        fmu_log_clear(&messages);
-        ASSERT_DISCARD(fmu_try_set(c, RP_MANIPULATOR_max_step, wrong[i]));
-        fmu_assert_logged(&messages, "max_step");
-    }
-    fmu_initialize(c, 0.0, 0.0);
-    TEST_ASSERT_EQUAL_DOUBLE(0.0, fmu_get(c, RP_MANIPULATOR_max_step));
-    fmu_assert_reset_is_fresh(c, "after limits that make no sense");
-}
-
-static void test_both_are_fixed_after_initialization(void) {
-    const fmi2ValueReference reference = RP_MANIPULATOR_solver_method;
-    const fmi2Integer value = FMU_ERK;
-    const fmi2Component c = fmu_initialized(&messages, 0.0);
-    ASSERT_ERROR(fmu.SetInteger(c, &reference, 1, &value));
-    fmu_assert_logged(&messages, "solver_method");
-    fmu_assert_in_error(c);
-    const fmi2Component other = fmu_initialized(&messages, 0.0);
-    ASSERT_ERROR(fmu_try_set(other, RP_MANIPULATOR_max_step, 0.1));
-    fmu_assert_in_error(other);
-}
 
 /* ---- The method ----------------------------------------------------------------------------- */
 

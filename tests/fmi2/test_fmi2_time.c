@@ -104,23 +104,6 @@ static void test_the_tolerance_parameter_wins_over_the_experiment(void) {
     TEST_ASSERT_TRUE(fine == effective_tolerance(1e-9, 1e-4));
 }
 
-static int steps_at(double tolerance) {
-    const fmi2ValueReference reference = RP_MANIPULATOR_solver_steps;
-    fmi2Integer steps = 0;
-    const fmi2Component c = fmu_instantiate(&messages, false);
-    fmu_initialize(c, 0.0, tolerance);
-    ASSERT_OK(fmu.DoStep(c, 0.0, 2.0, fmi2True));
-    ASSERT_OK(fmu.GetInteger(c, &reference, 1, &steps));
-    fmu_free(c);
-    return steps;
-}
-
-static void test_a_finer_tolerance_takes_more_internal_steps(void) {
-    const int coarse = steps_at(1e-4);
-    TEST_ASSERT_GREATER_THAN_INT(0, coarse);
-    TEST_ASSERT_GREATER_THAN_INT(coarse, steps_at(1e-9));
-}
-
 /* ---- Steps ---------------------------------------------------------------------------------- */
 
 static void test_steps_that_are_refused(void) {
@@ -261,18 +244,6 @@ static void test_the_rollback_hint_changes_nothing(void) {
         q1[i] = fmu_get(c, RP_MANIPULATOR_q1);
         TEST_ASSERT_TRUE(q1[i] == q1[0]);
     }
-}
-
-/* Neither a crash nor a hang: internal steps are limited. */
-static void test_an_endless_step_is_discarded(void) {
-    const fmi2Component c = fmu_initialized(&messages, 0.0);
-    const fmi2Status status = fmu.DoStep(c, 0.0, 1e300, fmi2True);
-    TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Discard, status, messages.texts);
-    double reached = NAN;
-    ASSERT_OK(fmu.GetRealStatus(c, fmi2LastSuccessfulTime, &reached));
-    TEST_ASSERT_TRUE(reached >= 0.0 && reached < 1e300);
-    TEST_ASSERT_TRUE(isfinite(fmu_get(c, RP_MANIPULATOR_q1)));
-    fmu_assert_reset_is_fresh(c, "after an endless step");
 }
 
 /* fmi2Discard of fmi2DoStep: section 4.2.2; fmi2LastSuccessfulTime: 4.2.3. */

@@ -325,13 +325,3 @@ static void test_results_of_a_step_need_a_place(void) {
         fmu3_free(c);
     }
 }
-
-/* The stop time comes with the initialization. */
-static void test_no_step_passes_the_stop_time(void) {
-    const fmi3Instance c = fmu3_co_simulation(&importer, NULL);
-    ASSERT_OK(fmu3.EnterInitializationMode(c, false, 0.0, 1.0, true, 2.0));
-    ASSERT_OK(fmu3.ExitInitializationMode(c));
-    fmu3_step(c, 1.0, 0.75);
-    ASSERT_ERROR(fmu3_try_step(c, 1.75, 0.5).status);
-    fmu3_assert_logged(&importer, "stop time is 2");
-}

@@ -60,35 +60,6 @@ static void get_states(struct instance *from, double states[2]) {
     states[1] = get_of(from, OSCILLATOR_V);
 }
 
-/* ---- Solutions ----------------------------------------------------------------------------------
- */
-
-EACH_METHOD static void test_held_inputs_give_the_exact_piecewise_solution(void) {
-    double exact[2] = {1.0, 0.0};
-    initialize_at(0.0);
-    for (int i = 0; i < 300; i++) {
-        const double u = cos(0.3 * i);
-        set(OSCILLATOR_U, u);
-        ASSERT_OK(instance_do_step(instance, 0.02 * i, 0.02));
-        oscillator_solution(2.0, u, 0.02, exact, exact);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(OSCILLATOR_X));
-        TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[1], get(OSCILLATOR_V));
-    }
-    TEST_ASSERT_EQUAL_DOUBLE(0.02 * 299 + 0.02, get(OSCILLATOR_TIME));
-}
-
-EACH_METHOD static void test_a_tunable_parameter_acts_from_the_next_step_on(void) {
-    double exact[2] = {1.0, 0.0};
-    initialize_at(0.0);
-    ASSERT_OK(instance_do_step(instance, 0.0, 0.5));
-    oscillator_solution(2.0, 0.0, 0.5, exact, exact);
-    set(OSCILLATOR_OMEGA, 3.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(OSCILLATOR_X));
-    ASSERT_OK(instance_do_step(instance, 0.5, 0.5));
-    oscillator_solution(3.0, 0.0, 0.5, exact, exact);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(OSCILLATOR_X));
-}
-
 EACH_METHOD static void test_the_sign_of_zero_is_no_change(void) {
     initialize_at(0.0);
     for (int i = 0; i < 50; i++) {
@@ -163,26 +134,6 @@ EACH_METHOD static void test_no_internal_step_passes_the_end_of_a_polynomial(voi
         ASSERT_OK(instance_set_input_derivatives(instance, &input, 1, &order, &slope));
         ASSERT_OK(instance_do_step(instance, i * h, h));
         TEST_ASSERT_TRUE(latest <= (i + 1) * h * (1.0 + 1e-12));
-    }
-}
-
-/* What lies beyond is dropped: the solution with the new input begins in the state at the point. */
-EACH_METHOD static void test_a_new_input_acts_from_the_point_on(void) {
-    const double h = 1.0 / 1024.0;
-    const double length = 0.25;
-    double exact[2];
-    double states[2];
-    initialize_at(0.0);
-    step_held(1024, h);
-    for (int i = 0; i < 40; i++) {
-        const double u = i % 2 == 0 ? 3.0 : -3.0;
-        get_states(instance, states);
-        set(OSCILLATOR_U, u);
-        ASSERT_OK(instance_do_step(instance, 1.0 + i * length, length));
-        oscillator_solution(2.0, u, length, states, exact);
-        get_states(instance, states);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-8, exact[0], states[0]);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-8, exact[1], states[1]);
     }
 }
 

@@ -1,4 +1,3 @@
-#include "allocations.h"
 #include "each_method.h"
 #include "integrator_test.h"
 
@@ -140,16 +139,6 @@ EACH_CVODE_METHOD static void test_many_points_lie_where_each_lies_alone(void) {
     }
 }
 
-EACH_METHOD static void test_a_restart_begins_at_time_zero_from_its_state(void) {
-    double first[2];
-    double again[2];
-    restart(INFINITY);
-    advance(3.0, first);
-    restart(INFINITY);
-    advance(3.0, again);
-    TEST_ASSERT_EQUAL_MEMORY(first, again, sizeof first);
-}
-
 EACH_METHOD static void test_nothing_is_evaluated_beyond_the_horizon(void) {
     double x[2];
     restart(1.0);
@@ -276,60 +265,6 @@ EACH_METHOD static void test_a_right_hand_side_that_fails_at_once_leaves_the_sta
     TEST_ASSERT_EQUAL_DOUBLE(0.0, reached);
 }
 
-EACH_METHOD static void test_a_restart_after_a_failure_works(void) {
-    double x[2];
-    double reached;
-    configure_with(1e-10, 0.25);
-    circle.failing_from = 1.0;
-    restart(INFINITY);
-    TEST_ASSERT_TRUE(integrator_advance(integrator, 2.0, step_limit, &reached, x) != STATUS_OK);
-    circle.failing_from = INFINITY;
-    restart(INFINITY);
-    advance(2.0, x);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0), x[0]);
-}
-
-EACH_METHOD static void test_nothing_is_allocated_after_creation(void) {
-    double x[2];
-    const long before = allocation_count();
-    configure(1e-8);
-    for (int i = 0; i < 100; i++) {
-        restart(i % 2 == 0 ? INFINITY : 2.0);
-        advance(1.0, x);
-        advance(2.0, x);
-    }
-    TEST_ASSERT_EQUAL_INT(before, allocation_count());
-    TEST_ASSERT_TRUE(before > 0);
-}
-
-/* The limit of a new integrator, and of one that had another. */
-EACH_METHOD static void test_no_step_is_longer_than_the_limit(void) {
-    static const double limits[] = {1e-4, 0.0, 0.01};
-    double x[2];
-    const double absolute[2] = {1e-6, 1e-6};
-    struct integrator_settings settings = {.method = (enum integrator_method)method,
-                                           .relative_tolerance = 1e-4,
-                                           .absolute_tolerances = absolute};
-    struct integrator_statistics statistics;
-    integrator_destroy(integrator);
-    create(circle_rhs, circle_series);
-    for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++) {
-        const double limit = settings.max_step = limits[i];
-        const double length = limit > 0.0 ? 100.0 * limit : 1.0;
-        ASSERT_OK(integrator_configure(integrator, &settings));
-        restart(INFINITY);
-        advance(length, x);
-        integrator_get_statistics(integrator, &statistics);
-        if (limit > 0.0) {
-            TEST_ASSERT_TRUE(statistics.last_step <= limit * (1.0 + 1e-9));
-            TEST_ASSERT_GREATER_OR_EQUAL_INT(100, statistics.steps);
-        } else {
-            TEST_ASSERT_TRUE(statistics.last_step > 0.01);
-        }
-    }
-}
-
-/* Whatever state the one before ended with. */
 /* After an advance the first step of a restart has an estimated error of order 1, h^2 x'' / 2, of a
  * hundredth of the tolerance: 0.1 sqrt(2 / norm), norm the weighted root mean square of x'' = -x.
  */
@@ -368,6 +303,7 @@ EACH_METHOD static void test_advances_need_no_second_attempt(void) {
     TEST_ASSERT_LESS_OR_EQUAL_INT(failed + 5, statistics.failed_steps);
 }
 
+/* Whatever state the one before ended with. */
 EACH_METHOD static void test_another_method_may_take_over(void) {
     static const double not_finite[2] = {NAN, INFINITY};
     const double absolute[2] = {1e-12, 1e-12};
@@ -389,20 +325,6 @@ EACH_METHOD static void test_another_method_may_take_over(void) {
     TEST_ASSERT_EQUAL_MEMORY(expected, x, sizeof x);
 }
 
-EACH_METHOD static void test_a_new_handle_takes_any_limit_and_tolerance(void) {
-    static const double limits[] = {1e-3, 1e-9, 5e-324, 1e300};
-    const double absolute[2] = {1e-16, 1e-16};
-    struct integrator_settings settings = {.method = (enum integrator_method)method,
-                                           .relative_tolerance = 1e-14,
-                                           .absolute_tolerances = absolute};
-    for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++) {
-        settings.max_step = limits[i];
-        integrator_destroy(integrator);
-        create(circle_rhs, circle_series);
-        ASSERT_OK(integrator_configure(integrator, &settings));
-    }
-}
-
 EACH_METHOD static void test_a_vanishing_step_ends_in_the_same_way_each_time(void) {
     static const double lengths[] = {5e-324, 1e-300, 1e-200};
     for (size_t i = 0; i < sizeof lengths / sizeof lengths[0]; i++) {
@@ -421,8 +343,4 @@ EACH_METHOD static void test_a_vanishing_step_ends_in_the_same_way_each_time(voi
         TEST_ASSERT_EQUAL_INT(statuses[0], statuses[1]);
         TEST_ASSERT_EQUAL_INT(evaluations[0], evaluations[1]);
     }
-}
-
-EACH_METHOD static void test_destroying_nothing_is_allowed(void) {
-    integrator_destroy(NULL);
 }
