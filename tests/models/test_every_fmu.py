@@ -1,7 +1,6 @@
 """Promises of every FMU, over all FMUs and their scenarios: scenarios meet their references, fmpy
-runs it, rollback leaves no trace, dependencies are found in values, names have one unit."""
+runs it, rollback leaves no trace, names have one unit. Dependencies: fmi3/test_initialization.py."""
 
-import math
 import random
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,8 +10,6 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi1 import FMICallException
-from fmpy.model_description import ModelVariable
 
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
@@ -20,7 +17,7 @@ from rparm.project import model_folder
 from rparm.runs.comparison import Runs
 from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import initialize
-from tests.support.instances import instantiated, restore, serialized
+from tests.support.instances import restore, serialized
 from tests.support.paths import EVERY
 from tests.support.rparm_project import FILES, FMUS, NAMES, fmi3_fmu, load, names_of
 
@@ -164,114 +161,6 @@ def test_rollback_leaves_no_trace(version: str, name: str, method: int | None) -
                 assert [other.do(k) for k in again] == once
             run.do(i)
         saved.free()
-
-
-# ---- Dependencies --------------------------------------------------------------------------------
-
-POINTS = 200
-# The plant declares all that events may depend on; discrete modes hide some of it at single points.
-CONSERVATIVE = ("RPPlant",)
-
-
-class Points:
-    """An instance in initialization mode whose knowns take random values."""
-
-    def __init__(self, name: str, fmu: object, variables: list[ModelVariable]) -> None:
-        self.fmu, self.chance = fmu, random.Random(name)
-        states = {v.derivative.name for v in variables if v.derivative}
-        self.knowns = [
-            v
-            for v in variables
-            if (v.causality in ("input", "parameter") or v.name in states)
-            and not v.name.startswith(("relative_tolerance", "max_", "solver_"))
-        ]
-        self.unknowns: list[ModelVariable] = []
-        self._references = {v.name: v.valueReference for v in self.knowns}
-        self._of_kind: dict[str, list[str]] = {}
-        for known in self.knowns:
-            self._of_kind.setdefault(known.type, []).append(known.name)
-
-    def draw(self, known: ModelVariable) -> float:
-        """Return a value in the variable's range: now and then 0, or one that limits nothing."""
-        chance = self.chance
-        low = -math.inf if known.min is None else float(known.min)
-        high = math.inf if known.max is None else float(known.max)
-        if known.type == "Boolean":
-            return chance.random() < 0.5
-        if known.type == "Enumeration":
-            return chance.randint(1, len(known.declaredType.items))
-        if known.type == "Integer":
-            return chance.randint(int(max(low, 0)), int(min(high, 10)))
-        if low == 0.0 and chance.random() < 0.2:
-            return 0.0  # features that are off
-        is_wide = known.name.rstrip("12").endswith("_max") and chance.random() < 0.5
-        size = 10 ** (chance.uniform(-1, 1) + (6 if is_wide or chance.random() < 0.1 else 0))
-        return min(max(size * (chance.choice((-1, 1)) if low < 0 else 1), low), high)
-
-    def place(self) -> dict[str, float]:
-        """Put the instance at a new point and return the values there."""
-        self.fmu.reset()
-        self.fmu.setupExperiment(startTime=self.chance.choice((0.0, 0.5, 1.5, 7.0)))
-        self.fmu.enterInitializationMode()
-        values = {known.name: self.draw(known) for known in self.knowns}
-        self.give(values)
-        return values
-
-    def give(self, values: dict[str, float]) -> None:
-        """Set all knowns."""
-        for kind, names in self._of_kind.items():
-            setter = getattr(self.fmu, f"set{'Integer' if kind == 'Enumeration' else kind}")
-            setter([self._references[name] for name in names], [values[name] for name in names])
-
-    def read(self) -> list[float]:
-        return [getattr(self.fmu, f"get{v.type}")([v.valueReference])[0] for v in self.unknowns]
-
-
-def found_dependencies(points: Points) -> dict[str, set[str]]:
-    """Return the knowns whose change changes each unknown, at any of many points."""
-    found: dict[str, set[str]] = {v.name: set() for v in points.unknowns}
-    for _ in range(POINTS):
-        try:
-            values = points.place()
-            before = points.read()
-        except FMICallException:
-            continue  # not finite there
-        for known in points.knowns:
-            points.give(values | {known.name: points.draw(known)})
-            try:
-                after = points.read()
-            except FMICallException:
-                continue
-            for unknown, one, other in zip(points.unknowns, before, after, strict=True):
-                if one != other:
-                    found[unknown.name].add(known.name)
-    return found
-
-
-@pytest.mark.parametrize("name", EVERY)
-def test_dependencies_are_those_of_the_values(fmu: Path, name: str) -> None:
-    """Initial unknowns depend on the knowns that change them, outputs on no further ones."""
-    with instantiated(fmu.with_name(f"{name}.fmu"), "CoSimulation") as (instance, description):
-        points = Points(name, instance, description.modelVariables)
-        points.unknowns = [u.variable for u in description.initialUnknowns]
-        found = found_dependencies(points)
-    initial = {
-        u.variable.name: {v.name for v in u.dependencies} - {"time"}
-        for u in description.initialUnknowns
-    }
-    for unknown, listed in initial.items():
-        assert found[unknown] <= listed, unknown
-        if name not in CONSERVATIVE:
-            assert found[unknown] == listed, unknown
-    parameters = {v.name for v in description.modelVariables if v.causality == "parameter"}
-    for u in (*description.outputs, *description.derivatives):
-        unknown, listed = u.variable.name, {v.name for v in u.dependencies} - {"time"}
-        if unknown not in initial:  # a state, or what the plant counts
-            assert listed == {unknown} or name in CONSERVATIVE
-        elif u.variable.variability != "discrete":
-            assert listed <= initial[unknown] - parameters, unknown
-            if not description.numberOfEventIndicators:
-                assert listed == initial[unknown] - parameters, unknown
 
 
 # ---- Names ---------------------------------------------------------------------------------------
