@@ -1,5 +1,5 @@
 """Promises of every FMU, over all FMUs and their scenarios: scenarios meet their references, fmpy
-runs it, rollback leaves no trace, names have one unit. Dependencies: fmi3/test_initialization.py."""
+runs it, rollback leaves no trace, names have one unit. Dependencies: test_initialization.py."""
 
 import random
 from collections.abc import Iterator
