@@ -1,5 +1,5 @@
 /* The sensor as the instance runs it: what is shown at the start and beyond all counts, which modes
- * are refused. test_sensor_ticks.py compares samples, latency and noise with a sensor in fractions,
+ * are refused. test_sensor.py compares samples, latency and noise with a sensor in fractions,
  * test_rp_sensor_masters.c the times of ticks with whole numbers. */
 #include "last_text.h"
 #include "model_test.h"

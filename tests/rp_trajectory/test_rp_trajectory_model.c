@@ -1,5 +1,5 @@
 /* The reference motions as the instance sees them: the payload, what is refused.
- * test_trajectory_payload.py has grasp and release. Derivatives by parameters are compared with 40
+ * test_trajectory.py has grasp and release. Derivatives by parameters are compared with 40
  * digits in test_trajectory.py. */
 #include "last_text.h"
 #include "model_test.h"

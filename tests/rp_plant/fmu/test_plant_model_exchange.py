@@ -1,6 +1,6 @@
 """The plant in Model Exchange: event mode, and Euler's method, which passes events by up to a step.
 
-random_motions.py has motions under CVode.
+test_plant_random_motions.py has motions under CVode.
 """
 
 from pathlib import Path

@@ -1,0 +1,147 @@
+"""Systems without Ecos: in the master of rparm and in libcosim they are what the references say,
+also of FMUs of FMI 3.0; what is refused, of either version."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rparm import project
+from rparm.errors import UserError
+from rparm.systems import comparison, ecos, master, ssp
+from tests.importers.osp import libcosim, only_variant
+from tests.support.rparm_project import Console
+from tests.support.ssp_files import SSP, edited, edited_fmu, replace
+from tests.support.systems import BOUND, CASES, CLOSED_LOOP, MACHINE_SYSTEM, System, difference
+
+ABSENT = "ecospy is not installed"
+
+
+def compared(name: str, variants: Sequence[str] | None = None) -> list[comparison.Outcome]:
+    """Variants of a system, or all, stepped in this process."""
+    folder = project.systems()[name]
+    with ssp.unpacked(project.built(folder, ".ssp")) as opened:
+        experiment = comparison.load_study(folder).EXPERIMENT
+        return [
+            comparison.simulate(
+                opened,
+                variant,
+                comparison.load_reference(opened, variant, folder, experiment),
+                master.run_in_master,
+            )
+            for variant in variants or opened.system.parameters
+        ]
+
+
+@pytest.mark.parametrize("name", ["closed_loop", "machine"])
+def test_all_variants_are_within_the_bound(name: str) -> None:
+    outcomes = compared(name)
+    assert len(outcomes) == 5
+    assert [outcome.variant for outcome in outcomes if not outcome.passed] == []
+
+
+def test_the_command_says_who_steps(
+    tmp_path: Path, console: Console, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ecos, "absent", lambda: ABSENT)
+    monkeypatch.setattr(ecos, "run", None)  # nobody may call it
+    code, out, _ = console("system", "nominal", "--report", tmp_path)
+    assert code == 0
+    assert f"{ABSENT}: the master of rparm steps closed_loop" in out
+    assert "passed: 1 variant" in out
+
+
+@pytest.mark.parametrize(
+    ("system", "machine", "words"),
+    [
+        ("linux", "x86_64", ""),
+        ("win32", "AMD64", ""),
+        ("linux", "aarch64", "x86-64 only"),
+        ("darwin", "x86_64", "x86-64 only"),
+    ],
+)
+def test_where_ecos_has_no_library(
+    monkeypatch: pytest.MonkeyPatch, system: str, machine: str, words: str
+) -> None:
+    monkeypatch.setattr("sys.platform", system)
+    monkeypatch.setattr("platform.machine", lambda: machine)
+    assert words in ecos.absent() and bool(words) == bool(ecos.absent())
+
+
+SSP3 = SSP.parent / "fmi3" / SSP.name
+
+
+def test_the_command_takes_the_fmus_of_fmi_3(tmp_path: Path, console: Console) -> None:
+    code, out, err = console("system", "nominal", "--fmi", "3", "--report", tmp_path)
+    assert (code, err) == (0, "") and "passed: 1 variant\n" in out
+    assert "ClosedLoop (FMI 3.0)" in (tmp_path / "index.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("source", [SSP, SSP3], ids=["2.0", "3.0"])
+def test_what_ecos_would_not_set_is_refused(tmp_path: Path, console: Console, source: Path) -> None:
+    """Enumerations of any version of FMI."""
+    law = '<ssv:Parameter name="mode"><ssv:Integer value="1"/></ssv:Parameter>'
+    added = replace("<ssv:Parameters>", f"<ssv:Parameters>{law}")
+    path = edited(source, tmp_path / "law.ssp", {"resources/controller_nominal.ssv": added})
+    error = console.failed("system", "nominal", "--ssp", path, "--report", tmp_path / "report")
+    assert "component 'controller': 'mode' is an Enumeration, which Ecos does not set" in error
+
+
+def test_another_version_of_fmi_is_refused(tmp_path: Path) -> None:
+    change = edited_fmu({"modelDescription.xml": replace('fmiVersion="3.0"', 'fmiVersion="3.1"')})
+    path = edited(SSP3, tmp_path / "later.ssp", {"resources/RPController.fmu": change})
+    refused = r"component 'controller': .* an FMU of FMI 2\.0 or 3\.0 .*, found FMI 3\.1"
+    with pytest.raises(UserError, match=refused), ssp.unpacked(path):
+        pass
+
+
+ROUNDING = 1e-9  # two engines with the same order
+
+
+@pytest.mark.parametrize(("system", "variant"), CASES, ids=lambda x: getattr(x, "folder", x))
+def test_libcosim_is_at_the_reference_of_its_order(
+    system: System, variant: str, tmp_path: Path
+) -> None:
+    """All Real variables are those of the sampled system."""
+    path = system.path  # libcosim takes the first variant
+    if variant != system.variants[0]:
+        change = {"SystemStructure.ssd": only_variant(variant)}
+        path = edited(system.path, tmp_path / "one.ssp", change)
+    with ssp.unpacked(path) as opened:
+        left_out = {"time", *comparison.discrete(opened)}
+    expected = system.reference(variant, "sampled.csv")
+    rows = system.rows(expected)[1:]
+    names = [name for name in expected if name not in left_out]
+    result = libcosim(path, names, system.steps, tmp_path)
+    for name in names:
+        assert difference(result[name][rows - 1], expected[name][1:]) <= BOUND, name
+
+
+def test_libcosim_differs_from_ecos_by_the_time_of_reading_alone(tmp_path: Path) -> None:
+    """Efforts without integral action show up one step later, and nothing else differs."""
+    result, steps = CLOSED_LOOP.run("nominal"), 2000
+    with ssp.unpacked(CLOSED_LOOP.path) as opened:
+        names = comparison.recorded(opened)
+    other = libcosim(CLOSED_LOOP.path, names, steps, tmp_path)
+    late = {f"controller.{name}" for name in ("tau1", "f2")}
+    late |= {name for name in names if name.startswith("controller.") and "error" in name}
+    direct = {"arm.ddq1", "arm.ddq2", "arm.actuator_power"}
+    for name in names:
+        if name in late:
+            assert difference(other[name], result[name][:steps]) <= ROUNDING, name
+        elif name not in direct:
+            assert difference(other[name], result[name][1 : steps + 1]) <= ROUNDING, name
+    for name in direct | late:
+        assert difference(other[name], result[name][1 : steps + 1]) > 1e4 * ROUNDING, name
+
+
+def test_readings_before_and_after_inputs_are_set_differ() -> None:
+    """So that a comparison with the wrong one fails."""
+    before, after = (
+        MACHINE_SYSTEM.reference("wall_contact", name) for name in ("sampled.csv", "ecos.csv")
+    )
+    for name in ("controller.tau1", "environment.wall_force", "plant.ddq1", "actuator.voltage1"):
+        assert np.abs(before[name] - after[name]).max() > 1e3 * BOUND * np.abs(after[name]).max()
+    for name in ("plant.q1", "actuator.current1", "sensor.q1_measured", "trajectory.q1_ref"):
+        np.testing.assert_array_equal(before[name], after[name])
