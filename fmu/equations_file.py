@@ -44,14 +44,7 @@ from rparm.expressions.expression import (
     in_order,
     with_kinds,
 )
-from rparm.expressions.units import (
-    ANGLE,
-    BASE,
-    Measure,
-    table_unit,
-    unit_of,
-    unit_of_exponents,
-)
+from rparm.expressions.units import ANGLE, BASE, Measure, table_unit, unit_of, unit_of_exponents
 
 LARGEST = 10**6  # bytes
 MOST_VARIABLES = 20_000

@@ -31,11 +31,7 @@ def direct(connections: Iterable[Connection]) -> list[Connection]:
 
 
 def changed(
-    opened: OpenedSystem,
-    parameters: Parameters,
-    stop: float,
-    step: float,
-    with_sensor: bool = True,
+    opened: OpenedSystem, parameters: Parameters, stop: float, step: float, with_sensor: bool = True
 ) -> OpenedSystem:
     """Return the machine with one variant, `VARIANT`, with its sensor or `direct`."""
     system = opened.system

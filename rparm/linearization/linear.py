@@ -12,15 +12,7 @@ from rparm.errors import UnplacedError, UserError, WrongValueError, did_you_mean
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import PARAMETERS, Model, Value, Variable
-from rparm.linearization.sampling import (
-    Tick,
-    held_numbers,
-    hold,
-    law,
-    period,
-    samplers,
-    ticks,
-)
+from rparm.linearization.sampling import Tick, held_numbers, hold, law, period, samplers, ticks
 from rparm.systems.python_component import PythonComponent, PythonInstance
 from rparm.units import typed_quantity
 

@@ -37,9 +37,7 @@ def grasp() -> Run:
 
 
 @pytest.fixture(scope="module", params=SYSTEMS)
-def variants(
-    request: pytest.FixtureRequest,
-) -> Iterator[tuple[str, OpenedSystem, list[Outcome]]]:
+def variants(request: pytest.FixtureRequest) -> Iterator[tuple[str, OpenedSystem, list[Outcome]]]:
     """A system with its references in the place of runs: they have the same columns."""
     folder = ROOT / "models" / request.param
     with ssp.unpacked(BUILD / f"{SYSTEMS[request.param]}.ssp") as opened:

@@ -122,10 +122,7 @@ def test_tanks_run_empty(folder: Path, method: int, pump: float) -> None:
 
 @pytest.mark.parametrize(
     ("x", "defined"),
-    [
-        (1.5, {"guarded": 2, "either": 1}),
-        (2.5, {"large": 3, "both": 1, "guarded": 1, "either": 2}),
-    ],
+    [(1.5, {"guarded": 2, "either": 1}), (2.5, {"large": 3, "both": 1, "guarded": 1, "either": 2})],
 )
 def test_what_follows_from_an_undefined_relation_is_not_finite(
     folder: Path, tmp_path: Path, x: float, defined: dict[str, float]

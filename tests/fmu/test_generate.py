@@ -164,10 +164,7 @@ def test_the_date_is_that_of_the_sources(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("license_text", "epoch", "message"),
-    [
-        (None, "", "LICENSE: cannot be read"),
-        *TABLES["origins"],
-    ],
+    [(None, "", "LICENSE: cannot be read"), *TABLES["origins"]],
 )
 def test_a_wrong_origin_is_named(
     tmp_path: Path, license_text: str | None, epoch: str, message: str

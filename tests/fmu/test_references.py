@@ -196,8 +196,7 @@ def test_a_copy_is_collected(controller: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "words"),
-    tables(str(Path(__file__).with_name("mistakes")))["references"]["rows"],
+    ("old", "new", "words"), tables(str(Path(__file__).with_name("mistakes")))["references"]["rows"]
 )
 def test_a_wrong_scenario_is_named(
     controller: Path, tmp_path: Path, old: str, new: str, words: str

@@ -160,9 +160,7 @@ def test_two_files_of_one_name_are_refused(console: Console) -> None:
     assert "b/x.toml: its page would have the name of that of a/x.toml" in error
 
 
-def test_files_stay_in_the_overview_and_scenarios_beside_them(
-    console: Console,
-) -> None:
+def test_files_stay_in_the_overview_and_scenarios_beside_them(console: Console) -> None:
     for name in ("a", "b", "a"):
         Path(f"{name}.toml").write_text(CONTENT, encoding="utf-8")
         assert console("run", f"{name}.toml", "--report", "out")[0] == 0

@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from rparm.report.run_data import (
-    MOST_ROWS,
-    Curve,
-    Plot,
-    thinned,
-    without_rounding,
-)  # fmt: skip
+from rparm.report.run_data import MOST_ROWS, Curve, Plot, thinned, without_rounding  # fmt: skip
 
 
 def series(kind: str, count: int, random: np.random.Generator) -> np.ndarray:

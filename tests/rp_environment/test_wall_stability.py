@@ -5,13 +5,7 @@ import re
 from dataclasses import replace
 
 import pytest
-from rparm.models.machine.wall_limit import (
-    AGE,
-    Contact,
-    exact_least_damping,
-    growth,
-    least_damping,
-)
+from rparm.models.machine.wall_limit import AGE, Contact, exact_least_damping, growth, least_damping
 
 from tests.support.paths import ROOT
 

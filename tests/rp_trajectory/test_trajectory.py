@@ -66,9 +66,7 @@ def give(instance: Instance, parameters: dict[str, object]) -> None:
 
 @contextmanager
 def running(
-    loaded: LoadedFmu,
-    parameters: dict[str, object],
-    start: float = 0.0,
+    loaded: LoadedFmu, parameters: dict[str, object], start: float = 0.0
 ) -> Iterator[Instance]:
     """An instance with `parameters`, initialized at `start` (s)."""
     with Instance(loaded) as instance:

@@ -53,11 +53,7 @@ def test_rounding_of_times_does_not_delay_a_switch(write) -> None:
         assert values.tolist() == [False] * n + [True] * (11 - n)
 
 
-@pytest.mark.parametrize(
-    "mistake",
-    MISTAKES["scenario_with_brake"],
-    ids=itemgetter("text"),
-)
+@pytest.mark.parametrize("mistake", MISTAKES["scenario_with_brake"], ids=itemgetter("text"))
 def test_mistakes_are_explained(write, mistake: dict[str, str]) -> None:
     path = write(f"{HEAD}{TIME}[inputs.brake]\n{mistake['text']}\n")
     with pytest.raises(UserError) as caught:

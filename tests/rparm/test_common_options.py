@@ -145,8 +145,7 @@ def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("words", "wanted"),
-    [*MISTAKES["completes"]["rows"], (["completion", ""], list(SHELLS))],
+    ("words", "wanted"), [*MISTAKES["completes"]["rows"], (["completion", ""], list(SHELLS))]
 )
 def test_bash_completes(script: Path, tmp_path: Path, words: list[str], wanted: list[str]) -> None:
     (tmp_path / "my_scenario.toml").touch()

@@ -222,8 +222,7 @@ def test_without_a_command_there_is_help(console: Console) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "guess"),
-    [(miss["arguments"], miss["message"]) for miss in MISTAKES["word"]],
+    ("arguments", "guess"), [(miss["arguments"], miss["message"]) for miss in MISTAKES["word"]]
 )
 def test_guesses(
     tmp_path: Path,

@@ -12,11 +12,7 @@ import pytest
 
 from rparm.fmi.fmu_file import Fmu
 from tests.rp_plant.fmu.plant_model_exchange import STATES, model
-from tests.rp_plant.fmu.plant_runs import (
-    BOUNCY_STOPS,
-    FRICTION,
-    RIGID,
-)
+from tests.rp_plant.fmu.plant_runs import BOUNCY_STOPS, FRICTION, RIGID
 
 STEP = 0.01  # s
 OUTPUTS = [*STATES, "event_count", "mode1", "mode2"]
