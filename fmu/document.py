@@ -36,13 +36,9 @@ STYLE_SHEET = Path(__file__).with_suffix(".css")
 TEMPLATE = Path(__file__).with_suffix(".html")
 # headings of the tables of variables by causality, in the order of the page
 GROUPS = {
-    "parameter": "Parameters",
-    "calculatedParameter": "Calculated parameters",
-    "input": "Inputs",
-    "output": "Outputs",
-    "local": "Local variables",
-    "independent": "Independent variable",
-}
+    "parameter": "Parameters", "calculatedParameter": "Calculated parameters", "input": "Inputs",
+    "output": "Outputs", "local": "Local variables", "independent": "Independent variable",
+}  # fmt: skip
 # their columns, attributes of a ScalarVariable and of its type element, with their headings
 COLUMNS = ("valueReference", "name", "type", "causality", "variability", "initial", "unit")
 COLUMNS += ("start", "min", "max", "description")

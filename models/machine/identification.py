@@ -20,13 +20,9 @@ BASE = "noisy_sensor"  # the variant that all else is taken from
 STOP, STEP = 8.0, 1e-3  # s
 LATE = 3 * STEP  # two ticks, and the step over which the encoders' inputs are held
 TRUE = {
-    "m2": 1.15,
-    "I1z": 0.13,
-    "damping1": 0.25,
-    "damping2": 4.0,
-    "coulomb_friction1": 0.35,
+    "m2": 1.15, "I1z": 0.13, "damping1": 0.25, "damping2": 4.0, "coulomb_friction1": 0.35,
     "coulomb_friction2": 0.6,
-}
+}  # fmt: skip
 # what a data sheet would say
 START = {"damping1": 0.2, "damping2": 5.0, "coulomb_friction1": 0.3, "coulomb_friction2": 0.5}
 FLAT = {"g": 0.0}

@@ -321,13 +321,9 @@ def _where(place: list[int | str]) -> str:
 def _keys(place: list[int | str]) -> list[str]:
     """Return the known keys of the table that an unknown key stands in."""
     tables = {
-        "parameters": Distribution,
-        "time": Time,
-        "maps": Map,
-        "settling": Settling,
-        "tracking": Tracking,
-        "crossings": Crossings,
-    }
+        "parameters": Distribution, "time": Time, "maps": Map, "settling": Settling,
+        "tracking": Tracking, "crossings": Crossings,
+    }  # fmt: skip
     for part in reversed(place[:-1]):
         if part in tables:
             return list(tables[part].model_fields)

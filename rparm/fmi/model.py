@@ -249,14 +249,9 @@ def _experiment(given: DefaultExperiment | None) -> Experiment:
 
 # types of FMI 2.0 and FMI 3.0 -> type of `Variable`
 TYPES = {
-    "Real": "Real",
-    "Integer": "Integer",
-    "Float64": "Real",
-    "Int32": "Integer",
-    "Boolean": "Boolean",
-    "String": "String",
-    "Enumeration": "Enumeration",
-}
+    "Real": "Real", "Integer": "Integer", "Float64": "Real", "Int32": "Integer",
+    "Boolean": "Boolean", "String": "String", "Enumeration": "Enumeration",
+}  # fmt: skip
 # of the texts in a model description
 CONVERT = {
     "Real": float,

@@ -17,15 +17,9 @@ from pathlib import Path
 
 LINES, BRANCHES = 0.95, 0.90
 PYTHON_TESTS = (
-    "bill_of_materials",
-    "declaration",
-    "document",
-    "generate",
-    "package",
-    "references",
-    "source_folder",
-    "terminals",
-)
+    "bill_of_materials", "declaration", "document", "generate", "package", "references",
+    "source_folder", "terminals",
+)  # fmt: skip
 
 
 def run(*command: object, **options: object) -> None:

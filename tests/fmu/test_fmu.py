@@ -56,12 +56,6 @@ def test_fmpy_finds_no_problem(fmu: Path, name: str) -> None:
     assert validate_fmu(str(fmu.parent / name)) == []
 
 
-def test_the_command_of_fmpy_finds_no_problem(fmu: Path) -> None:
-    command = Path(sys.executable).parent / "fmpy"
-    for path in (fmu, fmu.parent / "fmi3" / fmu.name):
-        assert "No problems found." in run_checked(command, "validate", path)
-
-
 @pytest.mark.parametrize("folder", FOLDERS.values())
 def test_the_page_of_a_model_names_the_variables_that_it_declares(folder: str) -> None:
     model = ROOT / "models" / folder

@@ -3,7 +3,6 @@
 import os
 import re
 import subprocess
-import tomllib
 import xml.etree.ElementTree as ET
 import zipfile
 from datetime import datetime
@@ -107,16 +106,6 @@ def test_states_that_are_derivatives_have_aliases(description: ET.Element) -> No
         assert variables[alias].get("initial") == "calculated"
     references = [v.get("valueReference") for v in variables.values()]
     assert len(references) - len(set(references)) == 2
-
-
-def test_an_alias_depends_on_its_state(description: ET.Element) -> None:
-    names = list(scalars(description))
-    for section in ("Derivatives", "InitialUnknowns"):
-        for unknown in description.iterfind(f"ModelStructure/{section}/Unknown"):
-            name = names[int(unknown.get("index")) - 1]
-            if name.startswith("der_"):
-                known = names[int(unknown.get("dependencies")) - 1]
-                assert known == name.replace("der_", "d")
 
 
 def test_outputs_are_listed_in_order(description: ET.Element) -> None:
@@ -287,11 +276,6 @@ def test_an_enumeration_in_the_table(trajectory: Path, tmp_path: Path) -> None:
     compile_table(tmp_path / "out", "rp_trajectory")
 
 
-def test_types_are_those_of_the_enumerations(description: ET.Element) -> None:
-    types = [t.get("name") for t in description.iterfind("TypeDefinitions/SimpleType")]
-    assert types == ["SolverMethodType"]
-
-
 def test_items_belong_to_the_guid_and_their_texts_do_not(trajectory: Path, tmp_path: Path) -> None:
     guids = [generated(trajectory, tmp_path / "same").get("guid")]
     change(trajectory, "The end effector moves along a circle", "Round and round")
@@ -317,12 +301,6 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     result = generate(VARIABLES, tmp_path / "out")
     assert result.returncode == 2
     assert str(tmp_path) in result.stderr
-
-
-def test_the_declarations_are_readable_by_others() -> None:
-    """Other programs read the file with nothing but a TOML reader."""
-    content = tomllib.loads(VARIABLES.read_text())
-    assert content["variables"]["q1"]["reference"] == 10
 
 
 @pytest.mark.parametrize("fmi", ["fmi2", "fmi3"])

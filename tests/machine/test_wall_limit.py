@@ -1,6 +1,5 @@
 """The damping that the wall needs: measured with the machine, within 2 % of the theory."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -28,12 +27,6 @@ from rparm.systems.structure import OpenedSystem
 from tests.importers.osp import libcosim
 
 STIFFNESS = 1e4  # N/m
-
-
-@pytest.fixture(scope="module")
-def fmus(opened: OpenedSystem) -> Iterator[dict[str, Fmu]]:
-    with opened.unpacked_fmus(wall_limit.SEQUENCE) as found:
-        yield found
 
 
 def check(measure: Measure, stiffness: float, order: str, inputs: str) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from rparm.runs import comparison
-from tests.support.instances import ERROR, Instance, LoadedFmu, status_of
+from tests.support.instances import Instance, LoadedFmu
 from tests.support.paths import ROOT
 from tests.support.rparm_project import declared, load, names_of
 
@@ -94,16 +94,6 @@ def test_values_are_those_of_the_equations(loaded: LoadedFmu, limit: str) -> Non
 
 
 # ---- What is refused -----------------------------------------------------------------------------
-
-
-def test_the_taylor_method_is_refused(loaded: LoadedFmu) -> None:
-    with Instance(loaded) as instance:
-        instance.fmi.setInteger([loaded.references["solver_method"]], [4])
-        instance.fmi.setupExperiment()
-        instance.fmi.enterInitializationMode()
-        assert status_of(instance.fmi.exitInitializationMode) == ERROR
-        text = instance.messages[-1].text
-        assert "solver_method = 4 (taylor) is refused: RPActuator has no Taylor series" in text
 
 
 # ---- With the arm --------------------------------------------------------------------------------

@@ -17,19 +17,11 @@ PLANT = MODELS / "rp_plant"
 
 # function: equations of the notes
 STATED = {
-    "arm_angular_jacobian": [1, 2],
-    "arm_link1_jacobian": [3],
-    "arm_mass_matrix": [4, 5, 6, 7, 8],
-    "arm_christoffel": [9],
-    "arm_potential_energy": [10],
-    "arm_gravity_forces": [11],
-    "arm_coriolis_matrix": [12],
-    "arm_inverse_dynamics": [13, 14, 15],
-    "link_motion": [16, 17, 18],
-    "link2_loads": [19, 20, 24, 25],
-    "link1_loads": [21, 22, 23],
-    "loads_of_motion": [26, 27],
-}
+    "arm_angular_jacobian": [1, 2], "arm_link1_jacobian": [3], "arm_mass_matrix": [4, 5, 6, 7, 8],
+    "arm_christoffel": [9], "arm_potential_energy": [10], "arm_gravity_forces": [11],
+    "arm_coriolis_matrix": [12], "arm_inverse_dynamics": [13, 14, 15], "link_motion": [16, 17, 18],
+    "link2_loads": [19, 20, 24, 25], "link1_loads": [21, 22, 23], "loads_of_motion": [26, 27],
+}  # fmt: skip
 COMMENT = re.compile(
     r"/\* (\(\d+\)(?:(?:-|, )\(\d+\))*) (?:[^*]|\*(?!/))*\*/\nstatic inline [^(]*?(\w+)\("
 )

@@ -28,13 +28,9 @@ from rparm.fmi.model import Model, Value
 
 MODELS = Path(__file__).resolve().parents[2]
 COMPONENTS = {
-    "trajectory": "rp_trajectory",
-    "controller": "rp_controller",
-    "actuator": "rp_actuator",
-    "plant": "rp_plant",
-    "sensor": "rp_sensor",
-    "environment": "rp_environment",
-}
+    "trajectory": "rp_trajectory", "controller": "rp_controller", "actuator": "rp_actuator",
+    "plant": "rp_plant", "sensor": "rp_sensor", "environment": "rp_environment",
+}  # fmt: skip
 # input of a component: the output that feeds it
 REFERENCES = {name: f"trajectory.{name}" for name in Controller.REFERENCES}
 MEASURED = {name: f"sensor.{name}_measured" for name in Controller.STATES}

@@ -20,23 +20,13 @@ FIRM = 1000.0  # N.m, N: dry friction that holds a joint whatever happens
 
 # friction and stops that give events of all kinds
 FRICTION = {
-    "coulomb_friction1": 1.5,
-    "breakaway_friction1": 2.0,
-    "stribeck_velocity1": 0.2,
-    "coulomb_friction2": 2.0,
-    "breakaway_friction2": 2.6,
-    "stribeck_velocity2": 0.1,
-}
+    "coulomb_friction1": 1.5, "breakaway_friction1": 2.0, "stribeck_velocity1": 0.2,
+    "coulomb_friction2": 2.0, "breakaway_friction2": 2.6, "stribeck_velocity2": 0.1,
+}  # fmt: skip
 BOUNCY_STOPS = {
-    "stops1": RIGID,
-    "lower1": -0.6,
-    "upper1": 0.9,
-    "restitution1": 0.5,
-    "stops2": RIGID,
-    "lower2": -0.1,
-    "upper2": 0.2,
-    "restitution2": 0.7,
-}
+    "stops1": RIGID, "lower1": -0.6, "upper1": 0.9, "restitution1": 0.5, "stops2": RIGID,
+    "lower2": -0.1, "upper2": 0.2, "restitution2": 0.7,
+}  # fmt: skip
 
 
 def near(x: float, bound: float = 1e-9) -> float:

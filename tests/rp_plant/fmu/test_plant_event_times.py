@@ -26,16 +26,10 @@ from tests.support.instances import DISCARD, Instance, LoadedFmu, status_of
 
 # stops that give way, one of them damped
 BUFFERS = {
-    "stops1": COMPLIANT,
-    "lower1": -0.6,
-    "upper1": 0.9,
-    "stop_stiffness1": 500.0,
-    "stops2": COMPLIANT,
-    "lower2": -0.1,
-    "upper2": 0.2,
-    "stop_stiffness2": 4000.0,
+    "stops1": COMPLIANT, "lower1": -0.6, "upper1": 0.9, "stop_stiffness1": 500.0,
+    "stops2": COMPLIANT, "lower2": -0.1, "upper2": 0.2, "stop_stiffness2": 4000.0,
     "stop_damping2": 0.5,
-}
+}  # fmt: skip
 
 
 # ---- The same bits of every event time -------------------------------------------------------
