@@ -7,12 +7,11 @@
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-bool location_create(const struct ode *ode, const double absolute_tolerances[],
+bool location_create(const struct ode *ode, const struct integrator_settings *settings,
                      struct location *location) {
     const size_t states = ode->state_count;
     const size_t count = ode->indicator_count;
-    *location =
-        (struct location){.ode = ode, .absolute_tolerances = absolute_tolerances, .time = INFINITY};
+    *location = (struct location){.ode = ode, .settings = settings, .time = INFINITY};
     if (count == 0) {
         return true;
     }
@@ -81,12 +80,27 @@ static enum status evaluate_one(struct location *location, size_t i, double t, c
     return status;
 }
 
+/* Returns the error of a state that no event follows from, in its unit: the tolerance, or the
+ * rounding of some thousand steps. However small the state is at a restart, it has the error of its
+ * usual size: absolute tolerances are relative ones of a hundredth of it. */
+static double error_of(const struct location *location, size_t state, double x) {
+    const struct integrator_settings *settings = location->settings;
+    const double tolerance = settings->absolute_tolerances[state];
+    const double usual = 100.0 * tolerance / settings->relative_tolerance;
+    return larger(tolerance, 0x1p8 * DBL_EPSILON * larger(fabs(x), usual));
+}
+
 /* Restarts the indicators of the model, whose noise follows from their limits so far. */
 static enum status restart_model(struct location *location, const double x[]) {
     const struct ode *ode = location->ode;
     const enum status status = evaluate(location, 0.0, x);
     if (ode->rounding != NULL) {
-        ode->rounding(location->first, ode->context);
+        for (size_t i = 0; i < ode->state_count; i++) {
+            location->x[i] = 2.0 * DBL_EPSILON * fabs(x[i]);
+            location->dx[i] = error_of(location, i, x[i]);
+        }
+        ode->rounding(location->dx, location->touch, ode->context);
+        ode->rounding(location->x, location->first, ode->context);
     }
     for (size_t k = 0; status == STATUS_OK && k < location->used_count; k++) {
         const size_t i = location->used[k];
@@ -96,7 +110,6 @@ static enum status restart_model(struct location *location, const double x[]) {
         location->is_armed[i] = location->z[i] > 0.0;
         if (ode->rounding != NULL) {
             location->noise[i] = larger(location->first[i], DBL_MIN);
-            location->touch[i] = 4.0 * location->first[i];
             location->rounding[i] = location->noise[i];
             location->is_armed[i] = location->z[i] > location->noise[i];
         }
@@ -133,10 +146,11 @@ enum status location_restart(struct location *location, const struct indicator *
             const bool is_sure = indicator->rises || z > 0.0;
             location->is_armed[i] = is_sure && (z > rounding || (rounding == 0.0 && z >= 0.0));
             const double miss =
-                fabs(indicator->factor) * location->absolute_tolerances[indicator->state];
+                fabs(indicator->factor) * location->settings->absolute_tolerances[indicator->state];
             location->noise[i] = is_sure ? rounding : larger(rounding, miss);
-            const double size = fabs(indicator->offset) + fabs(z - indicator->offset);
-            location->touch[i] = 8.0 * DBL_EPSILON * size;
+            location->touch[i] = fabs(indicator->factor) *
+                                     error_of(location, indicator->state, x[indicator->state]) +
+                                 8.0 * DBL_EPSILON * fabs(indicator->offset);
         }
     }
     return needs_model ? restart_model(location, x) : STATUS_OK;
@@ -180,15 +194,29 @@ static bool is_touch(const struct roots_polynomial *p, double begin, double end,
     return fabs(value) <= fmax(touch, 16.0 * DBL_EPSILON * size);
 }
 
-/* True if p ends at 0, up to `touch`, and hardly moves there. */
-static bool is_touch_at_end(const struct roots_polynomial *p, double touch) {
-    double value = p->c[0];
+/* True if p is at 0 at s, up to `touch` or its rounding, and turns before it falls farther below.
+ */
+static bool turns_at(const struct roots_polynomial *p, double s, double touch) {
+    double value = 0.0;
     double slope = 0.0;
-    for (int k = 1; k <= p->degree; k++) {
-        value += p->c[k];
-        slope += k * p->c[k];
+    double half_bend = 0.0;
+    double size = 0.0;
+    for (int k = p->degree; k >= 0; k--) {
+        half_bend = half_bend * s + slope;
+        slope = slope * s + value;
+        value = value * s + p->c[k];
+        size = size * s + fabs(p->c[k]);
     }
-    return fabs(value) <= touch && fabs(slope) <= 0x1p10 * touch;
+    const double depth = fmax(touch, 16.0 * DBL_EPSILON * size);
+    const bool is_lowest = slope >= 0.0;
+    return fabs(value) <= depth &&
+           (is_lowest || slope * slope <= 4.0 * half_bend * (value + depth));
+}
+
+/* Within a touch an indicator may be on either side of 0. */
+static void disarm(const struct fall *fall) {
+    *fall->is_armed = false;
+    *fall->noise = fmax(*fall->noise, 2.0 * fall->touch);
 }
 
 /* Returns the first s at which p, of an armed indicator, falls to 0, or 1 if it ends there: a touch
@@ -199,14 +227,15 @@ static double fall_or_end(const struct roots_polynomial *p, const struct fall *f
     const int count = roots_find(p, roots);
     for (int i = 0; i < count; i++) {
         const bool is_last = i + 1 == count;
-        if (is_last && is_touch_at_end(p, fall->touch)) {
-            *fall->is_armed = false;
-            *fall->noise = fmax(*fall->noise, 2.0 * fall->touch);
+        const double end = is_last ? 1.0 : roots[i + 1].s;
+        const bool turns =
+            is_last ? turns_at(p, end, fall->touch) : roots[i + 1].kind == ROOT_RISES;
+        const bool falls =
+            roots[i].kind == ROOT_FALLS && !(turns && is_touch(p, roots[i].s, end, fall->touch));
+        if (is_last && turns && !falls) {
+            disarm(fall);
             return INFINITY;
         }
-        const bool rises_again = !is_last && roots[i + 1].kind == ROOT_RISES;
-        const bool falls = roots[i].kind == ROOT_FALLS &&
-                           !(rises_again && is_touch(p, roots[i].s, roots[i + 1].s, fall->touch));
         if (falls || roots[i].s == 1.0) {
             return roots[i].s;
         }
@@ -281,11 +310,13 @@ static bool is_above_until(const struct roots_polynomial *p, double s, double no
  * and the same event would come again and again. */
 double fall_first(const struct roots_polynomial *p, const struct fall *fall) {
     double *noise = fall->noise;
-    const bool is_armed = *fall->is_armed;
-    if (fall->latest <= 1.0 && is_above_until(p, fall->latest, is_armed ? -1.0 : *noise)) {
+    if (fall->latest <= 1.0 && is_above_until(p, fall->latest, *fall->is_armed ? -1.0 : *noise)) {
         return INFINITY;
     }
-    if (!is_armed) {
+    if (p->degree > 0 && p->c[0] <= 0.0 && p->c[1] < 0.0 && turns_at(p, 0.0, fall->touch)) {
+        disarm(fall);
+    }
+    if (!*fall->is_armed) {
         double within = fmax(fall->error, *noise);
         if (fall->is_restart && p->c[0] <= -within) {
             within -=
