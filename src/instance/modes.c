@@ -365,10 +365,11 @@ bool instance_has_missed_event(struct instance *instance) {
         find_triggered(instance, instance->triggered, &is_any) != STATUS_OK) {
         return false;
     }
-    // an indicator that only comes to 0 will be seen
+    // an indicator that is within its band will be seen
+    const size_t count = instance->model->events->indicator_count;
     bool is_missed = false;
-    for (size_t i = 0; is_any && i < instance->model->events->indicator_count; i++) {
-        is_missed |= instance->triggered[i] && instance->z[i] < 0.0;
+    for (size_t i = 0; is_any && i < count; i++) {
+        is_missed |= instance->triggered[i] && instance->z[i] + instance->z[2 * count + i] < 0.0;
     }
     return is_missed;
 }

@@ -80,14 +80,17 @@ static enum status evaluate_one(struct location *location, size_t i, double t, c
     return status;
 }
 
+/* The rounding of some thousand steps, of one. */
+static const double roundings = 0x1p7;
+
 /* Returns the error of a state that no event follows from, in its unit: the tolerance, or the
- * rounding of some thousand steps. However small the state is at a restart, it has the error of its
+ * rounding of all steps so far. However small the state is at a restart, it has the error of its
  * usual size: absolute tolerances are relative ones of a hundredth of it. */
 static double error_of(const struct location *location, size_t state, double x) {
     const struct integrator_settings *settings = location->settings;
     const double tolerance = settings->absolute_tolerances[state];
     const double usual = 100.0 * tolerance / settings->relative_tolerance;
-    return larger(tolerance, 0x1p8 * DBL_EPSILON * larger(fabs(x), usual));
+    return larger(tolerance, 2.0 * roundings * DBL_EPSILON * larger(fabs(x), usual));
 }
 
 /* Restarts the indicators of the model, whose noise follows from their limits so far. */
@@ -97,7 +100,7 @@ static enum status restart_model(struct location *location, const double x[]) {
     if (ode->rounding != NULL) {
         for (size_t i = 0; i < ode->state_count; i++) {
             location->x[i] = 2.0 * DBL_EPSILON * fabs(x[i]);
-            location->dx[i] = error_of(location, i, x[i]);
+            location->dx[i] = error_of(location, i, x[i]) / roundings;
         }
         ode->rounding(location->dx, location->touch, ode->context);
         ode->rounding(location->x, location->first, ode->context);
@@ -109,6 +112,7 @@ static enum status restart_model(struct location *location, const double x[]) {
         }
         location->is_armed[i] = location->z[i] > 0.0;
         if (ode->rounding != NULL) {
+            location->touch[i] *= roundings;
             location->noise[i] = larger(location->first[i], DBL_MIN);
             location->rounding[i] = location->noise[i];
             location->is_armed[i] = location->z[i] > location->noise[i];
@@ -191,7 +195,7 @@ static bool is_touch(const struct roots_polynomial *p, double begin, double end,
         value = value * s + p->c[k];
         size = size * s + fabs(p->c[k]);
     }
-    return fabs(value) <= fmax(touch, 16.0 * DBL_EPSILON * size);
+    return fabs(value) <= fmax(touch, 2.0 * roundings * DBL_EPSILON * size);
 }
 
 /* True if p is at 0 at s, up to `touch` or its rounding, and turns before it falls farther below.
@@ -207,10 +211,9 @@ static bool turns_at(const struct roots_polynomial *p, double s, double touch) {
         value = value * s + p->c[k];
         size = size * s + fabs(p->c[k]);
     }
-    const double depth = fmax(touch, 16.0 * DBL_EPSILON * size);
-    const bool is_lowest = slope >= 0.0;
-    return fabs(value) <= depth &&
-           (is_lowest || slope * slope <= 4.0 * half_bend * (value + depth));
+    const double depth = fmax(touch, 2.0 * roundings * DBL_EPSILON * size);
+    const bool rises = slope >= 0.0;
+    return fabs(value) <= depth && (rises || slope * slope <= 4.0 * half_bend * (value + depth));
 }
 
 /* Within a touch an indicator may be on either side of 0. */
