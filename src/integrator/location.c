@@ -185,22 +185,9 @@ static double fall_behind(const struct roots_polynomial *p, double s) {
     return INFINITY;
 }
 
-/* True if p, between two roots, is no farther from 0 than `touch` or the rounding of its
- * coefficients. */
-static bool is_touch(const struct roots_polynomial *p, double begin, double end, double touch) {
-    const double s = 0.5 * (begin + end);
-    double value = 0.0;
-    double size = 0.0;
-    for (int k = p->degree; k >= 0; k--) {
-        value = value * s + p->c[k];
-        size = size * s + fabs(p->c[k]);
-    }
-    return fabs(value) <= fmax(touch, 2.0 * roundings * DBL_EPSILON * size);
-}
-
-/* True if p is at 0 at s, up to `touch` or its rounding, and turns before it falls farther below.
- */
-static bool turns_at(const struct roots_polynomial *p, double s, double touch) {
+/* True if p is at 0 at s, up to `touch` or its rounding, and turns before it falls farther below;
+ * between two roots it turns. */
+static bool is_touch(const struct roots_polynomial *p, double s, double touch, bool turns) {
     double value = 0.0;
     double slope = 0.0;
     double half_bend = 0.0;
@@ -212,8 +199,8 @@ static bool turns_at(const struct roots_polynomial *p, double s, double touch) {
         size = size * s + fabs(p->c[k]);
     }
     const double depth = fmax(touch, 2.0 * roundings * DBL_EPSILON * size);
-    const bool rises = slope >= 0.0;
-    return fabs(value) <= depth && (rises || slope * slope <= 4.0 * half_bend * (value + depth));
+    return fabs(value) <= depth &&
+           (turns || slope >= 0.0 || slope * slope <= 4.0 * half_bend * (value + depth));
 }
 
 /* Within a touch an indicator may be on either side of 0. */
@@ -231,10 +218,11 @@ static double fall_or_end(const struct roots_polynomial *p, const struct fall *f
     for (int i = 0; i < count; i++) {
         const bool is_last = i + 1 == count;
         const double end = is_last ? 1.0 : roots[i + 1].s;
+        const double middle = 0.5 * (roots[i].s + end);
         const bool turns =
-            is_last ? turns_at(p, end, fall->touch) : roots[i + 1].kind == ROOT_RISES;
+            is_last ? is_touch(p, end, fall->touch, false) : roots[i + 1].kind == ROOT_RISES;
         const bool falls =
-            roots[i].kind == ROOT_FALLS && !(turns && is_touch(p, roots[i].s, end, fall->touch));
+            roots[i].kind == ROOT_FALLS && !(turns && is_touch(p, middle, fall->touch, true));
         if (is_last && turns && !falls) {
             disarm(fall);
             return INFINITY;
@@ -316,7 +304,7 @@ double fall_first(const struct roots_polynomial *p, const struct fall *fall) {
     if (fall->latest <= 1.0 && is_above_until(p, fall->latest, *fall->is_armed ? -1.0 : *noise)) {
         return INFINITY;
     }
-    if (p->degree > 0 && p->c[0] <= 0.0 && p->c[1] < 0.0 && turns_at(p, 0.0, fall->touch)) {
+    if (p->degree > 0 && p->c[0] <= 0.0 && p->c[1] < 0.0 && is_touch(p, 0.0, fall->touch, false)) {
         disarm(fall);
     }
     if (!*fall->is_armed) {

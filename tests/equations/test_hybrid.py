@@ -136,24 +136,9 @@ def stays_above(run: Run) -> None:
     assert run.failure or run.counts[-1] > 10
 
 
-TOUCHES = [
-    "h < 0",
-    "0 > h",
-    "h <= 0",
-    "0 >= h",
-    "2 - h > 2",
-    "h < low",
-    "h < -f",
-    "rises + falls < 0",
-]
-TOUCHES += [
-    "h + ramp < ramp",
-    "h + time < time",
-    "ramp**2 < 0",
-    "1 + ramp**2 < 1",
-    "rises < 3 * time + f",
-]
-TOUCHES += ["3 * time**2 - 3 * time + 0.75 < 0"]
+TOUCHES = """h < 0; 0 > h; h <= 0; 0 >= h; 2 - h > 2; h < low; h < -f; rises + falls < 0
+h + ramp < ramp; h + time < time; ramp**2 < 0; 1 + ramp**2 < 1; rises < 3 * time + f
+3 * time**2 - 3 * time + 0.75 < 0""".replace("\n", "; ").split("; ")
 
 
 @pytest.mark.parametrize("when", TOUCHES)
