@@ -284,7 +284,9 @@ class Events:
         given = {("state", x.name): f"given->state_errors[{i}]" for i, x in enumerate(states)}
         given["time", ""] = "given->time * fabs(t)"
         for u in inputs:
-            given["input", u.name] = f"given->inputs * fabs({code.leaves['input', u.name]})"
+            value, rate = code.leaves["input", u.name], moving["first", u.name]
+            error = f"given->inputs * fabs({value}) + {given['time', '']} * fabs({rate})"
+            given["input", u.name] = f"({error})"
         errors = Errors(code, given)
         for k, relation in enumerate(self.relations):
             distance, used = relation.distance, self.used[relation.name]

@@ -63,16 +63,10 @@ enum status instance_indicators(double t, const double x[], double z[], void *in
         instance->memory.restart_values, instance->state.restart_time.s + t, x, instance->u, z);
 }
 
-void instance_rounding(double rounding[], void *instance_pointer) {
+void instance_rounding(const double state_errors[], double errors[], void *instance_pointer) {
     const struct instance *instance = instance_pointer;
-    const struct range states = instance->model->states;
-    const double *x = doubles_of(instance->memory.restart_values, states);
-    double *errors = doubles_of(instance->second_derivatives, states);
-    for (size_t i = 0; i < count_of(states); i++) {
-        errors[i] = 2.0 * DBL_EPSILON * fabs(x[i]);
-    }
     instance->model->events->errors(instance->memory.restart_values, instance->state.restart_time.s,
-                                    errors, 2.0 * DBL_EPSILON, rounding);
+                                    state_errors, 2.0 * DBL_EPSILON, errors);
 }
 
 void instance_reach(const double x[], double reach[], void *instance_pointer) {

@@ -207,6 +207,11 @@ static double size_of(const struct instance *instance, const struct indicator *i
            fabs(indicator->offset);
 }
 
+/* After an event an indicator that rises again from its band is above 0 at once, so that importers
+ * see no second event: the bands are this much wider there, and as before after this time, s. */
+static const double widening = 63.0;
+static const double widening_time = 1e-3;
+
 /* Writes the band that is added to each indicator: it falls to 0 only this far beyond its root. A
  * mode may begin at the root, and integrators miss falls that begin at 0. For an indicator of a
  * state the band is far above the rounding of its two parts, the state's nominal value and the
@@ -215,6 +220,8 @@ static double size_of(const struct instance *instance, const struct indicator *i
  * kinds of indicators, too. */
 static void write_bands(struct instance *instance, double bands[]) {
     const struct model_events *events = instance->model->events;
+    const double since =
+        (instance->state.time.s - instance->state.own.last_event_time) / widening_time;
     events->describe(instance->memory.values, instance->indicators);
     if (events->errors != NULL) {
         double *errors = doubles_of(instance->first_derivatives, instance->model->states);
@@ -231,6 +238,7 @@ static void write_bands(struct instance *instance, double bands[]) {
         } else if (events->errors == NULL) {
             bands[i] = 2.0 * near_root + 1e-9 * fabs(indicator->offset);
         }
+        bands[i] *= events->errors != NULL ? 1.0 + widening / (1.0 + since * since) : 1.0;
     }
 }
 
@@ -365,10 +373,11 @@ bool instance_has_missed_event(struct instance *instance) {
         find_triggered(instance, instance->triggered, &is_any) != STATUS_OK) {
         return false;
     }
-    // an indicator that only comes to 0 will be seen
+    // an indicator that is within its band will be seen
+    const size_t count = instance->model->events->indicator_count;
     bool is_missed = false;
-    for (size_t i = 0; is_any && i < instance->model->events->indicator_count; i++) {
-        is_missed |= instance->triggered[i] && instance->z[i] < 0.0;
+    for (size_t i = 0; is_any && i < count; i++) {
+        is_missed |= instance->triggered[i] && instance->z[i] + instance->z[2 * count + i] < 0.0;
     }
     return is_missed;
 }

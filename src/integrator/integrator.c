@@ -71,7 +71,8 @@ enum status integrator_create(const struct ode *ode, const struct message_sink *
     created->x = created->values + 2 * n;
     created->problem.failed_x = created->values + 3 * n;
     if (!workspace_create(&created->workspace, workspace_size(ode)) ||
-        !location_create(&created->problem.ode, created->values, &created->problem.location)) {
+        !location_create(&created->problem.ode, &created->problem.settings,
+                         &created->problem.location)) {
         integrator_destroy(created);
         return STATUS_OUT_OF_MEMORY;
     }

@@ -7,12 +7,11 @@
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-bool location_create(const struct ode *ode, const double absolute_tolerances[],
+bool location_create(const struct ode *ode, const struct integrator_settings *settings,
                      struct location *location) {
     const size_t states = ode->state_count;
     const size_t count = ode->indicator_count;
-    *location =
-        (struct location){.ode = ode, .absolute_tolerances = absolute_tolerances, .time = INFINITY};
+    *location = (struct location){.ode = ode, .settings = settings, .time = INFINITY};
     if (count == 0) {
         return true;
     }
@@ -81,12 +80,30 @@ static enum status evaluate_one(struct location *location, size_t i, double t, c
     return status;
 }
 
+/* The rounding of some thousand steps, of one. */
+static const double roundings = 0x1p7;
+
+/* Returns the error of a state that no event follows from, in its unit: the tolerance, or the
+ * rounding of all steps so far. However small the state is at a restart, it has the error of its
+ * usual size: absolute tolerances are relative ones of a hundredth of it. */
+static double error_of(const struct location *location, size_t state, double x) {
+    const struct integrator_settings *settings = location->settings;
+    const double tolerance = settings->absolute_tolerances[state];
+    const double usual = 100.0 * tolerance / settings->relative_tolerance;
+    return larger(tolerance, 2.0 * roundings * DBL_EPSILON * larger(fabs(x), usual));
+}
+
 /* Restarts the indicators of the model, whose noise follows from their limits so far. */
 static enum status restart_model(struct location *location, const double x[]) {
     const struct ode *ode = location->ode;
     const enum status status = evaluate(location, 0.0, x);
     if (ode->rounding != NULL) {
-        ode->rounding(location->first, ode->context);
+        for (size_t i = 0; i < ode->state_count; i++) {
+            location->x[i] = 2.0 * DBL_EPSILON * fabs(x[i]);
+            location->dx[i] = error_of(location, i, x[i]) / roundings;
+        }
+        ode->rounding(location->dx, location->touch, ode->context);
+        ode->rounding(location->x, location->first, ode->context);
     }
     for (size_t k = 0; status == STATUS_OK && k < location->used_count; k++) {
         const size_t i = location->used[k];
@@ -95,8 +112,8 @@ static enum status restart_model(struct location *location, const double x[]) {
         }
         location->is_armed[i] = location->z[i] > 0.0;
         if (ode->rounding != NULL) {
+            location->touch[i] *= roundings;
             location->noise[i] = larger(location->first[i], DBL_MIN);
-            location->touch[i] = 4.0 * location->first[i];
             location->rounding[i] = location->noise[i];
             location->is_armed[i] = location->z[i] > location->noise[i];
         }
@@ -133,10 +150,11 @@ enum status location_restart(struct location *location, const struct indicator *
             const bool is_sure = indicator->rises || z > 0.0;
             location->is_armed[i] = is_sure && (z > rounding || (rounding == 0.0 && z >= 0.0));
             const double miss =
-                fabs(indicator->factor) * location->absolute_tolerances[indicator->state];
+                fabs(indicator->factor) * location->settings->absolute_tolerances[indicator->state];
             location->noise[i] = is_sure ? rounding : larger(rounding, miss);
-            const double size = fabs(indicator->offset) + fabs(z - indicator->offset);
-            location->touch[i] = 8.0 * DBL_EPSILON * size;
+            location->touch[i] = fabs(indicator->factor) *
+                                     error_of(location, indicator->state, x[indicator->state]) +
+                                 8.0 * DBL_EPSILON * fabs(indicator->offset);
         }
     }
     return needs_model ? restart_model(location, x) : STATUS_OK;
@@ -167,28 +185,28 @@ static double fall_behind(const struct roots_polynomial *p, double s) {
     return INFINITY;
 }
 
-/* True if p, between two roots, is no farther from 0 than `touch` or the rounding of its
- * coefficients. */
-static bool is_touch(const struct roots_polynomial *p, double begin, double end, double touch) {
-    const double s = 0.5 * (begin + end);
+/* True if p is at 0 at s, up to `touch` or its rounding, and turns before it falls farther below;
+ * between two roots it turns. */
+static bool is_touch(const struct roots_polynomial *p, double s, double touch, bool turns) {
     double value = 0.0;
+    double slope = 0.0;
+    double half_bend = 0.0;
     double size = 0.0;
     for (int k = p->degree; k >= 0; k--) {
+        half_bend = half_bend * s + slope;
+        slope = slope * s + value;
         value = value * s + p->c[k];
         size = size * s + fabs(p->c[k]);
     }
-    return fabs(value) <= fmax(touch, 16.0 * DBL_EPSILON * size);
+    const double depth = fmax(touch, 2.0 * roundings * DBL_EPSILON * size);
+    return fabs(value) <= depth &&
+           (turns || slope >= 0.0 || slope * slope <= 4.0 * half_bend * (value + depth));
 }
 
-/* True if p ends at 0, up to `touch`, and hardly moves there. */
-static bool is_touch_at_end(const struct roots_polynomial *p, double touch) {
-    double value = p->c[0];
-    double slope = 0.0;
-    for (int k = 1; k <= p->degree; k++) {
-        value += p->c[k];
-        slope += k * p->c[k];
-    }
-    return fabs(value) <= touch && fabs(slope) <= 0x1p10 * touch;
+/* Within a touch an indicator may be on either side of 0. */
+static void disarm(const struct fall *fall) {
+    *fall->is_armed = false;
+    *fall->noise = fmax(*fall->noise, 2.0 * fall->touch);
 }
 
 /* Returns the first s at which p, of an armed indicator, falls to 0, or 1 if it ends there: a touch
@@ -199,14 +217,16 @@ static double fall_or_end(const struct roots_polynomial *p, const struct fall *f
     const int count = roots_find(p, roots);
     for (int i = 0; i < count; i++) {
         const bool is_last = i + 1 == count;
-        if (is_last && is_touch_at_end(p, fall->touch)) {
-            *fall->is_armed = false;
-            *fall->noise = fmax(*fall->noise, 2.0 * fall->touch);
+        const double end = is_last ? 1.0 : roots[i + 1].s;
+        const double middle = 0.5 * (roots[i].s + end);
+        const bool turns =
+            is_last ? is_touch(p, end, fall->touch, false) : roots[i + 1].kind == ROOT_RISES;
+        const bool falls =
+            roots[i].kind == ROOT_FALLS && !(turns && is_touch(p, middle, fall->touch, true));
+        if (is_last && turns && !falls) {
+            disarm(fall);
             return INFINITY;
         }
-        const bool rises_again = !is_last && roots[i + 1].kind == ROOT_RISES;
-        const bool falls = roots[i].kind == ROOT_FALLS &&
-                           !(rises_again && is_touch(p, roots[i].s, roots[i + 1].s, fall->touch));
         if (falls || roots[i].s == 1.0) {
             return roots[i].s;
         }
@@ -281,11 +301,13 @@ static bool is_above_until(const struct roots_polynomial *p, double s, double no
  * and the same event would come again and again. */
 double fall_first(const struct roots_polynomial *p, const struct fall *fall) {
     double *noise = fall->noise;
-    const bool is_armed = *fall->is_armed;
-    if (fall->latest <= 1.0 && is_above_until(p, fall->latest, is_armed ? -1.0 : *noise)) {
+    if (fall->latest <= 1.0 && is_above_until(p, fall->latest, *fall->is_armed ? -1.0 : *noise)) {
         return INFINITY;
     }
-    if (!is_armed) {
+    if (p->degree > 0 && p->c[0] <= 0.0 && p->c[1] < 0.0 && is_touch(p, 0.0, fall->touch, false)) {
+        disarm(fall);
+    }
+    if (!*fall->is_armed) {
         double within = fmax(fall->error, *noise);
         if (fall->is_restart && p->c[0] <= -within) {
             within -=

@@ -30,7 +30,7 @@ struct location {
     const struct ode *ode;
     size_t *used; /* indices of the used indicators */
     size_t used_count;
-    const double *absolute_tolerances; /* of the states */
+    const struct integrator_settings *settings; /* at each restart */
     bool *
         has_row; /* by indicator: true if step.indicator_row has it; otherwise it is interpolated */
     bool *is_armed; /* by indicator: true if it has been above 0 since the restart */
@@ -50,8 +50,9 @@ struct location {
 };
 
 /* Allocates all memory. Returns false if memory is short: then nothing has to be freed.
- * absolute_tolerances: of the states; they must stay. */
-MUST_CHECK NONNULL bool location_create(const struct ode *ode, const double absolute_tolerances[],
+ * settings: must stay, and hold from the first restart on. */
+MUST_CHECK NONNULL bool location_create(const struct ode *ode,
+                                        const struct integrator_settings *settings,
                                         struct location *location);
 NONNULL void location_destroy(struct location *location);
 

@@ -25,8 +25,8 @@ typedef enum status ode_series(double t, double time_scale, int first, int last,
 /* Writes all indicators at the time t and the state x to z. Otherwise like ode_rhs. */
 typedef enum status ode_indicators(double t, const double x[], double z[], void *context);
 
-/* Writes a bound of each indicator's rounding error at a restart. */
-typedef void ode_rounding(double rounding[], void *context);
+/* Writes a bound of each indicator's error at a restart, from errors of the states. */
+typedef void ode_rounding(const double state_errors[], double errors[], void *context);
 
 /* Writes how far each state may move from x within an internal step, like `reach` of struct
  * model_events. */
