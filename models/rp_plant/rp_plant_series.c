@@ -152,9 +152,9 @@ static double series_compliant_force(const struct series_motion *m, int i, int k
     }
     const double q = row[Q1 + i][k];
     double *d = row[DEPTH + i];
-    d[k] = k == 0 ? plant_penetration(m->p, contact, i, q) : plant_beyond(contact, 0.0, q);
+    d[k] = k == 0 ? plant_penetration(m->p, contact, i, q) : plant_beyond(contact, 0.0, 0.0, q);
     const double damped = plant_damped(m->p, contact, i, d[k], jet_product(d, row[W + i], k));
-    return plant_elastic_force(m->p, contact, i, damped);
+    return plant_stop_force(m->p, contact, i, damped, 1.0);
 }
 
 /* Returns order k of plant_effort, without the wrench. Inline, as most of it is left out for most

@@ -156,14 +156,14 @@ static inline int plant_closed_stop(const struct rp_plant_parameters *p, int i, 
     return q >= p->upper[i] ? -1 : 0;
 }
 
-static inline real plant_beyond(int contact, real limit, real q) {
-    return contact > 0 ? limit - q : q - limit;
+static inline real plant_beyond(int contact, real lower, real upper, real q) {
+    return contact > 0 ? lower - q : q - upper;
 }
 
 /* d of the stop that the joint is in contact with. */
 static inline real plant_penetration(const struct rp_plant_parameters *p, int contact, int i,
                                      real q) {
-    return plant_beyond(contact, contact > 0 ? p->lower[i] : p->upper[i], q);
+    return plant_beyond(contact, p->lower[i], p->upper[i], q);
 }
 
 /* x (1 + c d'), from the product x q'. */
@@ -178,10 +178,11 @@ static inline real plant_push(const struct rp_plant_parameters *p, int contact, 
     return plant_damped(p, contact, i, 1.0, dq);
 }
 
-/* k d, on the joint. */
-static inline real plant_elastic_force(const struct rp_plant_parameters *p, int contact, int i,
-                                       real d) {
-    const real force = p->stop_stiffness[i] * d;
+/* k d (1 + c d'), on the joint. */
+static inline real plant_stop_force(const struct rp_plant_parameters *p, int contact, int i, real d,
+                                    real push) {
+    const real elastic = p->stop_stiffness[i] * d;
+    const real force = elastic * push;
     return contact > 0 ? force : -force;
 }
 
@@ -193,7 +194,7 @@ static inline real plant_compliant_force(const struct rp_plant_parameters *p, in
         return 0.0;
     }
     const real d = plant_penetration(p, contact, i, q);
-    return plant_elastic_force(p, contact, i, d) * plant_push(p, contact, i, dq);
+    return plant_stop_force(p, contact, i, d, plant_push(p, contact, i, dq));
 }
 
 /* Also of a stop that the joint leaves behind: what it does not give back is lost. */
