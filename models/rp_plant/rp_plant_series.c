@@ -133,14 +133,14 @@ ALWAYS_INLINE double series_friction(const struct series_motion *m, int i, int k
     if (m->direction[i] == 0.0) {
         return 0.0;
     }
-    const double breakaway = m->p->breakaway_friction[i];
-    const double coulomb = k == 0 ? m->p->coulomb_friction[i] : 0.0;
+    const double coulomb = m->p->coulomb_friction[i];
     if (!m->depends_on_velocity[i]) {
-        return m->direction[i] * coulomb;
+        return k == 0 ? m->direction[i] * coulomb : 0.0;
     }
+    const double breakaway = m->p->breakaway_friction[i];
     const double e = series_exponential(m, i, k, row);
-    const double above = k == 0 ? breakaway : breakaway - m->p->coulomb_friction[i];
-    return m->direction[i] * plant_stribeck(above, coulomb, e);
+    return m->direction[i] * (k == 0 ? plant_stribeck(breakaway, coulomb, e)
+                                     : plant_stribeck(breakaway - coulomb, 0.0, e));
 }
 
 /* Returns order k of plant_compliant_force. */

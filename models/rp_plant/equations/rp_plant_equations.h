@@ -253,7 +253,8 @@ static inline void plant_efforts(const struct plant *plant, const struct rp_plan
         const real q = plant->arm.q[i], dq = plant->arm.dq[i];
         const int contact = modes->contact[i];
         const real friction = plant_friction(p, modes->joint[i], i, dq);
-        const real stop = plant_compliant_force(p, contact, i, q, dq);
+        const real stop =
+            contact == RP_PLANT_APART ? 0.0 : plant_compliant_force(p, contact, i, q, dq);
         efforts[i] = plant_effort(p, contact, i, dq, tau[i] + Q[i], friction, stop);
     }
 }
