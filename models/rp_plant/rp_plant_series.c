@@ -152,8 +152,9 @@ static double series_compliant_force(const struct series_motion *m, int i, int k
     }
     const double q = row[Q1 + i][k];
     double *d = row[DEPTH + i];
-    d[k] = k == 0 ? plant_penetration(m->p, contact, i, q) : plant_beyond(contact, 0.0, 0.0, q);
-    const double damped = plant_damped(m->p, contact, i, d[k], jet_product(d, row[W + i], k));
+    const double lower = k == 0 ? m->p->lower[i] : 0.0, upper = k == 0 ? m->p->upper[i] : 0.0;
+    d[k] = plant_penetration(contact, lower, upper, q);
+    const double damped = plant_push(m->p, contact, i, d[k], jet_product(d, row[W + i], k));
     return plant_stop_force(m->p, contact, i, damped, 1.0);
 }
 

@@ -82,8 +82,10 @@ static inline real plant_breakaway(const struct rp_plant_parameters *p, int i) {
     return p->breakaway_friction[i] > 0.0 ? p->breakaway_friction[i] : p->coulomb_friction[i];
 }
 
-/* exp(x), which is 0 below -750. So are its derivatives there, also where x overflows. */
-static inline real plant_exponential(real x) {
+/* e of Stribeck's law at w = v / vs: exp(-w^2), which is 0 where w^2 is above 750. So are its
+ * derivatives there, also where w^2 overflows. */
+static inline real plant_stribeck_decay(real w) {
+    const real x = -(w * w);
     return x < -750.0 ? 0.0 : exp(x);
 }
 
@@ -98,11 +100,6 @@ static inline real plant_turned_back(real w) {
         return 1.0; // to the last digit
     }
     return w8 / (1.0 + w8);
-}
-
-/* e of Stribeck's law at w = v / vs. */
-static inline real plant_stribeck_decay(real w) {
-    return plant_exponential(-(w * w));
 }
 
 /* Stribeck's law: F = Fc + (Fb - Fc) e, summed up so that F is Fb to the bit at rest: there is no
@@ -156,26 +153,16 @@ static inline int plant_closed_stop(const struct rp_plant_parameters *p, int i, 
     return q >= p->upper[i] ? -1 : 0;
 }
 
-static inline real plant_beyond(int contact, real lower, real upper, real q) {
+/* d of the stop that the joint is in contact with. */
+static inline real plant_penetration(int contact, real lower, real upper, real q) {
     return contact > 0 ? lower - q : q - upper;
 }
 
-/* d of the stop that the joint is in contact with. */
-static inline real plant_penetration(const struct rp_plant_parameters *p, int contact, int i,
-                                     real q) {
-    return plant_beyond(contact, p->lower[i], p->upper[i], q);
-}
-
-/* x (1 + c d'), from the product x q'. */
-static inline real plant_damped(const struct rp_plant_parameters *p, int contact, int i, real x,
-                                real x_dq) {
+/* x (1 + c d'), from the product x q': the stop pushes while 1 + c d' is above 0. */
+static inline real plant_push(const struct rp_plant_parameters *p, int contact, int i, real x,
+                              real x_dq) {
     const real damping = p->stop_damping[i] * x_dq;
     return contact > 0 ? x - damping : x + damping;
-}
-
-/* 1 + c d': the stop pushes while this is above 0. */
-static inline real plant_push(const struct rp_plant_parameters *p, int contact, int i, real dq) {
-    return plant_damped(p, contact, i, 1.0, dq);
 }
 
 /* k d (1 + c d'), on the joint. */
@@ -193,14 +180,14 @@ static inline real plant_compliant_force(const struct rp_plant_parameters *p, in
     if (abs(contact) != RP_PLANT_PUSHED) {
         return 0.0;
     }
-    const real d = plant_penetration(p, contact, i, q);
-    return plant_stop_force(p, contact, i, d, plant_push(p, contact, i, dq));
+    const real d = plant_penetration(contact, p->lower[i], p->upper[i], q);
+    return plant_stop_force(p, contact, i, d, plant_push(p, contact, i, 1.0, dq));
 }
 
 /* Also of a stop that the joint leaves behind: what it does not give back is lost. */
 static inline real plant_stop_energy(const struct rp_plant_parameters *p, int contact, int i,
                                      real q) {
-    const real d = plant_penetration(p, contact, i, q);
+    const real d = plant_penetration(contact, p->lower[i], p->upper[i], q);
     return 0.5 * (p->stop_stiffness[i] * (d * d));
 }
 
@@ -368,9 +355,9 @@ static inline void plant_stop_indicators(const struct rp_plant_parameters *p, in
         z[3] = p->upper[i] - q;
         return;
     }
-    z[contact > 0 ? 2 : 3] = plant_penetration(p, contact, i, q);
+    z[contact > 0 ? 2 : 3] = plant_penetration(contact, p->lower[i], p->upper[i], q);
     if (p->stop_damping[i] > 0.0) {
-        const real push = plant_push(p, contact, i, dq);
+        const real push = plant_push(p, contact, i, 1.0, dq);
         z[PLANT_PUSH] = abs(contact) == RP_PLANT_PUSHED ? push : -push;
     }
 }
