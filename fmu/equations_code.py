@@ -74,6 +74,7 @@ class CodeFile:
     program: Program
     functions: dict[str, Called]
     warnings: list[str]
+    flat: dict[str, set[str]]  # functions without slope that a function calls
 
     def called_by(self, graph: Graph) -> Mapping[str, Callable[[list[Value], bool], Value]]:
         """Return the functions of arguments in a graph, and of whether this is an instant."""
@@ -97,7 +98,7 @@ def read(path: Path) -> CodeFile:
             given = [graph.value("parameter", name=a) for a in function.arguments]
             calls.result(function, given, False)
     warnings = [warning.replace(" warning:", "") for warning in dict.fromkeys(calls.warnings)]
-    return CodeFile(program, found, warnings)
+    return CodeFile(program, found, warnings, calls.flat)
 
 
 def _lines(path: Path) -> str:
@@ -137,6 +138,7 @@ class Calls(Interpreter):
         self.conditions.decided = graph.choice
         self.results: dict[tuple[object, ...], Value] = {}
         self.is_instant, self.steps_in_all = False, 0
+        self.flat: dict[str, set[str]] = {}
 
     def called(self, name: str, function: c_ast.FuncDef) -> Called:
         """Return how expressions call a function."""
@@ -156,6 +158,7 @@ class Calls(Interpreter):
         key = (function.name, is_instant, *given)
         if key not in self.results:
             self.is_instant = is_instant
+            self.flat.setdefault(function.name, set())
             arguments = dict(zip(function.arguments, given, strict=True))
             (found,), _ = self.run(function.name, lambda place, _: arguments[place[0]])
             self.results[key], self.steps_in_all = found, self.steps_in_all + self.steps
@@ -186,5 +189,7 @@ class Calls(Interpreter):
         reals = []
         for (kind, value), at in zip(given, node.args.exprs, strict=True):
             reals.append(self.scalar(kind, value, DOUBLE, state, at))
+        if name in ROUNDING:
+            self.flat[self.calls[0]].add(name)
         names = dict(zip("xy", reals, strict=False))
         return DOUBLE, self.graph.of_tree(EXPRESSIONS[name], names, self.is_instant)

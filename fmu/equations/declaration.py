@@ -22,7 +22,7 @@ SOLVER = INSTANCE / "solver_variables.toml"
 EVENTS = INSTANCE / "event_variables.toml"
 TIME_EVENTS = INSTANCE / "time_event_variables.toml"
 
-FLAT = re.compile(r"\b(floor|ceil|round|mod|sign)(?=\s*\()")
+FLAT = {"floor", "ceil", "round", "mod", "sign"}
 Key = tuple[str, str]  # name and kind of a variable
 Leaf = tuple[str, str]  # of the graph: operation and name
 TYPES = {CONDITION: "boolean", WHOLE: "int32"}
@@ -138,10 +138,9 @@ def flat(file: ModelFile) -> list[str]:
     called += [pair for change in file.changes for pair in change.given.items()]
     found = {}
     for name, expression in called:
-        known = set(FLAT.findall(expression.text))
-        known |= {
-            node.op for node in in_order([expression.tree]) if node.op == "floor" and not known
-        }
+        nodes = in_order([expression.tree])
+        known = FLAT & {node.function for node in nodes}
+        known |= {f for node in nodes if node.op == "call" for f in file.code.flat[node.name]}
         leaves = _reached(expression.value.leaves, file, ["discrete"]) if known else ()
         if {op for op, _ in leaves} & {"state", "input", "discrete"}:
             found |= {f"{function} in {name.partition('[')[0]}": None for function in sorted(known)}

@@ -373,7 +373,7 @@ class Blocks:
             scope = scope.outer  # it was forgotten before the block began
         if value in self.blocks:
             self._block(value, scope)
-            return scope.known[value]
+            return self.text(value, scope)
         text = self._expression(value, scope)
         if value.op in CONDITIONS or self._is_inline(value, text, scope):
             return text

@@ -170,7 +170,8 @@ def parsed(text: str, files: list[Path]) -> Program:
     except ParseError as error:
         raise CTextError(_rephrased(str(error), *parser.clex.last)) from None
     except RecursionError:
-        raise CTextError(f"{name}: is nested too deeply") from None
+        reason = "this is nested too deeply: use variables for parts of it"
+        raise CTextError(f"{parser.clex.last[0]}: {reason}") from None
     program = Program(files=files)
     for node in tree.ext:
         _add(program, node)
@@ -266,7 +267,7 @@ def check_function(function: c_ast.FuncDef) -> None:
                     reason = f"{node.name} keeps a value between calls: leave out static"
                     raise refused(node, reason)
             case c_ast.UnaryOp(op="sizeof" | "~" | "_Alignof"):
-                raise refused(node, f"{node.op} is not read")
+                raise refused(node, f"{node.op} is not read: write the number")
             case c_ast.BinaryOp(op="&" | "|" | "^" | "<<" | ">>"):
                 raise refused(node, f"{node.op} is not read: use && || ! for conditions")
             case c_ast.BinaryOp(op="%") | c_ast.Assignment(op="%="):

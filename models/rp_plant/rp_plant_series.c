@@ -87,7 +87,6 @@ static double series_with_input(const struct series_motion *m, int input, const 
     return sum;
 }
 
-/* Adds Q1 = x fy - y fx + mz and Q2 = c1 fx + s1 fy. */
 static void series_add_wrench(const struct series_motion *m, int k, double row[][SERIES_LENGTH],
                               double effort[2]) {
     const double a = m->p->arm.a;
@@ -95,12 +94,15 @@ static void series_add_wrench(const struct series_motion *m, int k, double row[]
     const double L_s = jet_product(row[L], row[S], k) - m->offset_z * row[S][k];
     row[X][k] = L_c - a * row[S][k];
     row[Y][k] = L_s + a * row[C][k];
-    const double moment = series_with_input(m, FY, row[X], k) - series_with_input(m, FX, row[Y], k);
-    effort[0] += moment + jet_input(m->origin, MZ, k);
-    effort[1] += series_with_input(m, FX, row[C], k) + series_with_input(m, FY, row[S], k);
+    double Q[2];
+    plant_wrench_sums(series_with_input(m, FY, row[X], k), series_with_input(m, FX, row[Y], k),
+                      jet_input(m->origin, MZ, k), series_with_input(m, FX, row[C], k),
+                      series_with_input(m, FY, row[S], k), Q);
+    effort[0] += Q[0];
+    effort[1] += Q[1];
 }
 
-/* Returns order k of e = exp(-r^2), from e' = -2 r' (r e). */
+/* Returns order k of plant_stribeck_decay: e' = -2 r' (r e). */
 static double series_exponential(const struct series_motion *m, int i, int k,
                                  double row[][SERIES_LENGTH]) {
     double *r = row[RATIO + i];
@@ -110,7 +112,7 @@ static double series_exponential(const struct series_motion *m, int i, int k,
     r[k] = row[W + i][k] * m->per_vs[i];
     rate[k] = k * r[k];
     if (k == 0) {
-        e[0] = exp(-r[0] * r[0]);
+        e[0] = plant_stribeck_decay(r[0]);
         r_e[0] = r[0] * e[0];
         return e[0];
     }
@@ -125,47 +127,46 @@ static double series_exponential(const struct series_motion *m, int i, int k,
     return e[k];
 }
 
-/* Returns order k of plant_sliding_friction. */
-ALWAYS_INLINE double series_sliding_friction(const struct series_motion *m, int i, int k,
-                                             double row[][SERIES_LENGTH]) {
+/* Returns order k of plant_friction. Above order 0 the law is that of the forces Fb - Fc and 0. */
+ALWAYS_INLINE double series_friction(const struct series_motion *m, int i, int k,
+                                     double row[][SERIES_LENGTH]) {
+    if (m->direction[i] == 0.0) {
+        return 0.0;
+    }
     const double coulomb = m->p->coulomb_friction[i];
     if (!m->depends_on_velocity[i]) {
-        return k == 0 ? coulomb : 0.0;
+        return k == 0 ? m->direction[i] * coulomb : 0.0;
     }
-    const double e = series_exponential(m, i, k, row);
     const double breakaway = m->p->breakaway_friction[i];
-    return k == 0 ? breakaway * e + coulomb * (1.0 - e) : (breakaway - coulomb) * e;
+    const double e = series_exponential(m, i, k, row);
+    return m->direction[i] * (k == 0 ? plant_stribeck(breakaway, coulomb, e)
+                                     : plant_stribeck(breakaway - coulomb, 0.0, e));
 }
 
-/* Returns order k of plant_compliant_force:  s k (d + c (d d')) with d' = -s q', s: the side */
+/* Returns order k of plant_compliant_force. */
 static double series_compliant_force(const struct series_motion *m, int i, int k,
                                      double row[][SERIES_LENGTH]) {
     const int contact = m->modes.contact[i];
     if (abs(contact) != RP_PLANT_PUSHED) {
         return 0.0;
     }
-    const double *q = row[Q1 + i];
+    const double q = row[Q1 + i][k];
     double *d = row[DEPTH + i];
-    d[k] = -contact * q[k];
-    if (k == 0) {
-        d[0] = plant_penetration(m->p, contact, i, q[0]);
-    }
-    const double damped = m->p->stop_damping[i] * jet_product(d, row[W + i], k);
-    return m->p->stop_stiffness[i] * (contact * d[k] - damped);
+    const double lower = k == 0 ? m->p->lower[i] : 0.0, upper = k == 0 ? m->p->upper[i] : 0.0;
+    d[k] = plant_penetration(contact, lower, upper, q);
+    const double damped = plant_push(m->p, contact, i, d[k], jet_product(d, row[W + i], k));
+    return plant_stop_force(m->p, contact, i, damped, 1.0);
 }
 
-/* Returns order k of the effort of a joint, without the wrench. Inline, as most of it is left out
- * for most joints. */
+/* Returns order k of plant_effort, without the wrench. Inline, as most of it is left out for most
+ * joints. */
 ALWAYS_INLINE double series_effort(const struct series_motion *m, int i, int k,
                                    double row[][SERIES_LENGTH]) {
-    double effort = jet_input(m->origin, i, k) - m->p->damping[i] * row[W + i][k];
-    if (m->direction[i] != 0.0) {
-        effort -= m->direction[i] * series_sliding_friction(m, i, k, row);
-    }
-    if (m->modes.contact[i] != RP_PLANT_APART) {
-        effort += series_compliant_force(m, i, k, row);
-    }
-    return effort;
+    const int contact = m->modes.contact[i];
+    const double friction = series_friction(m, i, k, row);
+    const double stop = contact == RP_PLANT_APART ? 0.0 : series_compliant_force(m, i, k, row);
+    return plant_effort(m->p, contact, i, row[W + i][k], jet_input(m->origin, i, k), friction,
+                        stop);
 }
 
 /* ---- Constants ------------------------------------------------------------------------------ */
@@ -354,7 +355,7 @@ static inline void write_order(const struct series_motion *m, int k, const struc
 
 /* ---- Indicators ----------------------------------------------------------------------------- */
 
-/* As plant_stuck_indicators with both sides in use; those of other joints are not of the model. */
+/* With both sides in use; those of other joints are not of the model. */
 static void write_indicators(const struct series_motion *m, int k, const struct next *next,
                              double row[][SERIES_LENGTH]) {
     const double rate = (k + 1) / m->origin->time_scale;
@@ -368,9 +369,10 @@ static void write_indicators(const struct series_motion *m, int k, const struct 
     };
     for (int i = 0; i < 2; i++) {
         if (is_stuck(m, i)) {
-            const double breakaway = k == 0 ? plant_breakaway(m->p, i) : 0.0;
-            row[FORWARD + i][k] = breakaway - reaction[i];
-            row[BACKWARD + i][k] = breakaway + reaction[i];
+            double z[2];
+            plant_stuck_indicators(0, k == 0 ? plant_breakaway(m->p, i) : 0.0, reaction[i], z);
+            row[FORWARD + i][k] = z[0];
+            row[BACKWARD + i][k] = z[1];
         }
     }
 }

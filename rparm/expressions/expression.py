@@ -87,6 +87,7 @@ class Node:
     arguments here.
     Until `at_indexes` has replaced them: "element" of an array (arguments: its indexes; `name` has
     {} where they come), "sum" of the `body` over the index `name` (arguments: first and last).
+    `function`: of `FURTHER`, which it stands for.
     """
 
     op: str
@@ -95,6 +96,7 @@ class Node:
     value: float = 0.0
     name: str = ""
     body: "Node | None" = None
+    function: str = ""
 
 
 def in_order(roots: Iterable[Item], known: Container[Item] = ()) -> list[Item]:
@@ -510,7 +512,9 @@ class _Parser:
             self._operations += len(in_order([function.body]))
         if self._operations > MOST_OPERATIONS:
             raise ExpressionError(column, TOO_LARGE)
-        return function.of(arguments, column)
+        found = function.of(arguments, column)
+        name = next((name for name, known in FURTHER.items() if known is function), "")
+        return replace(found, function=name) if name else found
 
     def derivative(self) -> Node:
         """Parse the state whose derivative is meant."""
@@ -529,17 +533,19 @@ def derivative_of(state: str) -> str:
 
 
 # functions whose names are free for variables
-FURTHER: dict[str, Function | Lookup] = {"floor": Lookup("floor", ("x",), "floor")}
+FURTHER: dict[str, Function | Lookup] = {}
+_WHOLE = {"whole": Lookup("floor", ("x",), "floor")}
 for _name, _arguments, _body in (
     ("sign", "x", "1 if x > 0 else -1 if x < 0 else 0"),
     ("hypot", "x y", "sqrt(x**2 + y**2)"),
     ("log10", "x", f"log(x) / {math.log(10)!r}"),
     ("cbrt", "x", f"x**{1 / 3!r} if x >= 0 else -(-x)**{1 / 3!r}"),
-    ("ceil", "x", "-floor(-x)"),
-    ("round", "x", "floor(x + 0.5)"),
-    ("mod", "x y", "x - y * floor(x / y)"),
+    ("ceil", "x", "-whole(-x)"),
+    ("round", "x", "whole(x + 0.5)"),
+    ("mod", "x y", "x - y * whole(x / y)"),
 ):
-    FURTHER[_name] = Function(tuple(_arguments.split()), parse(_body, FURTHER), _name == "sign")
+    FURTHER[_name] = Function(tuple(_arguments.split()), parse(_body, _WHOLE), _name == "sign")
+FURTHER["floor"] = _WHOLE["whole"]
 
 
 # ---- Indexes -------------------------------------------------------------------------------------

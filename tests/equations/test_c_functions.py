@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.equations.compiled import Model, ModelFileError, c_model, read_text
+from tests.equations.compiled import Model, ModelFileError, c_model, declaration, read_text
 from tests.equations.examples import METHODS, MISTAKES, MODELS, build, simulated
 
 import equations_to_fmu  # isort: skip; compiled.py knows where it is
@@ -95,6 +95,24 @@ def test_values_are_those_of_compiled_c(tmp_path: Path) -> None:
             (above, below) = (np.array([x, y]) + s * np.array(direction) for s in (h, -h))
             slope = (c("mixed", *above) - c("mixed", *below)) / (2 * h)
             assert first[model.names.index("d_x")] == pytest.approx(slope, rel=1e-8, abs=1e-9)
+
+
+def test_functions_without_slope_are_found_where_they_are_called(tmp_path: Path) -> None:
+    """By functions of C and their helpers, and by functions of the file."""
+    text = """name = "M"
+code = "saw.c"
+[inputs]
+u = {}
+[functions]
+steps = { arguments = ["x"], value = "mod(x, 2) + saw(x)" }
+[outputs]
+a = { value = "saw(u) + ceil(u)" }
+b = { value = "steps(u)" }
+"""
+    part = "double part(double x) { return x - floor(x); }\n"
+    files(tmp_path, text, f"{part}double saw(double x) {{ return part(2.0 * x); }}")
+    found = declaration.flat(read_text(tmp_path, text))
+    assert found == ["ceil in a", "floor in a", "floor in b", "mod in b"]
 
 
 def test_units_that_fit(tmp_path: Path) -> None:

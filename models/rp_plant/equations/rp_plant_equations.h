@@ -1,5 +1,8 @@
 /* The equations of the plant. rp_plant.h says what they mean. In given modes they are smooth: a
- * joint that slides forward keeps the sign of its friction also where its velocity passes 0. */
+ * joint that slides forward keeps the sign of its friction also where its velocity passes 0.
+ *
+ * Functions that are linear in what moves take products of it as arguments: rp_plant_series.c gives
+ * them coefficients of order k in place of values. */
 #pragma once
 
 #include "rp_payload.h"
@@ -58,14 +61,20 @@ static inline real plant_kinetic_energy(const struct plant *plant) {
 
 /* ---- Forces --------------------------------------------------------------------------------- */
 
-/* Q = J^T w with the rows of (1) and (3). */
+/* Q = J^T w with the rows of (1) and (3), from products of x, y, c1 and s1 with the force. */
+static inline void plant_wrench_sums(real x_fy, real y_fx, real mz, real c1_fx, real s1_fy,
+                                     real forces[2]) {
+    forces[0] = x_fy - y_fx + mz;
+    forces[1] = c1_fx + s1_fy;
+}
+
 static inline void plant_wrench_forces(const struct plant *plant, const real wrench[3],
                                        real forces[2]) {
     const struct arm *hand = &plant->hand;
     real position[2];
     arm_end_effector_position(hand, position);
-    forces[0] = position[0] * wrench[1] - position[1] * wrench[0] + wrench[2];
-    forces[1] = hand->c1 * wrench[0] + hand->s1 * wrench[1];
+    plant_wrench_sums(position[0] * wrench[1], position[1] * wrench[0], wrench[2],
+                      hand->c1 * wrench[0], hand->s1 * wrench[1], forces);
 }
 
 /* Largest friction of a joint at rest, N.m (joint 0) or N (joint 1). */
@@ -73,8 +82,10 @@ static inline real plant_breakaway(const struct rp_plant_parameters *p, int i) {
     return p->breakaway_friction[i] > 0.0 ? p->breakaway_friction[i] : p->coulomb_friction[i];
 }
 
-/* exp(x), which is 0 below -750. So are its derivatives there, also where x overflows. */
-static inline real plant_exponential(real x) {
+/* e of Stribeck's law at w = v / vs: exp(-w^2), which is 0 where w^2 is above 750. So are its
+ * derivatives there, also where w^2 overflows. */
+static inline real plant_stribeck_decay(real w) {
+    const real x = -(w * w);
     return x < -750.0 ? 0.0 : exp(x);
 }
 
@@ -91,9 +102,14 @@ static inline real plant_turned_back(real w) {
     return w8 / (1.0 + w8);
 }
 
-/* Friction of a joint that slides at a speed v >= 0, by Stribeck's law: F(v) = Fc + (Fb - Fc) e,
- * summed up so that F(0) is Fb to the bit: there is no jump when a joint breaks away. v < 0 is what
- * integrators see past the event that ends the mode. */
+/* Stribeck's law: F = Fc + (Fb - Fc) e, summed up so that F is Fb to the bit at rest: there is no
+ * jump when a joint breaks away. */
+static inline real plant_stribeck(real breakaway, real coulomb, real e) {
+    return breakaway * e + coulomb * (1.0 - e);
+}
+
+/* Friction of a joint that slides at a speed v >= 0. v < 0 is what integrators see past the event
+ * that ends the mode. */
 static inline real plant_sliding_friction(const struct rp_plant_parameters *p, int i, real v) {
     const real coulomb = p->coulomb_friction[i];
     const real breakaway = p->breakaway_friction[i];
@@ -105,11 +121,11 @@ static inline real plant_sliding_friction(const struct rp_plant_parameters *p, i
     if (w > 10.0 && breakaway < 1e20 * coulomb) {
         return coulomb;
     }
-    real e = plant_exponential(-(w * w));
+    real e = plant_stribeck_decay(w);
     if (w < 0.0) {
         e += plant_turned_back(w);
     }
-    return breakaway * e + coulomb * (1.0 - e);
+    return plant_stribeck(breakaway, coulomb, e);
 }
 
 static inline bool plant_slides(int mode) {
@@ -138,14 +154,23 @@ static inline int plant_closed_stop(const struct rp_plant_parameters *p, int i, 
 }
 
 /* d of the stop that the joint is in contact with. */
-static inline real plant_penetration(const struct rp_plant_parameters *p, int contact, int i,
-                                     real q) {
-    return contact > 0 ? p->lower[i] - q : q - p->upper[i];
+static inline real plant_penetration(int contact, real lower, real upper, real q) {
+    return contact > 0 ? lower - q : q - upper;
 }
 
-/* 1 + c d': the stop pushes while this is above 0. */
-static inline real plant_push(const struct rp_plant_parameters *p, int contact, int i, real dq) {
-    return contact > 0 ? 1.0 - p->stop_damping[i] * dq : 1.0 + p->stop_damping[i] * dq;
+/* x (1 + c d'), from the product x q': the stop pushes while 1 + c d' is above 0. */
+static inline real plant_push(const struct rp_plant_parameters *p, int contact, int i, real x,
+                              real x_dq) {
+    const real damping = p->stop_damping[i] * x_dq;
+    return contact > 0 ? x - damping : x + damping;
+}
+
+/* k d (1 + c d'), on the joint. */
+static inline real plant_stop_force(const struct rp_plant_parameters *p, int contact, int i, real d,
+                                    real push) {
+    const real elastic = p->stop_stiffness[i] * d;
+    const real force = elastic * push;
+    return contact > 0 ? force : -force;
 }
 
 /* Hunt and Crossley: k d (1 + c d'), on the joint. In a given contact it continues past d = 0, up
@@ -155,15 +180,14 @@ static inline real plant_compliant_force(const struct rp_plant_parameters *p, in
     if (abs(contact) != RP_PLANT_PUSHED) {
         return 0.0;
     }
-    const real elastic = p->stop_stiffness[i] * plant_penetration(p, contact, i, q);
-    const real force = elastic * plant_push(p, contact, i, dq);
-    return contact > 0 ? force : -force;
+    const real d = plant_penetration(contact, p->lower[i], p->upper[i], q);
+    return plant_stop_force(p, contact, i, d, plant_push(p, contact, i, 1.0, dq));
 }
 
 /* Also of a stop that the joint leaves behind: what it does not give back is lost. */
 static inline real plant_stop_energy(const struct rp_plant_parameters *p, int contact, int i,
                                      real q) {
-    const real d = plant_penetration(p, contact, i, q);
+    const real d = plant_penetration(contact, p->lower[i], p->upper[i], q);
     return 0.5 * (p->stop_stiffness[i] * (d * d));
 }
 
@@ -201,22 +225,24 @@ static inline struct plant_hold plant_hold(const struct rp_plant_parameters *p,
 
 /* ---- Efforts -------------------------------------------------------------------------------- */
 
-/* applied: tau + Q. */
-static inline real plant_effort(const struct rp_plant_parameters *p,
-                                const struct rp_plant_modes *modes, int i, real q, real dq,
-                                real applied) {
+/* applied: tau + Q. friction, stop: as in struct plant_hold. */
+static inline real plant_effort(const struct rp_plant_parameters *p, int contact, int i, real dq,
+                                real applied, real friction, real stop) {
     const real damped = applied - p->damping[i] * dq;
-    const real rubbed = damped - plant_friction(p, modes->joint[i], i, dq);
-    const int contact = modes->contact[i];
-    return contact == RP_PLANT_APART ? rubbed
-                                     : rubbed + plant_compliant_force(p, contact, i, q, dq);
+    const real rubbed = damped - friction;
+    return contact == RP_PLANT_APART ? rubbed : rubbed + stop;
 }
 
 static inline void plant_efforts(const struct plant *plant, const struct rp_plant_parameters *p,
                                  const struct rp_plant_modes *modes, const real tau[2],
                                  const real Q[2], real efforts[2]) {
     for (int i = 0; i < 2; i++) {
-        efforts[i] = plant_effort(p, modes, i, plant->arm.q[i], plant->arm.dq[i], tau[i] + Q[i]);
+        const real q = plant->arm.q[i], dq = plant->arm.dq[i];
+        const int contact = modes->contact[i];
+        const real friction = plant_friction(p, modes->joint[i], i, dq);
+        const real stop =
+            contact == RP_PLANT_APART ? 0.0 : plant_compliant_force(p, contact, i, q, dq);
+        efforts[i] = plant_effort(p, contact, i, dq, tau[i] + Q[i], friction, stop);
     }
 }
 
@@ -315,10 +341,7 @@ static inline int plant_indicator_index(int joint, int k) {
 }
 
 /* On the lower and the upper side of a stuck joint; a closed stop leaves the one that opens. */
-static inline void plant_stuck_indicators(const struct rp_plant_parameters *p, int i, real q,
-                                          real reaction, real z[2]) {
-    const int closed = plant_closed_stop(p, i, q);
-    const real breakaway = plant_breakaway(p, i);
+static inline void plant_stuck_indicators(int closed, real breakaway, real reaction, real z[2]) {
     z[0] = closed < 0 ? 1.0 : breakaway - reaction;
     z[1] = closed > 0 ? 1.0 : breakaway + reaction;
 }
@@ -332,9 +355,9 @@ static inline void plant_stop_indicators(const struct rp_plant_parameters *p, in
         z[3] = p->upper[i] - q;
         return;
     }
-    z[contact > 0 ? 2 : 3] = plant_penetration(p, contact, i, q);
+    z[contact > 0 ? 2 : 3] = plant_penetration(contact, p->lower[i], p->upper[i], q);
     if (p->stop_damping[i] > 0.0) {
-        const real push = plant_push(p, contact, i, dq);
+        const real push = plant_push(p, contact, i, 1.0, dq);
         z[PLANT_PUSH] = abs(contact) == RP_PLANT_PUSHED ? push : -push;
     }
 }
@@ -350,7 +373,7 @@ static inline void plant_indicators(const struct rp_plant_parameters *p,
         z[k] = 1.0;
     }
     if (mode == RP_PLANT_STUCK) {
-        plant_stuck_indicators(p, i, q, reaction, z);
+        plant_stuck_indicators(plant_closed_stop(p, i, q), plant_breakaway(p, i), reaction, z);
         return;
     }
     if (plant_slides(mode)) {
