@@ -469,12 +469,11 @@ def held_states(found: Linear, model: Model) -> list[str]:
 
 def why_sampled(model: Model, way_out: str = "") -> str:
     """Say that an FMU is sampled, which needs a discrete model, and what to do."""
-    own = ", ".join(sampler.name for sampler in samplers(model))
     every = (n for n, v in model.variables.items() if "sample" in n and v.is_a(PARAMETERS))
-    switch = "" if own else next(every, "")
+    switch = next(every, "")
     ways = ", or ".join(filter(None, [switch and f"set {switch} to 0", way_out]))
     why = "which no linear model in continuous time can be"
-    return f"is sampled{own and f' by {own}'}, {why}{ways and f': {ways}'}"
+    return f"is sampled, {why}{ways and f': {ways}'}"
 
 
 def is_sampled(
@@ -482,11 +481,9 @@ def is_sampled(
 ) -> bool:
     """Return whether `outputs` follow inputs only at ticks.
 
-    It is so if it has samplers, if all that depend on inputs are discrete, or do not change with
-    them now while the FMU announces a time event.
+    It is so if all that depend on inputs are discrete, or do not change with them now while the
+    FMU announces a time event.
     """
-    if samplers(model):
-        return True
     following = [name for name in outputs if _depends_on_inputs(model, name)]
     rows = [found.outputs.index(name) for name in following if name in found.outputs]
     if not following or not rows:

@@ -6,17 +6,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rparm.errors import UserError, hint
+from rparm.errors import UserError, hint, placed
 from rparm.files import UnreadableError
 from rparm.fmi.fmu_file import MODEL_EXCHANGE, Fmu
 from rparm.fmi.model import Value, Variable
 from rparm.linearization import linear
-from rparm.linearization.sampling import hold
+from rparm.linearization.sampling import Tick, hold, samplers
 from rparm.systems import master
-from rparm.systems.master import Master
+from rparm.systems.master import ConnectedInstance, Master
 from rparm.systems.python_component import PythonComponent, PythonInstance
 from rparm.systems.structure import Connection, OpenedSystem
 
+SAME = 1e-9  # of the largest entry: a model that is another one but for rounding
 NEGLIGIBLE = 1e-14  # of the largest entries of row and column: rounding
 
 
@@ -86,15 +87,55 @@ class SystemSubject(ExitStack):
                     self._laws[name] = instance, instance.numbers[: len(instance.made.inputs)]
                     found[name] = self.law(name, self.ssp.system.step)
                     continue
+                if samplers(instance.fmu.model):
+                    found[name] = self._ticking(component, parameters.get(name, {}))
+                    continue
                 part = linear.linear_model(instance)
                 self._refuse_sampled(name, part, parameters.get(name, {}))
                 found[name] = part
         return found
 
+    def _ticking(self, component: ConnectedInstance, given: Mapping[str, Value]) -> linear.Linear:
+        """Linearize a component with samplers before they tick, by model exchange."""
+        name, instance = component.name, component.instance
+        if self.python:
+            wrong = f"component {name!r} has samplers, and {self.python[0]!r} is in Python"
+            raise UserError(f"{self.ssp.path}: {wrong}: expected one of both")
+        component.inputs.get()
+        inputs = dict(zip(component.inputs.names, component.inputs.view.tolist(), strict=True))
+        for c in self.connections:
+            if c.end_component == name and c.end_connector not in inputs:
+                inputs[c.end_connector] = instance.discrete(c.end_connector)
+        set_values = {n: master.start_value(instance.fmu, name, n, v) for n, v in given.items()}
+        with (
+            Fmu(self.ssp.fmu(name), kind=MODEL_EXCHANGE) as fmu,
+            linear.FmuSubject(fmu, self.time) as subject,
+        ):
+            return subject.at(set_values | inputs)
+
     def law(self, name: str, step: float) -> linear.Linear:
         """Linearize a component in Python at the point of `parts`, called every `step` s."""
         instance, inputs = self._laws[name]
         return linear.law_model(instance, self.time, step, inputs)
+
+    def joined(
+        self, parts: Mapping[str, linear.Linear], held: Mapping[str, list[str]]
+    ) -> linear.Linear:
+        """Join parts of which some tick, as a discrete model, without held states."""
+        with placed(self.ssp.path):
+            found, whole = (
+                connected(parts, connections)
+                .discretized()
+                .without(f"{name}.{x}" for name in held for x in held[name])
+                for connections in (self.kept, self.connections)
+            )
+        if self.cut is not None:
+            one, size = found.select([self.cut.end], [self.cut.start]), np.abs(whole.A).max()
+            back = (1 - one.D) * (whole.A - found.A)
+            if not np.allclose(back, one.B @ one.C, rtol=0, atol=SAME * size):
+                wrong = f"{self.cut.end} does not see {self.cut.start} once a period, just after"
+                raise UserError(f"--break: {wrong} the first tick: break at what that sets")
+        return found
 
     def at(self, values: Mapping[str, Value]) -> linear.Linear:
         """Linearize at values of parameters and states, held ones too, with all loops closed."""
@@ -205,7 +246,8 @@ def connected(
     A, B, C, D = map(_diagonal, zip(*map(_clear, parts.values()), strict=True))
     _refuse_algebraic_loop(outputs, D @ fed)
     solved, terms = _solved(D @ fed), _solved(np.abs(D) @ fed)
-    back, back_terms = B @ fed @ solved, np.abs(B) @ fed @ terms
+    into = fed @ solved
+    back, back_terms = B @ into, np.abs(B) @ fed @ terms
     return linear.Linear(
         states=tuple(f"{name}.{x}" for name, part in parts.items() for x in part.states),
         inputs=tuple(inputs),
@@ -226,7 +268,36 @@ def connected(
             for text in part.flat
         ),
         left_out=tuple(f"{name}.{y}" for name, part in parts.items() for y in part.left_out),
+        ticks=_ticks(parts, np.hstack([into @ C, np.eye(len(inputs)) + into @ D])),
     )
+
+
+def _ticks(parts: Mapping[str, linear.Linear], fed: np.ndarray) -> tuple[Tick, ...]:
+    """Return the ticks of all; `fed`: inputs by all states and inputs, (m, n + m).
+
+    A tick sees other components as they were before all ticks of its instant.
+    """
+    found, n, m = [], 0, 0
+    for name, part in parts.items():
+        own, ends = len(part.states), len(part.inputs)
+        for tick in part.ticks:
+            partials = tick.partials[:, own:] @ fed[m : m + ends]
+            late = partials.copy()
+            partials[:, n : n + own] += tick.partials[:, :own]
+            found.append(
+                Tick(
+                    f"{name}.{tick.name}",
+                    tick.every,
+                    tick.offset,
+                    [n + row for row in tick.rows],
+                    partials,
+                    late,
+                    {f"{name}.{x}": change for x, change in tick.changes.items()},
+                    [f"{name}.{mode}" for mode in tick.modes],
+                )
+            )
+        n, m = n + own, m + ends
+    return tuple(found)
 
 
 def sampled(

@@ -33,11 +33,11 @@ def build(path: Path, output: Path, *options: str) -> Path:
 @cache
 def example(name: str, folder: Path) -> Path:
     """The FMU of an example."""
-    output = folder / name
+    output, path = folder / name.replace("/", "_"), FOLDER / f"{name}.toml"
     output.mkdir(exist_ok=True)
-    for suffix in (".toml", ".lock.toml"):
-        copy(FOLDER / f"{name}{suffix}", output)
-    return build(output / f"{name}.toml", output)
+    for file in (path, path.with_suffix(".lock.toml")):
+        copy(file, output)
+    return build(output / path.name, output)
 
 
 def simulated(

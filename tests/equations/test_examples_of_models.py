@@ -4,6 +4,7 @@ import re
 import tomllib
 from pathlib import Path
 
+import fmpy
 import heyoka
 import numpy as np
 import pytest
@@ -163,6 +164,51 @@ def test_the_drive_is_that_of_a_loop_over_its_samples(folder: Path, method: int)
     found = np.array([run["phi"], run["omega"]]).T
     assert np.max(np.abs(exact)) > 5.0
     np.testing.assert_allclose(found, exact, rtol=0, atol=2e-6)
+
+
+OF_RP = {
+    "controller": ("RPController", ["tau1", "f2", "integral1", "integral2"]),
+    "encoder": ("RPSensor", ["q1_measured", "q2_measured", "dq1_measured", "dq2_measured"]),
+}
+VALUES = {
+    "sample_time": (0.001, 0.0031, 0.01),
+    "delay": (0.0, 0.0004, 0.001),
+    "latency": (0, 1, 64),
+    "resolution1": (0.01, 6.283185307179586e-4, 1e-12),
+    "mode": (1, 2, 3),
+    "tau1_max": (3.0, 100.0, 20.0),
+    "Ki2": (900.0, 0.0, 50.0),
+    "payload_attached": (True, False, True),
+    "payload_mass": (0.7, 0.0, 0.3),
+    "payload_inertia": (0.02, 0.0, 0.01),
+    "payload_x": (0.05, 0.0, -0.3),
+}
+
+
+@pytest.mark.parametrize("case", range(6))
+@pytest.mark.parametrize("name", OF_RP)
+def test_files_have_the_bits_and_references_of_c(
+    folder: Path, fmu: Path, name: str, case: int
+) -> None:
+    chance, (rp, outputs) = np.random.default_rng(case), OF_RP[name]
+    paths = fmu.with_name(f"{rp}.fmu"), example(f"rp/{name}", folder)
+    theirs, own = (read_model(path).variables for path in paths)
+    both = theirs.keys() & own.keys()
+    assert {n: own[n].reference for n in both} == {n: theirs[n].reference for n in both}
+    start = {n: v[chance.integers(3)] for n, v in VALUES.items() if n in both}
+    inputs = [n for n in own if own[n].causality == "input" and own[n].type == "Real"]
+    signals = np.zeros(40, [(n, "f8") for n in ("time", *inputs)])
+    signals["time"] = np.linspace(0.0, 0.3, 40)
+    for n in inputs:
+        signals[n] = np.cumsum(chance.normal(size=40)) / 4
+    first, second = (
+        fmpy.simulate_fmu(
+            str(path), fmi_type="CoSimulation", stop_time=0.3, output_interval=0.0037,
+            start_values=start, input=signals, output=outputs,
+        )
+        for path in paths
+    )  # fmt: skip
+    assert np.array_equal(first, second) and np.unique(first[outputs[1]]).size > 20
 
 
 def test_a_new_scenario_can_set_elements(folder: Path) -> None:
