@@ -405,6 +405,10 @@ class FmuSubject(ExitStack):
             raise UserError(f"{self.fmu.path}: {why} linearize it in model exchange")
         move(states)
 
+    def next_event(self) -> float | None:
+        """Return the time of the next time event in s; None for co-simulation."""
+        return getattr(self._instance, "next_event", None)
+
     def held(self, found: Linear) -> list[str]:
         """Return the states of `found` that are held."""
         return held_states(found, self.fmu.model)
@@ -414,18 +418,13 @@ class FmuSubject(ExitStack):
 
         UserError if its samplers have several rates, or if it is sampled and does not say how.
         """
-        instance, model = self._instance, self.fmu.model
+        model = self.fmu.model
         with placed(str(self.fmu.path)):
             if found.ticks:
                 return found.discretized().without(self.held(found))
-        if is_sampled(found, model, model.real_outputs, lambda: next_event(instance)):
+        if is_sampled(found, model, model.real_outputs, self.next_event):
             raise UserError(f"{self.fmu.path}: {why_sampled(model)}")
         return found.without(self.held(found))
-
-
-def next_event(instance: Instance) -> float | None:
-    """Return the time of the next time event in s; None for co-simulation."""
-    return getattr(instance, "next_event", None)
 
 
 def known_variable(model: Model, name: str, where: str) -> Variable:

@@ -92,16 +92,14 @@ def ticks(
             if value == UNDEFINED:
                 where = f"{instance.name}: sampler {sampler.name}"
                 raise UserError(f"{where}: the new value of {name} is not finite at the point")
-        targets_now = [sampler.new[name] for name in targets]
-        partials = instance.partials(targets_now, [*states, *inputs])
         found.append(
             Tick(
                 sampler.name,
                 values[sampler.times["period"]],
                 values[sampler.times["offset"]],
                 [states.index(name) for name in targets],
-                partials,
-                np.zeros_like(partials),
+                instance.partials([sampler.new[name] for name in targets], [*states, *inputs]),
+                np.zeros((len(targets), len(states) + len(inputs))),
                 {name: new[name] - values[name] for name in targets},
                 [name for name in new if name not in states and new[name]],
             )

@@ -109,14 +109,13 @@ def of_system(opened: OpenedSystem, request: Request) -> Study:
         units = _units(subject, found)
         limits: dict[str, Any] = {}
         if subject.cut is not None:
-            source = subject.cut.start
-            loop = open_loop(whole.select([request.cut], [source]))
+            loop = open_loop(whole.select([request.cut], [subject.cut.start]))
             limits = {"loop": loop, "margins": margins(loop)}
         elif not ticks:
             steps = largest_steps(parts, subject.connections, subject.ways, subject.law)
             limits = {"largest": steps}
-        python = tuple(subject.python)
-        return Study(path, found, units, request.free, variant, python=python, **limits)
+        limits["python"] = tuple(subject.python)
+        return Study(path, found, units, request.free, variant, **limits)
 
 
 def _path(request: Request) -> Path:

@@ -1,8 +1,9 @@
 """Linear models of systems: their FMUs' models, joined by the connections."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -87,31 +88,33 @@ class SystemSubject(ExitStack):
                     self._laws[name] = instance, instance.numbers[: len(instance.made.inputs)]
                     found[name] = self.law(name, self.ssp.system.step)
                     continue
-                if samplers(instance.fmu.model):
-                    found[name] = self._ticking(component, parameters.get(name, {}))
+                given = parameters.get(name, {})
+                if not samplers(instance.fmu.model):
+                    found[name] = linear.linear_model(instance)
+                    self._refuse_sampled(component, found[name], given)
                     continue
-                part = linear.linear_model(instance)
-                self._refuse_sampled(name, part, parameters.get(name, {}))
-                found[name] = part
+                if self.python:
+                    wrong = f"{name!r} has samplers, and {self.python[0]!r} is in Python"
+                    raise UserError(f"{self.ssp.path}: {wrong}: expected one of both")
+                found[name], _ = self._exchanged(component, given)
         return found
 
-    def _ticking(self, component: ConnectedInstance, given: Mapping[str, Value]) -> linear.Linear:
-        """Linearize a component with samplers before they tick, by model exchange."""
+    def _exchanged(
+        self, component: ConnectedInstance, given: Mapping[str, Value]
+    ) -> tuple[linear.Linear, float | None]:
+        """Linearize a component by model exchange, before samplers tick; with its time event."""
         name, instance = component.name, component.instance
-        if self.python:
-            wrong = f"component {name!r} has samplers, and {self.python[0]!r} is in Python"
-            raise UserError(f"{self.ssp.path}: {wrong}: expected one of both")
+        values = {n: master.start_value(instance.fmu, name, n, v) for n, v in given.items()}
         component.inputs.get()
-        inputs = dict(zip(component.inputs.names, component.inputs.view.tolist(), strict=True))
+        values |= zip(component.inputs.names, component.inputs.view.tolist(), strict=True)
         for c in self.connections:
-            if c.end_component == name and c.end_connector not in inputs:
-                inputs[c.end_connector] = instance.discrete(c.end_connector)
-        set_values = {n: master.start_value(instance.fmu, name, n, v) for n, v in given.items()}
+            if c.end_component == name and c.end_connector not in values:
+                values[c.end_connector] = instance.discrete(c.end_connector)
         with (
             Fmu(self.ssp.fmu(name), kind=MODEL_EXCHANGE) as fmu,
             linear.FmuSubject(fmu, self.time) as subject,
         ):
-            return subject.at(set_values | inputs)
+            return subject.at(values), subject.next_event()
 
     def law(self, name: str, step: float) -> linear.Linear:
         """Linearize a component in Python at the point of `parts`, called every `step` s."""
@@ -174,15 +177,20 @@ class SystemSubject(ExitStack):
             merged[component][variable] = value
         return merged
 
-    def _refuse_sampled(self, name: str, part: linear.Linear, values: Mapping[str, Value]) -> None:
+    def _refuse_sampled(
+        self, component: ConnectedInstance, part: linear.Linear, given: Mapping[str, Value]
+    ) -> None:
+        name, model = component.name, component.instance.fmu.model
         feeding = [c.start_connector for c in self.connections if c.start_component == name]
-        outputs = [output for output in feeding if self._is_real(name, output)]
+        outputs = [output for output in feeding if model.variables[output].type == "Real"]
 
         def announced() -> float | None:
-            return _next_event(self.ssp, name, values, self.time)
+            with suppress(UserError, UnreadableError):  # it may be for co-simulation alone
+                return self._exchanged(component, given)[1]
+            return None
 
-        if linear.is_sampled(part, self.ssp.models[name], outputs, announced):
-            wrong = linear.why_sampled(self.ssp.models[name], self._way_out(name))
+        if linear.is_sampled(part, model, outputs, announced):
+            wrong = linear.why_sampled(model, self._way_out(name))
             raise UserError(f"{self.ssp.path}: component {name!r} {wrong}")
 
     def _way_out(self, name: str) -> str:
@@ -191,9 +199,6 @@ class SystemSubject(ExitStack):
         except UserError:
             return ""
         return f"take it as ideal by --without {name}"
-
-    def _is_real(self, component: str, output: str) -> bool:
-        return self.ssp.models[component].variables[output].type == "Real"
 
 
 def bypassed(ssp: OpenedSystem, connections: Sequence[Connection], name: str) -> list[Connection]:
@@ -214,23 +219,6 @@ def bypassed(ssp: OpenedSystem, connections: Sequence[Connection], name: str) ->
     return result
 
 
-def _next_event(
-    ssp: OpenedSystem, name: str, values: Mapping[str, Value], time: float
-) -> float | None:
-    """Return the first time event of a component, if its FMU is for model exchange, too."""
-    try:
-        fmu = Fmu(ssp.fmu(name), kind=MODEL_EXCHANGE)
-    except (UserError, UnreadableError):
-        return None
-    with fmu, fmu.instance(name) as instance:
-        instance.set_up(time, None)
-        for variable, value in values.items():
-            instance.set(variable, value)
-        instance.enter_initialization()
-        instance.exit_initialization()
-        return linear.next_event(instance)
-
-
 # ---- Connections ---------------------------------------------------------------------------------
 def connected(
     parts: Mapping[str, linear.Linear], connections: Iterable[Connection]
@@ -249,27 +237,28 @@ def connected(
     into = fed @ solved
     back, back_terms = B @ into, np.abs(B) @ fed @ terms
     return linear.Linear(
-        states=tuple(f"{name}.{x}" for name, part in parts.items() for x in part.states),
-        inputs=tuple(inputs),
-        outputs=tuple(outputs),
         A=linear.cleared(A + back @ C, np.abs(A) + back_terms @ np.abs(C)),
         B=linear.cleared(B + back @ D, np.abs(B) + back_terms @ np.abs(D)),
         C=linear.cleared(solved @ C, terms @ np.abs(C)),
         D=linear.cleared(solved @ D, terms @ np.abs(D)),
-        **{
-            key: np.concatenate([getattr(part, key) for part in parts.values()])
-            for key in ("x", "u", "y", "rates")
-        },
-        at={f"{name}.{v}": value for name, part in parts.items() for v, value in part.at.items()},
-        held=tuple(f"{name}.{x}" for name, part in parts.items() for x in part.held),
-        flat=tuple(
-            text.replace(" in ", f" in {name}.")
-            for name, part in parts.items()
-            for text in part.flat
-        ),
-        left_out=tuple(f"{name}.{y}" for name, part in parts.items() for y in part.left_out),
+        **_joined(parts),
         ticks=_ticks(parts, np.hstack([into @ C, np.eye(len(inputs)) + into @ D])),
     )
+
+
+def _joined(parts: Mapping[str, linear.Linear]) -> dict[str, Any]:
+    """Return what linear models have side by side."""
+    numbers = {
+        key: np.concatenate([getattr(part, key) for part in parts.values()])
+        for key in ("x", "u", "y", "rates")
+    }
+    at = {f"{name}.{v}": value for name, part in parts.items() for v, value in part.at.items()}
+    flat = [f.replace(" in ", f" in {name}.") for name, part in parts.items() for f in part.flat]
+    listed = {
+        kind: tuple(f"{name}.{v}" for name, part in parts.items() for v in getattr(part, kind))
+        for kind in ("states", "inputs", "outputs", "held", "left_out")
+    }
+    return numbers | listed | {"at": at, "flat": tuple(flat)}
 
 
 def _ticks(parts: Mapping[str, linear.Linear], fed: np.ndarray) -> tuple[Tick, ...]:
@@ -281,21 +270,14 @@ def _ticks(parts: Mapping[str, linear.Linear], fed: np.ndarray) -> tuple[Tick, .
     for name, part in parts.items():
         own, ends = len(part.states), len(part.inputs)
         for tick in part.ticks:
-            partials = tick.partials[:, own:] @ fed[m : m + ends]
-            late = partials.copy()
+            late = tick.partials[:, own:] @ fed[m : m + ends]
+            partials = late.copy()
             partials[:, n : n + own] += tick.partials[:, :own]
-            found.append(
-                Tick(
-                    f"{name}.{tick.name}",
-                    tick.every,
-                    tick.offset,
-                    [n + row for row in tick.rows],
-                    partials,
-                    late,
-                    {f"{name}.{x}": change for x, change in tick.changes.items()},
-                    [f"{name}.{mode}" for mode in tick.modes],
-                )
-            )
+            rows, label = [n + row for row in tick.rows], f"{name}.{tick.name}"
+            changes = {f"{name}.{x}": change for x, change in tick.changes.items()}
+            modes = [f"{name}.{mode}" for mode in tick.modes]
+            made = Tick(label, tick.every, tick.offset, rows, partials, late, changes, modes)
+            found.append(made)
         n, m = n + own, m + ends
     return tuple(found)
 
@@ -326,29 +308,18 @@ def sampled(
     at_once = np.where(late[:, None], 0.0, D)
     x = np.hstack([A, np.zeros((n, k))]) + B @ u
     whole, terms = np.vstack([x, C[late] @ x + D[late] @ u]), np.abs(np.vstack([x, C[late] @ x]))
-    joined = {
-        key: np.concatenate([getattr(part, key) for part in parts.values()])
-        for key in ("x", "u", "y", "rates")
-    }
+    joined = _joined(parts)
     return linear.Linear(
-        states=(
-            *(f"{name}.{x}" for name, part in parts.items() for x in part.states),
-            *(name for name, is_late in zip(outputs, late, strict=True) if is_late),
-        ),
-        inputs=tuple(inputs),
-        outputs=tuple(outputs),
         A=linear.cleared(whole, terms),
         B=np.vstack([B, C[late] @ B + D[late]]),
         C=y + at_once @ u,
         D=at_once,
         **joined
         | {
+            "states": (*joined["states"], *np.array(outputs, object)[late]),
             "x": np.append(joined["x"], joined["y"][late]),
             "rates": np.append(joined["rates"], np.zeros(k)),
         },
-        at={f"{name}.{v}": value for name, part in parts.items() for v, value in part.at.items()},
-        held=tuple(f"{name}.{x}" for name, part in parts.items() for x in part.held),
-        left_out=tuple(f"{name}.{y}" for name, part in parts.items() for y in part.left_out),
         dt=step,
     )
 

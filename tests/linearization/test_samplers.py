@@ -14,7 +14,7 @@ from rparm.errors import UserError
 from rparm.fmi.fmu_file import CO_SIMULATION
 from rparm.linearization.responses import frequency_response
 from rparm.linearization.study import Request, study
-from tests.equations.examples import FOLDER, MODELS, example, made
+from tests.equations.examples import FOLDER, MODELS, axis, example, made
 
 TEXTS = MODELS["samplers"] | MODELS["sampled"]
 TEXTS |= {n.upper(): (FOLDER / f"{n}.toml").read_text(encoding="utf-8") for n in ("axis", "pwm")}
@@ -42,19 +42,15 @@ def test_deadbeat_control_of_a_double_integrator_settles_in_two_samples(folder: 
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_a_sampled_pid_controller_of_an_axis(folder: Path, fmi: int) -> None:
-    path, h, M, m, k, c = example("axis", folder), 0.03, 0.7, 1.9, 400.0, 11.0
-    Kp, Kd, Ki = 11.0, 2.0, 4.0
-    at = {"Ts": h, "M": M, "m": m, "k": k, "c": c, "Kp": Kp, "Kd": Kd, "Ki": Ki, "target": 0.2}
+    path, h = example("axis", folder), 0.03
+    at = {"M": 0.7, "m": 1.9, "k": 400.0, "c": 11.0, "Kp": 11.0, "Kd": 2.0, "Ki": 4.0}
     path = path if fmi == 2 else path.parent / "fmi3" / path.name
-    found = rparm.linearize(path, at=at, trim=["x", "y", "u", "sum", "last"])
+    point = {"Ts": h, "target": 0.2}
+    found = rparm.linearize(path, at=at | point, trim=["x", "y", "u", "sum", "last"])
     assert found.states == ("x", "v", "y", "w", "u", "sum", "last")
     assert found.x == pytest.approx([0.2, 0, 0.2, 0, 0, 0, 0.2], abs=1e-10)
-    tick, rates, belt = np.eye(9), np.zeros((9, 9)), np.array([k, c, -k, -c])  # inputs at the end
-    tick[4, 4] = tick[6, 6] = 0
-    tick[4:7, [0, 5, 6, 7]] = [[-Kp - Kd / h, 1, Kd / h, Kp], [-Ki * h, 1, 0, Ki * h], [1, 0, 0, 0]]
-    rates[[0, 2], [1, 3]] = 1
-    rates[1, :5], rates[3, :4], rates[3, 8] = [*-belt / M, 1 / M], belt / m, -1 / m
-    assert_close(np.hstack([found.A, found.B]), (expm(rates * h) @ tick)[:7])
+    tick, motion = axis(h, *at.values())
+    assert_close(np.hstack([found.A, found.B]), (motion @ tick)[:7])
     assert_close(np.hstack([found.C, found.D]), tick[:7])
 
 
@@ -176,24 +172,14 @@ def test_a_condition_is_taken_as_it_is_at_the_point(folder: Path) -> None:
 def test_what_has_no_discrete_model_says_what_to_do(folder: Path) -> None:
     with pytest.raises(UserError, match="has samplers: linearize it in model exchange"):
         study(Request(made(folder, TEXTS["DEADBEAT"]), kind=CO_SIMULATION))
-    with pytest.raises(UserError, match="can be: set sample_time to 0$"):
-        rparm.linearize("RPSensor", at={"q1": 1})
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "cut", "message"),
-    [
-        ("1.5", "1.5", "", ""),
-        ("2 * 0.1", "0.3", "", "several rates, .*: sensor.tick every 0.2 s, control.tick every"),
-        ("1.5", "1.5", "control.y", "control.y does not see sensor.y once a period, just after"),
-        ('"sensor.toml"', '"sensor.py"', "", "'control' has samplers, and 'sensor' is in Python"),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "cut", "message"), MODELS["loop"]["cases"])
 def test_a_tick_sees_what_other_components_were_before(
     tmp_path: Path, old: str, new: str, cut: str, message: str
 ) -> None:
     """u = -1.5 x of a sample earlier."""
-    for name, text in MODELS["loop"].items():
+    for name, text in MODELS["loop"]["files"].items():
         (tmp_path / name).write_text(text.replace(old, new), encoding="utf-8")
     request = Request(tmp_path / "loop.toml", cut=cut)
     if message:
