@@ -25,6 +25,8 @@ RUNS = {
     "thermostat": (7200.0, 10.0, {}, ["room"]),
     "drive": (0.5, 0.002, {}, ["phi", "seen"]),
     "masses": (20.0, 0.05, {}, ["x[1]", "x[10]"]),
+    "pwm": (0.02, 0.00002, {}, ["i"]),
+    "axis": (1.0, 0.002, {}, ["x", "y"]),
 }
 
 
@@ -37,7 +39,7 @@ def built(name: str, folder: Path) -> Path:
     return fmu
 
 
-figure, axes = plt.subplots(2, 5, figsize=(13.5, 4.5), layout="constrained")
+figure, axes = plt.subplots(3, 4, figsize=(13.5, 6.75), layout="constrained")
 with tempfile.TemporaryDirectory() as folder:
     for axis, (name, (stop, step, start, drawn)) in zip(axes.flat, RUNS.items(), strict=True):
         fmu = built(name, Path(folder))

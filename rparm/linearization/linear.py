@@ -397,6 +397,10 @@ class FmuSubject(ExitStack):
             raise UserError(f"{self.fmu.path}: {why} linearize it in model exchange")
         move(states)
 
+    def next_event(self) -> float | None:
+        """Return the time of the next time event in s; None for co-simulation."""
+        return getattr(self._instance, "next_event", None)
+
     def held(self, found: Linear) -> list[str]:
         """Return the states of `found` that are held."""
         return held_states(found, self.fmu.model)
@@ -406,18 +410,13 @@ class FmuSubject(ExitStack):
 
         UserError if its samplers have several rates, or if it is sampled and does not say how.
         """
-        instance, model = self._instance, self.fmu.model
+        model = self.fmu.model
         with placed(str(self.fmu.path)):
             if found.ticks:
                 return found.discretized().without(self.held(found))
-        if is_sampled(found, model, model.real_outputs, lambda: next_event(instance)):
+        if is_sampled(found, model, model.real_outputs, self.next_event):
             raise UserError(f"{self.fmu.path}: {why_sampled(model)}")
         return found.without(self.held(found))
-
-
-def next_event(instance: Instance) -> float | None:
-    """Return the time of the next time event in s; None for co-simulation."""
-    return getattr(instance, "next_event", None)
 
 
 def known_variable(model: Model, name: str, where: str) -> Variable:
@@ -461,12 +460,11 @@ def held_states(found: Linear, model: Model) -> list[str]:
 
 def why_sampled(model: Model, way_out: str = "") -> str:
     """Say that an FMU is sampled, which needs a discrete model, and what to do."""
-    own = ", ".join(sampler.name for sampler in samplers(model))
     every = (n for n, v in model.variables.items() if "sample" in n and v.is_a(PARAMETERS))
-    switch = "" if own else next(every, "")
+    switch = next(every, "")
     ways = ", or ".join(filter(None, [switch and f"set {switch} to 0", way_out]))
     why = "which no linear model in continuous time can be"
-    return f"is sampled{own and f' by {own}'}, {why}{ways and f': {ways}'}"
+    return f"is sampled, {why}{ways and f': {ways}'}"
 
 
 def is_sampled(
@@ -474,11 +472,9 @@ def is_sampled(
 ) -> bool:
     """Return whether `outputs` follow inputs only at ticks.
 
-    It is so if it has samplers, if all that depend on inputs are discrete, or do not change with
-    them now while the FMU announces a time event.
+    It is so if all that depend on inputs are discrete, or do not change with them now while the
+    FMU announces a time event.
     """
-    if samplers(model):
-        return True
     following = [name for name in outputs if _depends_on_inputs(model, name)]
     rows = [found.outputs.index(name) for name in following if name in found.outputs]
     if not following or not rows:

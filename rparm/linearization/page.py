@@ -145,6 +145,7 @@ def notes(found: Study) -> list[str]:
         texts.append(
             f"Sampled every {milliseconds(linear.dt)} by {names}. States are those just before the "
             "first tick of a period, outputs those just after it; inputs are held in between."
+            + (" Connections act at once: not a communication step late." if found.variant else "")
         )
     if linear.held:
         texts.append(

@@ -50,6 +50,7 @@ class Tick:
     offset: float  # s, after the start
     rows: list[int]  # the states, (r,)
     partials: np.ndarray  # of the new values by states and inputs, (r, n + m)
+    late: np.ndarray  # the part of it that other ticks of the instant do not change
     changes: dict[str, float]  # new value less the present one, by state
     modes: list[str]  # others that it changes here
 
@@ -98,6 +99,7 @@ def ticks(
                 values[sampler.times["offset"]],
                 [states.index(name) for name in targets],
                 instance.partials([sampler.new[name] for name in targets], [*states, *inputs]),
+                np.zeros((len(targets), len(states) + len(inputs))),
                 {name: new[name] - values[name] for name in targets},
                 [name for name in new if name not in states and new[name]],
             )
@@ -156,8 +158,9 @@ def period(A: np.ndarray, B: np.ndarray, every: Sequence[Tick]) -> tuple[np.ndar
     instants = _instants(every)
     ends = [time for time, _ in instants[1:]] + [instants[0][0] + every[0].every]
     for (time, here), end in zip(instants, ends, strict=True):
+        before = whole.copy()
         for tick in here:
-            whole[tick.rows] = tick.partials @ whole
+            whole[tick.rows] = tick.partials @ whole + tick.late @ (before - whole)
         first = whole.copy() if first is None else first
         transition, forced, _ = hold(A, B, end - time)
         whole[:n] = np.hstack([transition, forced]) @ whole

@@ -96,24 +96,26 @@ def of_system(opened: OpenedSystem, request: Request) -> Study:
         subject = stack.enter_context(made)
         trimmed = _point(subject, request)
         parts = subject.parts(trimmed.values)
-        held = subject.held(parts)
+        held, all_parts = subject.held(parts), parts
         parts = {name: part.without(held[name]) for name, part in parts.items()}
-        if subject.python:
+        if ticks := any(part.ticks for part in parts.values()):
+            whole = subject.joined(all_parts, held)
+        elif subject.python:
             feeding = [c.start for c in subject.connections]
             whole = sampled(parts, subject.kept, opened.system.step, feeding)
         else:
             whole = connected(parts, subject.kept)
         found = _chosen(whole, trimmed, request)
         units = _units(subject, found)
+        limits: dict[str, Any] = {}
         if subject.cut is not None:
-            source = subject.cut.start
-            loop = open_loop(whole.select([request.cut], [source]))
+            loop = open_loop(whole.select([request.cut], [subject.cut.start]))
             limits = {"loop": loop, "margins": margins(loop)}
-        else:
+        elif not ticks:
             steps = largest_steps(parts, subject.connections, subject.ways, subject.law)
             limits = {"largest": steps}
-        python = tuple(subject.python)
-        return Study(path, found, units, request.free, variant, python=python, **limits)
+        limits["python"] = tuple(subject.python)
+        return Study(path, found, units, request.free, variant, **limits)
 
 
 def _path(request: Request) -> Path:

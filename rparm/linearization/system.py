@@ -1,22 +1,24 @@
 """Linear models of systems: their FMUs' models, joined by the connections."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from rparm.errors import UserError, hint
+from rparm.errors import UserError, hint, placed
 from rparm.files import UnreadableError
 from rparm.fmi.fmu_file import MODEL_EXCHANGE, Fmu
 from rparm.fmi.model import Value, Variable
 from rparm.linearization import linear
-from rparm.linearization.sampling import hold
+from rparm.linearization.sampling import Tick, hold, samplers
 from rparm.systems import master
-from rparm.systems.master import Master
+from rparm.systems.master import ConnectedInstance, Master
 from rparm.systems.python_component import PythonComponent, PythonInstance
 from rparm.systems.structure import Connection, OpenedSystem
 
+SAME = 1e-9  # of the largest entry: a model that is another one but for rounding
 NEGLIGIBLE = 1e-14  # of the largest entries of row and column: rounding
 
 
@@ -86,15 +88,57 @@ class SystemSubject(ExitStack):
                     self._laws[name] = instance, instance.numbers[: len(instance.made.inputs)]
                     found[name] = self.law(name, self.ssp.system.step)
                     continue
-                part = linear.linear_model(instance)
-                self._refuse_sampled(name, part, parameters.get(name, {}))
-                found[name] = part
+                given = parameters.get(name, {})
+                if not samplers(instance.fmu.model):
+                    found[name] = linear.linear_model(instance)
+                    self._refuse_sampled(component, found[name], given)
+                    continue
+                if self.python:
+                    wrong = f"{name!r} has samplers, and {self.python[0]!r} is in Python"
+                    raise UserError(f"{self.ssp.path}: {wrong}: expected one of both")
+                found[name], _ = self._exchanged(component, given)
         return found
+
+    def _exchanged(
+        self, component: ConnectedInstance, given: Mapping[str, Value]
+    ) -> tuple[linear.Linear, float | None]:
+        """Linearize a component by model exchange, before samplers tick; with its time event."""
+        name, instance = component.name, component.instance
+        values = {n: master.start_value(instance.fmu, name, n, v) for n, v in given.items()}
+        component.inputs.get()
+        values |= zip(component.inputs.names, component.inputs.view.tolist(), strict=True)
+        for c in self.connections:
+            if c.end_component == name and c.end_connector not in values:
+                values[c.end_connector] = instance.discrete(c.end_connector)
+        with (
+            Fmu(self.ssp.fmu(name), kind=MODEL_EXCHANGE) as fmu,
+            linear.FmuSubject(fmu, self.time) as subject,
+        ):
+            return subject.at(values), subject.next_event()
 
     def law(self, name: str, step: float) -> linear.Linear:
         """Linearize a component in Python at the point of `parts`, called every `step` s."""
         instance, inputs = self._laws[name]
         return linear.law_model(instance, self.time, step, inputs)
+
+    def joined(
+        self, parts: Mapping[str, linear.Linear], held: Mapping[str, list[str]]
+    ) -> linear.Linear:
+        """Join parts of which some tick, as a discrete model, without held states."""
+        with placed(self.ssp.path):
+            found, whole = (
+                connected(parts, connections)
+                .discretized()
+                .without(f"{name}.{x}" for name in held for x in held[name])
+                for connections in (self.kept, self.connections)
+            )
+        if self.cut is not None:
+            one, size = found.select([self.cut.end], [self.cut.start]), np.abs(whole.A).max()
+            back = (1 - one.D) * (whole.A - found.A)
+            if not np.allclose(back, one.B @ one.C, rtol=0, atol=SAME * size):
+                wrong = f"{self.cut.end} does not see {self.cut.start} once a period, just after"
+                raise UserError(f"--break: {wrong} the first tick: break at what that sets")
+        return found
 
     def at(self, values: Mapping[str, Value]) -> linear.Linear:
         """Linearize at values of parameters and states, held ones too, with all loops closed."""
@@ -133,15 +177,20 @@ class SystemSubject(ExitStack):
             merged[component][variable] = value
         return merged
 
-    def _refuse_sampled(self, name: str, part: linear.Linear, values: Mapping[str, Value]) -> None:
+    def _refuse_sampled(
+        self, component: ConnectedInstance, part: linear.Linear, given: Mapping[str, Value]
+    ) -> None:
+        name, model = component.name, component.instance.fmu.model
         feeding = [c.start_connector for c in self.connections if c.start_component == name]
-        outputs = [output for output in feeding if self._is_real(name, output)]
+        outputs = [output for output in feeding if model.variables[output].type == "Real"]
 
         def announced() -> float | None:
-            return _next_event(self.ssp, name, values, self.time)
+            with suppress(UserError, UnreadableError):  # it may be for co-simulation alone
+                return self._exchanged(component, given)[1]
+            return None
 
-        if linear.is_sampled(part, self.ssp.models[name], outputs, announced):
-            wrong = linear.why_sampled(self.ssp.models[name], self._way_out(name))
+        if linear.is_sampled(part, model, outputs, announced):
+            wrong = linear.why_sampled(model, self._way_out(name))
             raise UserError(f"{self.ssp.path}: component {name!r} {wrong}")
 
     def _way_out(self, name: str) -> str:
@@ -150,9 +199,6 @@ class SystemSubject(ExitStack):
         except UserError:
             return ""
         return f"take it as ideal by --without {name}"
-
-    def _is_real(self, component: str, output: str) -> bool:
-        return self.ssp.models[component].variables[output].type == "Real"
 
 
 def bypassed(ssp: OpenedSystem, connections: Sequence[Connection], name: str) -> list[Connection]:
@@ -173,23 +219,6 @@ def bypassed(ssp: OpenedSystem, connections: Sequence[Connection], name: str) ->
     return result
 
 
-def _next_event(
-    ssp: OpenedSystem, name: str, values: Mapping[str, Value], time: float
-) -> float | None:
-    """Return the first time event of a component, if its FMU is for model exchange, too."""
-    try:
-        fmu = Fmu(ssp.fmu(name), kind=MODEL_EXCHANGE)
-    except (UserError, UnreadableError):
-        return None
-    with fmu, fmu.instance(name) as instance:
-        instance.set_up(time, None)
-        for variable, value in values.items():
-            instance.set(variable, value)
-        instance.enter_initialization()
-        instance.exit_initialization()
-        return linear.next_event(instance)
-
-
 # ---- Connections ---------------------------------------------------------------------------------
 def connected(
     parts: Mapping[str, linear.Linear], connections: Iterable[Connection]
@@ -205,28 +234,52 @@ def connected(
     A, B, C, D = map(_diagonal, zip(*map(_clear, parts.values()), strict=True))
     _refuse_algebraic_loop(outputs, D @ fed)
     solved, terms = _solved(D @ fed), _solved(np.abs(D) @ fed)
-    back, back_terms = B @ fed @ solved, np.abs(B) @ fed @ terms
+    into = fed @ solved
+    back, back_terms = B @ into, np.abs(B) @ fed @ terms
     return linear.Linear(
-        states=tuple(f"{name}.{x}" for name, part in parts.items() for x in part.states),
-        inputs=tuple(inputs),
-        outputs=tuple(outputs),
         A=linear.cleared(A + back @ C, np.abs(A) + back_terms @ np.abs(C)),
         B=linear.cleared(B + back @ D, np.abs(B) + back_terms @ np.abs(D)),
         C=linear.cleared(solved @ C, terms @ np.abs(C)),
         D=linear.cleared(solved @ D, terms @ np.abs(D)),
-        **{
-            key: np.concatenate([getattr(part, key) for part in parts.values()])
-            for key in ("x", "u", "y", "rates")
-        },
-        at={f"{name}.{v}": value for name, part in parts.items() for v, value in part.at.items()},
-        held=tuple(f"{name}.{x}" for name, part in parts.items() for x in part.held),
-        flat=tuple(
-            text.replace(" in ", f" in {name}.")
-            for name, part in parts.items()
-            for text in part.flat
-        ),
-        left_out=tuple(f"{name}.{y}" for name, part in parts.items() for y in part.left_out),
+        **_joined(parts),
+        ticks=_ticks(parts, np.hstack([into @ C, np.eye(len(inputs)) + into @ D])),
     )
+
+
+def _joined(parts: Mapping[str, linear.Linear]) -> dict[str, Any]:
+    """Return what linear models have side by side."""
+    numbers = {
+        key: np.concatenate([getattr(part, key) for part in parts.values()])
+        for key in ("x", "u", "y", "rates")
+    }
+    at = {f"{name}.{v}": value for name, part in parts.items() for v, value in part.at.items()}
+    flat = [f.replace(" in ", f" in {name}.") for name, part in parts.items() for f in part.flat]
+    listed = {
+        kind: tuple(f"{name}.{v}" for name, part in parts.items() for v in getattr(part, kind))
+        for kind in ("states", "inputs", "outputs", "held", "left_out")
+    }
+    return numbers | listed | {"at": at, "flat": tuple(flat)}
+
+
+def _ticks(parts: Mapping[str, linear.Linear], fed: np.ndarray) -> tuple[Tick, ...]:
+    """Return the ticks of all; `fed`: inputs by all states and inputs, (m, n + m).
+
+    A tick sees other components as they were before all ticks of its instant.
+    """
+    found, n, m = [], 0, 0
+    for name, part in parts.items():
+        own, ends = len(part.states), len(part.inputs)
+        for tick in part.ticks:
+            late = tick.partials[:, own:] @ fed[m : m + ends]
+            partials = late.copy()
+            partials[:, n : n + own] += tick.partials[:, :own]
+            rows, label = [n + row for row in tick.rows], f"{name}.{tick.name}"
+            changes = {f"{name}.{x}": change for x, change in tick.changes.items()}
+            modes = [f"{name}.{mode}" for mode in tick.modes]
+            made = Tick(label, tick.every, tick.offset, rows, partials, late, changes, modes)
+            found.append(made)
+        n, m = n + own, m + ends
+    return tuple(found)
 
 
 def sampled(
@@ -255,29 +308,18 @@ def sampled(
     at_once = np.where(late[:, None], 0.0, D)
     x = np.hstack([A, np.zeros((n, k))]) + B @ u
     whole, terms = np.vstack([x, C[late] @ x + D[late] @ u]), np.abs(np.vstack([x, C[late] @ x]))
-    joined = {
-        key: np.concatenate([getattr(part, key) for part in parts.values()])
-        for key in ("x", "u", "y", "rates")
-    }
+    joined = _joined(parts)
     return linear.Linear(
-        states=(
-            *(f"{name}.{x}" for name, part in parts.items() for x in part.states),
-            *(name for name, is_late in zip(outputs, late, strict=True) if is_late),
-        ),
-        inputs=tuple(inputs),
-        outputs=tuple(outputs),
         A=linear.cleared(whole, terms),
         B=np.vstack([B, C[late] @ B + D[late]]),
         C=y + at_once @ u,
         D=at_once,
         **joined
         | {
+            "states": (*joined["states"], *np.array(outputs, object)[late]),
             "x": np.append(joined["x"], joined["y"][late]),
             "rates": np.append(joined["rates"], np.zeros(k)),
         },
-        at={f"{name}.{v}": value for name, part in parts.items() for v, value in part.at.items()},
-        held=tuple(f"{name}.{x}" for name, part in parts.items() for x in part.held),
-        left_out=tuple(f"{name}.{y}" for name, part in parts.items() for y in part.left_out),
         dt=step,
     )
 

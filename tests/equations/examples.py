@@ -9,6 +9,7 @@ from shutil import copy
 import fmpy
 import numpy as np
 from fmpy.fmi2 import FMU2Slave
+from scipy.linalg import expm
 
 from tests.support.instances import Instance, LoadedFmu
 from tests.support.paths import ROOT
@@ -33,11 +34,22 @@ def build(path: Path, output: Path, *options: str) -> Path:
 @cache
 def example(name: str, folder: Path) -> Path:
     """The FMU of an example."""
-    output = folder / name
+    output, path = folder / name.replace("/", "_"), FOLDER / f"{name}.toml"
     output.mkdir(exist_ok=True)
-    for suffix in (".toml", ".lock.toml"):
-        copy(FOLDER / f"{name}{suffix}", output)
-    return build(output / f"{name}.toml", output)
+    for file in (path, path.with_suffix(".lock.toml")):
+        copy(file, output)
+    return build(output / path.name, output)
+
+
+def axis(h: float, *values: float) -> tuple[np.ndarray, np.ndarray]:
+    """A tick of this example, and a period h (s), of x, v, y, w, u, sum, last, target, load."""
+    M, m, k, c, Kp, Kd, Ki = values
+    tick, rates, belt = np.eye(9), np.zeros((9, 9)), np.array([k, c, -k, -c])
+    tick[4, 4] = tick[6, 6] = 0
+    tick[4:7, [0, 5, 6, 7]] = [[-Kp - Kd / h, 1, Kd / h, Kp], [-Ki * h, 1, 0, Ki * h], [1, 0, 0, 0]]
+    rates[[0, 2], [1, 3]] = 1
+    rates[1, :5], rates[3, :4], rates[3, 8] = [*-belt / M, 1 / M], belt / m, -1 / m
+    return tick, expm(rates * h)
 
 
 def simulated(

@@ -1,6 +1,7 @@
 """Files with samplers: their ticks, and models that only sampling makes possible."""
 
 import ctypes
+from functools import partial
 from pathlib import Path
 
 import fmpy
@@ -8,12 +9,12 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model, FMU2Slave
-from scipy.linalg import expm
 
 from tests.equations.compiled import Model
-from tests.equations.examples import METHODS, MODELS, initializing, made, simulated
+from tests.equations.examples import METHODS, MODELS, axis, example, initializing, made, simulated
 
 TEXTS = MODELS["sampled"]
+AXIS = partial(example, "axis")
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 
 
@@ -42,52 +43,25 @@ def test_ticks_do_not_drift_in_a_thousand_million(tmp_path: Path) -> None:
         assert model.next_time(values) == start + (0.0 + k * every)
 
 
-def pid(stop: float, m: float = 1.3, period: float = 0.01) -> np.ndarray:
-    """x, v, u at the ticks, by the exponential of the motion under a constant force."""
-    exponential = expm(np.array([[0, 1, 0], [0, 0, 1 / m], [0, 0, 0]]) * period)
-    state, total, last, rows = np.zeros(2), 0.0, 0.0, []
-    for _ in range(round(stop / period) + 1):
-        error = 1.0 - state[0]
-        force = 20.0 * error + total - 6.0 * (state[0] - last) / period
-        total, last = total + 10.0 * period * error, state[0]
-        rows.append([*state, force])
-        state = (exponential @ [*state, force])[:2]
-    return np.array(rows)
+def on_axis(stop: float) -> np.ndarray:
+    """x, v, y, w, u at the ticks until a time, just after each."""
+    tick, motion = axis(0.002, 1.3, 2.5, 9e3, 25.0, 900.0, 60.0, 3000.0)
+    rows = [tick @ [0, 0, 0, 0, 0, 0, 0, 0.1, 0]]
+    for _ in range(round(stop / 0.002)):
+        rows.append(tick @ motion @ rows[-1])
+    return np.array(rows)[:, :5]
 
 
 @EACH_METHOD
-@pytest.mark.parametrize("step", [0.01, 0.1, 0.025])
-def test_a_sampled_pid_controller_moves_a_mass(folder: Path, method: int, step: float) -> None:
-    run = simulated(
-        made(folder, TEXTS["PID"]), 4.0, step, {"solver_method": method}, relative_tolerance=1e-10
-    )
-    rows = np.round(run["time"] / 0.01, 6)
-    exact = pid(4.0)[rows[rows == np.round(rows)].astype(int)]
-    found = np.stack([run[name] for name in ("x", "v")], axis=1)[rows == np.round(rows)]
-    assert np.max(np.abs(found - exact[:, :2])) < 1e-9
-    assert np.max(np.abs(run["u"][rows == np.round(rows)] - exact[:, 2])) < 1e-7
-
-
-def current(t: float, duty: float, R: float = 2.0, L: float = 5e-3) -> float:
-    """Current at the time t, period by period."""
-    i, period = 0.0, 1e-3
-    for k in range(int(t / period) + 1):
-        for goal, length in ((24.0 / R, duty * period), (0.0, (1 - duty) * period)):
-            left = max(0.0, min(length, t - k * period - (duty * period if goal == 0 else 0)))
-            i = goal + (i - goal) * np.exp(-left * R / L)
-    return i
-
-
-@EACH_METHOD
-@pytest.mark.parametrize("duty", [0.3, 0.0])
-def test_a_pwm_drive_charges_a_coil(folder: Path, method: int, duty: float) -> None:
-    """At a duty of 0 both samplers tick at one instant: the second one has the last word."""
-    run = simulated(
-        made(folder, TEXTS["PWM"]), 0.02, 3.7e-4, {"solver_method": method, "duty": duty},
-        relative_tolerance=1e-11,
-    )  # fmt: skip
-    exact = [current(t, duty) for t in run["time"]]
-    assert np.max(np.abs(run["i"] - exact)) < 1e-9
+@pytest.mark.parametrize("step", [0.002, 0.02, 0.005])
+def test_a_sampled_pid_controller_moves_an_axis(folder: Path, method: int, step: float) -> None:
+    options = {"solver_method": method}
+    run = simulated(AXIS(folder), 1.0, step, options, relative_tolerance=1e-11)
+    rows = np.round(run["time"] / 0.002, 6)
+    at_ticks = rows == np.round(rows)
+    found = np.stack([run[name] for name in "xvywu"], axis=1)[at_ticks]
+    differences = np.abs(found - on_axis(1.0)[rows[at_ticks].astype(int)]).max(axis=0)
+    assert np.all(differences < [1e-9, 1e-9, 1e-9, 1e-9, 1e-6])
 
 
 @EACH_METHOD
@@ -120,19 +94,19 @@ def test_a_digital_filter_has_no_states(folder: Path) -> None:
         )
 
 
-def test_an_importer_that_moves_the_mass_itself_gets_all_ticks(folder: Path) -> None:
+def test_an_importer_that_moves_the_axis_itself_gets_all_ticks(folder: Path) -> None:
     """Model Exchange: tick k is due at k Ts, and the force follows from the states set there."""
-    begun, rows = initializing(made(folder, TEXTS["PID"]), FMU2Model), pid(1.0)
+    begun, rows = initializing(AXIS(folder), FMU2Model), on_axis(0.2)
     instance, reference = begun.fmi, begun.loaded.references["u"]
     instance.exitInitializationMode()
-    for k, (_, _, force) in enumerate(rows[:-1]):
+    for k, (*_, force) in enumerate(rows[:-1]):
         needed, terminates, _, changed, is_defined, time = instance.newDiscreteStates()
         assert (needed, terminates, changed, is_defined) == (False, False, False, True)
-        assert time == 0.01 * (k + 1)
+        assert time == 0.002 * (k + 1)
         assert instance.getReal([reference])[0] == pytest.approx(force, abs=1e-12)
         instance.enterContinuousTimeMode()
         instance.setTime(time)
-        instance.setContinuousStates((ctypes.c_double * 2)(*rows[k + 1, :2]), 2)
+        instance.setContinuousStates((ctypes.c_double * 4)(*rows[k + 1, :4]), 4)
         assert instance.getReal([reference])[0] == pytest.approx(force, abs=1e-12)
         instance.enterEventMode()
     instance.terminate()
@@ -140,11 +114,11 @@ def test_an_importer_that_moves_the_mass_itself_gets_all_ticks(folder: Path) -> 
 
 
 def test_ticks_survive_a_rollback_and_a_move_to_another_instance(folder: Path) -> None:
-    fmu = made(folder, TEXTS["PID"])
+    fmu = AXIS(folder)
     begun = initializing(fmu), initializing(fmu)
     first, second = (instance.fmi for instance in begun)
     names = begun[0].loaded.references
-    references = [names[name] for name in ("x", "v", "u", "sum", "last")]
+    references = [names[name] for name in ("x", "v", "y", "w", "u", "sum", "last")]
     for instance in (first, second):
         instance.exitInitializationMode()
     at = [0.0]
@@ -175,11 +149,11 @@ def test_start_values_of_discrete_variables_and_periods_can_be_set(folder: Path)
     ("start", "message"),
     [
         ({"Ts": 1e-6, "time": 1e9}, "sampler control: every = 1e-06 s is refused"),
-        ({"Kp": 1e308, "target": 1e308}, "sampler control: u = Kp * error + sum - Kd"),
+        ({"Kp": 1e308, "target": 1e308}, "sampler control: u = Kp * (target - x) + sum - Kd"),
     ],
 )
 def test_a_sampler_that_fails_is_named(folder: Path, start: dict[str, float], message: str) -> None:
-    fmu, logged = made(folder, TEXTS["PID"]), []
+    fmu, logged = AXIS(folder), []
     options = {"start_time": start.pop("time", 0.0)}
     with pytest.raises(FMICallException):
         fmpy.simulate_fmu(

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -15,14 +14,10 @@ from rparm.errors import UserError
 from rparm.fmi.fmu_file import CO_SIMULATION
 from rparm.linearization.responses import frequency_response
 from rparm.linearization.study import Request, study
-from tests.equations.examples import MODELS, made
+from tests.equations.examples import FOLDER, MODELS, axis, example, made
 
 TEXTS = MODELS["samplers"] | MODELS["sampled"]
-SYSTEM = """<SystemStructureDescription version="1.0" name="One"
-  xmlns="http://ssp-standard.org/SSP1/SystemStructureDescription">
-  <System name="One"><Elements><Component name="loop" source="resources/Deadbeat.fmu">
-  <Connectors><Connector name="r" kind="input"/></Connectors></Component></Elements></System>
-</SystemStructureDescription>"""
+TEXTS |= {n.upper(): (FOLDER / f"{n}.toml").read_text(encoding="utf-8") for n in ("axis", "pwm")}
 
 
 @pytest.fixture(scope="module")
@@ -46,18 +41,17 @@ def test_deadbeat_control_of_a_double_integrator_settles_in_two_samples(folder: 
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_a_sampled_pid_controller_of_a_mass(folder: Path, fmi: int) -> None:
-    path, h, m, Kp, Kd, Ki = made(folder, TEXTS["PID"]), 0.08, 0.7, 11.0, 2.0, 4.0
-    at = {"Ts": h, "m": m, "Kp": Kp, "Kd": Kd, "Ki": Ki, "target": 0.2}
+def test_a_sampled_pid_controller_of_an_axis(folder: Path, fmi: int) -> None:
+    path, h = example("axis", folder), 0.03
+    at = {"M": 0.7, "m": 1.9, "k": 400.0, "c": 11.0, "Kp": 11.0, "Kd": 2.0, "Ki": 4.0}
     path = path if fmi == 2 else path.parent / "fmi3" / path.name
-    found = rparm.linearize(path, at=at, trim=["x", "u", "sum", "last"])
-    assert found.states == ("x", "v", "u", "sum", "last")
-    assert found.x == pytest.approx([0.2, 0, 0, 0, 0.2], abs=1e-10)
-    tick, rates = np.eye(5), np.zeros((5, 5))
-    tick[2:] = [[-Kp - Kd / h, 0, 0, 1, Kd / h], [-Ki * h, 0, 0, 1, 0], [1, 0, 0, 0, 0]]
-    rates[0, 1], rates[1, 2] = 1, 1 / m
-    assert_close(found.A, expm(rates * h) @ tick)
-    assert_close(found.C, tick)
+    point = {"Ts": h, "target": 0.2}
+    found = rparm.linearize(path, at=at | point, trim=["x", "y", "u", "sum", "last"])
+    assert found.states == ("x", "v", "y", "w", "u", "sum", "last")
+    assert found.x == pytest.approx([0.2, 0, 0.2, 0, 0, 0, 0.2], abs=1e-10)
+    tick, motion = axis(h, *at.values())
+    assert_close(np.hstack([found.A, found.B]), (motion @ tick)[:7])
+    assert_close(np.hstack([found.C, found.D]), tick[:7])
 
 
 def crane(z: np.ndarray, h: float, r: float) -> np.ndarray:
@@ -151,7 +145,11 @@ REFUSED = {
     ),
     "condition": ("TWO", {"at": {"x[1]": 2.0}}, r"sampler s\[1\] changes on, level at this point"),
     "no value": ("LIMITED", {"at": {"x": 1.5}}, "sampler s: the new value of u is not finite"),
-    "no point": ("PID", {"trim": ["x", "u"]}, "found by x, u: sampler control changes sum by"),
+    "no point": (
+        "AXIS",
+        {"trim": ["x", "y", "u"]},
+        "found by x, u: sampler control changes sum by",
+    ),
     "moving": ("DEADBEAT", {"at": {"r": 1}, "trim": ["x2", "u"]}, "the derivative of x1 stays at"),
     "sampled twice": ("DEADBEAT", {}, "step: the model is sampled already, every 1 s"),
 }
@@ -171,17 +169,25 @@ def test_a_condition_is_taken_as_it_is_at_the_point(folder: Path) -> None:
     assert_close(found.A, block_diag(np.exp(-1), 1))
 
 
-def test_what_has_no_discrete_model_says_what_to_do(folder: Path, tmp_path: Path) -> None:
+def test_what_has_no_discrete_model_says_what_to_do(folder: Path) -> None:
     with pytest.raises(UserError, match="has samplers: linearize it in model exchange"):
         study(Request(made(folder, TEXTS["DEADBEAT"]), kind=CO_SIMULATION))
-    with pytest.raises(UserError, match="can be: set sample_time to 0$"):
-        rparm.linearize("RPSensor", at={"q1": 1})
-    path = tmp_path / "One.ssp"
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("SystemStructure.ssd", SYSTEM)
-        archive.write(made(folder, TEXTS["DEADBEAT"]), "resources/Deadbeat.fmu")
-    with pytest.raises(UserError, match="'loop' is sampled by feedback, which [^:]*: take it as"):
-        rparm.linearize(path)
+
+
+@pytest.mark.parametrize(("old", "new", "cut", "message"), MODELS["loop"]["cases"])
+def test_a_tick_sees_what_other_components_were_before(
+    tmp_path: Path, old: str, new: str, cut: str, message: str
+) -> None:
+    """u = -1.5 x of a sample earlier."""
+    for name, text in MODELS["loop"]["files"].items():
+        (tmp_path / name).write_text(text.replace(old, new), encoding="utf-8")
+    request = Request(tmp_path / "loop.toml", cut=cut)
+    if message:
+        with pytest.raises(UserError, match=message):
+            study(request)
+    else:
+        a, poles = np.exp(-0.2), study(request).linear.poles
+        np.testing.assert_allclose(np.poly(poles), [1, -a, 1.5 * (1 - a), 0], atol=1e-12)
 
 
 @pytest.mark.parametrize("version", ["", "fmi3"])

@@ -16,6 +16,7 @@ from rparm.linearization.system import SystemSubject, connected, looped
 from rparm.systems import ssp
 from rparm.systems.opened import opened as open_system
 from rparm.systems.structure import Connection
+from tests.equations.examples import MODELS
 
 
 @contextmanager
@@ -124,9 +125,8 @@ def test_refused(options: dict, message: str) -> None:
 
 @pytest.mark.parametrize("name", ["RPSensor", "RPController"])
 def test_a_sampled_fmu_is_refused(name: str) -> None:
-    at = {"sample_time": "1 ms"}
-    with pytest.raises(UserError, match="is sampled"):
-        study(Request(name, at=at))
+    with pytest.raises(UserError, match="is sampled, .* can be: set sample_time to 0$"):
+        study(Request(name, at={"sample_time": "1 ms"}))
 
 
 def test_a_system_is_trimmed_with_all_loops_closed() -> None:
@@ -189,35 +189,40 @@ class Pid:
 """
 
 
-def python_loop(fmu: Path, folder: Path, code: str = PID, step: float = 0.05) -> Path:
+def sampled_loop(fmu: Path, folder: Path, code: str = PID, step: float = 0.05) -> Path:
     """A file with the arm that lies flat: its slider alone is a double integrator."""
-    (folder / "pid.py").write_text(code, encoding="utf-8")
+    law = "pid.py" if "class" in code else "pid.toml"
+    gains = 'file = "gains.json"\n' if "class" in code else ""
+    (folder / law).write_text(code, encoding="utf-8")
     (folder / "gains.json").write_text(f'{{"pid": {{"gains": [{KP}, {KI}, {KD}]}}}}')
     file = folder / "loop.toml"
     file.write_text(
         f'name = "Loop"\nstep = {step}\nstop = 1\n'
-        f'[components]\narm = "{fmu.as_posix()}"\npid = "pid.py"\n'
+        f'[components]\narm = "{fmu.as_posix()}"\npid = "{law}"\n'
         '[connections]\n"arm.f2" = "pid.f2"\n"pid.q2" = "arm.q2"\n'
-        f'[parameters]\nfile = "gains.json"\n"arm.m2" = {MASS}\n"arm.g" = 0\n"arm.a" = 0\n'
+        f'[parameters]\n{gains}"arm.m2" = {MASS}\n"arm.g" = 0\n"arm.a" = 0\n'
     )
     return file
 
 
-def pid_loop(h: float) -> control.TransferFunction:
-    """L by hand: held force on a mass, a delay of one step, sums and differences of positions."""
+def pid_loop(h: float, late: int = 1) -> control.TransferFunction:
+    """L by hand: held force on a mass, steps of delay, sums and differences of positions."""
     sums = np.polyadd([KP, -KP, 0.0], [KI * h, 0.0, 0.0])
     law = np.polyadd(sums, KD / h * np.array([1.0, -2.0, 1.0]))  # over z (z - 1)
     num = h * h / 2 / MASS * np.polymul([1.0, 1.0], law)
-    return control.tf(num, np.poly([1.0, 1.0, 1.0, 0.0, 0.0]), h)
+    return control.tf(num, np.poly([1.0, 1.0, 1.0, 0.0, *[0.0] * late]), h)
 
 
-def test_a_law_in_python_has_poles_and_margins_of_its_z_transform(
-    fmu: Path, tmp_path: Path
+@pytest.mark.parametrize("late", [0, 1], ids=["samplers", "python"])
+def test_a_sampled_law_has_poles_and_margins_of_its_z_transform(
+    fmu: Path, tmp_path: Path, late: int
 ) -> None:
-    file, L = python_loop(fmu, tmp_path), pid_loop(0.05)
+    """Python acts a step late, samplers at once; no tick reads the force of before."""
+    code = PID if late else MODELS["samplers"]["LAW"]
+    file, L = sampled_loop(fmu, tmp_path, code), pid_loop(0.05, late)
     found = study(Request(file)).linear
     assert found.dt == 0.05
-    expected = [1.0, 1.0, *control.feedback(L).poles()]  # of the joint that nothing moves
+    expected = [1.0, 1.0, *control.feedback(L).poles(), *[0.0] * (1 - late)]  # 1: the other joint
 
     def size(pole: complex) -> tuple[float, float]:
         return round(abs(pole), 6), pole.imag
@@ -234,7 +239,7 @@ def test_the_largest_step_of_python_is_where_a_pole_leaves_the_circle(
     fmu: Path, tmp_path: Path
 ) -> None:
     """In Jacobi order; the law is called once a step, so it changes with the step, too."""
-    (jacobi, _) = study(Request(python_loop(fmu, tmp_path))).largest
+    (jacobi, _) = study(Request(sampled_loop(fmu, tmp_path))).largest
     assert (jacobi.order, jacobi.inputs) == ("jacobi", "held")
 
     def radius(h: float) -> float:
@@ -255,7 +260,7 @@ def test_the_largest_step_of_python_is_where_a_pole_leaves_the_circle(
 def test_a_law_without_a_linear_model_is_refused(
     fmu: Path, tmp_path: Path, old: str, new: str, message: str
 ) -> None:
-    file = python_loop(fmu, tmp_path, PID.replace(old, new))
+    file = sampled_loop(fmu, tmp_path, PID.replace(old, new))
     with pytest.raises(UserError, match=message):
         study(Request(file))
 
@@ -264,7 +269,7 @@ def test_a_law_that_bends_is_differentiated(fmu: Path, tmp_path: Path) -> None:
     """exp(5 x) - 1 at x = 0.1, from another variant's point."""
     text = PID.replace('-kp * inputs["q2"]', '-np.expm1(5.0 * inputs["q2"])')
     with (
-        open_system(python_loop(fmu, tmp_path, text)) as system,
+        open_system(sampled_loop(fmu, tmp_path, text)) as system,
         SystemSubject(system, "default") as subject,
     ):
         part = subject.parts({"arm.q2": 0.1})["pid"]
