@@ -25,9 +25,17 @@ MOST_NUMBERS = 10  # parameters, whose correlations are written into their cells
 
 
 def write(
-    found: Identification, folder: Path, model: Model, true: Mapping[str, float], again: str
-) -> pages.RunPage:
-    """Write the page MODEL.html and its picture into a folder; `again` is what makes it again."""
+    found: Identification,
+    folder: Path,
+    model: Model,
+    true: Mapping[str, float],
+    again: str,
+    root: str = "",
+) -> Path:
+    """Write the page and its picture into a folder; its path. `again` is what makes it again.
+
+    `root` leads from there to the start page, if there is one.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     picture = figure_of(found.whiteness, found.known, found.covariances.scatter)
     pages.save_figure(picture, folder / PICTURE)
@@ -49,8 +57,7 @@ def write(
         diagram=(PICTURE, "Autocorrelations of the residuals, correlations of the parameters"),
         again=again,
     )
-    pages.write_run(folder / f"{found.model}.html", page)
-    return page
+    return pages.write_alone(folder, page, root)
 
 
 # ---- Plots ---------------------------------------------------------------------------------------

@@ -73,12 +73,14 @@ ON_AXIS = 1e-7  # damping below which the peak of a pole is infinite: its height
 POLE_GAIN = 1e6  # gain beyond which a Nyquist diagram breaks its line: a pole may be on the axis
 
 
-def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
-    """Write page and pictures into a folder two below that of the start page; return the page.
+def write(folder: Path, found: Study, step: float | None, again: str, root: str = "") -> Path:
+    """Write page and pictures into a folder; return the page. `again` makes them again.
 
-    The command `again` makes them again.
+    `root` leads from there to the start page, if there is one.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    if not root:
+        pages.write_assets(folder)
     linear = found.linear
     parts: list[Part] = []
     if found.trimmed:
@@ -98,7 +100,7 @@ def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
     return pages.write_page(
         folder / pages.INDEX,
         "linearization.html",
-        root="../../",
+        root=root,
         title=f"{name}: linear model",
         about=ABOUT,
         again=again,
