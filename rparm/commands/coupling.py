@@ -13,7 +13,6 @@ from rparm.command_line import (
     add_step,
     add_system,
     file_or_name,
-    other_folder,
     retyped,
 )
 from rparm.console import Progress
@@ -120,7 +119,7 @@ def _halved(system: OpenedSystem, variant: str, options: argparse.Namespace) -> 
 
 
 def _again(options: argparse.Namespace, positional: Sequence[str | Path]) -> str:
-    given = {"ssp": options.ssp, "step": options.step} | other_folder(options.report, PART)
+    given = {"ssp": options.ssp, "step": options.step}
     given["fmi"] = options.fmi if options.fmi != project.VERSIONS[0] else None
     return retyped("coupling", positional, given)
 
