@@ -85,7 +85,8 @@ def _written(
     """Write the page, and its line on the start page with the first output."""
     from rparm.identification import page
 
-    again, output, first = _again(options), found.checked.outputs[0], range(found.of_first)
+    again, first = _again(options), range(found.of_first)
+    output = next(iter(found.checked.outputs))
     times = np.concatenate([found.segments[i].times for i in first])
     values = np.concatenate([found.predicted[i][:, 0] for i in first])
     return overview.write_in_folder(

@@ -228,7 +228,7 @@ def _runs(
     for scenario in chosen:
         ended, why = [], []
         for tolerance in dict.fromkeys(own[scenario]):
-            label = f"{scenario.name} at {tolerance:g}"
+            label = f"{scenario.name} at {short(tolerance)}"
             ahead = runs.steps_ahead(scenario, [tolerance], compared=True)
             found = _one(runs, failures, runs.compared, scenario, tolerance, label, ahead)
             ended += found

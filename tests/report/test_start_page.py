@@ -1,12 +1,14 @@
 """The start page: the door to the results of all commands in a folder."""
 
 import random
+from dataclasses import replace
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import lxml.html
 import pytest
 
+from tests.identification.synthetic import ARM, write
 from tests.report.conftest import CONTENT
 from tests.support.rparm_project import Console
 
@@ -14,9 +16,11 @@ LOOP = """name = "Bench"
 step = 0.01
 stop = 0.2
 [components]
-plant = "RPPlant"
-[inputs]
-"plant.tau1" = { constant = 20.0 }
+arm = "RPManipulator"
+control = "RPController"
+[connections]
+"control.q1" = "arm.q1"
+"arm.tau1" = "control.tau1"
 """
 CAMPAIGN = """title = "Payload"
 description = "Another second link."
@@ -29,6 +33,10 @@ uniform = [0.5, 1.5]
 [keep]
 final = ["q1"]
 """
+IDENTIFY = (
+    *("--inputs", "tau1", "f2", "--measured", "q1", "q2", "--parameters", "m2"),
+    *("--set", "I1z=0.12", "a=110mm", "l1=0.55"),
+)
 QUICK = "constant_effort_single_step"
 # a command -> the names of its results
 COMMANDS = {
@@ -38,7 +46,7 @@ COMMANDS = {
     ("coupling", "bench.toml"): ["Bench_default"],
     ("linearize", "RPPlant"): ["RPPlant"],
     ("linearize", "RPPlant", "--at", "q1=30deg"): ["RPPlant"],
-    ("identify", "--demo"): ["RPPlant"],
+    ("identify", "RPManipulator", "log.csv", *IDENTIFY): ["RPManipulator"],
     ("campaign", "payload.toml", "--workers", "1", "--no-dashboard"): ["payload"],
     ("campaign", "payload.toml", "--replay", "3"): ["run_3"],
     ("prove", QUICK): [QUICK],
@@ -59,6 +67,7 @@ def test_each_result_is_listed_once_and_opens(
     monkeypatch.chdir(tmp_path)
     for name, text in (("mine", CONTENT), ("bench", LOOP), ("payload", CAMPAIGN)):
         Path(f"{name}.toml").write_text(text, encoding="utf-8")
+    write(replace(ARM, duration=2.0), Path("log.csv"), 1)
     order = random.Random(45).sample(list(COMMANDS), len(COMMANDS))
     for command in order:
         code, out, err = console(*command, "--output", "all")
