@@ -88,7 +88,7 @@ def _halved(system: OpenedSystem, variant: str, options: argparse.Namespace) -> 
         console.remark(note)
     first = found[0]
     title = f"{name}, {variant}: errors of the coupling"
-    curves = [Curve(f"{x.order.replace('_', '-')}, {x.inputs}", x.errors) for x in found]
+    curves = [Curve(f"{x.order.replace('_', '-')}, {x.inputs}", x.errors[::-1]) for x in found]
     axis = Axis("communication step", "ms", log=True)
     plot = Plot("error of the coupling", "", curves, log=True)
     page = RunPage(
@@ -96,7 +96,7 @@ def _halved(system: OpenedSystem, variant: str, options: argparse.Namespace) -> 
         description=ABOUT,
         status=RAN,
         facts=[("system", name), ("variant", variant)],
-        data=RunData(title, "", 1e3 * first.steps, [plot], axis),
+        data=RunData(title, "", 1e3 * first.steps[::-1], [plot], axis),
         tables=tables,
         notes=[note] if note else [],
         again=_again(options, [file_or_name(options.what, SUFFIXES), variant]),

@@ -92,7 +92,7 @@ def _written(
     return overview.write_in_folder(
         project.results_folder(options.report), PART, found.model,
         lambda folder, root: page.write(found, folder, model, true, again, root),
-        title=", ".join(found.estimates), group=found.model, command=again,
+        title=f"Parameters: {', '.join(found.estimates)}", group=found.model, command=again,
         status=RAN if found.passed else FAILED, line=sparkline(times, values), line_of=output,
         line_text=f"Simulated {output}",
     )  # fmt: skip

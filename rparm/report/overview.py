@@ -166,7 +166,7 @@ def _all(report: Path) -> dict[str, Entry]:
 
 def _found(folder: Path) -> Iterator[tuple[Path, Entry]]:
     """Yield the entries whose pages are there, with their files; what is no entry is ignored."""
-    texts = [field.name for field in fields(Entry) if field.type == "str"]
+    texts = [field.name for field in fields(Entry) if field.type is str]
     for file in sorted(
         file for i in range(DEEPEST) for file in folder.glob("*/" * i + f"*{ENTRY}")
     ):
@@ -278,7 +278,7 @@ def sparkline(x: np.ndarray, y: np.ndarray) -> str:
 
 
 def _path(x: np.ndarray, y: np.ndarray) -> str:
-    return "M" + "L".join(f"{a:.4g} {b:.4g}" for a, b in zip(x, y, strict=True))
+    return "M" + "L".join(f"{a:.4g} {b:.4g}" for a, b in zip(x, y, strict=True)) + "h0"
 
 
 def sparkline_svg(x: np.ndarray, y: np.ndarray) -> str:

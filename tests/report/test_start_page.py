@@ -9,7 +9,8 @@ import lxml.html
 import pytest
 
 from tests.identification.synthetic import ARM, write
-from tests.report.conftest import CONTENT
+from tests.report.conftest import CONTENT, LATE, STRANGE, VARIANT
+from tests.support.browser import Browser
 from tests.support.rparm_project import Console
 
 LOOP = """name = "Bench"
@@ -21,6 +22,8 @@ control = "RPController"
 [connections]
 "control.q1" = "arm.q1"
 "arm.tau1" = "control.tau1"
+[parameters]
+"arm.q1" = 0.3
 """
 CAMPAIGN = """title = "Payload"
 description = "Another second link."
@@ -41,6 +44,7 @@ QUICK = "constant_effort_single_step"
 # a command -> the names of its results
 COMMANDS = {
     ("run", QUICK, "--tolerance", "1e-8"): [QUICK],
+    ("run", "late_start", "--tolerance", "1e-8"): ["late_start"],
     ("run", "mine.toml"): ["mine"],
     ("system", "bench.toml"): ["Bench_default"],
     ("coupling", "bench.toml"): ["Bench_default"],
@@ -69,7 +73,7 @@ def test_each_result_is_listed_once_and_opens(
         Path(f"{name}.toml").write_text(text, encoding="utf-8")
     write(replace(ARM, duration=2.0), Path("log.csv"), 1)
     order = random.Random(45).sample(list(COMMANDS), len(COMMANDS))
-    for command in order:
+    for command in (*order, order[0]):
         code, out, err = console(*command, "--output", "all")
         assert code == 0, (command, out, err)
         assert "all/" in out.splitlines()[-1] and " --open" in out.splitlines()[-1], command
@@ -83,3 +87,22 @@ def test_each_result_is_listed_once_and_opens(
         assert index in links(page), page
     for style in lxml.html.fromstring(index.read_bytes()).xpath("//link[@rel='stylesheet']/@href"):
         assert (index.parent / style).is_file()
+
+
+def test_it_searches_filters_and_sorts(browser: Browser, report: Path) -> None:
+    """Without scripts all lines are there; with them those that were asked for."""
+    browser.open(report / "index.html")
+    shown = (
+        "Object.entries(arguments[0]).forEach(([id, value]) => {"
+        " document.getElementById(id).value = value;"
+        " document.getElementById(id).dispatchEvent(new Event('input', {bubbles: true})); });"
+        "return [...document.querySelectorAll('.what a')].filter(x => x.offsetParent)"
+        ".map(x => x.innerText)"
+    )
+    every = browser.run(shown, {})
+    assert browser.run(shown, {"search": "LATE"}) == [LATE]
+    assert browser.run(shown, {"search": "", "verdict": "completed"}) == [STRANGE]
+    assert browser.run(shown, {"verdict": "", "kind": "system"}) == [VARIANT]
+    by_name = browser.run(shown, {"kind": "", "sort": "name"})
+    assert by_name == sorted(every, key=str.lower) != every
+    assert browser.run(shown, {"sort": ""}) == every
