@@ -230,6 +230,8 @@ def file_or_name(given: str, suffixes: Iterable[str]) -> str | Path:
 
 
 def _typed(value: object) -> str:
+    if isinstance(value, float):
+        return repr(value).replace("e-0", "e-")
     return str(project.from_root(value) if isinstance(value, Path) else value)
 
 

@@ -239,5 +239,5 @@ def verdict(passed: bool) -> str:
 
 
 def number(value: float) -> str:
-    """Write a number with at most nine digits."""
-    return f"{value:.9g}"
+    """Write a number with at most nine digits, 1e-8 for 1e-08."""
+    return f"{value:.9g}".replace("e-0", "e-")

@@ -7,12 +7,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from rparm import console, project
 from rparm.command_line import Ended, add_flag, add_output, count, number, retyped
 from rparm.console import Progress
 from rparm.errors import UserError, one_line
 from rparm.files import from_here, written
 from rparm.interruption import arrived
+from rparm.report import overview
+from rparm.report.overview import RAN, Entry, sparkline
 from rparm.runs.scenario import title
 
 if TYPE_CHECKING:
@@ -84,7 +88,9 @@ def do_campaign(options: argparse.Namespace) -> Ended:
             again = f"{_command(options)} --replay {options.replay}"
             one = work.replay(campaign, made.base, made.points, options.replay, folder, again)
             print(*one.lines, sep="\n")
-            verdict = f"failed: {one.failure}" if one.failure else f"ran: run {options.replay}"
+            verdict = (
+                f"failed: {one.failure}" if one.failure else f"completed: run {options.replay}"
+            )
             return Ended(1 if one.failure else 0, verdict, one.document, page=one.page)
         _run_missing(options, security, made)
         failed = results.failed()
@@ -102,6 +108,7 @@ def do_campaign(options: argparse.Namespace) -> Ended:
                 index = page.Page(campaign, made.job, results, units, _command(options)).write(
                     digest
                 )
+                _record(file.stem, made, index, _command(options), failed)
         except UserError:
             raise
         except Exception as error:  # the libraries that draw raise what they like
@@ -109,8 +116,20 @@ def do_campaign(options: argparse.Namespace) -> Ended:
                 f"{folder}: the page cannot be written: {type(error).__name__}: {one_line(error)}; "
                 "the results are complete"
             ) from error
-    print(f"page: {from_here(index)}")
     return Ended(0, verdict, {**document, "page": index.absolute()}, page=index)
+
+
+def _record(name: str, made: "Work", page: Path, command: str, failed: int) -> None:
+    """Put the campaign on the start page, with the distribution of its first result."""
+    count, kept = made.campaign.count, made.job.measures[0].column
+    values = np.sort(made.results.table([kept])[kept])
+    entry = Entry(
+        name, f"{made.campaign.title}: {count} runs" + f", {failed} failed" * bool(failed),
+        made.base.path.stem, page.name, RAN, command=command, line_of=f"distribution of {kept}",
+        line=sparkline(values, np.arange(count)), line_text=f"Runs with a smaller {kept}",
+    )  # fmt: skip
+    report = project.results_folder(page.parent)
+    overview.record(report, overview.CAMPAIGNS, [entry], page.parent)
 
 
 def _security(options: argparse.Namespace) -> "Security | None":

@@ -5,17 +5,22 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rparm import console, project
 from rparm.command_line import Ended, add_flag, add_report, file_or_name, names, pairs, retyped
 from rparm.errors import UserError, placed
 from rparm.files import check_writable, from_here, number_in, written
+from rparm.report import overview
+from rparm.report.overview import FAILED, RAN, sparkline
 from rparm.units import SECONDS, typed_quantity
 
 if TYPE_CHECKING:
+    from rparm.fmi.model import Model
     from rparm.identification.identify import Identification
     from rparm.identification.request import Request
 
-PART = "identify"
+PART = overview.IDENTIFICATIONS
 SEGMENT = "0.4"  # s
 SEVERAL = "parameters", "inputs", "measured", "set", "start", "columns", "units"
 GIVEN = *SEVERAL, "delay", "validate"
@@ -53,7 +58,7 @@ def add_identify_options(parser: argparse.ArgumentParser) -> None:
 def do_identify(options: argparse.Namespace) -> Ended:
     """Identify, print a table, write page and files."""
     from rparm.fmi.fmu_file import Fmu
-    from rparm.identification import identify, page, results
+    from rparm.identification import identify, results
 
     check_writable(options.report)
     path, request, true = _asked(options)
@@ -64,14 +69,33 @@ def do_identify(options: argparse.Namespace) -> Ended:
     with written(options.report):
         options.report.mkdir(parents=True, exist_ok=True)
         files = results.write_files(found, options.report, model)
-        files.append(page.write(found, options.report, model, true, _again(options)))
-    verdict = f"identified: {len(found.estimates)} parameters, page {from_here(files[-1])}"
+        files.append(_written(found, options, model, true))
+    verdict = f"identified: {len(found.estimates)} parameters"
     if not found.has_converged:
-        verdict = f"failed: the fit has not converged in {found.steps} steps"
+        verdict = f"failed: the fit has not converged in {found.steps} iterations"
     elif found.misfit:
         verdict = f"{'identified' if found.passed else 'failed'}: {found.misfit}"
     document = results.document(found) | {"files": [file.absolute() for file in files]}
     return Ended(0 if found.passed else 1, verdict, document, page=files[-1])
+
+
+def _written(
+    found: "Identification", options: argparse.Namespace, model: "Model", true: dict[str, float]
+) -> Path:
+    """Write the page, and its line on the start page with the first output."""
+    from rparm.identification import page
+
+    again, first = _again(options), range(found.of_first)
+    output = next(iter(found.checked.outputs))
+    times = np.concatenate([found.segments[i].times for i in first])
+    values = np.concatenate([found.predicted[i][:, 0] for i in first])
+    return overview.write_in_folder(
+        project.results_folder(options.report), PART, found.model,
+        lambda folder, root: page.write(found, folder, model, true, again, root),
+        title=f"Parameters: {', '.join(found.estimates)}", group=found.model, command=again,
+        status=RAN if found.passed else FAILED, line=sparkline(times, values), line_of=output,
+        line_text=f"Simulated {output}",
+    )  # fmt: skip
 
 
 def _asked(options: argparse.Namespace) -> tuple[Path, "Request", dict[str, float]]:

@@ -17,7 +17,10 @@ from rparm.command_line import (
 )
 from rparm.errors import UserError
 from rparm.files import check_writable, from_here, written
+from rparm.report import overview
+from rparm.report.overview import RAN, crosses
 
+PART = overview.LINEAR
 MOST_COLUMNS, MOST_ROWS = 6, 12  # of matrices in the terminal
 SUFFIXES = (".fmu", ".ssp", ".toml")
 
@@ -56,7 +59,7 @@ def add_linearize_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--save", nargs="+", default=[], type=Path, metavar="FILE", help=".json, .mat or .csv"
     )
-    add_report(parser, "linearize")
+    add_report(parser, PART)
 
 
 def do_linearize(options: argparse.Namespace) -> Ended:
@@ -100,9 +103,18 @@ def do_linearize(options: argparse.Namespace) -> Ended:
     for path in options.save:
         study.save(path, found, options.step)
         print(f"saved: {from_here(path)}")
-    with written(options.report):
-        index = page.write(options.report, found, options.step, _command(options))
-    print(f"page: {from_here(index)}")
+    report, again, poles = (
+        project.results_folder(options.report),
+        _command(options),
+        found.linear.poles,
+    )
+    with written(report):
+        index = overview.write_in_folder(
+            report, PART, "_".join(filter(None, (found.path.stem, found.variant))),
+            lambda folder, root: page.write(folder, found, options.step, again, root),
+            title=f"{n} states, {m} inputs, {p} outputs", group=found.path.stem, status=RAN,
+            line_text=f"{len(poles)} poles", shapes=crosses(poles), command=again,
+        )  # fmt: skip
     document = study.document(found, options.step) | {"page": index.absolute()}
     verdict = f"linear: {n} states, {m} inputs, {p} outputs"
     return Ended(0, verdict, document, page=index)

@@ -73,9 +73,14 @@ ON_AXIS = 1e-7  # damping below which the peak of a pole is infinite: its height
 POLE_GAIN = 1e6  # gain beyond which a Nyquist diagram breaks its line: a pole may be on the axis
 
 
-def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
-    """Write page and pictures into a folder; return the page. `again` makes them again."""
-    pages.write_assets(folder)
+def write(folder: Path, found: Study, step: float | None, again: str, root: str = "") -> Path:
+    """Write page and pictures into a folder; return the page. `again` makes them again.
+
+    `root` leads from there to the start page, if there is one.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    if not root:
+        pages.write_assets(folder)
     linear = found.linear
     parts: list[Part] = []
     if found.trimmed:
@@ -88,14 +93,14 @@ def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
         pages.save_figure(poles_figure(linear, step, found.loop), folder / "poles.png")
         parts.append((poles_table(found), POLES[linear.dt > 0], [("poles", "Poles")]))
     if pictures := _pictures(folder, found, step):
-        parts.append((pages.Table("Answers", [], []), PICTURES, pictures))
+        parts.append((pages.Table("Responses", [], []), PICTURES, pictures))
     parts.append((point_table(found), POINT, []))
     parts.append((matrices_table(found), MATRICES[linear.dt > 0], []))
     name = f"{found.path.stem}, {found.variant}" if found.variant else found.path.stem
     return pages.write_page(
         folder / pages.INDEX,
         "linearization.html",
-        root="",
+        root=root,
         title=f"{name}: linear model",
         about=ABOUT,
         again=again,
@@ -120,7 +125,7 @@ def _pictures(folder: Path, found: Study, step: float | None) -> list[Picture]:
         return []
     pages.save_figure(bode_figure(shown, step), folder / "bode.png")
     pages.save_figure(steps_figure(shown, step), folder / "steps.png")
-    return [("bode", "Bode diagram"), ("steps", "Answers to steps")]
+    return [("bode", "Bode diagram"), ("steps", "Step responses")]
 
 
 def _not_drawn(found: Study) -> list[str]:

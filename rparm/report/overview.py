@@ -1,42 +1,64 @@
-"""The overview of the report: a line for each page, with a sparkline of its error or motion."""
+"""The start page of a folder of results: a line for each page, from the entry beside it.
+
+A command writes its page, then the entry PAGE.entry.json. The list is made of the entries that are
+found in the folder and below, so that commands that run at the same time lose nothing.
+"""
 
 import json
-from collections.abc import Collection, Sequence
+import shlex
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields, replace
+from datetime import datetime
+from itertools import count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from rparm import project
 from rparm.files import write_text
 from rparm.report import pages
 from rparm.report.pages import RunPage
 from rparm.report.run_data import Plot
+from rparm.units import number
 
-ENTRIES = "entries.json"
-PASSED, FAILED, RAN = "passed", "FAILED", "ran"  # RAN: there was nothing to compare with
+ENTRY = ".entry.json"
+DEEPEST = 4  # folders in which entries are looked for, that of the start page among them
+PASSED, FAILED, RAN = "passed", "FAILED", "completed"  # RAN: there was nothing to compare with
 SCENARIOS, STUDIES, SYSTEM, FILES = "scenarios", "studies", "system", "files"
-# folder -> title; in the order of the overview
+LINEAR, COUPLING, CAMPAIGNS = "linearize", "coupling", "campaigns"
+IDENTIFICATIONS, PROOFS, REPLAYS = "identify", "proofs", "replays"
+# section -> its kind of result; in the order of the start page
 SECTIONS = {
-    FILES: "Your scenarios",
-    SCENARIOS: "Scenarios",
-    SYSTEM: "Variants of the systems",
-    STUDIES: "Studies",
+    FILES: "own scenario",
+    SCENARIOS: "scenario",
+    SYSTEM: "system",
+    LINEAR: "linear model",
+    IDENTIFICATIONS: "identification",
+    CAMPAIGNS: "campaign",
+    REPLAYS: "run of a campaign",
+    COUPLING: "coupling study",
+    PROOFS: "proof",
+    STUDIES: "accuracy study",
 }
-WIDTH, HEIGHT, MARGIN = 100.0, 24.0, 2.0  # of the view box
+WIDTH, HEIGHT, MARGIN = 100.0, 60.0, 5.0  # of the view box
 SPACE = "\N{NO-BREAK SPACE}"  # before a unit
 THIN = 'vector-effect="non-scaling-stroke"'
 COLUMNS = 60  # the curve's extremes in each are drawn
+NOTHING = 1e-12  # SI: a curve on a linear axis that stays below is rounding
+POSES, DOTS = 6, 300  # most in a thumbnail
+CROSS = "M{:.4g} {:.4g}m-3-3l6 6m0-6l-6 6"
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A line of the overview."""
+    """A line of the start page."""
 
     name: str
     title: str
     group: str  # model or system, with its version of FMI
-    page: str  # file name in the section's folder
+    page: str  # file name, beside the entry
     status: str  # PASSED, FAILED or RAN
     error: float | None = None  # the worst one; None if it is NaN or unknown
     bound: float | None = None
@@ -46,85 +68,178 @@ class Entry:
     line_of: str = ""  # the variable of the sparkline
     source: str = ""  # file of a user
     line_scale: str = ""  # its smallest and largest value, and how long it is
+    shapes: Sequence[Sequence[str]] = ()  # drawn in place of the line: class and path of each
+    command: str = ""  # that makes the page again
+    section: str = ""  # one of SECTIONS
+    date: str = ""  # ISO 8601, of the entry
+    commit: str = ""  # of the project, in a checkout
+
+    @property
+    def model(self) -> str:
+        """The model without its version of FMI."""
+        return self.group.partition(" (")[0]
 
 
-def write_page(folder: Path, name: str, page: RunPage, group: str, **more: object) -> Entry:
+def write_page(folder: Path, name: str, page: RunPage, group: str, **more: Any) -> Entry:
     """Write a page of a section; its entry, with `more` in place of what follows from the page."""
     folder.mkdir(parents=True, exist_ok=True)
     pages.write_run(folder / f"{name}.html", page)
-    fields = {"name": name, "title": page.title, "group": group, "status": page.status}
-    fields["page"] = f"{name}.html"
+    return entry_of(name, page, group, **more)
+
+
+def entry_of(name: str, page: RunPage, group: str, **more: Any) -> Entry:
+    """Return the entry of a page that has been written as NAME.html."""
+    known = {"name": name, "title": page.title, "group": group, "status": page.status}
+    known |= {"page": f"{name}.html", "command": page.again}
     if page.data is not None:
         plot, x = page.data.plots[0], page.data.x
         curve = plot.curves[0]
+        values = curve.values
+        if plot.log:
+            values = np.log10(np.where(values > 0, values, np.nan))
+        elif np.abs(values[np.isfinite(values)]).max(initial=0.0) < NOTHING:
+            values = np.zeros(len(x))
+        known |= {"line": sparkline(x, values), "shapes": poses(page.data.motion or {})}
+        known["line_text"] = "Motion of the arm; " * bool(known["shapes"]) + plot.text
         scale = sparkline_scale(x, plot, page.data.axis.unit)
-        fields |= {"line": sparkline(x, curve.values), "line_text": plot.text}
-        fields |= {"line_of": curve.name, "line_scale": scale}
-    return Entry(**fields | more)
+        known |= {"line_of": curve.name, "line_scale": scale}
+    return Entry(**known | more)
 
 
-def record(report: Path, section: str, entries: Sequence[Entry]) -> Path:
-    """Put `entries` before the others of a section, and write the overview; return its path."""
-    names = {entry.name for entry in entries}
-    others = [entry for entry in read(report, section) if entry.name not in names]
-    _keep(report, section, [*entries, *others])
+def record(
+    report: Path, section: str, entries: Sequence[Entry], folder: Path | None = None
+) -> Path:
+    """Keep the entries of pages in `folder`, by default the section's; write the start page."""
+    now = datetime.now().astimezone().isoformat(timespec="seconds")
+    for each in entries:
+        stamp = {"date": now, "commit": project.commit(), "section": section}
+        stamp["command"] = _whole(report, each.command)
+        text = json.dumps(asdict(replace(each, **stamp)), ensure_ascii=False, indent=1)
+        name = each.page.removesuffix(".html")
+        write_text((folder or report / section) / f"{name}{ENTRY}", text + "\n")
     return write(report)
 
 
-def _keep(report: Path, section: str, entries: Sequence[Entry]) -> None:
-    text = json.dumps([asdict(entry) for entry in entries], ensure_ascii=False, indent=1)
-    write_text(report / section / ENTRIES, text + "\n")
+def _whole(report: Path, command: str) -> str:
+    """Add the folder to a command that has none, unless it is the usual one."""
+    if " --output " in command or report.absolute() == project.report_folder().absolute():
+        return command
+    return f"{command} --output {shlex.quote(str(project.from_root(report)))}"
+
+
+def write_in_folder(
+    report: Path, section: str, name: str, write: Callable[[Path, str], Path], **known: Any
+) -> Path:
+    """Write a page by `write(folder, root)`, and its entry; its path.
+
+    Its folder in the section has its name, unless that has the page of another command.
+    """
+    taken = {file.parent.name: entry.command for file, entry in _found(report / section)}
+    whole = _whole(report, known["command"])
+    names = (name if i == 1 else f"{name}_{i}" for i in count(1))
+    name = next(each for each in names if taken.get(each, whole) == whole)
+    path = write(report / section / name, "../../")
+    record(report, section, [Entry(name=name, page=path.name, **known)], path.parent)
+    return path
 
 
 def forget(report: Path, section: str, names: Collection[str] | None = None) -> None:
-    """Remove entries of a section, all or some; and the overview if nothing is left in it."""
-    others = [] if names is None else [e for e in read(report, section) if e.name not in names]
-    if others:
-        _keep(report, section, others)
-    else:
-        (report / section / ENTRIES).unlink(missing_ok=True)
-    if any(read(report, name) for name in SECTIONS):
+    """Remove entries of a section, all or some; and the start page if nothing is left in it."""
+    for name in [entry.name for entry in read(report, section)] if names is None else names:
+        (report / section / f"{name}{ENTRY}").unlink(missing_ok=True)
+    if _all(report):
         write(report)
     else:
         (report / pages.INDEX).unlink(missing_ok=True)
 
 
 def read(report: Path, section: str) -> list[Entry]:
-    """Read the entries of a section; a file that nobody can read has none."""
-    with suppress(OSError, ValueError, TypeError, RecursionError):
-        content = json.loads((report / section / ENTRIES).read_text(encoding="utf-8"))
-        return [Entry(**item) for item in content]
-    return []
+    """Read the entries of the pages in a section's folder."""
+    folder = report / section
+    return [entry for file, entry in _found(folder) if file.parent == folder]
+
+
+def _all(report: Path) -> dict[str, Entry]:
+    """Return all entries, by the addresses of their pages."""
+    return {(f.parent / e.page).relative_to(report).as_posix(): e for f, e in _found(report)}
+
+
+def _found(folder: Path) -> Iterator[tuple[Path, Entry]]:
+    """Yield the entries whose pages are there, with their files; what is no entry is ignored."""
+    texts = [field.name for field in fields(Entry) if field.type is str]
+    for file in sorted(
+        file for i in range(DEEPEST) for file in folder.glob("*/" * i + f"*{ENTRY}")
+    ):
+        with suppress(OSError, ValueError, TypeError, RecursionError):
+            entry = Entry(**json.loads(file.read_text(encoding="utf-8")))
+            _ = "".join(getattr(entry, name) for name in texts), entry.group.partition(" ")
+            _ = [f"{kind}" + path for kind, path in entry.shapes]
+            _ = abs(entry.error or 0), abs(entry.bound or 0)
+            is_beside = Path(entry.page).name == entry.page and (file.parent / entry.page).is_file()
+            if is_beside and entry.section in SECTIONS:
+                yield file, entry
 
 
 def write(report: Path) -> Path:
-    """Write the overview, and what its pages load."""
+    """Write the start page, and what its pages load; again if an entry has come meanwhile."""
     pages.write_assets(report)
-    sections = []
-    for folder, title in SECTIONS.items():
-        entries = read(report, folder)
-        if entries:
-            groups: dict[str, list[Entry]] = {}
-            for entry in entries:
-                groups.setdefault(entry.group, []).append(entry)
-            section = {"folder": folder, "title": title, "summary": _summary(entries)}
-            sections.append(section | {"groups": groups})
-    statuses = [entry.status for folder in SECTIONS for entry in read(report, folder)]
-    shown = {"root": "", "sections": sections, "width": WIDTH, "height": HEIGHT}
-    shown |= {"failed": statuses.count(FAILED), "count": len(statuses)}
-    return pages.write_page(report / pages.INDEX, "overview.html", **shown)
+    while True:
+        found = _all(report)
+        _write(report, found)
+        if _all(report) == found:
+            return report / pages.INDEX
 
 
-def _summary(entries: Sequence[Entry]) -> dict[str, object]:
-    """Say how many of a section passed, and which is worst."""
-    compared = [entry for entry in entries if entry.status != RAN]
-    known = [entry for entry in compared if entry.error is not None]
-    return {
-        "count": len(entries),
-        "compared": len(compared),
-        "passed": sum(entry.status == PASSED for entry in compared),
-        "worst": max(known, key=lambda entry: entry.error, default=None),
+def _write(report: Path, found: Mapping[str, Entry]) -> None:
+    scenarios = {
+        name.replace("_", ""): len(list(folder.glob("scenarios/*")))
+        for name, folder in project.models().items()
     }
+    groups: dict[str, list[tuple[str, Entry]]] = {}
+    kinds = list(SECTIONS)
+    in_order = sorted(found.items(), key=lambda x: (kinds.index(x[1].section), x[1].name))
+    for item in sorted(in_order, key=lambda x: (-scenarios.get(x[1].model.lower(), 0), x[1].model)):
+        groups.setdefault(item[1].model, []).append(item)
+    statuses = [entry.status for entry in found.values()]
+    pages.write_page(
+        report / pages.INDEX, "overview.html", root="", groups=groups, kinds=SECTIONS,
+        statuses=statuses, version=project.version(), commit=project.commit(),
+        width=WIDTH, height=HEIGHT,
+    )  # fmt: skip
+
+
+# ---- Thumbnails ----------------------------------------------------------------------------------
+def poses(moving: Mapping[str, Any]) -> list[list[str]]:
+    """Draw the path of an arm's end effector, and poses from the first to the last."""
+    arm, q1, q2 = moving.get("arm"), *(np.array(moving.get(x) or ()) for x in ("q1", "q2"))
+    there = np.isfinite(q1) & np.isfinite(q2)
+    if arm is None or not there.any():
+        return []
+    along = np.exp(1j * q1[there])  # a point x + i y in frame 0
+    across = 1j * arm["a"] * along
+    tip = (arm["l1"] + q2[there]) * along + across
+    joints = _placed(np.array([0 * tip, arm["l1"] * along, arm["l1"] * along + across, tip]))
+    shown = np.unique(np.linspace(0, len(tip) - 1, POSES).astype(int))
+    kept = np.unique(np.linspace(0, len(tip) - 1, DOTS).astype(int))
+    drawn = [_path(joints[:, i].real, joints[:, i].imag) for i in shown]
+    trace = _path(joints[-1, kept].real, joints[-1, kept].imag)
+    return [["trace", trace], *(["ghost", path] for path in drawn[:-1]), ["arm", drawn[-1]]]
+
+
+def crosses(poles: np.ndarray) -> list[list[str]]:
+    """Draw poles, and the imaginary axis."""
+    zero, *points = _placed(np.array([0, *poles])).tolist()
+    path = "".join(CROSS.format(p.real, p.imag) for p in points)
+    return [["axis", f"M{zero.real:.4g} 0V{HEIGHT:g}"], ["curve", path]]
+
+
+def _placed(points: np.ndarray) -> np.ndarray:
+    """Place points x + i y in the view box, to scale; upwards is down there."""
+    low, high = (f(points.real) + 1j * f(points.imag) for f in (np.min, np.max))
+    size = high - low
+    room = WIDTH - 2 * MARGIN, HEIGHT - 2 * MARGIN
+    scale = min(room[0] / max(size.real, 1e-9), room[1] / max(size.imag, 1e-9))
+    return np.conj(scale * (points - (low + high) / 2)) + (WIDTH + 1j * HEIGHT) / 2
 
 
 def sparkline_scale(x: np.ndarray, plot: Plot, unit: str) -> str:
@@ -132,7 +247,9 @@ def sparkline_scale(x: np.ndarray, plot: Plot, unit: str) -> str:
     values = plot.curves[0].values[np.isfinite(plot.curves[0].values)]
     if not len(values):
         return ""
-    low, high = (f"{value:.3g}" for value in (values.min(), values.max()))
+    if not plot.log and np.abs(values).max() < NOTHING:
+        values = np.zeros(1)
+    low, high = (number(float(f"{value:.3g}")) for value in (values.min(), values.max()))
     between = low if low == high else f"{low} to {high}"
     parts = (f"{between} {plot.unit}".strip(), f"{x[-1] - x[0]:.3g} {unit}")
     return ", ".join(SPACE.join(part.rsplit(" ", 1)) for part in parts)
@@ -157,8 +274,11 @@ def sparkline(x: np.ndarray, y: np.ndarray) -> str:
     height = np.ptp(y)
     up = (y[kept] - y.min()) / height if height > 0 else np.full(len(kept), 0.5)
     x, y = across * (WIDTH - 2 * MARGIN), up * (HEIGHT - 2 * MARGIN)
-    points = zip(MARGIN + x, HEIGHT - MARGIN - y, strict=True)
-    return "M" + "L".join(f"{a:.4g} {b:.4g}" for a, b in points)
+    return _path(MARGIN + x, HEIGHT - MARGIN - y)
+
+
+def _path(x: np.ndarray, y: np.ndarray) -> str:
+    return "M" + "L".join(f"{a:.4g} {b:.4g}" for a, b in zip(x, y, strict=True)) + "h0"
 
 
 def sparkline_svg(x: np.ndarray, y: np.ndarray) -> str:
