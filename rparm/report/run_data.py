@@ -22,14 +22,28 @@ class Curve:
 
     name: str
     values: np.ndarray  # (rows,)
-    reference: np.ndarray | None = None  # (rows,), drawn below it
+    reference: np.ndarray | None = None  # (rows,), drawn dashed above it
     steps: bool = False  # each row ends an interval of this value
     limit: bool = False  # is not a result but a limit of results
+    points: bool = False  # is drawn as points below the other curves
+    other: np.ndarray | None = None  # (rows,) of another result; NaN where that has none
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """Its arrays by their names; the difference from the other result in all digits."""
+        drawn = {"values": self.values, "reference": self.reference, "other": self.other}
+        found = {name: values for name, values in drawn.items() if values is not None}
+        if self.other is None:
+            return found
+        rounding = ROUNDING * max(np.abs(self.values).max(initial=0.0), SMALLEST_SCALE)
+        with np.errstate(over="ignore", invalid="ignore"):
+            left = self.values - self.other
+        return found | {"difference": np.where(np.abs(left) <= rounding, 0.0, left)}
 
     def at(self, rows: np.ndarray) -> "Curve":
         """Reduce to some of the rows."""
-        reference = None if self.reference is None else self.reference[rows]
-        return replace(self, values=self.values[rows], reference=reference)
+        columns = {name: x[rows] for name, x in self.columns.items() if name != "difference"}
+        return replace(self, **columns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +65,7 @@ class Plot:
     @property
     def columns(self) -> list[np.ndarray]:
         """Drawn curves, (rows,) each; logarithms on a logarithmic axis."""
-        drawn = [values for x in self.curves for values in (x.values, x.reference)]
-        found = [values for values in drawn if values is not None]
+        found = [values for curve in self.curves for values in curve.columns.values()]
         if not self.log:
             return found
         tiny = np.finfo(float).tiny
@@ -97,6 +110,7 @@ class RunData:
     plots: Sequence[Plot]
     axis: Axis = field(default_factory=Axis)
     motion: dict[str, Any] | None = None  # of rparm.report.motion
+    other: dict[str, Any] | None = None  # of rparm.report.overlay
 
     def json(self) -> str:
         """Write text for a script element: no text in it ends the element."""
@@ -108,6 +122,7 @@ class RunData:
             "time": packer.packed(self.x),
             "plots": [_plot(plot, packer) for plot in self.plots],
             "motion": self._motion(packer),
+            "other": self.other,
             "arrays": packer.arrays,
         }
         text = json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
@@ -191,11 +206,10 @@ def _plot(plot: Plot, packer: "_Packer") -> dict[str, Any]:
     content["levels"] = [{"name": name, "value": value} for name, value in plot.levels]
     content["curves"] = curves = []
     for curve in plot.curves:
-        item = {"name": curve.name, "values": packer.packed(narrow(curve.values))}
-        item |= {"steps": curve.steps, "limit": curve.limit}
-        if curve.reference is not None:
-            item["reference"] = packer.packed(narrow(curve.reference))
-        curves.append(item)
+        item = {"name": curve.name, "steps": curve.steps}
+        item |= {"limit": curve.limit, "points": curve.points}
+        columns = curve.columns.items()
+        curves.append(item | {name: packer.packed(narrow(x)) for name, x in columns})
     return content
 
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, count
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from rparm.report.run_data import Axis, Curve, Plot, RunData
 from rparm.runs import comparison
 from rparm.runs.comparison import Failure, Run, Sweep
 from rparm.runs.convergence import Convergence
+from rparm.runs.inputs import Log
 from rparm.units import milliseconds, short, verdict
 
 ACCURACY = "accuracy"  # name of the page over the tolerance
@@ -39,8 +41,9 @@ def _by(items: Iterable[Any], key: Callable[[Any], Any]) -> dict[Any, list[Any]]
 class ReportWriter:
     """Writes pages of scenarios, of users' own files and of studies into a folder."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, others: Mapping[str, Log] = MappingProxyType({})) -> None:
+        """`others` are what to draw over results, SECTION/NAME."""
+        self.folder, self._others = folder, others
         self.files: dict[str, Path] = {}  # pages of users' own files that were written, by name
 
     def begin(self) -> None:
@@ -79,7 +82,8 @@ class ReportWriter:
             folder = self.folder / section
             name = scenario.name if ours else self._free_name(path)
             if group:
-                entry = scenario_page.write(folder, name, group, again, others)
+                over = self._others.get(f"{section}/{scenario.name}")
+                entry = scenario_page.write(folder, name, group, again, others, over)
             else:
                 entry = scenario_page.write_failed(folder, name, others[0], again)
             entries.append(entry if ours else replace(entry, source=str(path)))

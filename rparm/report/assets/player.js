@@ -157,7 +157,9 @@ class Player {
     this.clockText = found('.player-clock');
     this.select = found('select');
     this.select.value = String(this.speed);
-    this.values = this.#values(found('.player-values'));
+    this.controls = found('.player-controls');
+    this.list = found('.player-values');
+    this.values = this.#values(this.list);
     this.#label();
   }
 
@@ -174,6 +176,7 @@ class Player {
     ];
     return texts.filter(([name]) => this.#shows(name)).map(([name, label, text]) => {
       const item = document.createElement('li');
+      item.dataset.name = name;
       item.innerHTML = `<b>${label}</b> <span></span>`;
       item.classList.toggle('player-words', name.startsWith('mode'));
       list.append(item);
@@ -196,7 +199,7 @@ class Player {
       this.clock = this.time;
     });
     this.select.addEventListener('change', () => { this.speed = Number(this.select.value); });
-    this.element.addEventListener('keydown', event => this.#key(event));
+    this.controls.addEventListener('keydown', event => this.#key(event));
     this.dark.addEventListener('change', () => this.#resize());
     new ResizeObserver(() => this.#resize()).observe(this.element);
   }
