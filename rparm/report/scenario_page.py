@@ -226,7 +226,7 @@ def _facts(run: Run) -> list[tuple[str, str]]:
         *_common_facts(run.scenario, model),
         ("steps", f"{result.steps} {_lengths(run.scenario.steps)}"),
         ("tolerance", short(result.tolerance)),
-        ("worst error", f"{run.error:.1e}{bound} ({run.worst})"),
+        ("worst error", f"{short(run.error, 1)}{bound} ({run.worst})"),
     ]
 
 

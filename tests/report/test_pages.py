@@ -222,7 +222,7 @@ def test_numbers_and_units_have_one_style(browser: Browser, report: Path) -> Non
         show(browser, report / name)
         browser.run("document.querySelectorAll('details').forEach(x => { x.open = true; })")
         shown = browser.run(
-            "return [...document.querySelectorAll('td.number, .values li, .facts strong,"
+            "return [...document.querySelectorAll('td.number, .readout li, .facts strong,"
             " figcaption')].map(x => x.innerText)"
         )
         assert len(shown) > 5

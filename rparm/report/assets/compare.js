@@ -86,6 +86,15 @@ const Compare = (() => {
     return null;
   }
 
+  /** Short name of it: of a file, or of the folder where a command wrote it as it did this run's. */
+  function label({ name }) {
+    const parts = name.split(/[\\/]/);
+    const own = decodeURIComponent(document.querySelector('.facts a')?.getAttribute('href') ?? '');
+    if (parts.at(-1) !== own) return parts.at(-1);
+    const folders = parts.slice(0, -1).filter((part) => !['scenarios', 'files', 'system', ''].includes(part));
+    return folders.at(-1) ?? own;
+  }
+
   /** What readers need to know of it. `scaled` and `shown` are those of plots.js. */
   function described({ other, plots }, scaled, shown) {
     const largest = new Map();
@@ -103,5 +112,5 @@ const Compare = (() => {
       + `${[...largest.values()].join(', ')}.${between}`;
   }
 
-  return { Refused, over, alone, described };
+  return { Refused, over, alone, label, described };
 })();

@@ -142,14 +142,14 @@ class Player {
         <input type="range" class="player-time" aria-label="Time" min="0" max="${last}" step="1"
           value="0">
         <span class="player-clock" aria-hidden="true"></span>
-        <label class="player-speed">Speed
+        <label class="player-speed"><span>Speed</span>
           <select>${Player.SPEEDS.map(x => `<option value="${x}">${x} ×</option>`).join('')}</select>
         </label>
       </div>
       <ul class="player-values"></ul>
-      <p class="player-keys">Keys, while a control of the player has the focus:
+      <details class="player-keys"><summary>Keys</summary>While a control of the player has the focus:
         <kbd>Space</kbd> plays and pauses, <kbd>←</kbd> <kbd>→</kbd> go
-        by a row, with <kbd>Shift</kbd> by twenty, <kbd>Home</kbd> <kbd>End</kbd> to the ends.</p>`;
+        by a row, with <kbd>Shift</kbd> by twenty, <kbd>Home</kbd> <kbd>End</kbd> to the ends.</details>`;
     const found = name => this.element.querySelector(name);
     this.canvas = found('canvas');
     this.button = found('.player-toggle');

@@ -162,7 +162,7 @@ const Plots = (() => {
     });
     const compared = isCompared(plot);
     return {
-      margin: { l: 62, r: 12, t: 26, b: 38 },
+      margin: { l: 62, r: 12, t: 10, b: 38 },
       showlegend: false,
       hovermode: false,
       separators: '.\u202f', // decimal point, and a narrow space between thousands
@@ -171,7 +171,7 @@ const Plots = (() => {
       font: { color: palette.ink, size: 12 },
       paper_bgcolor: palette.paper,
       plot_bgcolor: palette.paper,
-      modebar: { bgcolor: 'rgba(0,0,0,0)', color: palette.reference, activecolor: palette.ink },
+      modebar: { bgcolor: palette.paper, color: palette.reference, activecolor: palette.ink },
       xaxis: {
         ...lines,
         title: { text: axis.unit ? `${axis.title} (${axis.unit})` : axis.title, standoff: 4 },
@@ -196,20 +196,18 @@ const Plots = (() => {
 
   /** Colour of another result: that of its curve, and where there is only one, another one. */
   function otherColour(plot, i, palette) {
-    return plot.curves.length > 1 ? palette.ink : palette.curves[1];
+    return palette.curves[plot.curves.length > 1 ? i % COLOURS : 1];
   }
 
   /** Lines of a plot's legend: name, style, and whose values they are. */
   function entries(plot, palette, other) {
-    const found = plot.curves.flatMap((curve, i) => {
-      const dashed = (name, colour) => ({ name, colour, dashes: DASHES[4] });
-      const several = plot.curves.length > 1 ? ` of ${curve.name}` : '';
-      return [
-        { name: curve.name, ...styleOf(curve, i, palette), points: curve.points },
-        ...(curve.reference ? [dashed(`reference${several}`, palette.ink)] : []),
-        ...(curve.other ? [dashed(`${other}${several && `: ${curve.name}`}`, otherColour(plot, i, palette))] : []),
-      ];
-    });
+    const found = plot.curves.map((curve, i) => (
+      { name: curve.name, ...styleOf(curve, i, palette), points: curve.points }));
+    // one line for all: the references are dark, the others have the colours of their curves
+    const dashed = (name, colour) => found.push({ name, colour, dashes: DASHES[4] });
+    if (plot.curves.some((curve) => curve.reference)) dashed('reference', palette.ink);
+    const first = plot.curves.findIndex((curve) => curve.other);
+    if (first >= 0) dashed(other, otherColour(plot, first, palette));
     const levels = (plot.levels ?? []).map(({ name }) => ({ name, colour: palette.ink, dashes: DASHES[1] }));
     return [...found, ...levels];
   }
@@ -259,7 +257,7 @@ const Plots = (() => {
     restyle() {
       this.palette = colours();
       this.units = unitsOf(this.plot);
-      legend(this.figure.querySelector('.values'), this.plot, this.palette, this.data.other?.name);
+      legend(this.figure.querySelector('.values'), this.plot, this.palette, this.data.other && Compare.label(this.data.other));
       this.figure.classList.toggle('compared', isCompared(this.plot));
     }
 
@@ -303,6 +301,13 @@ const Plots = (() => {
       const seen = new Set();
       list.replaceChildren();
       for (const { plot, palette, units } of plots) {
+        const names = plot.curves.map(({ name }) => name);
+        if (names.length > 1 && names.join(', ') !== plot.title) {
+          const title = document.createElement('li');
+          title.className = 'group';
+          title.textContent = plot.title;
+          list.append(title);
+        }
         plot.curves.forEach((curve, i) => {
           const name = curve.points && curve.name === 'measured' ? `${plot.title} measured` : curve.name;
           if (seen.has(name)) return;
@@ -312,7 +317,7 @@ const Plots = (() => {
             const label = document.createElement('span');
             const value = document.createElement('span');
             label.append(...(style ? [swatch(style)] : []), minus(text));
-            item.className = style ? '' : 'beside';
+            item.className = style ? '' : 'also';
             item.append(label, ' ', value);
             list.append(item);
             this.values.push({ values, factor, value, unit: unit ? ` ${unit}` : '' });
@@ -320,6 +325,7 @@ const Plots = (() => {
           };
           const own = add(name, curve.values, units.own, { ...styleOf(curve, i, palette), points: curve.points });
           own.dataset.curve = curve.name;
+          own.dataset.factor = units.own.factor;
           if (curve.reference) add('reference', curve.reference, units.own);
           if (!curve.other) return;
           add(other, curve.other, units.own);
@@ -363,7 +369,8 @@ const Plots = (() => {
       this.player = new Player(element, this.data.motion);
       this.bar = this.player.slider;
       this.bar.id = 'cursor';
-      this.panel.prepend(this.player.controls, this.player.list);
+      this.player.controls.querySelector('.player-clock').replaceWith(this.output);
+      this.panel.querySelector('.cursor-bar').replaceWith(this.player.controls, this.player.list);
       const names = this.data.plots.flatMap((plot) => plot.curves.map((curve) => curve.name));
       for (const item of this.player.list.children) {
         const own = item.dataset.name;
@@ -424,7 +431,7 @@ const Plots = (() => {
     }
 
     read() {
-      this.readout = new Readout(this.panel.querySelector('.readout'), this.plots, this.data.other?.name);
+      this.readout = new Readout(this.panel.querySelector('.readout'), this.plots, this.data.other && Compare.label(this.data.other));
       if (this.row !== undefined) this.readout.show(this.row);
     }
 
