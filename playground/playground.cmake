@@ -11,7 +11,7 @@ if(NOT CAN_RELEASE)
   return()
 endif()
 
-add_platform(wasm32-wasi ${fmus})
+add_platform(wasm32-wasi ${fmus} runtime)
 set(modules "")
 foreach(name IN LISTS fmus)
   list(APPEND modules ${PROJECT_BINARY_DIR}/platforms/wasm32-wasi/fmu/${name}/${name}.wasm)

@@ -13,6 +13,8 @@ from tests.report.conftest import LATE, SCENARIOS, STRANGE, VARIANT, show
 from tests.support.browser import Browser
 from tests.support.ssp_files import read_csv
 
+PREFIXES = {1e-9: " n", 1e-6: " µ", 1e-3: " m", 1.0: "", 1e3: " k"}
+
 
 @pytest.mark.parametrize(
     ("name", "curves"),
@@ -36,23 +38,23 @@ def test_the_cursor_shows_rows_of_the_values(
         time, shown = browser.run(
             "page.seek(arguments[0]);"
             "const shown = [...document.querySelectorAll('[data-curve]')];"
-            "return [page.x[page.row], shown.map(x => [x.dataset.curve, x.innerText])]",
+            "return [page.x[page.row], shown.map(x => [x.dataset.curve, x.innerText, x.dataset.factor])]",
             row,
         )
         found = np.flatnonzero(values["time"] == time)
         assert len(found) == 1 and (row < rows - 1 or found[0] == last)
         seen = {
-            curve: text.split()[0].replace("\N{MINUS SIGN}", "-")
-            for curve, text in shown
-            if curve in values
+            curve: float(text.split()[0].replace("\N{MINUS SIGN}", "-")) * float(factor)
+            for curve, text, factor in shown
+            if curve in values and PREFIXES[float(factor)] in text
         }
         assert curves <= set(seen)
-        for curve, text in seen.items():
+        for curve, number in seen.items():
             value = values[curve][found[0]]
             last_digit = 10.0 ** (np.floor(np.log10(abs(value))) - 6) if value else 0.0
             rounding = ROUNDING * max(np.max(np.abs(values[curve])), SMALLEST_SCALE)
-            assert abs(float(text) - value) <= max(last_digit, rounding), curve  # seven digits
-            assert text == "0" or abs(value) >= rounding
+            assert abs(number - value) <= max(last_digit, rounding), curve  # seven digits
+            assert not number or abs(value) >= rounding
 
 
 def test_cursor_player_and_plots_are_in_step(browser: Browser, report: Path) -> None:
