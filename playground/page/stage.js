@@ -46,6 +46,7 @@ class Stage {
 
   /** Take over the size of the canvas, the colours and the parameters. */
   fit() {
+    if (!this.canvas.clientWidth) return; // not in view
     const ratio = window.devicePixelRatio || 1;
     this.canvas.width = Math.round(this.canvas.clientWidth * ratio);
     this.canvas.height = Math.round(this.canvas.clientHeight * ratio);
@@ -101,6 +102,7 @@ class Stage {
 
   /** The arm as it is now; where it leaves the view, this follows. */
   draw() {
+    if (!this.canvas.clientWidth) return;
     const reach = this.#reach();
     if (reach !== this.reach) this.#choose(reach);
     const context = this.canvas.getContext('2d');
