@@ -58,11 +58,6 @@ class Plot:
     note: str = ""  # meaning of its values
 
     @property
-    def gaps(self) -> bool:
-        """Whether a value has no place on the axis."""
-        return self.log and any((curve.values == 0).any() for curve in self.curves)
-
-    @property
     def columns(self) -> list[np.ndarray]:
         """Drawn curves, (rows,) each; logarithms on a logarithmic axis."""
         found = [values for curve in self.curves for values in curve.columns.values()]

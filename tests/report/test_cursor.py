@@ -38,7 +38,8 @@ def test_the_cursor_shows_rows_of_the_values(
         time, shown = browser.run(
             "page.seek(arguments[0]);"
             "const shown = [...document.querySelectorAll('[data-curve]')];"
-            "return [page.x[page.row], shown.map(x => [x.dataset.curve, x.innerText, x.dataset.factor])]",
+            "const read = x => [x.dataset.curve, x.innerText, x.dataset.factor];"
+            "return [page.x[page.row], shown.map(read)]",
             row,
         )
         found = np.flatnonzero(values["time"] == time)

@@ -248,6 +248,12 @@ const Plots = (() => {
       this.x = data.time;
       this.axis = data.axis;
       this.drawing = figure.querySelector('.drawing');
+      if (plot.log && plot.curves.some(({ values }) => values.includes(0))) {
+        const note = document.createElement('p');
+        note.className = 'muted note';
+        note.textContent = 'This axis has no place for 0: a line has a gap where its value is 0.';
+        figure.querySelector('figcaption').after(note);
+      }
       this.line = document.createElement('div');
       this.line.className = 'cursor';
       this.line.hidden = true;
