@@ -66,8 +66,8 @@ def do_run(options: argparse.Namespace) -> Ended:
         for scenario in chosen:
             runs.reference(scenario)  # so that a missing reference is reported before anything runs
         check_writable(options.report)
-        results = {f"{SCENARIOS}/{x.name}": fmus[x.model].model.variables for x in chosen}
-        results |= {f"{FILES}/{x.name}": fmus[x.model].model.variables for x in own}
+        results = {(SCENARIOS, x.name): fmus[x.model].model.variables for x in chosen}
+        results |= {(FILES, x.name): fmus[x.model].model.variables for x in own}
         writer = ReportWriter(options.report, overlay.read(options.other, results))
         with written(options.report):
             writer.begin()

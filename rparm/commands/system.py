@@ -12,7 +12,7 @@ from rparm.errors import UserError, did_you_mean, together
 from rparm.files import check_writable, from_here, written
 from rparm.project import PROGRAM
 from rparm.report import overlay, overview, system_page
-from rparm.report.overview import Entry
+from rparm.report.overview import SYSTEM, Entry
 from rparm.report.system_page import Section
 from rparm.result_tables import VariantTable
 from rparm.systems import comparison, ecos, master
@@ -56,12 +56,8 @@ def do_system(options: argparse.Namespace) -> Ended:
             found = {system.name: names for system, names in chosen}
             blocks = ("\n  ".join([name, *names]) for name, names in found.items())
             return Ended(0, "\n".join(blocks), {"systems": found})
-        results = {
-            f"{overview.SYSTEM}/{system.page(name)}": system.names
-            for system, names in chosen
-            for name in names
-        }
-        options.others = overlay.read(options.other, results)
+        known = {(SYSTEM, s.page(name)): s.names for s, names in chosen for name in names}
+        options.others = overlay.read(options.other, known)
         check_writable(options.report)
         with written(options.report):
             for system, names in chosen:
@@ -172,7 +168,7 @@ def _run(chosen: Sequence[tuple[Section, Sequence[str]]], options: argparse.Name
             )
             console.messages(name, outcome.run.messages)
             with written(options.report):
-                over = options.others.get(f"{overview.SYSTEM}/{section.page(outcome.variant)}")
+                over = options.others.get((SYSTEM, section.page(outcome.variant)))
                 entries.append(system_page.write_variant(options.report, section, outcome, over))
             if options.pictures and section.study:
                 from rparm.report.pages import save_figure  # matplotlib takes long to import

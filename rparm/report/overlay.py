@@ -8,15 +8,16 @@ import numpy as np
 
 from rparm.errors import UserError, placed
 from rparm.files import is_file, missing
-from rparm.report.run_data import Plot
+from rparm.report.run_data import ROUNDING, TIME, Curve, Plot
+from rparm.runs.comparison import SMALLEST_SCALE
 from rparm.runs.inputs import EARLY, Log, Logged, read_log
 from rparm.units import counted
 
-TIME = "time"  # column of a result, s
+Others = Mapping[tuple[str, str], Log]  # by section and name of results
 
 
-def read(given: Path | None, results: Mapping[str, Collection[str]]) -> dict[str, Log]:
-    """Read what is given for results, SECTION/NAME with their variables; UserError if it is no use.
+def read(given: Path | None, results: Mapping[tuple[str, str], Collection[str]]) -> Others:
+    """Read what is given for results with these variables; UserError if it is no use.
 
     A folder has a result of each, as a command wrote it, or NAME.csv; a file is for one result.
     """
@@ -25,21 +26,19 @@ def read(given: Path | None, results: Mapping[str, Collection[str]]) -> dict[str
     with placed("--with"):
         if not given.is_dir() and len(results) > 1:
             raise UserError(f"{given} is no folder, as {counted(results, 'result')} need")
-        return {page: _read(given, Path(page), known) for page, known in results.items()}
+        return {result: _read(given, *result, known) for result, known in results.items()}
 
 
-def _read(given: Path, page: Path, known: Collection[str]) -> Log:
-    places = [given / folder / f"{page.name}.csv" for folder in (page.parent, "")]
-    file = next(filter(is_file, places), None) if given.is_dir() else given
-    if file is None:
-        raise UserError(f"{given}: has no result of {page.name}, {page}.csv")
+def _read(given: Path, section: str, name: str, known: Collection[str]) -> Log:
+    places = [given / folder / f"{name}.csv" for folder in (section, "")]
+    file = next(filter(is_file, places), places[0]) if given.is_dir() else given
     if not file.exists():
         raise UserError(f"{file}: {missing(file)}")
     log = read_log(file)
     common = sorted({*known} & {*log.names})
     log.columns(TIME, common)  # its rows are checked before anything runs
     if not common:
-        raise UserError(f"{file}: has no column with the name of a variable of {page.name}")
+        raise UserError(f"{file}: has no column with the name of a variable of {name}")
     return log
 
 
@@ -56,14 +55,17 @@ def lay(
     if not names or not len(inside):
         missed = "time of this run" if names else "variable that a plot of this run shows"
         raise UserError(f"--with: {log.path}: has no {missed}")
-    others = {}
-    for name, values in zip(names, found.values.T, strict=True):
-        signal = Logged(found.times, values, False, "")
-        others[name] = np.where(signal.covers(elapsed), signal.values(elapsed), np.nan)
+    columns = dict(zip(names, found.values.T, strict=True))
+
+    def laid(curve: Curve) -> Curve:
+        if curve.name not in columns:
+            return curve
+        signal = Logged(found.times, columns[curve.name], False, "")
+        other = np.where(signal.covers(elapsed), signal.values(elapsed), np.nan)
+        left = curve.values - other
+        rounding = ROUNDING * max(np.abs(curve.values).max(), SMALLEST_SCALE)
+        return replace(curve, other=other, difference=np.where(np.abs(left) < rounding, 0.0, left))
+
     after = np.minimum(np.searchsorted(found.times, inside - EARLY), len(found.times) - 1)
     other = {"name": str(log.path), "between": bool((found.times[after] > inside + EARLY).any())}
-    laid = [
-        replace(plot, curves=[replace(x, other=others.get(x.name)) for x in plot.curves])
-        for plot in plots
-    ]
-    return laid, other
+    return [replace(plot, curves=[*map(laid, plot.curves)]) for plot in plots], other

@@ -12,6 +12,7 @@ import numpy as np
 from rparm import project
 from rparm.files import from_here
 from rparm.report import overview, pages, scenario_page
+from rparm.report.overlay import Others
 from rparm.report.overview import FAILED, FILES, PASSED, SCENARIOS, STUDIES, Entry
 from rparm.report.overview import sparkline as sparkline
 from rparm.report.pages import RunPage, Table
@@ -19,7 +20,6 @@ from rparm.report.run_data import Axis, Curve, Plot, RunData
 from rparm.runs import comparison
 from rparm.runs.comparison import Failure, Run, Sweep
 from rparm.runs.convergence import Convergence
-from rparm.runs.inputs import Log
 from rparm.units import milliseconds, short, verdict
 
 ACCURACY = "accuracy"  # name of the page over the tolerance
@@ -41,8 +41,8 @@ def _by(items: Iterable[Any], key: Callable[[Any], Any]) -> dict[Any, list[Any]]
 class ReportWriter:
     """Writes pages of scenarios, of users' own files and of studies into a folder."""
 
-    def __init__(self, folder: Path, others: Mapping[str, Log] = MappingProxyType({})) -> None:
-        """`others` are what to draw over results, SECTION/NAME."""
+    def __init__(self, folder: Path, others: Others = MappingProxyType({})) -> None:
+        """`others` are what to draw over results."""
         self.folder, self._others = folder, others
         self.files: dict[str, Path] = {}  # pages of users' own files that were written, by name
 
@@ -82,7 +82,7 @@ class ReportWriter:
             folder = self.folder / section
             name = scenario.name if ours else self._free_name(path)
             if group:
-                over = self._others.get(f"{section}/{scenario.name}")
+                over = self._others.get((section, scenario.name))
                 entry = scenario_page.write(folder, name, group, again, others, over)
             else:
                 entry = scenario_page.write_failed(folder, name, others[0], again)
