@@ -35,7 +35,7 @@ def _read(given: Path, section: str, name: str, known: Collection[str]) -> Log:
     if not file.exists():
         raise UserError(f"{file}: {missing(file)}")
     log = read_log(file)
-    common = sorted({*known} & {*log.names})
+    common = sorted({*known} & {*log.names} - {TIME})
     log.columns(TIME, common)  # its rows are checked before anything runs
     if not common:
         raise UserError(f"{file}: has no column with the name of a variable of {name}")

@@ -364,7 +364,7 @@ const Plots = (() => {
         this.bar.max = this.x.length - 1;
         this.bar.addEventListener('input', () => this.seek(Number(this.bar.value)));
       }
-      this.addCompare(this.panel.parentNode.querySelector('.compare'));
+      this.addCompare(document.querySelector('.compare'));
       this.read();
       this.show(0);
     }
