@@ -117,13 +117,13 @@ IN_PAGE = Path(__file__).with_name("compare_in_page.js").read_text(encoding="utf
 def test_a_dropped_line_is_interpolated_exactly(each_browser: Browser, report: Path) -> None:
     """A straight line is linear between any of its rows; outside there is nothing."""
     show(each_browser, report / f"scenarios/{SCENARIOS[0]}.html", width=400)
-    rows = [[time, 0.25 - 0.5 * time] for time in (0.1, 0.7113, 1.9)]
+    rows = [[time, 0.25 - 0.5 * time] for time in (0.1003, 0.7113, 1.9003)]
     found = each_browser.run(f"{IN_PAGE} return compared(arguments[0])", rows)
     assert "a line.csv" in found["said"] and "interpolated linearly" in found["said"]
     for time, value, other, left in zip(
         *(found[key] for key in ("times", "values", "other", "difference")), strict=True
     ):
-        inside = 0.1 <= time <= 1.9
+        inside = 0.1003 <= time <= 1.9003
         assert (other is not None) == inside
         if inside:
             assert other == pytest.approx(0.25 - 0.5 * time, abs=1e-12)

@@ -377,6 +377,7 @@ const Plots = (() => {
       this.bar.id = 'cursor';
       this.player.controls.querySelector('.player-clock').replaceWith(this.output);
       this.panel.querySelector('.cursor-bar').replaceWith(this.player.controls, this.player.list);
+      this.panel.append(element.querySelector('.player-keys'));
       const names = this.data.plots.flatMap((plot) => plot.curves.map((curve) => curve.name));
       for (const item of this.player.list.children) {
         const own = item.dataset.name;
