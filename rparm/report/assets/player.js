@@ -8,6 +8,7 @@
  */
 class Player {
   static SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
+  static POINTS = 1000; // of the path that is drawn
   static CALM = 0.5; // s between pictures where the user wants less motion
   static COLOURS = ['ink', 'paper', 'grid', 'accent', 'reference', 'effort', 'stop', 'good', 'bad'];
 
@@ -44,13 +45,20 @@ class Player {
       ghost: reference && {q1: reference.q1[row], q2: reference.q2[row]},
       payload_waits: motion.arm.payload?.at_rest && row < this.grasp
         ? {q1: motion.q1[this.grasp], q2: motion.q2[this.grasp]} : null,
-      trace: this.path.slice(0, row + 1),
+      trace: this.#trace(row),
     };
     for (const name of ['q1', 'q2', 'tau1', 'f2', 'ee_fx', 'ee_fy', 'payload_attached', 'mode1',
       'mode2']) {
       scene[name] = motion[name]?.[row] ?? null;
     }
     return scene;
+  }
+
+  /** Path until a row: its points, but not more than are seen. */
+  #trace(row) {
+    const every = Math.ceil(this.path.length / Player.POINTS);
+    const found = this.path.slice(0, row + 1);
+    return every === 1 ? found : found.filter((_, i) => i % every === 0 || i === row);
   }
 
   /** Shows the row whose time is the nearest to `time` (s). */
