@@ -230,7 +230,7 @@ def document(pages: list[Path], model_description: Path, output: Path) -> None:
     page = templates.get_template(TEMPLATE.name).render(
         title=": ".join(root.attrib[k] for k in ("modelName", "description") if k in root.attrib),
         style=read_text(STYLE_SHEET),
-        headings=chain(*headings, [("variables", "Variables of the FMU")]),
+        headings=chain(*headings, [("all-variables", "Variables of the FMU")]),
         contents="".join(contents),
         experiment=", ".join(f"{k} {v}{' s' if k in SECONDS else ''}" for k, v in values.items()),
         groups=variable_groups(root),

@@ -1,10 +1,6 @@
 # What FMUs of own equations are linked with: all that is the same for every model, compiled once.
 # BUILD/runtime/runtime.json says where it is and how a model is compiled and linked to it: building.py.
 
-if(WASM)
-  return() # the playground has its own models
-endif()
-
 set(runtime_versions "")
 foreach(version IN LISTS FMI_VERSIONS)
   set(target runtime_${version})
@@ -48,9 +44,14 @@ endif()
 # CMake keeps the first word of a compiler and its other words apart; @NAME@ stands for the name of the FMU
 separate_arguments(compiler UNIX_COMMAND "${CMAKE_C_COMPILER} ${CMAKE_C_COMPILER_ARG1}")
 separate_arguments(flags UNIX_COMMAND "${CMAKE_C_FLAGS} ${CMAKE_C_FLAGS_RELEASE}")
-set(compile ${flags} -std=c17 ${CMAKE_C_COMPILE_OPTIONS_PIC} -fvisibility=hidden)
+set(compile ${flags} -std=c17 -fvisibility=hidden)
+set(shared ${CMAKE_SHARED_LIBRARY_CREATE_C_FLAGS})
+if(NOT WASM)
+  list(APPEND compile ${CMAKE_C_COMPILE_OPTIONS_PIC})
+  set(shared -shared)
+endif()
 separate_arguments(link UNIX_COMMAND "${CMAKE_SHARED_LINKER_FLAGS}")
-list(APPEND link ${FMU_LINK_OPTIONS} -shared) # -static behind it would ask zig for an archive
+list(APPEND link ${FMU_LINK_OPTIONS} ${shared}) # -static behind it would ask zig for an archive
 if(APPLE)
   list(APPEND link -install_name @rpath/@NAME@${FMU_LIBRARY_SUFFIX})
 endif()

@@ -17,7 +17,7 @@ SCRIPTS = (
         PAGE / f"{name}.js"
         for name in (
             "model_description", "fmu", "simulation", "settings", "controls", "numbers", "stage",
-            "chart", "playground",
+            "chart", "own", "playground",
         )
     ),
 )  # fmt: skip

@@ -1,5 +1,12 @@
-# Target playground: build/playground/index.html, one page with the FMUs as WebAssembly in it. They are built by
-# the preset wasm32-wasi.
+# Target playground: build/playground/index.html, one page with two FMUs as WebAssembly in it, and FMUs to drop on it:
+# build/platforms/wasm32-wasi/NAME.fmu, target web of the preset wasm32-wasi. That has the runtime of rparm build --web, too.
+
+if(WASM)
+  get_property(names DIRECTORY ${PROJECT_SOURCE_DIR} PROPERTY FMUS)
+  list(TRANSFORM names APPEND _fmu)
+  add_custom_target(web DEPENDS runtime)
+  add_dependencies(web ${names})
+endif()
 
 set(fmus RPPlant RPController)
 set(page ${PROJECT_BINARY_DIR}/playground/index.html)
@@ -11,7 +18,7 @@ if(NOT CAN_RELEASE)
   return()
 endif()
 
-add_platform(wasm32-wasi ${fmus})
+add_platform(wasm32-wasi web)
 set(modules "")
 foreach(name IN LISTS fmus)
   list(APPEND modules ${PROJECT_BINARY_DIR}/platforms/wasm32-wasi/fmu/${name}/${name}.wasm)

@@ -18,7 +18,12 @@ NEEDED = ("latex2mathml", "markdown_it", "mdit_py_plugins", "pycparser", "pydant
 
 
 def build(
-    file: str | Path, *, output: str | Path = "", platforms: bool = False, lock: bool = True
+    file: str | Path,
+    *,
+    output: str | Path = "",
+    platforms: bool = False,
+    web: bool = False,
+    lock: bool = True,
 ) -> tuple[Path, Path]:
     """Make FMUs of the equations in a file; examples/models/README.md explains it.
 
@@ -32,6 +37,8 @@ def build(
         Folder for the FMUs; default: the current one.
     platforms : bool
         For all platforms, by zig; else for this machine, by gcc, clang or zig.
+    web : bool
+        As WebAssembly, by zig, for the playground.
     lock : bool
         Whether the lock file is written.
 
@@ -41,9 +48,9 @@ def build(
         NAME.fmu of FMI 2.0 and fmi3/NAME.fmu of FMI 3.0.
     """
     project.check_installed(NEEDED, "build")
-    runtimes = project.runtimes(platforms)
+    runtimes = project.runtimes(platforms, web)
     with temporary_folder() as work:
-        kept, *fmus = _made(Path(file), runtimes, not platforms, work)
+        kept, *fmus = _made(Path(file), runtimes, not (platforms or web), work)
         paths = Path(output) / fmus[0], Path(output) / fmus[1]
         made = {Path(file).with_name(kept): work / kept} if lock else {}
         _put(made | dict(zip(paths, (work / name for name in fmus), strict=True)))

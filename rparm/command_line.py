@@ -158,6 +158,12 @@ def add_report(parser: argparse.ArgumentParser, part: str = "") -> None:
     _add_folder(parser, "report", text, folder)
 
 
+def add_other(parser: argparse.ArgumentParser) -> None:
+    """Add another result to draw over what is run."""
+    text = "draw over it: a CSV file with the column time, or a folder that has a result of each"
+    parser.add_argument("--with", dest="other", type=Path, metavar="PATH", help=text)
+
+
 def add_output(parser: argparse.ArgumentParser, text: str) -> None:
     """Add the folder for other files than pages and results."""
     _add_folder(parser, "output", text)

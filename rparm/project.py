@@ -288,11 +288,14 @@ def model_builder() -> Path:
     return Path(fmu_tools.__path__[0]) / "equations_to_fmu.py"
 
 
-def runtimes(all_platforms: bool) -> list[Path]:
+def runtimes(all_platforms: bool, web: bool = False) -> list[Path]:
     """Return the runtimes to link models with, here or on all platforms; UserError if not there."""
     if all_platforms:
         return sorted(built_for_all().glob("*.json"))
-    if INSTALLED:
+    if web:
+        runtime = ROOT / "build" / "platforms" / "wasm32-wasi" / "runtime" / "runtime.json"
+        way_out = "./run.sh playground, in a checkout, makes it"
+    elif INSTALLED:
         runtime = built_for_all() / f"{platform_name()}.json"
         way_out = f"{PROGRAM} build --platforms builds for others"
     else:

@@ -3,8 +3,8 @@
 /** Curves of variables of one unit over the last seconds, with their legend. */
 class Chart {
   static SPAN = 10; // s
-  static INTERVAL = 0.02; // s between two points
-  static TICK = 2; // s between two numbers at the axis of time
+  static POINTS = 500; // in the span
+  static TICKS = 5; // in the span
   static ROW = 14; // px between two numbers at the axis of values
   static FONT = '12px system-ui, sans-serif';
   static DASHES = ['solid', 'solid', 'dashed'];
@@ -15,9 +15,12 @@ class Chart {
    * @param {string} title
    * @param {number} least range of the axis of values
    * @param {string[]} names of the variables
+   * @param {number} span s
    */
-  constructor(element, plant, title, least, names) {
+  constructor(element, plant, title, least, names, span = Chart.SPAN) {
     this.least = least;
+    this.span = span;
+    this.interval = span / Chart.POINTS;
     this.names = names;
     this.source = plant.reals(names);
     /** @type {number[][]} time in s, values */
@@ -25,12 +28,12 @@ class Chart {
     const {unit} = plant.description.find(names[0]);
     const figure = document.createElement('figure');
     const caption = document.createElement('figcaption');
-    caption.textContent = `${title} (${unit})`;
+    caption.textContent = [title, unit && `(${unit})`].filter(Boolean).join(' ');
     if (names.length > 1) caption.append(this.#legend());
     this.canvas = document.createElement('canvas');
     this.canvas.setAttribute('role', 'img');
     this.canvas.setAttribute('aria-label',
-      `${names.join(', ')} of the last ${Chart.SPAN} s: the numbers are in the tables`);
+      `${names.join(', ')} of the last ${span} s`);
     figure.append(caption, this.canvas);
     element.append(figure);
   }
@@ -51,9 +54,9 @@ class Chart {
   /** Add the values at `time` (s), unless there are values at this time already; drop later ones. */
   add(time) {
     while (this.rows.length && this.rows.at(-1)[0] > time) this.rows.pop();
-    if (this.rows.length && time - this.rows.at(-1)[0] < Chart.INTERVAL) return;
+    if (this.rows.length && time - this.rows.at(-1)[0] < this.interval * (1 - 1e-9)) return;
     this.rows.push([time, ...this.source.get()]);
-    const first = this.rows.findIndex(([then]) => then >= time - Chart.SPAN);
+    const first = this.rows.findIndex(([then]) => then >= time - this.span);
     this.rows.splice(0, first);
   }
 
@@ -65,7 +68,7 @@ class Chart {
   #range() {
     const values = this.rows.flatMap(([, ...row]) => row);
     const lowest = Math.min(0, ...values), highest = Math.max(0, ...values);
-    return [lowest, Math.max(highest, lowest + this.least)];
+    return [lowest, Math.max(highest, lowest + (this.least || (highest > lowest ? 0 : 1)))];
   }
 
   draw() {
@@ -88,8 +91,8 @@ class Chart {
    */
   #axes(context, width, height) {
     const [lowest, highest] = this.#range();
-    const {SPAN, TICK, ROW} = Chart;
-    const end = Math.max(this.rows.at(-1)?.[0] ?? 0, SPAN);
+    const {ROW} = Chart, {span} = this, tick = span / Chart.TICKS;
+    const end = Math.max(this.rows.at(-1)?.[0] ?? 0, (this.rows[0]?.[0] ?? 0) + span);
     const top = 12, bottom = height - 24;
     const y = value => top + (bottom - top) * (highest - value) / (highest - lowest);
     const room = Math.min(y(0) - top, bottom - y(0));
@@ -97,9 +100,9 @@ class Chart {
       value => [value, String(Number(value.toPrecision(3))).replace('-', '\u2212')]);
     const left = 12 + Math.max(...values.map(([, text]) => context.measureText(text).width));
     const right = width - 24;
-    const x = time => right - (right - left) * (end - time) / SPAN;
-    const first = Math.ceil((end - SPAN) / TICK), last = Math.floor(end / TICK);
-    const times = Array.from({length: last - first + 1}, (_, i) => (first + i) * TICK);
+    const x = time => right - (right - left) * (end - time) / span;
+    const first = Math.ceil((end - span) / tick - 1e-6), last = Math.floor(end / tick + 1e-6);
+    const times = Array.from({length: last - first + 1}, (_, i) => (first + i) * tick);
     return {left, right, top, bottom, x, y, values, times};
   }
 
@@ -135,7 +138,7 @@ class Chart {
     context.textBaseline = 'top';
     for (const time of times) {
       line([x(time), top], [x(time), bottom]);
-      context.fillText(`${time} s`, x(time), bottom + 8);
+      context.fillText(`${Number(time.toPrecision(6))} s`, x(time), bottom + 8);
     }
   }
 }

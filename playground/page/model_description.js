@@ -24,6 +24,12 @@ class ModelDescription {
     const root = new DOMParser().parseFromString(xml, 'text/xml').documentElement;
     this.name = root.getAttribute('modelName');
     this.guid = root.getAttribute('guid');
+    this.version = root.getAttribute('fmiVersion') ?? 'an unknown version';
+    this.text = root.getAttribute('description') ?? '';
+    const experiment = root.querySelector('DefaultExperiment');
+    const seconds = name => Number(experiment?.getAttribute(name) ?? 0);
+    /** Of the default experiment, s; 0 for what it does not say. */
+    this.experiment = {start: seconds('startTime'), stop: seconds('stopTime'), step: seconds('stepSize')};
     const types = new Map([...root.querySelectorAll('SimpleType')].map(
       type => [type.getAttribute('name'), ModelDescription.items(type)]));
     /** @type {Map<string, Variable>} */

@@ -31,6 +31,7 @@ class Playground {
     this.#addKeys();
     this.play(!matchMedia('(prefers-reduced-motion: reduce)').matches);
     this.show();
+    this.#addOwn();
     requestAnimationFrame(now => this.#frame(now, now, 0));
   }
 
@@ -130,6 +131,45 @@ class Playground {
       if (!(event.key in acts)) return;
       event.preventDefault();
       acts[event.key]();
+    });
+  }
+
+  /** FMUs that are dropped on the page, or chosen, take the place of the arm. */
+  #addOwn() {
+    const [notice, input, back] = ['notice', 'file', 'arm'].map(id => document.getElementById(id));
+    const parts = [document.querySelector('main'), document.getElementById('own')];
+    const say = text => {
+      notice.textContent = text;
+      notice.hidden = !text;
+    };
+    const swap = isOwn => {
+      [parts[0].hidden, parts[1].hidden, back.hidden] = [isOwn, !isOwn, !isOwn];
+      this.own?.end();
+      say('');
+    };
+    const take = async file => {
+      try {
+        const fmu = await Own.load(file);
+        this.play(false);
+        swap(true);
+        this.own = new Own(parts[1], fmu, say);
+      } catch (error) {
+        if (!(error instanceof UnsuitedError || error instanceof FmuError)) throw error;
+        say(`${file.name}: ${error.message}`);
+      }
+    };
+    input.addEventListener('change', () => {
+      if (input.files.length) take(input.files[0]);
+      input.value = '';
+    });
+    back.addEventListener('click', () => {
+      swap(false);
+      this.stage.fit();
+    });
+    document.addEventListener('dragover', event => event.preventDefault());
+    document.addEventListener('drop', event => {
+      event.preventDefault();
+      if (event.dataTransfer.files.length) take(event.dataTransfer.files[0]);
     });
   }
 

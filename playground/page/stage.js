@@ -3,6 +3,7 @@
 /** The drawing of the arm: the hand that pulls at it, its path, and the colours of the page. */
 class Stage {
   static PUSH = 20; // N, of an arrow key
+  static ZOOM = 1.1; // from one size of the view to the next
   static PATH = 300; // points
   static GRIP = 70; // px from the end effector within which it can be taken
   static SLIDE = [-0.5, 0.5]; // m, least range in view where joint 2 has no stops
@@ -46,6 +47,7 @@ class Stage {
 
   /** Take over the size of the canvas, the colours and the parameters. */
   fit() {
+    if (!this.canvas.clientWidth) return; // not in view
     const ratio = window.devicePixelRatio || 1;
     this.canvas.width = Math.round(this.canvas.clientWidth * ratio);
     this.canvas.height = Math.round(this.canvas.clientHeight * ratio);
@@ -55,15 +57,16 @@ class Stage {
     this.draw();
   }
 
-  /** Distance from joint 1, m, within which the whole arm is now and between its stops. */
+  /** Distance from joint 1, m, within which the whole arm is now, and a little more. */
   #reach() {
     const {a, l1, stops} = this.geometry;
     const [low, high] = stops.q2 ?? Stage.SLIDE;
     const [, q2] = this.simulation.motion.get();
     // link 2 is so long that it is in its sleeve wherever it is: it ends `low` before the end
     // effector and `high` behind it
-    const along = [l1 + Math.max(high, q2) - low, l1 + Math.min(low, q2) - high];
-    return Math.hypot(Math.max(...along.map(Math.abs)), a);
+    const along = [l1 + q2 - low, l1 + q2 - high, l1];
+    const reach = Math.hypot(Math.max(...along.map(Math.abs)), a);
+    return Stage.ZOOM ** Math.ceil(Math.log(reach) / Math.log(Stage.ZOOM)); // so that it seldom changes
   }
 
   /** Choose the view for a reach in m; the point under the pointer stays there. */
@@ -101,8 +104,9 @@ class Stage {
 
   /** The arm as it is now; where it leaves the view, this follows. */
   draw() {
+    if (!this.canvas.clientWidth) return;
     const reach = this.#reach();
-    if (reach !== this.reach) this.#choose(reach);
+    if (reach > this.reach) this.#choose(reach);
     const context = this.canvas.getContext('2d');
     const ratio = window.devicePixelRatio || 1;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);

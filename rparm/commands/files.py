@@ -289,13 +289,15 @@ def add_build_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("file", metavar="FILE.toml", type=Path, help="the file with the equations")
     add_flag(parser, "--platforms", "for all platforms, by zig, not for this machine")
+    add_flag(parser, "--web", "as WebAssembly, by zig: drop NAME.fmu on the playground")
     add_output(parser, "folder for the FMUs (default: the current one)")
 
 
 def do_build(options: argparse.Namespace) -> Ended:
     from rparm.building import build
 
-    paths = build(options.file, output=options.output or Path(), platforms=options.platforms)
+    to, where = options.output or Path(), {"platforms": options.platforms, "web": options.web}
+    paths = build(options.file, output=to, **where)
     new = f"{project.PROGRAM} new my_run --model {shlex.quote(str(paths[0]))}"
     verdict = f"{' and '.join(map(str, paths))}: built; a scenario of it: {new}"
     return Ended(0, verdict, {"fmus": [path.absolute() for path in paths]})

@@ -7,7 +7,15 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from rparm import console, project, result_tables
-from rparm.command_line import Ended, add_flag, add_fmi, add_report, add_tolerance, retyped
+from rparm.command_line import (
+    Ended,
+    add_flag,
+    add_fmi,
+    add_other,
+    add_report,
+    add_tolerance,
+    retyped,
+)  # fmt: skip
 from rparm.commands.files import do_list
 from rparm.console import Progress
 from rparm.errors import UserError, did_you_mean, placed, together
@@ -15,7 +23,8 @@ from rparm.files import check_writable, from_here, missing, written
 from rparm.fmi.fmu_file import Fmu
 from rparm.needs import COMMANDS
 from rparm.project import PROGRAM, VERSIONS
-from rparm.report import pages
+from rparm.report import overlay, pages
+from rparm.report.overview import FILES, SCENARIOS
 from rparm.report.writer import ReportWriter
 from rparm.result_tables import Done, RunTable, SweepTable, print_convergence, print_measured
 from rparm.runs import convergence
@@ -44,6 +53,7 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fmu", type=Path, metavar="PATH", help=text)
     add_fmi(parser, None, "run only FMUs of this version of FMI")
     add_report(parser)
+    add_other(parser)
     add_tolerance(parser, "run at this relative tolerance only, without the sweep")
 
 
@@ -64,8 +74,12 @@ def do_run(options: argparse.Namespace) -> Ended:
         for scenario in chosen:
             runs.reference(scenario)  # so that a missing reference is reported before anything runs
         check_writable(options.report)
+        results = {(SCENARIOS, x.name): fmus[x.model].model.variables for x in chosen}
+        results |= {(FILES, x.name): fmus[x.model].model.variables for x in own}
         given = {name: getattr(options, name) for name in ("fmu", "fmi", "tolerance")}
-        writer = ReportWriter(options.report, retyped("run", [], given).partition(" run")[2])
+        given["with"] = options.other
+        again = retyped("run", [], given).partition(" run")[2]
+        writer = ReportWriter(options.report, again, overlay.read(options.other, results))
         with written(options.report):
             writer.begin()
             if chosen:

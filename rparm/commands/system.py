@@ -7,13 +7,21 @@ from dataclasses import replace
 from pathlib import Path
 
 from rparm import console, project
-from rparm.command_line import Ended, add_flag, add_report, add_step, add_system, retyped
+from rparm.command_line import (
+    Ended,
+    add_flag,
+    add_other,
+    add_report,
+    add_step,
+    add_system,
+    retyped,
+)  # fmt: skip
 from rparm.console import Progress
 from rparm.errors import UserError, did_you_mean, together
 from rparm.files import check_writable, written
 from rparm.project import PROGRAM
-from rparm.report import overview, system_page
-from rparm.report.overview import Entry
+from rparm.report import overlay, overview, system_page
+from rparm.report.overview import SYSTEM, Entry
 from rparm.report.system_page import Section
 from rparm.result_tables import VariantTable
 from rparm.systems import comparison, ecos, master
@@ -33,6 +41,7 @@ def add_system_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help=text)
     add_step(parser)
     add_report(parser)
+    add_other(parser)
     text = "draw each variant into a picture in this folder, too"
     parser.add_argument("--pictures", type=Path, metavar="DIR", help=text)
     add_flag(parser, "--list", "name the systems and their variants")
@@ -56,6 +65,8 @@ def do_system(options: argparse.Namespace) -> Ended:
             found = {system.name: names for system, names in chosen}
             blocks = ("\n  ".join([name, *names]) for name, names in found.items())
             return Ended(0, "\n".join(blocks), {"systems": found})
+        known = {(SYSTEM, s.page(name)): s.names for s, names in chosen for name in names}
+        options.others = overlay.read(options.other, known)
         check_writable(options.report)
         with written(options.report):
             for system, names in chosen:
@@ -166,7 +177,8 @@ def _run(chosen: Sequence[tuple[Section, Sequence[str]]], options: argparse.Name
             )
             console.messages(name, outcome.run.messages)
             with written(options.report):
-                entries.append(system_page.write_variant(options.report, section, outcome))
+                over = options.others.get((SYSTEM, section.page(outcome.variant)))
+                entries.append(system_page.write_variant(options.report, section, outcome, over))
             if options.pictures and section.study:
                 from rparm.report.pages import save_figure  # matplotlib takes long to import
 
@@ -176,7 +188,7 @@ def _run(chosen: Sequence[tuple[Section, Sequence[str]]], options: argparse.Name
                     save_figure(figure, options.pictures / f"{name}.png")
             outcomes.append(outcome)
         print()
-    given = {"ssp": options.ssp, "step": options.step}
+    given = {"ssp": options.ssp, "step": options.step, "with": options.other}
     given["fmi"] = options.fmi if options.fmi != project.VERSIONS[0] else None
     more = retyped("system", [], given).partition(" system")[2]
     with written(options.report):

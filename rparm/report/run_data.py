@@ -12,6 +12,7 @@ from rparm.runs.comparison import SMALLEST_SCALE
 
 MOST_ROWS = 800  # of a page, so that a report stays small
 FEWEST_PACKED = 8  # numbers; shorter lists stay as they are
+TIME = "time"  # keeps all digits
 ROUNDING = 1e-12  # of a variable's scale: less is rounding of its computation
 SEEN = 1e-6  # of a column's range: extremes that stand out by less are not seen
 
@@ -22,14 +23,22 @@ class Curve:
 
     name: str
     values: np.ndarray  # (rows,)
-    reference: np.ndarray | None = None  # (rows,), drawn below it
+    reference: np.ndarray | None = None  # (rows,), drawn dashed above it
     steps: bool = False  # each row ends an interval of this value
     limit: bool = False  # is not a result but a limit of results
+    points: bool = False  # is drawn as points below the other curves
+    other: np.ndarray | None = None  # (rows,) of another result; NaN where that has none
+    difference: np.ndarray | None = None  # (rows,) from it
+
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """What it has for each row."""
+        names = "values", "reference", "other", "difference"
+        return {name: x for name in names if (x := getattr(self, name)) is not None}
 
     def at(self, rows: np.ndarray) -> "Curve":
         """Reduce to some of the rows."""
-        reference = None if self.reference is None else self.reference[rows]
-        return replace(self, values=self.values[rows], reference=reference)
+        return replace(self, **{name: values[rows] for name, values in self.arrays.items()})
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,15 +53,9 @@ class Plot:
     note: str = ""  # meaning of its values
 
     @property
-    def gaps(self) -> bool:
-        """Whether a value has no place on the axis."""
-        return self.log and any((curve.values == 0).any() for curve in self.curves)
-
-    @property
     def columns(self) -> list[np.ndarray]:
         """Drawn curves, (rows,) each; logarithms on a logarithmic axis."""
-        drawn = [values for x in self.curves for values in (x.values, x.reference)]
-        found = [values for values in drawn if values is not None]
+        found = [values for curve in self.curves for values in curve.arrays.values()]
         if not self.log:
             return found
         tiny = np.finfo(float).tiny
@@ -97,6 +100,7 @@ class RunData:
     plots: Sequence[Plot]
     axis: Axis = field(default_factory=Axis)
     motion: dict[str, Any] | None = None  # of rparm.report.motion
+    other: dict[str, Any] | None = None  # of rparm.report.overlay
 
     def json(self) -> str:
         """Write text for a script element: no text in it ends the element."""
@@ -105,25 +109,14 @@ class RunData:
             "name": self.name,
             "title": self.title,
             "axis": vars(self.axis),
-            "time": packer.packed(self.x),
+            TIME: packer.packed(self.x, TIME),
             "plots": [_plot(plot, packer) for plot in self.plots],
-            "motion": self._motion(packer),
+            "motion": packer.packed(self.motion),
+            "other": self.other,
             "arrays": packer.arrays,
         }
         text = json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
         return text.replace("<", "\\u003c")
-
-    def _motion(self, packer: "_Packer") -> dict[str, Any] | None:
-        if self.motion is None:
-            return None
-        reference = self.motion["reference"]
-        ghost = reference and {name: narrow(np.array(x)) for name, x in reference.items()}
-        columns = {
-            name: narrow(np.array(column))
-            for name, column in self.motion.items()
-            if name != "time" and isinstance(column, list) and type(column[0]) is float
-        }
-        return packer.packed(self.motion | columns | {"reference": ghost})
 
 
 def without_rounding(values: np.ndarray) -> np.ndarray:
@@ -191,11 +184,8 @@ def _plot(plot: Plot, packer: "_Packer") -> dict[str, Any]:
     content["levels"] = [{"name": name, "value": value} for name, value in plot.levels]
     content["curves"] = curves = []
     for curve in plot.curves:
-        item = {"name": curve.name, "values": packer.packed(narrow(curve.values))}
-        item |= {"steps": curve.steps, "limit": curve.limit}
-        if curve.reference is not None:
-            item["reference"] = packer.packed(narrow(curve.reference))
-        curves.append(item)
+        item = {"name": curve.name, "steps": curve.steps, "limit": curve.limit}
+        curves.append(item | {"points": curve.points} | packer.packed(curve.arrays))
     return content
 
 
@@ -206,15 +196,16 @@ class _Packer:
         self.arrays: list[dict[str, str]] = []
         self._known: dict[tuple[str, bytes], int] = {}
 
-    def packed(self, content: Any) -> Any:
-        """Replace arrays and lists of floats in `content` by their indices in `arrays`."""
+    def packed(self, content: Any, name: str = "") -> Any:
+        """Replace arrays and lists of floats by their indices in `arrays`, short but for times."""
         if isinstance(content, dict):
-            return {name: self.packed(value) for name, value in content.items()}
+            return {name: self.packed(value, name) for name, value in content.items()}
         long = isinstance(content, list) and len(content) >= FEWEST_PACKED
         if long and all(type(value) is float for value in content):
             content = np.array(content)
         if not isinstance(content, np.ndarray):
             return content
+        content = content if name == TIME else narrow(content)
         kind = "f4" if content.dtype == np.float32 else "f8"
         data = content.astype(f"<{kind}").tobytes()
         if (kind, data) not in self._known:

@@ -10,12 +10,12 @@ import numpy as np
 from rparm import files
 from rparm.fmi.model import Model, Value, Variable
 from rparm.proof import ASSUMED, ProvenError, errors_of_run
-from rparm.report import motion, overview
+from rparm.report import motion, overlay, overview
 from rparm.report.overview import FAILED, PASSED, RAN, Entry
 from rparm.report.pages import RunPage, Table
 from rparm.report.run_data import Curve, Plot, RunData, result_curve, thinned
 from rparm.runs.comparison import Comparison, Failure, Run, comparisons, estimated_from
-from rparm.runs.inputs import Constant, Logged, Signal, Sines, Switches
+from rparm.runs.inputs import Constant, Log, Logged, Signal, Sines, Switches
 from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import Result
 from rparm.units import bits, milliseconds, number, ordinal, rounded_up, sentence, short, unit
@@ -25,18 +25,28 @@ MOST_POINTS = 8  # of a table, to be listed
 
 
 def write(
-    folder: Path, name: str, runs: Sequence[Run], again: str, failures: Sequence[Failure] = ()
+    folder: Path,
+    name: str,
+    runs: Sequence[Run],
+    again: str,
+    failures: Sequence[Failure] = (),
+    other: Log | None = None,
 ) -> Entry:
     """Write page and values, called `name`, of a scenario to a section; its line in the overview.
 
-    The first run is drawn; `failures` did not end. The command `again` runs the scenario.
+    The first run is drawn, over it the `other` result; `failures` did not end. The command `again`
+    runs the scenario.
     """
     folder.mkdir(parents=True, exist_ok=True)
     first, scenario = runs[0], runs[0].scenario
     columns = recorded(scenario, first.fmu.model, first.result)
     digits = DIGITS if first.compared else None
     csv = _write_values(folder / f"{name}.csv", first.result, columns, digits)
-    rows, plots = _thinned(_plots(runs, columns))
+    drawn, over = _plots(runs, columns), None
+    if other is not None:
+        elapsed = scenario.elapsed[scenario.reference_rows][: len(first.result.times)]
+        drawn, over = overlay.lay(other, drawn, elapsed, scenario.start)
+    rows, plots = _thinned(drawn)
     moving, times = motion.of_run(first, rows), first.result.times[rows]
     proof = errors_of_run(scenario, first.result) or {}
     page = RunPage(
@@ -44,7 +54,7 @@ def write(
         description=scenario.description,
         status=FAILED if failures or not all(run.passed for run in runs) else status(first),
         facts=[*_facts(first), *_proven(proof, first.fmu.model)],
-        data=RunData(scenario.name, scenario.title, times, plots, motion=moving),
+        data=RunData(scenario.name, scenario.title, times, plots, motion=moving, other=over),
         tables=_tables(runs),
         notes=[*_notes(runs), *([f"The proven error assumes {ASSUMED}."] if proof else [])],
         failures=[
@@ -216,7 +226,7 @@ def _facts(run: Run) -> list[tuple[str, str]]:
         *_common_facts(run.scenario, model),
         ("steps", f"{result.steps} {_lengths(run.scenario.steps)}"),
         ("tolerance", short(result.tolerance)),
-        ("worst error", f"{run.error:.1e}{bound} ({run.worst})"),
+        ("worst error", f"{short(run.error, 1)}{bound} ({run.worst})"),
     ]
 
 
@@ -343,7 +353,9 @@ def with_measured(
         if index == len(result):
             simulated = result_curve(name, compared.simulated)
             result.append(Plot(name, unit(model.variables[name].unit), [simulated]))
-        curve = result_curve(f"{name} measured", compared.measured)
+        alone = len(result[index].curves) == 1
+        label = "measured" if alone else f"{name} measured"
+        curve = replace(result_curve(label, compared.measured), points=True)
         result[index] = replace(result[index], curves=[*result[index].curves, curve])
     return result
 

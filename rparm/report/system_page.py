@@ -15,11 +15,12 @@ from rparm import files, project
 from rparm.errors import UserError
 from rparm.files import from_here, whole, write_text
 from rparm.fmi.model import KINDS
-from rparm.report import block_diagram, motion, overview, pages
+from rparm.report import block_diagram, motion, overlay, overview, pages
 from rparm.report.overview import FAILED, PASSED, RAN, SYSTEM, Entry
 from rparm.report.pages import RunPage, Table
 from rparm.report.run_data import Plot, RunData, result_curve, thinned
 from rparm.report.scenario_page import cells, meanings
+from rparm.runs.inputs import Log
 from rparm.systems import comparison, ecos
 from rparm.systems.comparison import BOUND, Diagram, Measure, Outcome, Study, load_study
 from rparm.systems.structure import OpenedSystem
@@ -118,10 +119,12 @@ def remove(report: Path, system: str, names: Sequence[str]) -> None:
         folder.rmdir()
 
 
-def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
+def write_variant(
+    report: Path, section: Section, outcome: Outcome, other: Log | None = None
+) -> Entry:
     """Write page and values of a run, complete or not at all; return its line of the overview."""
     run, ssp, folder = outcome.run, section.ssp, _folder(report, section)
-    rows, data = _data(section, outcome)
+    rows, data = _data(section, outcome, other)
     failures = []
     if not outcome.passed:
         error = f"{outcome.error:.1e}"
@@ -134,7 +137,11 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
         status=RAN if outcome.is_estimate else PASSED if outcome.passed else FAILED,
         facts=_facts(section, outcome),
         data=data,
-        tables=[*_parameters(ssp, outcome.variant), *_solvers(ssp, run), *_errors(ssp, outcome)],
+        tables=[
+            *_parameters(ssp, outcome.variant),
+            *_solvers(ssp, run),
+            *_errors(ssp, outcome),
+        ],
         notes=[
             *(f"{m.name.capitalize()}: {m.meaning}." for m in section.measures),
             "These numbers are of all steps, also of those that the file leaves out.",
@@ -213,18 +220,22 @@ def _texts(section: Section, variant: str) -> dict[str, Any]:
     }
 
 
-def _data(section: Section, outcome: Outcome) -> tuple[np.ndarray, RunData]:
+def _data(
+    section: Section, outcome: Outcome, other: Log | None = None
+) -> tuple[np.ndarray, RunData]:
     """Return the rows of the file of values, and plots and motion at these."""
-    times = outcome.run.times
-    plots = [_plot(section.ssp, outcome, diagram) for diagram in section.diagrams]
+    times, ssp, over = outcome.run.times, section.ssp, None
+    plots = [_plot(ssp, outcome, diagram) for diagram in section.diagrams]
+    if other is not None:
+        plots, over = overlay.lay(other, plots, times - ssp.system.start, ssp.system.start)
     rows = thinned([column for plot in plots for column in plot.columns], MOST_ROWS)
     plots = [plot.at(rows) for plot in plots]
     if section.folder:
-        moving = motion.of_outcome(section.name, section.ssp, outcome, rows)
+        moving = motion.of_outcome(section.name, ssp, outcome, rows)
     else:
         component, model = section.animated or ("", "")
-        moving = motion.of_outcome(model, section.ssp, outcome, rows, component)
-    return rows, RunData(outcome.variant, "", times[rows], plots, motion=moving)
+        moving = motion.of_outcome(model, ssp, outcome, rows, component)
+    return rows, RunData(outcome.variant, "", times[rows], plots, motion=moving, other=over)
 
 
 def _values(section: Section, folder: Path, outcome: Outcome, rows: np.ndarray) -> dict[str, str]:

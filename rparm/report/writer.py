@@ -4,6 +4,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, count
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from rparm import project
 from rparm.files import from_here
 from rparm.report import overview, pages, scenario_page
+from rparm.report.overlay import Others
 from rparm.report.overview import FAILED, FILES, PASSED, SCENARIOS, STUDIES, Entry
 from rparm.report.overview import sparkline as sparkline
 from rparm.report.pages import RunPage, Table
@@ -39,9 +41,11 @@ def _by(items: Iterable[Any], key: Callable[[Any], Any]) -> dict[Any, list[Any]]
 class ReportWriter:
     """Writes pages of scenarios, of users' own files and of studies into a folder."""
 
-    def __init__(self, folder: Path, options: str = "") -> None:
-        """`options` are those of the command, for its pages."""
-        self.folder, self.options = folder, options
+    def __init__(
+        self, folder: Path, options: str = "", others: Others = MappingProxyType({})
+    ) -> None:
+        """`options` are those of the command, for its pages; `others` what to draw over results."""
+        self.folder, self.options, self._others = folder, options, others
         self.files: dict[str, Path] = {}  # pages of users' own files that were written, by name
 
     def begin(self) -> None:
@@ -80,7 +84,8 @@ class ReportWriter:
             folder = self.folder / section
             name = scenario.name if ours else self._free_name(path)
             if group:
-                entry = scenario_page.write(folder, name, group, again, others)
+                over = self._others.get((section, scenario.name))
+                entry = scenario_page.write(folder, name, group, again, others, over)
             else:
                 entry = scenario_page.write_failed(folder, name, others[0], again)
             entries.append(entry if ours else replace(entry, source=str(path)))

@@ -7,33 +7,7 @@ from typing import Any
 from rparm.report.recording import ASSETS, SCRIPTS, STYLES
 from tests.support.browser import Browser
 
-PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head><meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>Arm</title>
-<link rel="icon" href="data:,">{styles}</head>
-<body><main><h1>Arm</h1><div id="player"></div></main>
-<script type="application/json" id="motion">{motion}</script>{scripts}
-<script>
-  const element = document.getElementById('player');
-  const events = [];
-  element.addEventListener('time', event => events.push(event.detail));
-  const player = new Player(element, JSON.parse(document.getElementById('motion').textContent));
-  /** Colour of the canvas at a place in px of CSS. */
-  function colourAt([x, y]) {{
-    const ratio = player.canvas.width / player.view.width;
-    const [red, green, blue] = player.canvas.getContext('2d')
-      .getImageData(Math.floor(x * ratio), Math.floor(y * ratio), 1, 1).data;
-    return [red, green, blue];
-  }}
-  /** What a colour of CSS is as red, green, blue. */
-  function parsed(colour) {{
-    const context = new OffscreenCanvas(1, 1).getContext('2d');
-    context.fillStyle = colour;
-    context.fillRect(0, 0, 1, 1);
-    return [...context.getImageData(0, 0, 1, 1).data].slice(0, 3);
-  }}
-</script></body></html>
-"""
+PAGE = Path(__file__).with_suffix(".html").read_text(encoding="utf-8")
 
 ARM = {"a": 0.1, "l1": 0.5, "lc1": 0.25, "g": 9.81, "stops": None, "wall": None, "payload": None}
 

@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,20 +12,12 @@ from tests.support.browser import Browser
 CONSTANT = {"time": [0.0, 1.0, 2.0], "q1": [0.0] * 3, "q2": [0.2] * 3}  # nothing moves
 NEAR = 12  # of 255: edges are smoothed
 
-# pixels of a colour in a box, in px of CSS: how many, and from where to where
-PIXELS = """
-  const [name, left, top, right, bottom] = arguments;
-  const colour = parsed(player.view.colours[name]);
-  const found = {count: 0, left: Infinity, right: -Infinity};
-  for (let y = top; y <= bottom; y++) for (let x = left; x <= right; x++) {
-    const here = colourAt([x, y]);
-    if (here.some((channel, i) => Math.abs(channel - colour[i]) > 12)) continue;
-    found.count += 1;
-    found.left = Math.min(found.left, x);
-    found.right = Math.max(found.right, x);
-  }
-  return found;
-"""
+IN_PAGE = Path(__file__).with_name("drawn.js").read_text(encoding="utf-8")
+
+
+def call(browser: Browser, function: str, *arguments: object) -> Any:
+    """Value of a function of drawn.js."""
+    return browser.run(f"{IN_PAGE} return {function}(...arguments)", *arguments)
 
 
 def still(browser: Browser, folder: Path, **changes) -> None:
@@ -45,20 +38,10 @@ def test_the_end_effector_moves_where_the_motion_says(browser: Browser, tmp_path
         q1, L = motion["q1"][row], ARM["l1"] + motion["q2"][row]
         x = L * math.cos(q1) - ARM["a"] * math.sin(q1)
         y = L * math.sin(q1) + ARM["a"] * math.cos(q1)
-        ring, good, centres[row] = browser.run(
-            """
-            const [x, y] = Arm.toPixel(player.view, arguments[0]);
-            const radius = 0.62 * player.view.bar;
-            const around = [...Array(8).keys()].map(i => i * Math.PI / 4);
-            return [around.map(angle => colourAt(
-              [x + radius * Math.cos(angle), y + radius * Math.sin(angle)])),
-              parsed(player.view.colours.good), [x, y]];
-            """,
-            [x, y],
-        )
+        ring, good, centres[row] = call(browser, "ring", [x, y])
         assert sum(alike(colour, good) for colour in ring) >= 6, row
     browser.run("player.show(0)")
-    paper = browser.run("return parsed(player.view.colours.paper)")
+    [paper] = call(browser, "named", "paper")
     for row in (60, 100):  # the arm has left, or is not there yet
         assert alike(browser.run("return colourAt(arguments[0])", centres[row]), paper)
 
@@ -66,21 +49,8 @@ def test_the_end_effector_moves_where_the_motion_says(browser: Browser, tmp_path
 def test_links_join_their_points(browser: Browser, tmp_path: Path) -> None:
     show(browser, tmp_path, synthetic())
     for row in (50, 100):
-        *link1, link2 = browser.run(
-            """
-            player.show(arguments[0]);
-            const {arm, q1, q2} = player.motion, {row, view} = player;
-            const {elbow, sleeve, endEffector} = Arm.forward(arm, q1[row], q2[row]);
-            const between = (one, other, part) => one.map((x, i) => x + part * (other[i] - x));
-            return [between([0, 0], elbow, 0.3), between([0, 0], elbow, 0.8),
-              between(elbow, sleeve, 0.4), between(sleeve, endEffector, 0.6)]
-              .map(point => colourAt(Arm.toPixel(view, point)));
-            """,
-            row,
-        )
-        paper, grid = browser.run(
-            "return ['paper', 'grid'].map(name => parsed(player.view.colours[name]))"
-        )
+        *link1, link2 = call(browser, "onLinks", row)
+        paper, grid = call(browser, "named", "paper", "grid")
         assert link1[0] == link1[1] == link1[2]
         for colour in (link1[0], link2):
             assert not alike(colour, paper)
@@ -91,13 +61,13 @@ def test_links_join_their_points(browser: Browser, tmp_path: Path) -> None:
 def test_the_trace_is_the_path_so_far(browser: Browser, tmp_path: Path) -> None:
     show(browser, tmp_path, synthetic())
     browser.run("player.show(60)")
-    path, pixel, good = browser.run(
-        "return [player.scene.trace, colourAt(Arm.toPixel(player.view, player.path[57])),"
-        " parsed(player.view.colours.good)]"
+    path, place, good = browser.run("return [player.scene.trace, player.path[57]]") + call(
+        browser, "named", "good"
     )
+    pixel = call(browser, "at", place)
     assert path == browser.run("return player.path.slice(0, 61)")
     browser.run("player.show(0)")
-    before = browser.run("return colourAt(Arm.toPixel(player.view, player.path[57]))")
+    before = call(browser, "at", place)
     assert not alike(before, good)
     assert not alike(before, pixel)
 
@@ -105,16 +75,12 @@ def test_the_trace_is_the_path_so_far(browser: Browser, tmp_path: Path) -> None:
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_force_is_as_long_as_it_is_large(browser: Browser, tmp_path: Path, sign: int) -> None:
     still(browser, tmp_path, f2=[20.0 * sign, 10.0 * sign, 0.0])
-    left, top, sleeve = browser.run(
-        "const [x, y] = Arm.toPixel(player.view, [0.5, 0.1]); const {bar} = player.view;"
-        "return [Math.round(x - 90), Math.round(y - 2.3 * bar), Math.round(x)]"
-    )
-    bar = browser.run("return player.view.bar")
-    box = ("effort", left, top, left + 180, round(top + 1.1 * bar))
+    sleeve, top, bar = call(browser, "sleeve")
+    box = ("effort", sleeve - 90, round(top), sleeve + 90, round(top + 1.1 * bar))
     found = []
     for row in range(3):
         browser.run("player.show(arguments[0])", row)
-        found.append(browser.run(PIXELS, *box))
+        found.append(call(browser, "pixels", *box))
     end = "right" if sign > 0 else "left"
     assert sign * (found[0][end] - sleeve) == pytest.approx(72, abs=2)
     assert sign * (found[1][end] - sleeve) == pytest.approx(36, abs=2)
@@ -124,18 +90,10 @@ def test_a_force_is_as_long_as_it_is_large(browser: Browser, tmp_path: Path, sig
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_torque_is_an_arc_of_its_size(browser: Browser, tmp_path: Path, sign: int) -> None:
     still(browser, tmp_path, tau1=[5.0 * sign, 2.5 * sign, 0.0])
-    effort = browser.run("return parsed(player.view.colours.effort)")
+    [effort] = call(browser, "named", "effort")
 
     def lit(degrees: float) -> bool:
-        colour = browser.run(
-            """
-            const [x, y] = Arm.toPixel(player.view, [0, 0]), radius = 2.6 * player.view.bar;
-            const angle = arguments[0];
-            return colourAt([x + radius * Math.cos(angle), y - radius * Math.sin(angle)]);
-            """,
-            sign * math.radians(degrees),
-        )
-        return alike(colour, effort)
+        return alike(call(browser, "onArc", sign * math.radians(degrees)), effort)
 
     begin = math.degrees(0.35)
     angles = {0: 240, 1: 120}  # degrees, of the largest torque on the scale and of half of it
@@ -150,18 +108,8 @@ def test_a_torque_is_an_arc_of_its_size(browser: Browser, tmp_path: Path, sign: 
 
 def test_a_force_on_the_tip_points_from_it(browser: Browser, tmp_path: Path) -> None:
     still(browser, tmp_path, ee_fx=[0.0, 3.0, 0.0], ee_fy=[0.0, 4.0, 0.0])
-    bad = browser.run("return parsed(player.view.colours.bad)")
-    along = [
-        browser.run(
-            """
-            player.show(arguments[0]);
-            const [x, y] = Arm.toPixel(player.view, player.path[0]);
-            return [20, 40, 60].map(r => colourAt([x + 0.6 * r, y - 0.8 * r]));
-            """,
-            row,
-        )
-        for row in (0, 1)
-    ]
+    [bad] = call(browser, "named", "bad")
+    along = [call(browser, "fromTip", row) for row in (0, 1)]
     assert not any(alike(colour, bad) for colour in along[0])
     assert all(alike(colour, bad) for colour in along[1])
 
@@ -170,20 +118,10 @@ def test_a_stop_that_is_struck_is_filled(browser: Browser, tmp_path: Path) -> No
     arm = ARM | {"stops": {"q1": None, "q2": [-0.1, 0.2]}}
     motion = synthetic(**CONSTANT | {"q2": [0.2, 0.1, -0.1]}, arm=arm)
     show(browser, tmp_path, motion, width=800)
-    stop = browser.run("return parsed(player.view.colours.stop)")
+    [stop] = call(browser, "named", "stop")
     filled = []
     for row, q2 in enumerate(motion["q2"]):
-        browser.run("player.show(arguments[0])", row)
-        # the middles of the collars, half of their height off the axis of link 2
-        colours = browser.run(
-            """
-            const {scale, bar} = player.view, q2 = arguments[0];
-            const [x, y] = Arm.toPixel(player.view, [0.5 + q2, 0.1]);
-            return [1.15 * bar + 0.1 * scale + 0.3 * bar, -1.15 * bar - 0.2 * scale - 0.3 * bar]
-              .map(along => colourAt([x + along, y - 0.5 * bar]));
-            """,
-            q2,
-        )
+        colours = call(browser, "collars", row, q2)
         filled.append([alike(colour, stop) for colour in colours])
     assert filled == [[False, True], [False, False], [True, False]]
 
@@ -193,24 +131,10 @@ def test_link_1_lies_against_the_stop_that_it_strikes(browser: Browser, tmp_path
     arm = ARM | {"stops": {"q1": limits, "q2": None}}
     motion = synthetic(**CONSTANT | {"q1": [0.8, 0.0, -0.5]}, arm=arm)
     show(browser, tmp_path, motion, width=800)
-    stop, paper = browser.run(
-        "return ['stop', 'paper'].map(name => parsed(player.view.colours[name]))"
-    )
+    stop, paper = call(browser, "named", "stop", "paper")
     filled = []
     for row in range(3):
-        browser.run("player.show(arguments[0])", row)
-        # the middle of each block: its half and that of link 1 beyond the limit
-        colours = browser.run(
-            """
-            const {scale, bar} = player.view, [x, y] = Arm.toPixel(player.view, [0, 0]);
-            const radius = 0.42 * 0.5 * scale;
-            return arguments[0].map((limit, i) => {
-              const beyond = i ? bar : -bar, s = Math.sin(limit), c = Math.cos(limit);
-              return colourAt([x + radius * c - beyond * s, y - radius * s - beyond * c]);
-            });
-            """,
-            limits,
-        )
+        colours = call(browser, "blocks", row, limits)
         assert not any(alike(colour, paper) for colour in colours)
         filled.append([alike(colour, stop) for colour in colours])
     assert filled == [[False, True], [False, False], [True, False]]
@@ -218,14 +142,7 @@ def test_link_1_lies_against_the_stop_that_it_strikes(browser: Browser, tmp_path
 
 def test_modes_of_friction_have_marks(browser: Browser, tmp_path: Path) -> None:
     still(browser, tmp_path, mode1=[0, 1, 2], mode2=[2, 2, -1])
-    box = browser.run(
-        "const [x, y] = Arm.toPixel(player.view, [0, 0]), {bar} = player.view;"
-        "return [x - 2.4 * bar, y - 2.4 * bar, x + 2.4 * bar, y + 2.4 * bar].map(Math.round)"
-    )
-    counts = []
-    for row in range(3):
-        browser.run("player.show(arguments[0])", row)
-        counts.append(browser.run(PIXELS, "accent", *box)["count"])
+    counts = [call(browser, "marks", row) for row in range(3)]
     assert counts[0] > 40  # a padlock
     assert counts[1] > 20  # chevrons
     assert counts[2] == 0
@@ -239,36 +156,19 @@ def test_the_payload_is_drawn_while_it_is_attached(browser: Browser, tmp_path: P
     for at_rest, shown in ((False, attached), (True, [True, True, False])):
         arm["payload"]["at_rest"] = at_rest
         still(browser, tmp_path, arm=arm, payload_attached=attached)
-        paper = browser.run("return parsed(player.view.colours.paper)")
+        [paper] = call(browser, "named", "paper")
         for row, expected in enumerate(shown):
-            colour = browser.run(
-                """
-                player.show(arguments[0]);
-                const [x, y] = Arm.toPixel(player.view, [0.8, 0.2]);
-                return colourAt([x + player.view.bar, y + player.view.bar]);
-                """,
-                row,
-            )
-            assert alike(colour, paper) != expected
+            assert alike(call(browser, "payload", row), paper) != expected
 
 
 def test_the_reference_is_another_outline(browser: Browser, tmp_path: Path) -> None:
     still(browser, tmp_path, reference={"q1": [0.4] * 3, "q2": [0.2] * 3})
-    colour, reference = browser.run(
-        """
-        const [x, y] = Arm.toPixel(player.view, [0.25 * Math.cos(0.4), 0.25 * Math.sin(0.4)]);
-        const beside = player.view.bar / 2 + 3.5;
-        return [colourAt([x - beside * Math.sin(0.4), y - beside * Math.cos(0.4)]),
-          parsed(player.view.colours.reference)];
-        """
-    )
-    assert alike(colour, reference)
+    assert alike(*call(browser, "outline"))
 
 
 def test_the_wall_is_where_its_parameters_say(browser: Browser, tmp_path: Path) -> None:
     wall = {"position": 0.06, "angle": math.pi / 2, "tip_x": 0.0, "tip_z": 0.0}
     still(browser, tmp_path, arm=ARM | {"wall": wall})
-    stop = browser.run("return parsed(player.view.colours.stop)")
+    [stop] = call(browser, "named", "stop")
     for y, expected in ((0.06, True), (0.08, False)):
-        colour = browser.run("return colourAt(Arm.toPixel(player.view, [0.55, arguments[0]]))", y)
-        assert alike(colour, stop) == expected
+        assert alike(call(browser, "at", [0.55, y]), stop) == expected

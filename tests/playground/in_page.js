@@ -133,3 +133,39 @@ function torture(changes) {
   counts.steps = simulation.steps;
   return counts;
 }
+
+// ---- FMUs of users ------------------------------------------------------------------------------
+
+/** Drop a file, its bytes in base64; what the page says of it, '' once it is loaded and paused. */
+async function dropped(name, encodedBytes) {
+  const {own} = window.tested, notice = document.getElementById('notice'), data = new DataTransfer();
+  notice.hidden = true;
+  data.items.add(new File([Uint8Array.from(atob(encodedBytes), (sign) => sign.charCodeAt(0))], name));
+  document.dispatchEvent(new DragEvent('drop', {dataTransfer: data, bubbles: true, cancelable: true}));
+  for (let i = 0; i < 500 && notice.hidden && window.tested.own === own; i++) {
+    await new Promise(next => setTimeout(next, 10));
+  }
+  if (window.tested.own !== own) window.tested.own.play(false);
+  return notice.hidden ? '' : notice.textContent;
+}
+
+/** Move a slider of the FMU of a user. */
+function slide(name, value) {
+  const slider = document.getElementById(`own-${name}`);
+  slider.value = value;
+  slider.dispatchEvent(new Event('input'));
+  return slider.valueAsNumber;
+}
+
+/** From its start, `count` steps; values of variables then. */
+function stepped(count, names) {
+  const {own} = window.tested;
+  own.reset();
+  for (let n = 0; n < count; n++) {
+    own.fmu.doStep(own.time, own.step);
+    own.steps++;
+    for (const chart of own.charts) chart.add(own.time);
+  }
+  for (const chart of own.charts) chart.draw();
+  return [own.time, ...names.map(name => own.fmu.get(name))];
+}

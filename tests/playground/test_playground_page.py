@@ -9,7 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from pytest import approx
 
+from rparm.building import build as build_fmus
 from tests.playground.opened_page import OpenedPage, choose, click, find, type_number
 from tests.support.browser import Browser
 from tests.support.paths import ROOT
@@ -249,6 +251,54 @@ def test_a_page_that_cannot_start_says_why(browser: Browser, page: Path, tmp_pat
     said = browser.run("return document.getElementById('message').textContent")
     assert said.startswith("The playground does not start: the GUID '{00000000-")
     browser.check_quiet()
+
+
+# ---- FMUs of users -------------------------------------------------------------------------------
+LAG = """
+name = "Lag"
+description = "First order"
+experiment = { stop = 4.0, step = 0.01 }
+[parameters]
+T = { start = 0.5, unit = "s", min = 1e-3, max = 2 }
+[inputs]
+u = { unit = "m", min = -3, max = 3 }
+[states]
+x = { unit = "m", derivative = "(u - x) / T" }
+"""
+
+
+def drop(opened: OpenedPage, name: str, content: bytes) -> str:
+    return opened.call("dropped", name, base64.b64encode(content).decode())
+
+
+@pytest.mark.parametrize("width", [400, 1200])
+def test_an_own_model_is_felt_in_the_page(
+    each_browser: Browser, page: Path, tmp_path: Path, width: int
+) -> None:
+    """A lag follows a step of its input as 1 - exp(-t / T), by sliders of both."""
+    opened = OpenedPage(each_browser, page, width=width)
+    (tmp_path / "lag.toml").write_text(LAG)
+    fmu, _ = build_fmus(tmp_path / "lag.toml", output=tmp_path, web=True)
+    assert drop(opened, "Lag.fmu", fmu.read_bytes()) == ""
+    assert opened.call("slide", "u", 2) == 2 and opened.call("slide", "T", 0.803) == approx(
+        0.8, 0.01
+    )
+    time, x, lag = opened.call("stepped", 150, ["x", "T"])
+    assert time == approx(1.5) and x == approx(2 * (1 - math.exp(-1.5 / lag)), rel=1e-6)
+    assert opened.text("#own h2") == "Lag" and "x (m)" in opened.text("#own figure")
+    assert each_browser.overflow() == 0 and each_browser.violations() == []
+    native = page.parents[1] / "RPSensor.fmu"
+    told = {"a.fmu": (b"no zip", "is no ZIP archive")}
+    told |= {"b.fmu": (native.read_bytes(), "has no WebAssembly: rparm build --web")}
+    told |= {"c.fmu": (fmu.with_name("fmi3").joinpath("Lag.fmu").read_bytes(), "is of FMI 3.0")}
+    for name, (content, words) in told.items():
+        assert f"{name}: {words}" in drop(opened, name, content)
+    for file in (page.parents[1] / "platforms" / "wasm32-wasi").glob("*.fmu"):
+        assert drop(opened, file.name, file.read_bytes()) == "", file
+        assert opened.call("stepped", 5, [])[0] > 0
+    each_browser.run("document.getElementById('arm').click()")
+    assert each_browser.run("return document.getElementById('own').hidden")
+    each_browser.check_quiet()
 
 
 # ---- The program that writes the page ------------------------------------------------------------

@@ -1,5 +1,6 @@
 """The cursor of a page: it shows the values that the page links, in all plots and the player."""
 
+from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import quote
 
@@ -7,11 +8,16 @@ import numpy as np
 import pytest
 from selenium.webdriver.common.keys import Keys
 
+from rparm.__main__ import main
+from rparm.report import scenario_page
 from rparm.report.run_data import ROUNDING
 from rparm.runs.comparison import SMALLEST_SCALE
-from tests.report.conftest import LATE, SCENARIOS, STRANGE, VARIANT, show
+from tests.report.conftest import CONTENT, LATE, SCENARIOS, STRANGE, VARIANT, show
 from tests.support.browser import Browser
+from tests.support.rparm_project import MISTAKES
 from tests.support.ssp_files import read_csv
+
+PREFIXES = {1e-9: " n", 1e-6: " µ", 1e-3: " m", 1.0: "", 1e3: " k"}
 
 
 @pytest.mark.parametrize(
@@ -36,23 +42,24 @@ def test_the_cursor_shows_rows_of_the_values(
         time, shown = browser.run(
             "page.seek(arguments[0]);"
             "const shown = [...document.querySelectorAll('[data-curve]')];"
-            "return [page.x[page.row], shown.map(x => [x.dataset.curve, x.innerText])]",
+            "const read = x => [x.dataset.curve, x.innerText, x.dataset.factor];"
+            "return [page.x[page.row], shown.map(read)]",
             row,
         )
         found = np.flatnonzero(values["time"] == time)
         assert len(found) == 1 and (row < rows - 1 or found[0] == last)
         seen = {
-            curve: text.split()[0].replace("\N{MINUS SIGN}", "-")
-            for curve, text in shown
-            if curve in values
+            curve: float(text.split()[0].replace("\N{MINUS SIGN}", "-")) * float(factor)
+            for curve, text, factor in shown
+            if curve in values and PREFIXES[float(factor)] in text
         }
         assert curves <= set(seen)
-        for curve, text in seen.items():
+        for curve, number in seen.items():
             value = values[curve][found[0]]
             last_digit = 10.0 ** (np.floor(np.log10(abs(value))) - 6) if value else 0.0
             rounding = ROUNDING * max(np.max(np.abs(values[curve])), SMALLEST_SCALE)
-            assert abs(float(text) - value) <= max(last_digit, rounding), curve  # seven digits
-            assert text == "0" or abs(value) >= rounding
+            assert abs(number - value) <= max(last_digit, rounding), curve  # seven digits
+            assert not number or abs(value) >= rounding
 
 
 def test_cursor_player_and_plots_are_in_step(browser: Browser, report: Path) -> None:
@@ -101,3 +108,81 @@ def test_a_late_time_keeps_its_digits(browser: Browser, report: Path) -> None:
         "return [...document.querySelectorAll('.xtick text')].map(tick => tick.textContent)"
     )
     assert labels and all(float(label.replace("\u202f", "")) >= 1e6 for label in labels)
+
+
+# ---- Another result ------------------------------------------------------------------------------
+IN_PAGE = Path(__file__).with_name("compare_in_page.js").read_text(encoding="utf-8")
+
+
+def test_a_dropped_line_is_interpolated_exactly(each_browser: Browser, report: Path) -> None:
+    """A straight line is linear between any of its rows; outside there is nothing."""
+    show(each_browser, report / f"scenarios/{SCENARIOS[0]}.html", width=400)
+    rows = [[time, 0.25 - 0.5 * time] for time in (0.1003, 0.7113, 1.9003)]
+    found = each_browser.run(f"{IN_PAGE} return compared(arguments[0])", rows)
+    assert "a line.csv" in found["said"] and "interpolated linearly" in found["said"]
+    for time, value, other, left in zip(
+        *(found[key] for key in ("times", "values", "other", "difference")), strict=True
+    ):
+        inside = 0.1003 <= time <= 1.9003
+        assert (other is not None) == inside
+        if inside:
+            assert other == pytest.approx(0.25 - 0.5 * time, abs=1e-12)
+            assert left == pytest.approx(value - other, abs=1e-7)
+    assert each_browser.overflow() == 0
+    for text, _, words in MISTAKES["compared"]["rows"]:
+        assert words in each_browser.run(f"{IN_PAGE} return drop('x.csv', arguments[0])", text)
+    each_browser.check_quiet()
+    each_browser.run("page.clear.click()")
+    assert not each_browser.run("return page.data.plots.some(x => x.curves[0].other)")
+
+
+def test_a_difference_has_all_digits(browser: Browser, report: Path, tmp_path: Path) -> None:
+    """Of the same run with a drift of 1 nrad/s: a millionth of what seven digits show."""
+    csv = (report / f"scenarios/{SCENARIOS[0]}.csv").read_text().splitlines()
+    split = [line.split(",") for line in csv]
+    for row in split[1:]:
+        row[1] = repr(float(row[1]) + 1e-9 * float(row[0]))
+    other = tmp_path / "scenarios" / f"{SCENARIOS[0]}.csv"
+    other.parent.mkdir()
+    other.write_text("\n".join(map(",".join, split)) + "\n")
+    given = ["run", SCENARIOS[0], "--tolerance", "1e-8", "--report", str(tmp_path), "--with"]
+    assert split[0][:2] == ['"time"', '"q1"'] and main([*given, str(tmp_path)]) == 0
+    show(browser, tmp_path / f"scenarios/{SCENARIOS[0]}.html")
+    times, left, unit, said = browser.run(
+        "const [{plot, units}] = page.plots, {difference} = plot.curves[0];"
+        "return [page.x, difference, units.difference.unit, page.notice.textContent]"
+    )
+    assert left == pytest.approx([-1e-9 * time for time in times], abs=2e-12)
+    assert unit == "nrad" and "interpolated" not in said and "q1 2 nrad" in said
+    assert browser.violations() == []
+
+
+def test_files_of_no_use_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "log.csv"
+    given = ["run", SCENARIOS[0], "--tolerance", "1e-8", "--report", str(tmp_path / "report")]
+    for text, words, _ in [*MISTAKES["compared"]["rows"], (None, "no such file", "")]:
+        file.unlink(missing_ok=True)
+        if text is not None:
+            file.write_text(text)
+        assert main([*given, "--with", str(file)]) == 2
+        error = capsys.readouterr().err.strip().splitlines()[-1]
+        assert error.startswith("error: ") and str(file) in error and words in error
+    assert main([*given, "--with", str(tmp_path)]) == 2
+    assert f"{SCENARIOS[0]}.csv: no such file" in capsys.readouterr().err
+
+
+def test_how_soon_the_page_of_10000_rows_responds(
+    browser: Browser, tmp_path: Path, record_property: Callable[[str, object], None]
+) -> None:
+    """A report, no bound: 10 000 steps, and a page that shows all of their rows."""
+    file = tmp_path / "long.toml"
+    file.write_text(CONTENT.replace("step = 0.01", "step = 1e-4"), encoding="utf-8")
+    every = lambda columns: np.arange(len(columns[0]))  # noqa: E731
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scenario_page, "thinned", every)
+        assert main(["run", str(file), "--report", str(tmp_path)]) == 0
+    show(browser, tmp_path / "files/long.html", width=1400)
+    assert browser.run("return page.x.length") == 10001
+    found = browser.run(f"{IN_PAGE} return responses(40)")
+    record_property("slider_ms", {"median": found[20], "largest": found[-1]})
+    print(f"slider of 10 000 rows: median {found[20]:.1f} ms, largest {found[-1]:.1f} ms")

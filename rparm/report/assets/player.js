@@ -8,6 +8,7 @@
  */
 class Player {
   static SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
+  static POINTS = 1000; // of the path that is drawn
   static CALM = 0.5; // s between pictures where the user wants less motion
   static COLOURS = ['ink', 'paper', 'grid', 'accent', 'reference', 'effort', 'stop', 'good', 'bad'];
 
@@ -44,13 +45,20 @@ class Player {
       ghost: reference && {q1: reference.q1[row], q2: reference.q2[row]},
       payload_waits: motion.arm.payload?.at_rest && row < this.grasp
         ? {q1: motion.q1[this.grasp], q2: motion.q2[this.grasp]} : null,
-      trace: this.path.slice(0, row + 1),
+      trace: this.#trace(row),
     };
     for (const name of ['q1', 'q2', 'tau1', 'f2', 'ee_fx', 'ee_fy', 'payload_attached', 'mode1',
       'mode2']) {
       scene[name] = motion[name]?.[row] ?? null;
     }
     return scene;
+  }
+
+  /** Path until a row: its points, but not more than are seen. */
+  #trace(row) {
+    const every = Math.ceil(this.path.length / Player.POINTS);
+    const found = this.path.slice(0, row + 1);
+    return every === 1 ? found : found.filter((_, i) => i % every === 0 || i === row);
   }
 
   /** Shows the row whose time is the nearest to `time` (s). */
@@ -142,14 +150,14 @@ class Player {
         <input type="range" class="player-time" aria-label="Time" min="0" max="${last}" step="1"
           value="0">
         <span class="player-clock" aria-hidden="true"></span>
-        <label class="player-speed">Speed
+        <label class="player-speed"><span>Speed</span>
           <select>${Player.SPEEDS.map(x => `<option value="${x}">${x} ×</option>`).join('')}</select>
         </label>
       </div>
       <ul class="player-values"></ul>
-      <p class="player-keys">Keys, while a control of the player has the focus:
+      <details class="player-keys"><summary>Keys</summary>While a control of the player has the focus:
         <kbd>Space</kbd> plays and pauses, <kbd>←</kbd> <kbd>→</kbd> go
-        by a row, with <kbd>Shift</kbd> by twenty, <kbd>Home</kbd> <kbd>End</kbd> to the ends.</p>`;
+        by a row, with <kbd>Shift</kbd> by twenty, <kbd>Home</kbd> <kbd>End</kbd> to the ends.</details>`;
     const found = name => this.element.querySelector(name);
     this.canvas = found('canvas');
     this.button = found('.player-toggle');
@@ -157,7 +165,9 @@ class Player {
     this.clockText = found('.player-clock');
     this.select = found('select');
     this.select.value = String(this.speed);
-    this.values = this.#values(found('.player-values'));
+    this.controls = found('.player-controls');
+    this.list = found('.player-values');
+    this.values = this.#values(this.list);
     this.#label();
   }
 
@@ -174,6 +184,7 @@ class Player {
     ];
     return texts.filter(([name]) => this.#shows(name)).map(([name, label, text]) => {
       const item = document.createElement('li');
+      item.dataset.name = name;
       item.innerHTML = `<b>${label}</b> <span></span>`;
       item.classList.toggle('player-words', name.startsWith('mode'));
       list.append(item);
@@ -196,7 +207,7 @@ class Player {
       this.clock = this.time;
     });
     this.select.addEventListener('change', () => { this.speed = Number(this.select.value); });
-    this.element.addEventListener('keydown', event => this.#key(event));
+    this.controls.addEventListener('keydown', event => this.#key(event));
     this.dark.addEventListener('change', () => this.#resize());
     new ResizeObserver(() => this.#resize()).observe(this.element);
   }

@@ -1,0 +1,71 @@
+"""Another result drawn over a run: of another run or commit, or a log of what was measured."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from rparm.errors import UserError, placed
+from rparm.files import is_file, missing
+from rparm.report.run_data import ROUNDING, TIME, Curve, Plot
+from rparm.runs.comparison import SMALLEST_SCALE
+from rparm.runs.inputs import EARLY, Log, Logged, read_log
+from rparm.units import counted
+
+Others = Mapping[tuple[str, str], Log]  # by section and name of results
+
+
+def read(given: Path | None, results: Mapping[tuple[str, str], Collection[str]]) -> Others:
+    """Read what is given for results with these variables; UserError if it is no use.
+
+    A folder has a result of each, as a command wrote it, or NAME.csv; a file is for one result.
+    """
+    if given is None:
+        return {}
+    with placed("--with"):
+        if not given.is_dir() and len(results) > 1:
+            raise UserError(f"{given} is no folder, as {counted(results, 'result')} need")
+        return {result: _read(given, *result, known) for result, known in results.items()}
+
+
+def _read(given: Path, section: str, name: str, known: Collection[str]) -> Log:
+    places = [given / folder / f"{name}.csv" for folder in (section, "")]
+    file = next(filter(is_file, places), places[0]) if given.is_dir() else given
+    if not file.exists():
+        raise UserError(f"{file}: {missing(file)}")
+    log = read_log(file)
+    common = sorted({*known} & {*log.names} - {TIME})
+    log.columns(TIME, common)  # its rows are checked before anything runs
+    if not common:
+        raise UserError(f"{file}: has no column with the name of a variable of {name}")
+    return log
+
+
+def lay(
+    log: Log, plots: Sequence[Plot], elapsed: np.ndarray, start: float
+) -> tuple[list[Plot], dict[str, str]]:
+    """Return plots with a log's values at a run's times, and how pages name and explain it.
+
+    Times are `elapsed` seconds (rows,) since the `start` (s).
+    """
+    names = sorted({curve.name for plot in plots for curve in plot.curves} & {*log.names})
+    found = log.columns(TIME, names, start)
+    inside = elapsed[Logged(found.times, found.times, False, "").covers(elapsed)]
+    if not names or not len(inside):
+        missed = "time of this run" if names else "variable that a plot of this run shows"
+        raise UserError(f"--with: {log.path}: has no {missed}")
+    columns = dict(zip(names, found.values.T, strict=True))
+
+    def laid(curve: Curve) -> Curve:
+        if curve.name not in columns:
+            return curve
+        signal = Logged(found.times, columns[curve.name], False, "")
+        other = np.where(signal.covers(elapsed), signal.values(elapsed), np.nan)
+        left = curve.values - other
+        rounding = ROUNDING * max(np.abs(curve.values).max(), SMALLEST_SCALE)
+        return replace(curve, other=other, difference=np.where(np.abs(left) < rounding, 0.0, left))
+
+    after = np.minimum(np.searchsorted(found.times, inside - EARLY), len(found.times) - 1)
+    other = {"name": str(log.path), "between": bool((found.times[after] > inside + EARLY).any())}
+    return [replace(plot, curves=[*map(laid, plot.curves)]) for plot in plots], other
