@@ -17,7 +17,8 @@ from rparm.command_line import (
 from rparm.console import Progress
 from rparm.errors import UserError
 from rparm.files import check_writable, from_here, written
-from rparm.report import pages
+from rparm.report import charts, pages
+from rparm.report.charts import Chart
 from rparm.report.pages import Table
 from rparm.systems import comparison, master
 from rparm.systems.comparison import HALVINGS, CouplingStudy, Halved
@@ -70,7 +71,7 @@ def _halved(system: OpenedSystem, variant: str, options: argparse.Namespace) -> 
     total = len(ways) * system.system.steps * (2 ** (HALVINGS + 1) - 1)
     with Progress(name, total) as progress:
         found = [comparison.halve(system, variant, way, progress) for way in ways]
-    parts = [(_table(found), ERRORS, [("coupling", "Errors over the step")])]
+    parts = [(_table(found), ERRORS, [_chart(found)])]
     limits, note = _limits(system, variant)
     if limits is not None:
         from rparm.linearization.page import STEPS
@@ -90,10 +91,10 @@ def _halved(system: OpenedSystem, variant: str, options: argparse.Namespace) -> 
     again = retyped("coupling", [file_or_name(options.what, SUFFIXES), variant], given)
     with written(folder):
         pages.write_assets(folder)
-        _draw(found, folder / "coupling.png")
         index = pages.write_page(
             folder / pages.INDEX, "linearization.html", root="", parts=parts, again=again,
             title=f"{name}, {variant}: the coupling", about=ABOUT, notes=[note] if note else [],
+            facts=[], matrices=[],
         )  # fmt: skip
     print(f"page: {from_here(index)}")
     first = found[0]
@@ -142,20 +143,15 @@ def _limits(system: OpenedSystem, variant: str) -> tuple[Table | None, str]:
     return page.steps_table(list(found)), ""
 
 
-def _draw(found: Sequence[Halved], path: Path) -> None:
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    with mpl.rc_context(pages.STYLE):
-        figure = Figure(figsize=(7, 4), layout="constrained")
-        axes = figure.subplots()
-        for x in found:
-            label = f"{x.order.replace('_', '-')}, {x.inputs}"
-            axes.loglog(1e3 * x.steps, x.errors, marker="o", label=label)
-        axes.set_xlabel("communication step (ms)")
-        axes.set_ylabel("error")
-        axes.legend(fontsize=8)
-        pages.save_figure(figure, path)
+def _chart(found: Sequence[Halved]) -> Chart:
+    traces = [
+        {"x": 1e3 * x.steps, "y": x.errors, "name": f"{x.order.replace('_', '-')}, {x.inputs}",
+         "mode": "lines+markers", "line": charts.line(colour), "marker": {"color": colour}}
+        for x, colour in zip(found, charts.curves(), strict=False)
+    ]  # fmt: skip
+    axes = {"xaxis": charts.axis("communication step (ms)", log=True)}
+    axes["yaxis"] = charts.axis("error", log=True)
+    return Chart("Errors over the step", "Error of each way to step over the step", traces, axes)
 
 
 def _study(options: argparse.Namespace, folder: Path, known: CouplingStudy) -> Ended:

@@ -1,24 +1,23 @@
-"""The page of a linear model: tables, texts and pictures."""
+"""The page of a linear model: tables, texts and charts."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from html import escape
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from rparm.linearization.largest_step import LargestStep
-from rparm.linearization.linear import Linear, zeros
-from rparm.linearization.margins import Margins, closed, searched
+from rparm.linearization.linear import Linear, participations, zeros
+from rparm.linearization.margins import Crossing, Margins, closed, lag, searched
 from rparm.linearization.responses import frequencies, frequency_response
 from rparm.linearization.study import Study
-from rparm.report import pages
-from rparm.units import milliseconds
+from rparm.report import charts, pages
+from rparm.report.charts import Chart, Trace
+from rparm.units import exponents, milliseconds, unit
 
-Picture = tuple[str, str]  # file without its suffix, and its description
-Part = tuple[pages.Table, str, list[Picture]]
+Part = tuple[pages.Table, str, list[Chart]]
 NONE = "–"
 LISTED = 12  # names in a sentence
 REAL = 1e-6  # of a pole: a smaller real or imaginary part is rounding, as of poles that are equal
@@ -49,17 +48,17 @@ EQUILIBRIUM = (
     "stop holds a joint, every value between the two ends is an equilibrium while the others stay "
     "as they are; the value shown is in the middle."
 )
-PICTURES = (
+BODE = (
     "Bode: amplitude and phase of an output's oscillation relative to an input's. "
-    "Dashed and dotted: the same, sampled, with inputs held between samples."
+    "Dashed, and dots: the same, sampled, with inputs held between samples."
 )
+PARTS = "A state takes part in a pole as its left and right eigenvectors say; equal poles share."
 MATRICES = (
     "A row for each derivative of a state and each output, a column for each state and input. "
     "Units are those of the variables, and s.",
     "A row for each state one sample later and each output, a column for each state and input. "
     "Units are those of the variables.",
 )
-TEXTS = pages.STYLE | {"text.parse_math": False}
 MOST_DRAWN = 2  # inputs and outputs that are drawn: with more, curves would share a colour
 ROUNDING = 1e-12  # of the largest response: less is none
 AROUND = 2.0  # decades beyond the poles that a Bode diagram shows
@@ -73,24 +72,40 @@ ON_AXIS = 1e-7  # damping below which the peak of a pole is infinite: its height
 POLE_GAIN = 1e6  # gain beyond which a Nyquist diagram breaks its line: a pole may be on the axis
 
 
+HERTZ = "%{x:.4~g} Hz<br>"  # at the pointer
+SECONDS = "%{x:.4~g} s<br>%{y:.5~g}<extra></extra>"
+NYQUIST = "L at %{text:.4~g} Hz:<br>%{x:.4~g} %{y:+.4~g}i<extra></extra>"
+MOST_TURNS = 720  # degrees of phase that a scale of 45 degrees still suits
+LEAST_PART = 0.01  # of a state in a pole; less is not said
+MOST_PARTS = 4  # states that are named of a pole
+
+
 def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
-    """Write page and pictures into a folder; return the page. `again` makes them again."""
+    """Write the page into a folder, and return it. `again` is the command that makes it again."""
     pages.write_assets(folder)
-    linear = found.linear
+    linear, loop = found.linear, found.loop
     parts: list[Part] = []
     if found.trimmed:
         parts.append((equilibrium_table(found), EQUILIBRIUM, []))
-    if found.margins is not None:
-        parts.append((margins_table(found.margins), MARGINS, []))
+    if loop is not None and found.margins is not None:
+        made = bode_chart(loop, step, found.margins), nyquist_chart(loop, step, found.margins)
+        parts.append((margins_table(found.margins), f"{MARGINS} {BODE}", [*made]))
+        title = "Step response of the closed loop"
+        made = [steps_chart(closed(loop), None, found.units, title)]
+        parts.append((pages.Table(title, [], []), "From the request at the break.", made))
+    shown = drawn(linear)
+    if loop is None and shown.inputs and shown.outputs:
+        responses = [bode_chart(shown, step), steps_chart(shown, step, found.units)]
+        parts.append((pages.Table("Responses", [], []), BODE, responses))
+    if len(linear.states):
+        table = poles_table(found)
+        rows = zip(table.rows, _rows_of(linear, taking_part(linear)), strict=True)
+        cells = [[*row, ", ".join(states)] for row, states in rows]
+        table = replace(table, head=[*table.head, "states that take part"], rows=cells)
+        parts.append((table, f"{POLES[linear.dt > 0]} {PARTS}", poles_charts(linear, step, loop)))
     if found.largest:
         parts.append((steps_table(list(found.largest)), STEPS, []))
-    if len(linear.states):
-        pages.save_figure(poles_figure(linear, step, found.loop), folder / "poles.png")
-        parts.append((poles_table(found), POLES[linear.dt > 0], [("poles", "Poles")]))
-    if pictures := _pictures(folder, found, step):
-        parts.append((pages.Table("Answers", [], []), PICTURES, pictures))
     parts.append((point_table(found), POINT, []))
-    parts.append((matrices_table(found), MATRICES[linear.dt > 0], []))
     name = f"{found.path.stem}, {found.variant}" if found.variant else found.path.stem
     return pages.write_page(
         folder / pages.INDEX,
@@ -99,28 +114,46 @@ def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
         title=f"{name}: linear model",
         about=ABOUT,
         again=again,
+        facts=_facts(found),
         notes=[*notes(found), *_not_drawn(found)],
         parts=parts,
+        matrices=_matrices(found),
+        about_matrices=MATRICES[linear.dt > 0],
     )
 
 
-def _pictures(folder: Path, found: Study, step: float | None) -> list[Picture]:
-    """Draw Bode, Nyquist and steps: of the loop where it is broken, else of inputs and outputs."""
-    if found.loop is not None:
-        pages.save_figure(bode_figure(found.loop, step, found.margins), folder / "bode.png")
-        pages.save_figure(nyquist_figure(found.loop, step), folder / "nyquist.png")
-        pages.save_figure(steps_figure(closed(found.loop), None), folder / "steps.png")
-        return [
-            ("bode", "Bode diagram of the loop"),
-            ("nyquist", "Nyquist diagram of the loop"),
-            ("steps", "The closed loop after a step"),
-        ]
-    shown = drawn(found.linear)
-    if not shown.inputs or not shown.outputs:
-        return []
-    pages.save_figure(bode_figure(shown, step), folder / "bode.png")
-    pages.save_figure(steps_figure(shown, step), folder / "steps.png")
-    return [("bode", "Bode diagram"), ("steps", "Answers to steps")]
+def _facts(found: Study) -> list[tuple[str, str]]:
+    """Say in a few words what it is, and whether it is stable."""
+    linear, counts = found.linear, [len(found.linear.states), len(found.linear.inputs)]
+    rates = linear.rates_of(linear.poles)
+    growing = int((rates.real > REAL * np.abs(rates)).sum())
+    facts = [(name, str(n)) for name, n in zip(("states", "inputs"), counts, strict=True)]
+    facts += [("outputs", str(len(linear.outputs))), ("poles that grow", str(growing))]
+    if found.margins is not None:
+        facts.append(("closed loop", "stable" if found.margins.stable else "unstable"))
+    return facts
+
+
+def _matrices(found: Study) -> list[tuple[str, list, list, list]]:
+    """Return name, rows, columns (names and units) and entries of A, B, C and D."""
+    linear = found.linear
+    u = {name: unit(text) for name, text in found.units.items()}
+    states, inputs, outputs = (
+        [(name, u.get(name, "")) for name in names]
+        for names in (linear.states, linear.inputs, linear.outputs)
+    )
+    mark, rate = ("+", "{}") if linear.dt else ("'", "{} per s")
+    moved = [(name + mark, rate.format(text).strip()) for name, text in states]
+    parts = (
+        ("A", moved, states),
+        ("B", moved, inputs),
+        ("C", outputs, states),
+        ("D", outputs, inputs),
+    )
+    return [
+        (name, rows, columns, [[_short(float(x)) for x in row] for row in getattr(linear, name)])
+        for name, rows, columns in parts if rows and columns
+    ]  # fmt: skip
 
 
 def _not_drawn(found: Study) -> list[str]:
@@ -128,7 +161,7 @@ def _not_drawn(found: Study) -> list[str]:
     if found.loop is not None or max(len(linear.inputs), len(linear.outputs)) <= MOST_DRAWN:
         return []
     first = f"the first {MOST_DRAWN} outputs that respond, and inputs"
-    return [f"Pictures show {first}; --inputs and --outputs choose."]
+    return [f"Charts show {first}; --inputs and --outputs choose."]
 
 
 # ---- Tables and texts ----------------------------------------------------------------------------
@@ -202,7 +235,12 @@ def _names(names: list[str] | tuple[str, ...]) -> str:
 
 def point_table(found: Study) -> pages.Table:
     """Return the values of states and inputs."""
-    rows = [[name, value, found.units.get(name, "")] for name, value in found.linear.at.items()]
+    values = found.linear.at
+    least = ROUNDING * max(map(abs, values.values()), default=0.0)
+    rows = [
+        [name, value if abs(value) > least else 0.0, unit(found.units.get(name))]
+        for name, value in values.items()
+    ]
     return pages.Table("The point", ["variable", "value", "unit"], rows)
 
 
@@ -212,30 +250,45 @@ def equilibrium_table(found: Study) -> pages.Table:
     for name in found.trimmed:
         ends = found.linear.intervals.get(name, (math.nan, math.nan))
         numbers = _short(found.linear.at[name]), *map(_or_none, ends)
-        rows.append([name, *numbers, found.units.get(name, "")])
+        rows.append([name, *numbers, unit(found.units.get(name))])
     return pages.Table("Equilibrium", ["variable", "value", "from", "to", "unit"], rows)
 
 
 def poles_table(found: Study) -> pages.Table:
     """Return poles, conjugate pairs in one row."""
-    linear, rows = found.linear, []
-    for exact, exact_rate in zip(linear.poles, linear.rates_of(linear.poles), strict=True):
-        pole, rate = _without_rounding(exact), _without_rounding(exact_rate)
-        if pole.imag < 0:
-            continue  # its conjugate stands for both
-        rows.append(
-            [
-                _short(pole.real),
-                f"± {_short(pole.imag)}" if pole.imag else NONE,
-                _short(abs(rate.imag) / (2 * math.pi)) if rate.imag else NONE,
-                _short(-rate.real / abs(exact_rate) + 0.0) if rate else NONE,
-                _short(1 / abs(rate.real)) if rate.real else NONE,
-            ]
-        )
+    linear = found.linear
+    cells = [*map(_pole_cells, linear.poles, linear.rates_of(linear.poles))]
     head = ["real part (1/s)", "imaginary (rad/s)", "frequency (Hz)", "damping", "1/real (s)"]
     if linear.dt:
         head = ["real part", "imaginary", "frequency (Hz)", "damping", "time constant (s)"]
-    return pages.Table("Poles" if found.loop is None else "Poles of the broken loop", head, rows)
+    title = "Poles" if found.loop is None else "Poles of the broken loop"
+    return pages.Table(title, head, _rows_of(linear, cells))
+
+
+def _rows_of(linear: Linear, items: Sequence[list[str]]) -> list[list[str]]:
+    """Leave out items of poles whose conjugate stands for both."""
+    pairs = zip(linear.poles, items, strict=True)
+    return [item for pole, item in pairs if _without_rounding(pole).imag >= 0]
+
+
+def _pole_cells(exact: complex, exact_rate: complex) -> list[str]:
+    pole, rate = _without_rounding(exact), _without_rounding(exact_rate)
+    return [
+        _short(pole.real),
+        f"± {_short(abs(pole.imag))}" if pole.imag else NONE,
+        _short(abs(rate.imag) / (2 * math.pi)) if rate.imag else NONE,
+        _short(-rate.real / abs(exact_rate) + 0.0) if rate else NONE,
+        _short(1 / abs(rate.real)) if rate.real else NONE,
+    ]
+
+
+def taking_part(linear: Linear) -> list[list[str]]:
+    """Name the states that take part in each pole, and by how much, the most first."""
+    found = []
+    for parts in participations(linear.A, linear.poles):
+        order = [i for i in np.argsort(-parts, kind="stable") if parts[i] >= LEAST_PART]
+        found.append([f"{linear.states[i]} {100 * parts[i]:.0f} %" for i in order[:MOST_PARTS]])
+    return found
 
 
 def _without_rounding(pole: complex) -> complex:
@@ -244,17 +297,69 @@ def _without_rounding(pole: complex) -> complex:
     return complex(*(float(x) if abs(x) > least else 0.0 for x in (pole.real, pole.imag)))
 
 
+@dataclass(frozen=True)
+class Mark:
+    """A margin in the charts, at the frequency where the loop would oscillate without it."""
+
+    name: str
+    text: str
+    crossing: Crossing
+    lag: float | None  # degrees of phase that are left; None: gain is
+
+    @property
+    def hertz(self) -> float:
+        return self.crossing.frequency / (2 * math.pi)
+
+    @property
+    def colour(self) -> str:
+        return "--effort" if self.lag is None else "--good"
+
+
+def marks(found: Margins) -> list[Mark]:
+    """Return the margins that a loop has; of an unstable one where it crosses gain 1 and -180."""
+    gains, turns = found.gain_crossings, found.phase_crossings
+    if not found.stable:
+        made = [Mark("gain 1", "gain 1", x, 0.0) for x in gains]
+        return made + [Mark("-180", f"-180 degrees, gain {abs(x.value):.4g}", x, None)
+                       for x in turns if 0 < x.frequency < math.inf]  # fmt: skip
+    made = []
+    for name, factor in (("up", found.gain_up), ("down", found.gain_down)):
+        text = f"gain margin, {name}: {factor:.4g} times"
+        made += [Mark(name, text, x, None) for x in turns if math.isclose(1 / abs(x.value), factor)]
+    for name, text, value, over in (
+        ("phase", f"phase margin: {found.phase:.4g} degrees", math.radians(found.phase), None),
+        ("delay", f"delay margin: {milliseconds(found.delay)}", found.delay, "frequency"),
+    ):
+        made += [
+            Mark(name, text, x, math.degrees(lag(x)))
+            for x in gains
+            if math.isclose(lag(x) / (getattr(x, over) if over else 1.0), value)
+        ][:1]
+    return made
+
+
+def _drawn_marks(found: Margins | None) -> list[Mark]:
+    """Return marks that have a place on a logarithmic axis, one for margins at the same crossing."""
+    known = [mark for mark in (marks(found) if found else ()) if 0 < mark.hertz < math.inf]
+    if len(known) > 1 and known[-1].name == "delay" and known[-1].crossing == known[-2].crossing:
+        text = f"{known[-2].text}, {known[-1].text}"
+        known[-2:] = [replace(known[-2], text=text)]
+    return known
+
+
 def margins_table(found: Margins) -> pages.Table:
     """Return the margins of a loop; those that it does not have are "–"."""
+    at = {mark.name: _or_none(mark.hertz) for mark in marks(found)}
+    delay = milliseconds(found.delay) if math.isfinite(found.delay) else NONE
     rows = [
-        ["gain, up to times", _or_none(found.gain_up)],
-        ["gain, down to times", _or_none(found.gain_down or math.inf)],
-        ["further lag (degrees)", _or_none(found.phase)],
-        ["further delay", milliseconds(found.delay) if math.isfinite(found.delay) else NONE],
-    ]
-    crossings = [f"{x.frequency / (2 * math.pi):.4g} Hz" for x in found.gain_crossings]
-    rows.append(["the loop's gain is 1 at", ", ".join(crossings) or NONE])
-    return pages.Table("Margins", ["margin", "value"], rows)
+        ["gain margin, up (times)", _or_none(found.gain_up), at.get("up", NONE)],
+        ["gain margin, down (times)", _or_none(found.gain_down or math.inf), at.get("down", NONE)],
+        ["phase margin (degrees)", _or_none(found.phase), at.get("phase", NONE)],
+        ["delay margin", delay, at.get("delay", NONE)],
+        *(["the loop's gain is 1", NONE, _short(x.frequency / (2 * math.pi))]
+          for x in found.gain_crossings),
+    ]  # fmt: skip
+    return pages.Table("Margins", ["margin", "value", "at (Hz)"], rows)
 
 
 def steps_table(found: list[LargestStep] | tuple[LargestStep, ...]) -> pages.Table:
@@ -279,114 +384,154 @@ def matrices_table(found: Study) -> pages.Table:
 
 
 def _short(number: float) -> str:
-    return f"{number:.6g}"
+    return exponents(f"{number:.6g}")
 
 
 def _or_none(number: float) -> str:
-    return f"{number:.6g}" if math.isfinite(number) else NONE
+    return _short(number) if math.isfinite(number) else NONE
 
 
-# ---- Pictures ------------------------------------------------------------------------------------
-def bode_figure(model: Linear, step: float | None, found: Margins | None = None) -> Figure:
+# ---- Charts -------------------------------------------------------------------------------------
+def bode_chart(model: Linear, step: float | None, found: Margins | None = None) -> Chart:
     """Draw gain and phase of each output by each input, with margins of a loop."""
-    with mpl.rc_context(TEXTS):
-        figure = Figure(figsize=(9, 6), layout="constrained")
-        gain, phase = figure.subplots(2, 1, sharex=True)
-        grid = _grid(model, found)
-        answers = [(label, one, frequency_response(one)(grid)) for label, one in _channels(model)]
-        largest = max((np.abs(values).max() for _, _, values in answers), default=0.0)
-        shown = [each for each in answers if np.abs(each[2]).max() > ROUNDING * largest]
-        for (label, one, values), color in zip(shown, _colors(), strict=False):
-            _bode(gain, phase, values, grid, color, label)
-            if step is not None:
-                sampled = one.sampled(step)
-                below = _below(grid, sampled)
-                name = f"{label}, held for {milliseconds(step)}"
-                response = frequency_response(sampled)(below)
-                _bode(gain, phase, response, below, color, name, pages.DASHED)
-        for axes, level in ((gain, 0.0), (phase, -180.0)):
-            if step is not None:
-                axes.axvline(0.5 / step, color=pages.MUTED, linewidth=0.8, linestyle=":")
-            for crossing in found.gain_crossings if found else ():
-                axes.axvline(crossing.frequency / (2 * math.pi), color=pages.INK, linewidth=0.8)
-                axes.axhline(level, color=pages.INK, linewidth=0.8)
-        gain.set_ylabel("gain (dB)")
-        phase.set_ylabel("phase (degrees)")
-        phase.set_xlabel("frequency (Hz)")
-        gain.set_xlim(grid[0] / (2 * math.pi), grid[-1] / (2 * math.pi))
-        if gain.get_legend_handles_labels()[0]:
-            gain.legend(fontsize=8)
-    return figure
+    grid = _grid(model, found)
+    responses = [(label, one, frequency_response(one)(grid)) for label, one in _channels(model)]
+    largest = max((np.abs(values).max() for _, _, values in responses), default=0.0)
+    shown = [each for each in responses if np.abs(each[2]).max() > ROUNDING * largest]
+    known = _drawn_marks(found)
+    traces: list[Trace] = []
+    for (label, one, values), color in zip(shown, charts.curves(), strict=False):
+        traces += _bode(values, grid, label, charts.line(color))
+        if found is not None:
+            traces += _bode_marks(known, *(trace["y"] for trace in traces[:2]), grid)
+        if step is not None:
+            sampled = one.sampled(step)
+            below = _below(grid, sampled)
+            name = f"{label}, held for {milliseconds(step)}"
+            style = charts.line(color, dash=charts.DASHED)
+            traces += _bode(frequency_response(sampled)(below), below, name, style)
+    lines = [charts.vertical(0.5 / step)] if step is not None else []
+    lines += [charts.vertical(mark.hertz, "--ink") for mark in known]
+    ends = [math.log10(w / (2 * math.pi)) for w in grid[[0, -1]]]
+    phases = [np.ptp(t["y"]) for t in traces if t.get("yaxis") == "y2" and len(t["y"])]
+    turns = {"dtick": 45, "nticks": 0} if max(phases, default=0.0) < MOST_TURNS else {}
+    layout = charts.stacked(charts.axis("gain (dB)"), charts.axis("phase (degrees)", **turns))
+    layout["xaxis"] = charts.axis("frequency (Hz)", log=True, anchor="y2", range=ends)
+    text = f"Gain and phase over the frequency: {', '.join(label for label, _, _ in shown)}"
+    return Chart("Bode diagram", text, traces, {**layout, "shapes": lines}, height=30)
 
 
-def _bode(
-    gain: Axes,
-    phase: Axes,
-    values: np.ndarray,
-    grid: np.ndarray,
-    color: str,
-    label: str,
-    line: object = "-",
-) -> None:
+def _bode(values: np.ndarray, grid: np.ndarray, label: str, line: Trace) -> list[Trace]:
     grid, values = grid[np.isfinite(values)], values[np.isfinite(values)]
     with np.errstate(divide="ignore"):
         decibels = 20 * np.log10(np.abs(values))
-    hertz = grid / (2 * math.pi)
-    gain.semilogx(hertz, decibels, color=color, linestyle=line, label=label)
     turned = np.degrees(np.unwrap(np.angle(values)))
     turned -= 360 * np.round((turned[0] + 90) / 360)
-    phase.semilogx(hertz, turned, color=color, linestyle=line)
+    both = {"x": grid / (2 * math.pi), "mode": "lines", "line": line, "name": label}
+    gain = {**both, "y": decibels, "hovertemplate": HERTZ + "%{y:.4~g} dB<extra></extra>"}
+    phase = {**both, "y": turned, "hovertemplate": HERTZ + "%{y:.4~g} degrees<extra></extra>"}
+    return [gain, {**phase, "yaxis": "y2", "showlegend": False}]
 
 
-def nyquist_figure(loop: Linear, step: float | None) -> Figure:
+def _bode_marks(
+    found: Sequence["Mark"], decibels: np.ndarray, turned: np.ndarray, grid: np.ndarray
+) -> list[Trace]:
+    """Draw each margin as the piece that is left to 0 dB, or to a phase of -180 degrees."""
+    traces = []
+    for mark in found:
+        w = 2 * math.pi * mark.hertz
+        ends, place = [float(np.interp(w, grid, decibels)), 0.0], {"yaxis": "y"}
+        if mark.lag is not None:
+            phase = float(np.interp(w, grid, turned))
+            ends, place = [phase, phase - mark.lag], {"yaxis": "y2"}
+        traces.append(_mark(mark, [mark.hertz] * 2, ends) | place)
+    return traces
+
+
+def _mark(mark: "Mark", x: list[float], y: list[float]) -> Trace:
+    text = f"{mark.text}, at {exponents(f'{mark.hertz:.4g}')} Hz"
+    style = {"mode": "lines+markers", "marker": {"color": mark.colour, "size": 9}}
+    style |= {"line": charts.line(mark.colour, 4), "hovertemplate": f"{text}<extra></extra>"}
+    return {"x": x, "y": y, "name": text, "meta": mark.name, **style}
+
+
+def nyquist_chart(loop: Linear, step: float | None, found: Margins | None = None) -> Chart:
     """Draw L along the frequencies; -1 is where it becomes unstable."""
-    with mpl.rc_context(TEXTS):
-        figure = Figure(figsize=(6, 6), layout="constrained")
-        axes = figure.subplots()
-        grid = searched(loop)
-        _nyquist(axes, frequency_response(loop)(grid), "-", "sampled" if loop.dt else "continuous")
-        if step is not None:
-            sampled, name = loop.sampled(step), f"held for {milliseconds(step)}"
-            response = frequency_response(sampled)(_below(grid, sampled))
-            _nyquist(axes, response, pages.DASHED, name)
-        circle = np.exp(1j * np.linspace(0, 2 * math.pi, 200))
-        axes.plot(circle.real, circle.imag, color=pages.MUTED, linewidth=0.8, linestyle=":")
-        axes.plot(-1, 0, "+", color=pages.ERROR_COLORS[0], markersize=14, markeredgewidth=2)
-        axes.set_xlim(-FARTHEST, FARTHEST)
-        axes.set_ylim(-FARTHEST, FARTHEST)
-        axes.set_aspect("equal")
-        axes.set_xlabel("real part of L")
-        axes.set_ylabel("imaginary part of L")
-        axes.legend(fontsize=8)
-    return figure
+    grid = searched(loop)
+    traces = _nyquist(
+        frequency_response(loop)(grid), grid, "sampled" if loop.dt else "continuous", "solid"
+    )
+    if step is not None:
+        sampled, name = loop.sampled(step), f"held for {milliseconds(step)}"
+        below = _below(grid, sampled)
+        traces += _nyquist(frequency_response(sampled)(below), below, name, charts.DASHED)
+    traces.append(_circle() | {"line": charts.line("--muted", 1, "2px,3px")})
+    for mark in _drawn_marks(found):
+        traces.append(
+            _mark(mark, [mark.crossing.value.real], [mark.crossing.value.imag])
+            | {"mode": "markers"}
+        )
+    critical = {"color": "--bad", "size": 12, "symbol": "cross-thin-open", "line": {"width": 3}}
+    traces.append({"x": [-1], "y": [0], "mode": "markers", "marker": critical, "name": "-1"})
+    layout = {
+        "xaxis": charts.axis("real part of L", range=[-FARTHEST, FARTHEST], constrain="domain"),
+        "yaxis": charts.axis("imaginary part of L", range=[-FARTHEST, FARTHEST], scaleanchor="x"),
+    }
+    text = "The loop L in the complex plane, along the frequencies, beside the critical point -1"
+    return Chart("Nyquist diagram", text, traces, layout, height=30)
 
 
-def _nyquist(axes: Axes, values: np.ndarray, line: object, label: str) -> None:
+def _nyquist(values: np.ndarray, grid: np.ndarray, label: str, dash: str) -> list[Trace]:
     values = np.where(np.abs(values) < POLE_GAIN, values, np.nan)
-    axes.plot(values.real, values.imag, color=pages.RUN_COLOR, linestyle=line, label=label)
-    axes.plot(values.real, -values.imag, color=pages.RUN_COLOR, linestyle=line, alpha=0.35)
+    line = charts.line("--curve1", dash=dash)
+    drawn = {"x": values.real, "mode": "lines", "line": line, "name": label}
+    hertz = {"text": grid / (2 * math.pi), "hovertemplate": NYQUIST}
+    mirrored = {"opacity": 0.35, "hoverinfo": "skip", "hovertemplate": "", "showlegend": False}
+    return [{**drawn, **hertz, "y": values.imag}, {**drawn, **mirrored, "y": -values.imag}]
 
 
-def steps_figure(model: Linear, step: float | None) -> Figure:
-    """Answer of each output to a step of each input by 1."""
-    with mpl.rc_context(TEXTS):
-        count = len(model.outputs)
-        figure = Figure(figsize=(9, 1.2 + 2 * count), layout="constrained")
-        every = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
-        end = _end(model, step)
-        for axes, output in zip(every, model.outputs, strict=True):
-            for name, color in zip(model.inputs, _colors(), strict=False):
-                one = model.select([name], [output])
-                style = {"color": color, "label": f"step of {name}"}
-                style |= {"drawstyle": "steps-post", "marker": "."} if model.dt else {}
-                axes.plot(*_step(one, end / POINTS, end), **style)
-                if step is not None and end <= MOST_DOTS * step:
-                    axes.plot(*_step(one, step, end), ".", color=color)
-            axes.set_ylabel(output)
-        every[0].legend(fontsize=8)
-        every[-1].set_xlim(0, end)
-        every[-1].set_xlabel("time (s)")
-    return figure
+def _circle() -> Trace:
+    circle = np.exp(1j * np.linspace(0, 2 * math.pi, 200))
+    style = {"mode": "lines", "line": charts.line("--ink", 1), "hoverinfo": "skip"}
+    return {"x": circle.real, "y": circle.imag, "hovertemplate": "", **style}
+
+
+def steps_chart(
+    model: Linear, step: float | None, units: Mapping[str, str], title: str = "Step responses"
+) -> Chart:
+    """Draw the response of each output to a step of each input by 1."""
+    traces: list[Trace] = []
+    end = _end(model, step)
+    for i, output in enumerate(model.outputs):
+        for name, color in zip(model.inputs, charts.curves(), strict=False):
+            one = model.select([name], [output])
+            style = {"mode": "lines", "line": charts.line(color), "showlegend": i == 0}
+            style |= {"name": f"step of {name} by {_with_unit('1', units.get(name))}"}
+            style |= {"yaxis": f"y{i + 1 if i else ''}", "hovertemplate": SECONDS}
+            dots = {"mode": "markers", "marker": {"color": color, "size": 5}, "showlegend": False}
+            if model.dt:
+                style |= {"mode": "lines+markers", "line": charts.line(color, shape="hv"),
+                          "marker": dots["marker"]}  # fmt: skip
+            times, values = _step(one, end / POINTS, end)
+            traces.append({"x": times, "y": values, **style})
+            if step is not None and end <= MOST_DOTS * step:
+                times, values = _step(one, step, end)
+                traces.append({"x": times, "y": values, **style, **dots})
+    axes = [charts.axis(_labelled(name, units.get(name))) for name in model.outputs]
+    layout = charts.stacked(*axes)
+    layout["xaxis"] = charts.axis(
+        "time (s)", range=[0, end], anchor=f"y{len(axes) if axes[1:] else ''}"
+    )
+    text = f"{title}: {', '.join(model.outputs)} over the time after a step of an input by 1"
+    return Chart(title, text, traces, layout, height=8 + 11 * len(axes))
+
+
+def _with_unit(number: str, text: str | None) -> str:
+    return f"{number} {unit(text)}".strip()
+
+
+def _labelled(name: str, text: str | None) -> str:
+    return f"{name} ({unit(text)})" if unit(text) else name
 
 
 def _step(model: Linear, length: float, end: float) -> tuple[np.ndarray, np.ndarray]:
@@ -399,42 +544,56 @@ def _step(model: Linear, length: float, end: float) -> tuple[np.ndarray, np.ndar
     return model.dt * np.arange(count), values
 
 
-def poles_figure(model: Linear, step: float | None, loop: Linear | None = None) -> Figure:
+def poles_charts(model: Linear, step: float | None, loop: Linear | None = None) -> list[Chart]:
     """Draw poles in the plane of s, and of the sampled model in the plane of z."""
-    with mpl.rc_context(TEXTS):
-        figure = Figure(figsize=(9, 4.2), layout="constrained")
-        if model.dt:
-            text = f"sampled every {milliseconds(model.dt)}"
-            _draw_sampled_poles(figure.subplots(), model.poles, text)
-            return figure
-        plain, sampled = figure.subplots(1, 2)
-        plain.axvline(0, color=pages.INK, linewidth=0.8)
-        style = {"color": pages.RUN_COLOR, "label": "poles", "markersize": 9}
-        plain.plot(model.poles.real, model.poles.imag, "x", **style)
-        height = FLATTEST * np.abs(model.poles).max(initial=1.0)
-        low, high = plain.get_ylim()
-        plain.set_ylim(min(low, -height), max(high, height))
-        if loop is not None:
-            found = closed(loop).poles
-            style = {"color": pages.ERROR_COLORS[0], "label": "when it is closed", "markersize": 11}
-            plain.plot(found.real, found.imag, "+", **style)
-        plain.set_xlabel("real part (1/s): left of 0 dies out")
-        plain.set_ylabel("imaginary part (rad/s)")
-        plain.legend(fontsize=8)
-        if step is None:
-            sampled.set_visible(False)
-        else:
-            text = f"held for {milliseconds(step)}"
-            _draw_sampled_poles(sampled, model.sampled(step).poles, text)
-    return figure
+    if model.dt:
+        return [_sampled_poles(model, f"Poles, sampled every {milliseconds(model.dt)}")]
+    traces = [_poles(model, "poles", "x-thin-open", "--curve1")]
+    if loop is not None:
+        label = "when the loop is closed"
+        traces.append(_poles(closed(loop), label, "cross-thin-open", "--curve2"))
+    everywhere = np.concatenate([model.poles, closed(loop).poles if loop is not None else ()])
+    size = np.abs(everywhere).max(initial=0.0) or 1.0
+    low, high = everywhere.real.min(initial=0.0), everywhere.real.max(initial=0.0)
+    tall = max(np.abs(everywhere.imag).max(initial=0.0), FLATTEST * size)
+    wide = [low - FLATTEST * size, high + FLATTEST * size]
+    growing = {"type": "rect", "x0": 0, "x1": wide[1], "y0": 0, "y1": 1, "yref": "paper"}
+    growing |= {"fillcolor": "--bad", "opacity": 0.12, "line": {"width": 0}, "layer": "below"}
+    layout = {
+        "xaxis": charts.axis("real part (1/s)", range=wide),
+        "yaxis": charts.axis("imaginary part (rad/s)", range=[-1.2 * tall, 1.2 * tall]),
+        "shapes": [growing, charts.vertical(0, "--ink", "solid")],
+    }
+    text = f"Poles in the complex plane: {', '.join(map(str, np.round(model.poles, 3)))}"
+    found = [Chart("Poles", text, traces, layout)]
+    if step is not None:
+        found.append(_sampled_poles(model.sampled(step), f"Poles, held for {milliseconds(step)}"))
+    return found
 
 
-def _draw_sampled_poles(axes: Axes, found: np.ndarray, text: str) -> None:
-    circle = np.exp(1j * np.linspace(0, 2 * math.pi, 200))
-    axes.plot(circle.real, circle.imag, color=pages.INK, linewidth=0.8)
-    axes.plot(found.real, found.imag, "x", color=pages.RUN_COLOR, markersize=9)
-    axes.set_aspect("equal")
-    axes.set_xlabel(f"{text}: within the circle dies out")
+def _sampled_poles(model: Linear, title: str) -> Chart:
+    traces = [_circle(), _poles(model, "", "x-thin-open", "--curve1")]
+    layout = {
+        "xaxis": charts.axis("real part", constrain="domain"),
+        "yaxis": charts.axis("imaginary part", scaleanchor="x"),
+    }
+    text = f"Poles beside the unit circle: {', '.join(map(str, np.round(model.poles, 3)))}"
+    return Chart(title, text, traces, layout)
+
+
+def _poles(model: Linear, label: str, symbol: str, color: str) -> Trace:
+    texts = []
+    for pole, rate, states in zip(
+        model.poles, model.rates_of(model.poles), taking_part(model), strict=True
+    ):
+        cells = _pole_cells(pole, rate)
+        place = f"{cells[0]} {'±' if pole.imag > 0 else '∓'} {_short(abs(pole.imag))}i"
+        lines = [f"pole {place if cells[1] != NONE else cells[0]}{'' if model.dt else ' 1/s'}"]
+        lines += [f"frequency {cells[2]} Hz"] * (cells[2] != NONE) + [f"damping {cells[3]}"]
+        texts.append("<br>".join([*lines, *map(escape, states)]))
+    marker = {"symbol": symbol, "size": 11, "color": color, "line": {"width": 2.5, "color": color}}
+    drawn = {"x": model.poles.real, "y": model.poles.imag, "mode": "markers", "marker": marker}
+    return drawn | {"name": label, "text": texts, "hovertemplate": "%{text}<extra></extra>"}
 
 
 def drawn(model: Linear) -> Linear:
@@ -442,8 +601,8 @@ def drawn(model: Linear) -> Linear:
     grid = frequencies(model.rates_of(model.poles), (), AROUND)
     s = model.points(grid)[:, None, None]
     states = np.linalg.solve(s * np.eye(len(model.A)) - model.A, model.B + 0 * s)
-    answers = np.abs(model.C @ states + model.D).max(axis=0)  # (outputs, inputs)
-    responds = answers > ROUNDING * answers.max(initial=0.0)
+    gains = np.abs(model.C @ states + model.D).max(axis=0)  # (outputs, inputs)
+    responds = gains > ROUNDING * gains.max(initial=0.0)
     outputs = np.flatnonzero(responds.any(axis=1))[:MOST_DRAWN]
     inputs = np.flatnonzero(responds[outputs].any(axis=0))[:MOST_DRAWN]
     return model.select([model.inputs[i] for i in inputs], [model.outputs[i] for i in outputs])
@@ -453,11 +612,6 @@ def _channels(model: Linear) -> Iterator[tuple[str, Linear]]:
     for output in model.outputs:
         for name in model.inputs:
             yield f"{output} by {name}", model.select([name], [output])
-
-
-def _colors() -> Iterator[str]:
-    while True:
-        yield from (pages.RUN_COLOR, *pages.ERROR_COLORS)
 
 
 def _grid(model: Linear, found: Margins | None = None) -> np.ndarray:
