@@ -339,7 +339,7 @@ def marks(found: Margins) -> list[Mark]:
 
 
 def _drawn_marks(found: Margins | None) -> list[Mark]:
-    """Return marks that have a place on a logarithmic axis, one for margins at the same crossing."""
+    """Return marks that a logarithmic axis has a place for, one for margins at one crossing."""
     known = [mark for mark in (marks(found) if found else ()) if 0 < mark.hertz < math.inf]
     if len(known) > 1 and known[-1].name == "delay" and known[-1].crossing == known[-2].crossing:
         text = f"{known[-2].text}, {known[-1].text}"

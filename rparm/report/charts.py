@@ -5,6 +5,7 @@ texts; what is shown at the pointer (`text`, `hovertemplate`) may have <br>.
 """
 
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import cycle
@@ -43,11 +44,31 @@ def _plain(content: Any) -> Any:
     """Return lists for arrays, and None for numbers that are not finite."""
     if isinstance(content, Mapping):
         return {name: _plain(value) for name, value in content.items()}
+    if isinstance(content, np.ndarray) and content.dtype == float:
+        digits, rows = _digits(content), content.tolist()
+        return (
+            [_numbers(row, digits) for row in rows] if content.ndim > 1 else _numbers(rows, digits)
+        )
     if isinstance(content, np.ndarray | list | tuple):
         return [_plain(value) for value in content]
     if isinstance(content, float | np.floating):
-        return float(f"{content:.{DIGITS}g}") if np.isfinite(content) else None
+        return _numbers([float(content)], DIGITS)[0]
     return int(content) if isinstance(content, np.integer) else content
+
+
+def _numbers(values: Sequence[float], digits: int) -> list[float | None]:
+    return [float(f"{x:.{digits}g}") if math.isfinite(x) else None for x in values]
+
+
+def _digits(values: np.ndarray) -> int:
+    """Return how many digits numbers need to be told apart: more if they hardly vary."""
+    numbers = values[np.isfinite(values)]
+    with np.errstate(over="ignore"):
+        width = np.ptp(numbers) if len(numbers) else 0.0
+    if not 0 < width < math.inf:
+        return 17 if width else DIGITS
+    more = math.log10(max(np.abs(numbers).max() / width, 1.0))
+    return min(DIGITS + math.ceil(more), 17)
 
 
 def curves() -> Iterator[str]:

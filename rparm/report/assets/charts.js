@@ -103,7 +103,10 @@ const Charts = (() => {
   }
 
   async function redraw() {
-    for (const [element, chart] of drawn) await draw(element, chart);
+    for (const [element, chart] of drawn) {
+      if (element.isConnected) await draw(element, chart);
+      else drawn.delete(element);
+    }
   }
 
   async function start() {
@@ -113,7 +116,7 @@ const Charts = (() => {
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', redraw);
     document.documentElement.dataset.charts = 'yes';
     // other scripts draw on some pages, and say themselves when they are ready
-    if (!document.getElementById('run')) document.documentElement.dataset.ready = 'yes';
+    if (!document.querySelector('#run, #campaign')) document.documentElement.dataset.ready = 'yes';
   }
 
   return { draw, shown, escaped, ready: start() };
