@@ -1,21 +1,23 @@
 """Runs a command of rparm.commands, and ends as it ends."""
 
 import os
+import shlex
 import signal
 import sys
 import webbrowser
 from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from io import TextIOWrapper
 from typing import NoReturn, TextIO
 
 from rparm import command_line, console, project
 from rparm.command_line import Answered, Ended
 from rparm.errors import UserError, reason
-from rparm.files import write_text, written
+from rparm.files import from_here, write_text, written
 from rparm.interruption import handle_endings
-from rparm.needs import COMMANDS, NO_READER
+from rparm.needs import COMMANDS, DEFAULT, NO_READER
 
 LONGEST_MESSAGE = 2000  # characters; some quote what a file says
 
@@ -30,11 +32,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = given[: given.index("--")] if "--" in given else given
     as_json = "--json" in options  # a mistake in the arguments is a document, too
     try:
-        if not given:
-            print(command_line.overview(), file=sys.stderr)
-            return 2
         with console.results_stream(as_json, "--quiet" in options) as results:
-            return _say(_ended(given), as_json, results)
+            return _say(_ended(given or [DEFAULT]), as_json, results)
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130
@@ -56,7 +55,7 @@ def _ended(arguments: Sequence[str]) -> Ended:
         ended = command_line.function(options.command, "do_{}")(options)
         _keep_document(options, ended)
         _show_page(options, ended)
-        return ended
+        return _with_next(arguments, options, ended)
     except Answered as answer:
         return Ended(0, answer.text, {answer.name: answer.text})
     except UserError as error:
@@ -66,6 +65,16 @@ def _ended(arguments: Sequence[str]) -> Ended:
             raise
         extra = COMMANDS[options.command].extra or "all"
         return Ended(2, "", error=project.not_installed(str(error.name), extra))
+
+
+def _with_next(arguments: Sequence[str], options: Namespace, ended: Ended) -> Ended:
+    """Say in the last line where the page is, and how to open it."""
+    if ended.page is None or ended.page.suffix != ".html":
+        return ended
+    parts = [ended.verdict, str(from_here(ended.page))]
+    if not options.open:
+        parts.append(f"open it: {shlex.join([project.PROGRAM, *arguments, '--open'])}")
+    return replace(ended, verdict="; ".join(filter(None, parts)))
 
 
 def _keep_document(options: Namespace, ended: Ended) -> None:

@@ -112,7 +112,7 @@ class Table(Mapping[str, np.ndarray]):
         drawn = [plot.at(rows) for plot in plots]
         data = run_data.RunData("table", "Run", self._times[rows], drawn)
         about = "Run", f"{self._size}.", overview.RAN
-        page = pages.RunPage(*about, facts=(), data=data, tables=(), overview=False)
+        page = pages.RunPage(*about, facts=(), data=data, tables=())
         folder = Path(output or project.report_folder("plots"))
         with written(folder):
             path = pages.write_alone(folder, page)

@@ -214,14 +214,24 @@ def names(given: Sequence[str]) -> list[str]:
 
 def retyped(command: str, positional: Iterable[object], given: Mapping[str, object]) -> str:
     """Write a command as it is typed again in the project's folder; without options not given."""
-    parts = [project.PROGRAM, command, *map(_typed, positional)]
+    return shlex.join([project.PROGRAM, command, *map(_typed, positional)]) + retyped_options(given)
+
+
+def retyped_options(given: Mapping[str, object]) -> str:
+    """Write options as `retyped` does, each after a blank."""
+    parts: list[str] = []
     for name, value in given.items():
         if value is True:
             parts.append(f"--{name}")
         elif value is not None and value is not False and value != "" and value != []:
             values = value if isinstance(value, list) else [value]
             parts += [f"--{name}", *map(_typed, values)]
-    return shlex.join(parts)
+    return "".join(f" {shlex.quote(part)}" for part in parts)
+
+
+def other_folder(folder: Path, part: str = "") -> dict[str, Path]:
+    """Return the option --output, for `retyped`, if it is not the usual folder."""
+    return {} if folder == project.report_folder(part) else {"output": folder}
 
 
 def file_or_name(given: str, suffixes: Iterable[str]) -> str | Path:
@@ -230,6 +240,8 @@ def file_or_name(given: str, suffixes: Iterable[str]) -> str | Path:
 
 
 def _typed(value: object) -> str:
+    if isinstance(value, float):
+        return repr(value).replace("e-0", "e-")
     return str(project.from_root(value) if isinstance(value, Path) else value)
 
 

@@ -25,10 +25,13 @@ An installed package has fmu/ and models/ in its folder share/, what is built as
 says, and writes to rparm-output/ in the current folder.
 """
 
+import functools
 import os
 import platform
 import re
+import subprocess
 from collections.abc import Iterable
+from contextlib import suppress
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
@@ -310,7 +313,7 @@ def report_folder(part: str = "") -> Path:
 
 def campaign_folder(name: str) -> Path:
     """Return the folder for a campaign's results if no other one is given."""
-    return (Path("rparm-output") if INSTALLED else ROOT / "build") / "campaigns" / name
+    return report_folder("campaigns") / name
 
 
 def playground_page() -> Path:
@@ -337,6 +340,23 @@ def version() -> str:
     found = re.search(r"^project\(\w+ VERSION (\S+)", text, re.MULTILINE)
     assert found is not None
     return found[1]
+
+
+@functools.cache
+def commit() -> str:
+    """Return the commit of a checkout, with -dirty if files have changed; "" if it is not known."""
+    if not (ROOT / ".git").exists():
+        return ""
+    command = ["git", "-C", str(ROOT), "describe", "--always", "--dirty", "--exclude", "*"]
+    with suppress(OSError):
+        return subprocess.run(command, capture_output=True, text=True).stdout.strip()
+    return ""
+
+
+def results_folder(folder: Path) -> Path:
+    """Return the folder whose start page lists what is written into `folder`."""
+    usual = report_folder().absolute()
+    return usual if folder.absolute().is_relative_to(usual) else folder
 
 
 def how_to_install(extra: str) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from SALib.analyze import sobol
 from scipy.stats import rankdata
 
+from rparm import project
 from rparm.campaign.campaign_file import Campaign
 from rparm.campaign.job import LYAPUNOV, Job
 from rparm.campaign.planning import FAILURE, RUN, sampling_problem
@@ -26,6 +27,7 @@ WORST = 10  # runs that are listed
 RESAMPLES = 1000  # of the bootstrap
 CONFIDENCE = 0.95
 NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\.?\d[\d.]*(?:[eE][-+]?\d+)?|(?:inf|nan)\b)")
+PAGE = "campaign.html"
 MOST = 10**7  # runs, whose table is held in memory
 DRAWN = 24  # columns in charts at most
 POINTS = 1500  # runs in a scatter plot at most, besides the extreme ones
@@ -145,6 +147,7 @@ class Page:
         self, campaign: Campaign, job: Job, results: Results, units: Mapping[str, str], command: str
     ) -> None:
         self.campaign, self.job, self.folder, self.again = campaign, job, results.folder, command
+        self.report = project.results_folder(self.folder)
         self.table = results.table([*results.columns, FAILURE])
         self.kept = {measure.column: self.table[measure.column] for measure in job.measures}
         self.labels = {name: f"{name} [{unit}]" if unit else name for name, unit in units.items()}
@@ -157,11 +160,11 @@ class Page:
         """Write the page, on a table with this digest; its path."""
         manifest = json.loads((self.folder / MANIFEST).read_text(encoding="utf-8"))
         found = self.indices()
-        pages.write_assets(self.folder)
         return pages.write_page(
-            self.folder / pages.INDEX,
+            self.folder / PAGE,
             "campaign.html",
-            root="",
+            root=pages.root(self.report, self.folder),
+            home=True,
             title=self.campaign.title,
             campaign=self.campaign,
             digest=digest,

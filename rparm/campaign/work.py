@@ -25,17 +25,17 @@ from rparm.campaign.results import Results
 from rparm.campaign.runs import Rows, Runner, open_fmus
 from rparm.errors import UserError
 from rparm.interruption import temporary_folder
-from rparm.report import motion, pages
+from rparm.report import motion, overview, pages
 from rparm.report.motion import Recorded
 from rparm.report.overview import RAN
-from rparm.report.pages import INDEX, RunPage, Table
+from rparm.report.pages import RunPage, Table
 from rparm.report.run_data import Plot, RunData, result_curve, thinned
 from rparm.units import unit
 
 if TYPE_CHECKING:
     from distributed import Client
 
-FOLDER = "replays"
+FOLDER = overview.REPLAYS
 DIED = "the run takes its process down"
 
 
@@ -140,7 +140,7 @@ def replay(
     table = folder / FOLDER / f"run_{run}.csv"
     table.parent.mkdir(parents=True, exist_ok=True)
     files.write_trajectory(table, job.times, job.watched, record)
-    pages.write_assets(folder)
+    report = project.results_folder(folder)
     page = RunPage(
         title=f"{campaign.title}: run {run}",
         description="One run of a campaign, made again.",
@@ -154,9 +154,11 @@ def replay(
         csv=table.name,
         csv_note="It has all Real outputs.",
         again=command,
-        overview=(folder / INDEX).exists(),
     )
-    written = pages.write_run(table.with_suffix(".html"), page)
+    root = pages.root(report, table.parent)
+    written = pages.write_run(table.with_suffix(".html"), page, root)
+    entry = overview.entry_of(table.stem, page, base.path.stem)
+    overview.record(report, overview.REPLAYS, [entry], table.parent)
     return Replay(given, kept, [table, written], "")
 
 

@@ -13,6 +13,8 @@ from rparm.console import Progress
 from rparm.errors import UserError, one_line
 from rparm.files import from_here, written
 from rparm.interruption import arrived
+from rparm.report import overview
+from rparm.report.overview import RAN, Entry, dots
 from rparm.runs.scenario import title
 
 if TYPE_CHECKING:
@@ -84,7 +86,9 @@ def do_campaign(options: argparse.Namespace) -> Ended:
             again = f"{_command(options)} --replay {options.replay}"
             one = work.replay(campaign, made.base, made.points, options.replay, folder, again)
             print(*one.lines, sep="\n")
-            verdict = f"failed: {one.failure}" if one.failure else f"ran: run {options.replay}"
+            verdict = (
+                f"failed: {one.failure}" if one.failure else f"completed: run {options.replay}"
+            )
             return Ended(1 if one.failure else 0, verdict, one.document, page=one.page)
         _run_missing(options, security, made)
         failed = results.failed()
@@ -102,6 +106,7 @@ def do_campaign(options: argparse.Namespace) -> Ended:
                 index = page.Page(campaign, made.job, results, units, _command(options)).write(
                     digest
                 )
+                _record(file.stem, made, index, _command(options), failed)
         except UserError:
             raise
         except Exception as error:  # the libraries that draw raise what they like
@@ -109,8 +114,22 @@ def do_campaign(options: argparse.Namespace) -> Ended:
                 f"{folder}: the page cannot be written: {type(error).__name__}: {one_line(error)}; "
                 "the results are complete"
             ) from error
-    print(f"page: {from_here(index)}")
     return Ended(0, verdict, {**document, "page": index.absolute()}, page=index)
+
+
+def _record(name: str, made: "Work", page: Path, command: str, failed: int) -> None:
+    """Put the campaign on the start page, with its first result over its first parameter."""
+    campaign, kept = made.campaign, made.job.measures[0].column
+    first = next(iter(campaign.parameters))
+    table = made.results.table([first, kept])
+    title = f"{campaign.title}: {campaign.count} runs" + f", {failed} of them failed" * bool(failed)
+    entry = Entry(
+        name, title, made.base.path.stem, page.name, RAN, command=command,
+        line_of=f"{kept} over {first}", line_text=f"Runs: {kept} over {first}",
+        shapes=dots(table[first], table[kept]),
+    )  # fmt: skip
+    report = project.results_folder(page.parent)
+    overview.record(report, overview.CAMPAIGNS, [entry], page.parent)
 
 
 def _security(options: argparse.Namespace) -> "Security | None":

@@ -3,6 +3,7 @@
 import argparse
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rparm import console, project
@@ -12,20 +13,24 @@ from rparm.command_line import (
     add_step,
     add_system,
     file_or_name,
+    other_folder,
     retyped,
 )
 from rparm.console import Progress
 from rparm.errors import UserError
-from rparm.files import check_writable, from_here, written
-from rparm.report import charts, pages
-from rparm.report.charts import Chart
-from rparm.report.pages import Table
+from rparm.files import check_writable, from_folder, written
+from rparm.report import overview
+from rparm.report.overview import FAILED, PASSED, RAN
+from rparm.report.pages import RunPage, Table
+from rparm.report.run_data import Axis, Curve, Plot, RunData
 from rparm.systems import comparison, master
 from rparm.systems.comparison import HALVINGS, CouplingStudy, Halved
 from rparm.systems.opened import SUFFIXES, given_file, opened, system_file
 from rparm.systems.structure import OpenedSystem
 from rparm.units import milliseconds, short
+from rparm.units import verdict as passed_or_failed
 
+PART = overview.COUPLING
 ABOUT = "How far the system's co-simulation is from its limit for small communication steps."
 ERRORS = (
     "An error is the largest distance of an output from the limit that the two smallest steps lead "
@@ -47,7 +52,7 @@ def add_coupling_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("variant", nargs="?", metavar="VARIANT", help=text)
     add_step(parser)
     add_system(parser)
-    add_report(parser, "system")
+    add_report(parser, PART)
 
 
 def do_coupling(options: argparse.Namespace) -> Ended:
@@ -71,33 +76,33 @@ def _halved(system: OpenedSystem, variant: str, options: argparse.Namespace) -> 
     total = len(ways) * system.system.steps * (2 ** (HALVINGS + 1) - 1)
     with Progress(name, total) as progress:
         found = [comparison.halve(system, variant, way, progress) for way in ways]
-    parts = [(_table(found), ERRORS, [_chart(found)])]
+    tables = [replace(_table(found), note=ERRORS)]
     limits, note = _limits(system, variant)
     if limits is not None:
         from rparm.linearization.page import STEPS
 
-        parts.append((limits, STEPS, []))
-    for table, text, _ in parts:
+        tables.append(replace(limits, note=STEPS))
+    for table in tables:
         console.plain_table(table.title, table.head, table.rows)
-        console.remark(text)
+        console.remark(table.note)
     if note:
         console.remark(note)
-    folder = options.report / f"coupling_{name}_{variant}"
-    given = {
-        "ssp": options.ssp,
-        "step": options.step,
-        "fmi": options.fmi if options.fmi != project.VERSIONS[0] else None,
-    }
-    again = retyped("coupling", [file_or_name(options.what, SUFFIXES), variant], given)
-    with written(folder):
-        pages.write_assets(folder)
-        index = pages.write_page(
-            folder / pages.INDEX, "linearization.html", root="", parts=parts, again=again,
-            title=f"{name}, {variant}: the coupling", about=ABOUT, notes=[note] if note else [],
-            facts=[], matrices=[],
-        )  # fmt: skip
-    print(f"page: {from_here(index)}")
     first = found[0]
+    title = f"{name}, {variant}: errors of the coupling"
+    curves = [Curve(f"{x.order.replace('_', '-')}, {x.inputs}", x.errors) for x in found]
+    axis = Axis("communication step", "ms", log=True)
+    plot = Plot("error of the coupling", "", curves, log=True)
+    page = RunPage(
+        title=title,
+        description=ABOUT,
+        status=RAN,
+        facts=[("system", name), ("variant", variant)],
+        data=RunData(title, "", 1e3 * first.steps, [plot], axis),
+        tables=tables,
+        notes=[note] if note else [],
+        again=_again(options, [file_or_name(options.what, SUFFIXES), variant]),
+    )
+    index = _written(options, f"{name}_{variant}", page, name)
     order = f", order {first.orders[-1]:.2f}" if math.isfinite(first.orders[-1]) else ""
     verdict = (
         f"coupling: error {short(float(first.errors[0]), 1)} at {milliseconds(first.steps[0])}"
@@ -112,6 +117,21 @@ def _halved(system: OpenedSystem, variant: str, options: argparse.Namespace) -> 
         "page": index.absolute(),
     }  # fmt: skip
     return Ended(0, verdict + order, document, page=index)
+
+
+def _again(options: argparse.Namespace, positional: Sequence[str | Path]) -> str:
+    given = {"ssp": options.ssp, "step": options.step} | other_folder(options.report, PART)
+    given["fmi"] = options.fmi if options.fmi != project.VERSIONS[0] else None
+    return retyped("coupling", positional, given)
+
+
+def _written(options: argparse.Namespace, name: str, page: RunPage, group: str) -> Path:
+    """Write a page into the folder of the results, and its line on the start page."""
+    report = project.results_folder(options.report)
+    with written(report):
+        entry = overview.write_page(report / PART, name, page, group)
+        overview.record(report, PART, [entry])
+    return report / PART / entry.page
 
 
 def _finite(numbers: Sequence[float]) -> list[float | None]:
@@ -143,17 +163,6 @@ def _limits(system: OpenedSystem, variant: str) -> tuple[Table | None, str]:
     return page.steps_table(list(found)), ""
 
 
-def _chart(found: Sequence[Halved]) -> Chart:
-    traces = [
-        {"x": 1e3 * x.steps, "y": x.errors, "name": f"{x.order.replace('_', '-')}, {x.inputs}",
-         "mode": "lines+markers", "line": charts.line(colour), "marker": {"color": colour}}
-        for x, colour in zip(found, charts.curves(), strict=False)
-    ]  # fmt: skip
-    axes = {"xaxis": charts.axis("communication step (ms)", log=True)}
-    axes["yaxis"] = charts.axis("error", log=True)
-    return Chart("Errors over the step", "Error of each way to step over the step", traces, axes)
-
-
 def _study(options: argparse.Namespace, folder: Path, known: CouplingStudy) -> Ended:
     """Study the closed loop in depth, as its study.py defines."""
     from rparm.linearization.largest_step import study_steps
@@ -167,7 +176,21 @@ def _study(options: argparse.Namespace, folder: Path, known: CouplingStudy) -> E
             ssp = project.built(other, ".ssp", version=options.fmi)
             parts[f"largest steps of {other.name}"] = study_steps(ssp, rest)
     failed = [name for name, part in parts.items() if not part["passed"]]
+    rows = [[name, passed_or_failed(name not in failed)] for name in parts]
     picture = (options.report / known.COUPLING_PICTURE).absolute()
+    report = project.results_folder(options.report)
+    beside = from_folder(picture, report.absolute() / PART)
+    page = RunPage(
+        title=f"{folder.name}: errors of the coupling",
+        description=ABOUT,
+        status=FAILED if failed else PASSED,
+        facts=[("system", folder.name)],
+        data=None,
+        tables=[Table("Parts", ["part", "result"], rows)],
+        diagram=(beside, "Errors over the communication step"),
+        again=_again(options, []),
+    )
+    index = _written(options, folder.name, page, path.stem)
     verdict = console.verdict_line(failed, parts, "part")
-    document = {"parts": parts, "picture": picture}
-    return Ended(1 if failed else 0, verdict, document, page=picture)
+    document = {"parts": parts, "picture": picture, "page": index.absolute()}
+    return Ended(1 if failed else 0, verdict, document, page=index)

@@ -17,7 +17,7 @@ from rparm.federation import SILENCE, component, federation, network
 from rparm.federation.component import parts, real_connections
 from rparm.federation.federation import Record
 from rparm.federation.network import KEY, key
-from rparm.files import check_writable, written
+from rparm.files import check_writable, from_here, written
 from rparm.project import VERSIONS
 from rparm.result_tables import FederationTable
 from rparm.systems import comparison, ecos
@@ -108,8 +108,9 @@ def do_federation(options: argparse.Namespace) -> Ended:
             known = {by: us for by, us in times.items() if math.isfinite(us)}
             rows.append({**row, "microseconds_per_step": known, "passed": passed})
             failed += [] if passed else [name]
-    code = 1 if failed else 0
-    return Ended(code, console.verdict_line(failed, names, "variant"), {"variants": rows})
+    keep = f"values: {from_here(options.output)}" if options.output else "--output DIR keeps values"
+    verdict = f"{console.verdict_line(failed, names, 'variant')}; {keep}"
+    return Ended(1 if failed else 0, verdict, {"variants": rows})
 
 
 def _write(path: Path, record: Record) -> None:

@@ -13,7 +13,7 @@ from rparm import console, project, schemas
 from rparm.building import NEEDED
 from rparm.command_line import Ended, add_document, add_flag, add_fmi, add_output
 from rparm.errors import UserError, closest, placed
-from rparm.files import check_for_windows, copied, create, from_folder, from_here, written
+from rparm.files import check_for_windows, copied, create, from_folder, written
 from rparm.fmi.model import INPUTS, Model, Variable
 from rparm.project import VERSIONS
 from rparm.runs import scenario
@@ -21,6 +21,7 @@ from rparm.systems.loop_file import NAME
 from rparm.systems.structure import times
 
 SUFFIX = ".toml"
+TOOLS = project.page("docs/use-in-your-tool.md")
 MODELS_PAGE, TUTORIAL = "examples/models/README.md", "docs/tutorial.md"
 MODEL_FILE = """\
 # A body on a spring: change it to what you simulate. examples/models/README.md explains the file.
@@ -277,7 +278,8 @@ def do_build(options: argparse.Namespace) -> Ended:
     from rparm.building import build
 
     paths = build(options.file, output=options.output or Path(), platforms=options.platforms)
-    verdict = f"{' and '.join(map(str, paths))}: built"
+    new = f"{project.PROGRAM} new my_run --model {shlex.quote(str(paths[0]))}"
+    verdict = f"{' and '.join(map(str, paths))}: built; a scenario of it: {new}"
     return Ended(0, verdict, {"fmus": [path.absolute() for path in paths]})
 
 
@@ -310,7 +312,8 @@ def do_ssp(options: argparse.Namespace) -> Ended:
     notes += [f"{component} needs {what}" for component, what in needed.items()]
     console.messages(str(path), [*opened.notes, *notes])
     document = {"file": path.absolute(), "inputs": inputs, "needs": needed}
-    return Ended(0, f"{path}: written", document, page=path)
+    verdict = f"{path}: written; run it by {project.PROGRAM} system {shlex.quote(str(path))}"
+    return Ended(0, verdict, document, page=path)
 
 
 def add_fmu_options(parser: argparse.ArgumentParser) -> None:
@@ -324,7 +327,9 @@ def do_fmu(options: argparse.Namespace) -> Ended:
     """Copy the FMU; a file that has its name is replaced."""
     file = project.built(project.model(options.name), ".fmu", version=options.fmi)
     path = copied(file, (options.output or Path()) / file.name)
-    verdict = f"{path}: FMI {options.fmi}, {path.stat().st_size} bytes"
+    verdict = (
+        f"{path}: FMI {options.fmi}, {path.stat().st_size} bytes; to import it: {TOOLS}"
+    )
     return Ended(0, verdict, {"file": path.absolute(), "fmi_version": options.fmi})
 
 
@@ -351,4 +356,4 @@ def do_playground(options: argparse.Namespace) -> Ended:
     page = project.playground_page()
     if options.output:
         page = copied(page, options.output / "playground.html")
-    return Ended(0, str(from_here(page)), {"page": page.absolute()}, page=page)
+    return Ended(0, "", {"page": page.absolute()}, page=page)

@@ -6,16 +6,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rparm import console, project
-from rparm.command_line import Ended, add_flag, add_report, file_or_name, names, pairs, retyped
+from rparm.command_line import (
+    Ended,
+    add_flag,
+    add_report,
+    file_or_name,
+    names,
+    other_folder,
+    pairs,
+    retyped,
+)
 from rparm.errors import UserError, placed
 from rparm.files import check_writable, from_here, number_in, written
+from rparm.report import overview
 from rparm.units import SECONDS, typed_quantity
 
 if TYPE_CHECKING:
     from rparm.identification.identify import Identification
     from rparm.identification.request import Request
 
-PART = "identify"
+PART = overview.IDENTIFICATIONS
 SEGMENT = "0.4"  # s
 SEVERAL = "parameters", "inputs", "measured", "set", "start", "columns", "units"
 GIVEN = *SEVERAL, "delay", "validate"
@@ -64,10 +74,15 @@ def do_identify(options: argparse.Namespace) -> Ended:
     with written(options.report):
         options.report.mkdir(parents=True, exist_ok=True)
         files = results.write_files(found, options.report, model)
-        files.append(page.write(found, options.report, model, true, _again(options)))
-    verdict = f"identified: {len(found.estimates)} parameters, page {from_here(files[-1])}"
+        report = project.results_folder(options.report)
+        place = report / PART
+        made = page.write(found, place, model, true, _again(options))
+        entry = overview.entry_of(found.model, made, found.model)
+        overview.record(report, PART, [entry])
+        files.append(place / entry.page)
+    verdict = f"identified: {len(found.estimates)} parameters"
     if not found.has_converged:
-        verdict = f"failed: the fit has not converged in {found.steps} steps"
+        verdict = f"failed: the fit has not converged in {found.steps} iterations"
     elif found.misfit:
         verdict = f"{'identified' if found.passed else 'failed'}: {found.misfit}"
     document = results.document(found) | {"files": [file.absolute() for file in files]}
@@ -130,7 +145,8 @@ def _again(options: argparse.Namespace) -> str:
     files = [file_or_name(options.fmu, (".fmu",)), *options.logs] if options.fmu else []
     given = {name: getattr(options, name) for name in (*SEVERAL, "validate")}
     given["segment"] = options.segment if options.segment != SEGMENT else None
-    return retyped("identify", files, given | {"delay": options.delay, "demo": options.demo})
+    given |= {"delay": options.delay, "demo": options.demo} | other_folder(options.report, PART)
+    return retyped("identify", files, given)
 
 
 def _values(option: str, given: Sequence[str]) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from rparm.command_line import (
     add_report,
     file_or_name,
     names,
+    other_folder,
     pairs,
     positive_seconds,
     retyped,
@@ -17,7 +18,10 @@ from rparm.command_line import (
 )
 from rparm.errors import UserError
 from rparm.files import check_writable, from_here, written
+from rparm.report import overview
+from rparm.report.overview import RAN, Entry, dots
 
+PART = overview.LINEAR
 MOST_COLUMNS, MOST_ROWS = 6, 12  # of matrices in the terminal
 SUFFIXES = (".fmu", ".ssp", ".toml")
 
@@ -56,7 +60,7 @@ def add_linearize_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--save", nargs="+", default=[], type=Path, metavar="FILE", help=".json, .mat or .csv"
     )
-    add_report(parser, "linearize")
+    add_report(parser, PART)
 
 
 def do_linearize(options: argparse.Namespace) -> Ended:
@@ -100,9 +104,18 @@ def do_linearize(options: argparse.Namespace) -> Ended:
     for path in options.save:
         study.save(path, found, options.step)
         print(f"saved: {from_here(path)}")
-    with written(options.report):
-        index = page.write(options.report, found, options.step, _command(options))
-    print(f"page: {from_here(index)}")
+    report, command = project.results_folder(options.report), _command(options)
+    name = "_".join(filter(None, (found.path.stem, found.variant)))
+    with written(report):
+        name = overview.free_name(report / PART, name, command)
+        index = page.write(report / PART / name, found, options.step, command)
+        poles = found.linear.poles
+        entry = Entry(
+            name, f"Linear model: {n} states, {m} inputs, {p} outputs", found.path.stem, index.name,
+            RAN, line_text=f"{len(poles)} poles", shapes=dots(poles.real, poles.imag, cross=True),
+            command=command,
+        )  # fmt: skip
+        overview.record(report, PART, [entry], index.parent)
     document = study.document(found, options.step) | {"page": index.absolute()}
     verdict = f"linear: {n} states, {m} inputs, {p} outputs"
     return Ended(0, verdict, document, page=index)
@@ -110,6 +123,7 @@ def do_linearize(options: argparse.Namespace) -> Ended:
 
 def _command(options: argparse.Namespace) -> str:
     given = {"fmi": options.fmi if options.fmi != project.VERSIONS[0] else None}
+    given |= other_folder(options.report, PART)
     for name in ("variant", "at", "time", "trim", "inputs", "outputs", "without", "cut", "step"):
         given["break" if name == "cut" else name] = getattr(options, name)
     return retyped("linearize", [file_or_name(options.what, SUFFIXES)], given)

@@ -7,16 +7,16 @@ from dataclasses import asdict
 import numpy as np
 
 from rparm import console, project, proof
-from rparm.command_line import Ended, add_flag, add_report, add_tolerance, retyped
+from rparm.command_line import Ended, add_flag, add_report, add_tolerance, other_folder, retyped
 from rparm.console import Progress
 from rparm.errors import UserError, WrongValueError, placed
-from rparm.files import check_writable, from_here, written
+from rparm.files import check_writable, written
 from rparm.fmi.fmu_file import Fmu
 from rparm.proof import ASSUMED, Enclosure, ProvenReference, Prover
 from rparm.report import proof_page
 from rparm.runs import scenario as scenarios
 from rparm.runs.scenario import Scenario
-from rparm.units import counted, rounded_up, typed_quantity, verdict
+from rparm.units import counted, rounded_up, short, typed_quantity, verdict
 
 COLUMNS = {"values": 8, "nearest doubles": 8, "interval": 9}
 
@@ -71,7 +71,6 @@ def do_prove(options: argparse.Namespace) -> Ended:
             page = proof_page.write(
                 options.report, scenario, fmu.model, states, courses, good, _command(options)
             )
-    print(f"page: {from_here(page)}")
     checked = _checked(program, {scenario: enclosure}) if options.check else {}
     largest = max(e.error for errors in found.values() for e in errors.values())
     methods = {m: {n: asdict(e) for n, e in errors.items()} for m, errors in found.items()}
@@ -102,6 +101,7 @@ def _verdict(references: Collection[ProvenReference]) -> str:
 def _command(options: argparse.Namespace) -> str:
     names = [options.name] if options.name else []
     given = {name: getattr(options, name) for name in ("method", "tolerance", "within")}
+    given |= {"check": options.check} | other_folder(options.report)
     return retyped("prove", names, given)
 
 
@@ -140,7 +140,9 @@ def _runs(
     units = [fmu.model.variables[name].unit for name in enclosure.names]
     heads = {f"{n} {u or ''}".strip(): 10 for n, u in zip(enclosure.names, units, strict=True)}
     print(f"{scenario.name}: largest distance from the exact motion at communication points")
-    names = [f"{m} at {proof.tolerance_of(m, tolerance or scenario.tolerance):g}" for m in methods]
+    names = [
+        f"{m} at {short(proof.tolerance_of(m, tolerance or scenario.tolerance))}" for m in methods
+    ]
     table = console.Table("method", [*names, "interval"], heads, result=0)
     found, courses = {}, {}
     for method, name in zip(methods, names, strict=True):
@@ -181,7 +183,6 @@ def _references(options: argparse.Namespace) -> Ended:
         page = proof_page.write_references(
             options.report, ("reference", *COLUMNS, "result"), rows, found, _command(options)
         )
-    print(f"page: {from_here(page)}")
     good = {name: asdict(reference) for name, reference in found.items()}
     document = {"references": good, "page": page.absolute()} | everything
     if not all(reference.passed for reference in found.values()):

@@ -7,7 +7,15 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from rparm import console, project, result_tables
-from rparm.command_line import Ended, add_flag, add_fmi, add_report, add_tolerance
+from rparm.command_line import (
+    Ended,
+    add_flag,
+    add_fmi,
+    add_report,
+    add_tolerance,
+    other_folder,
+    retyped_options,
+)
 from rparm.commands.files import do_list
 from rparm.console import Progress
 from rparm.errors import UserError, did_you_mean, placed, together
@@ -64,7 +72,9 @@ def do_run(options: argparse.Namespace) -> Ended:
         for scenario in chosen:
             runs.reference(scenario)  # so that a missing reference is reported before anything runs
         check_writable(options.report)
-        writer = ReportWriter(options.report)
+        given = {name: getattr(options, name) for name in ("fmu", "fmi", "tolerance")}
+        more = retyped_options(given | other_folder(options.report))
+        writer = ReportWriter(options.report, more)
         with written(options.report):
             writer.begin()
             if chosen:
@@ -89,9 +99,7 @@ def do_run(options: argparse.Namespace) -> Ended:
     print()
     for name, file in writer.files.items():
         print(f"{name}: {from_here(file)}")
-    index = options.report / pages.INDEX
-    print(f"report: {from_here(index)}")
-    return _ended(done, index.absolute(), page)
+    return _ended(done, (options.report / pages.INDEX).absolute(), page)
 
 
 def _ended(done: Done, report: Path, page: Path) -> Ended:
@@ -101,7 +109,7 @@ def _ended(done: Done, report: Path, page: Path) -> Ended:
     everything = [*done.chosen, *done.own]
     verdict = console.verdict_line(wrong, everything, "scenario")
     if not wrong and done.own:
-        verdict = f"ran: {counted(everything, 'scenario')}, errors estimated"
+        verdict = f"completed: {counted(everything, 'scenario')}, errors estimated"
         verdict = f"{verdict} of {len(done.own)}" if done.chosen else verdict
     document = {"passed": not wrong, **result_tables.document(done), "report": report}
     if done.failures:

@@ -3,13 +3,22 @@
 import argparse
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 from rparm import console, project
-from rparm.command_line import Ended, add_flag, add_report, add_step, add_system
+from rparm.command_line import (
+    Ended,
+    add_flag,
+    add_report,
+    add_step,
+    add_system,
+    other_folder,
+    retyped_options,
+)
 from rparm.console import Progress
 from rparm.errors import UserError, did_you_mean, together
-from rparm.files import check_writable, from_here, written
+from rparm.files import check_writable, written
 from rparm.project import PROGRAM
 from rparm.report import overview, system_page
 from rparm.report.overview import Entry
@@ -175,13 +184,16 @@ def _run(chosen: Sequence[tuple[Section, Sequence[str]]], options: argparse.Name
                     save_figure(figure, options.pictures / f"{name}.png")
             outcomes.append(outcome)
         print()
+    given = {"ssp": options.ssp, "step": options.step} | other_folder(options.report)
+    given["fmi"] = options.fmi if options.fmi != project.VERSIONS[0] else None
+    more = retyped_options(given)
     with written(options.report):
+        entries = [replace(entry, command=entry.command + more) for entry in entries]
         index = overview.record(options.report, overview.SYSTEM, entries)
-    print(f"report: {from_here(index)}")
     failed = [*failures, *(outcome.variant for outcome in outcomes if not outcome.passed)]
     verdict = console.verdict_line(failed, rows, "variant")
     if not failed and not any(section.folder for section, _ in plans):
-        verdict = verdict.replace("passed", "ran")
+        verdict = verdict.replace("passed", "completed")
     document = {"passed": not failed, "variants": rows, "report": index.absolute()}
     if failures:
         return Ended(code, verdict, document, together(list(failures.values())), index)

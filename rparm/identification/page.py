@@ -26,8 +26,9 @@ MOST_NUMBERS = 10  # parameters, whose correlations are written into their cells
 
 def write(
     found: Identification, folder: Path, model: Model, true: Mapping[str, float], again: str
-) -> Path:
-    """Write the page and its picture into a folder; its path. `again` is what makes it again."""
+) -> pages.RunPage:
+    """Write the page MODEL.html and its picture into a folder; `again` is what makes it again."""
+    folder.mkdir(parents=True, exist_ok=True)
     picture = figure_of(found.whiteness, found.known, found.covariances.scatter)
     pages.save_figure(picture, folder / PICTURE)
     logs = ", ".join(recording.path.name for recording in found.recordings)
@@ -40,16 +41,16 @@ def write(
             ("rows", str(sum(int(segment.counts.sum()) for segment in found.segments))),
             ("segments", f"{len(found.segments)} of {number(found.request.segment)} s"),
             ("chi2", f"{found.chi2:.4g} (1: only noise is left)"),
-            ("steps", str(found.steps)),
+            ("iterations", str(found.steps)),
         ],
         data=_data(found, model),
         tables=_tables(found, model, true),
         failures=found.warnings,
         diagram=(PICTURE, "Autocorrelations of the residuals, correlations of the parameters"),
         again=again,
-        overview=False,
     )
-    return pages.write_alone(folder, page)
+    pages.write_run(folder / f"{found.model}.html", page)
+    return page
 
 
 # ---- Plots ---------------------------------------------------------------------------------------

@@ -81,8 +81,11 @@ MOST_PARTS = 4  # states that are named of a pole
 
 
 def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
-    """Write the page into a folder, and return it. `again` is the command that makes it again."""
-    pages.write_assets(folder)
+    """Write the page into a folder two below that of the start page; return the page.
+
+    The command `again` makes it again.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
     linear, loop = found.linear, found.loop
     parts: list[Part] = []
     if found.trimmed:
@@ -110,7 +113,7 @@ def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
     return pages.write_page(
         folder / pages.INDEX,
         "linearization.html",
-        root="",
+        root="../../",
         title=f"{name}: linear model",
         about=ABOUT,
         again=again,

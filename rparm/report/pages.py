@@ -16,7 +16,7 @@ from urllib.parse import quote
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from rparm import project, units
-from rparm.files import whole, write_text
+from rparm.files import from_folder, whole, write_text
 from rparm.report.run_data import RunData
 
 if TYPE_CHECKING:
@@ -105,19 +105,23 @@ class RunPage:
     csv_note: str = ""
     diagram: tuple[str, str] | None = None  # file name beside the page, and its description
     again: str = ""  # the command that runs it again
-    overview: bool = True  # whether there is one
 
 
-def write_run(path: Path, page: RunPage) -> Path:
-    """Write a page of a section of the report; return its path."""
-    return write_page(path, "run.html", root="../", page=page, data=page.data and page.data.json())
+def write_run(path: Path, page: RunPage, root: str = "../") -> Path:
+    """Write a page of a report, whose folder `root` leads to; return its path."""
+    return write_page(path, "run.html", root=root, page=page, data=page.data and page.data.json())
+
+
+def root(report: Path, folder: Path) -> str:
+    """Return how a page in a folder of a report leads to the report's own."""
+    path = from_folder(report.absolute(), folder.absolute())
+    return "" if path == "." else f"{path}/"
 
 
 def write_alone(folder: Path, page: RunPage) -> Path:
-    """Write a page without an overview and what it loads; return its path."""
+    """Write a page without a start page, and what it loads; return its path."""
     write_assets(folder)
-    values = {"root": "", "page": page, "data": page.data and page.data.json()}
-    return write_page(folder / INDEX, "run.html", **values)
+    return write_run(folder / INDEX, page, "")
 
 
 def write_page(path: Path, template: str, **values: object) -> Path:

@@ -1,7 +1,6 @@
 """The page of proven errors."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,14 +8,13 @@ import numpy as np
 from rparm import proof
 from rparm.fmi.model import Model
 from rparm.proof import Enclosure, ProvenReference
-from rparm.report import pages
-from rparm.report.overview import FAILED, PASSED
-from rparm.report.pages import INDEX, RunPage, Table, write_run
+from rparm.report import overview
+from rparm.report.overview import FAILED, PASSED, PROOFS
+from rparm.report.pages import RunPage, Table
 from rparm.report.run_data import Curve, Plot, RunData, thinned
 from rparm.runs.scenario import Scenario
 from rparm.units import SMALLEST, counted, number, rounded_up, unit
 
-FOLDER = "proofs"  # of the report
 ASSUMES = f"The proof assumes {proof.ASSUMED}."
 
 
@@ -69,7 +67,7 @@ def write(
         failures=[str(wrong) for wrong in good.wrong] if good else [],
         again=again,
     )
-    return _write(report, scenario.name, page)
+    return _write(report, scenario.name, page, model.name)
 
 
 def write_references(
@@ -91,18 +89,17 @@ def write_references(
         failures=[str(wrong) for good in found.values() for wrong in good.wrong],
         again=again,
     )
-    return _write(report, "references", page)
+    return _write(report, "references", page, "All models")
 
 
 def _status(references: Iterable[ProvenReference]) -> str:
     return PASSED if all(good.passed for good in references) else FAILED
 
 
-def _write(report: Path, name: str, page: RunPage) -> Path:
-    pages.write_assets(report)
-    (report / FOLDER).mkdir(parents=True, exist_ok=True)
-    with_overview = (report / INDEX).exists()
-    return write_run(report / FOLDER / f"{name}.html", replace(page, overview=with_overview))
+def _write(report: Path, name: str, page: RunPage, group: str) -> Path:
+    entry = overview.write_page(report / PROOFS, name, page, group)
+    overview.record(report, PROOFS, [entry])
+    return report / PROOFS / entry.page
 
 
 def _largest(model: Model, enclosure: Enclosure, errors: Mapping[str, np.ndarray]) -> Table:

@@ -39,8 +39,9 @@ def _by(items: Iterable[Any], key: Callable[[Any], Any]) -> dict[Any, list[Any]]
 class ReportWriter:
     """Writes pages of scenarios, of users' own files and of studies into a folder."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, options: str = "") -> None:
+        """`options` are those of the command, for its pages."""
+        self.folder, self.options = folder, options
         self.files: dict[str, Path] = {}  # pages of users' own files that were written, by name
 
     def begin(self) -> None:
@@ -75,7 +76,7 @@ class ReportWriter:
             ours = group[0].compared if group else project.is_ours(path)
             section, entries = (SCENARIOS, scenarios) if ours else (FILES, files)
             shown = scenario.name if ours else f"'{from_here(path)}'"
-            again = f"{project.PROGRAM} {shown}"
+            again = f"{project.PROGRAM} {shown}{self.options}"
             folder = self.folder / section
             name = scenario.name if ours else self._free_name(path)
             if group:
@@ -86,8 +87,11 @@ class ReportWriter:
             if not ours:
                 self.files[name] = folder / entry.page
             progress(1)
-        written = [write_sweeps(self.folder / STUDIES, sweeps)] if sweeps else []
-        written += [write_convergence(self.folder / STUDIES, x) for x in studies]
+        whole = f"{project.PROGRAM} run{self.options}"
+        swept = dict.fromkeys(sweep.scenario.name for sweep in sweeps)
+        some = whole if studies else " ".join((whole, *swept))
+        written = [write_sweeps(self.folder / STUDIES, sweeps, some)] if sweeps else []
+        written += [write_convergence(self.folder / STUDIES, x, whole) for x in studies]
         index = self._record(scenarios, files, written)
         return index if scenarios or len(files) != 1 else self.folder / FILES / files[0].page
 
@@ -110,7 +114,7 @@ class ReportWriter:
         return index
 
 
-def write_sweeps(folder: Path, sweeps: Sequence[Sweep]) -> Entry:
+def write_sweeps(folder: Path, sweeps: Sequence[Sweep], again: str) -> Entry:
     """Write the page of errors over the tolerance; its line in the overview."""
     x = np.array(sweeps[0].tolerances)
     models = _by(sweeps, lambda sweep: sweep.scenario.model)
@@ -126,7 +130,7 @@ def write_sweeps(folder: Path, sweeps: Sequence[Sweep]) -> Entry:
         for model, own in models.items()
     ]
     rows = [
-        [sweep.scenario.name, *(f"{error:.1e}" for error in sweep.errors), verdict(sweep.passed)]
+        [sweep.scenario.name, *(short(error, 1) for error in sweep.errors), verdict(sweep.passed)]
         for sweep in sweeps
     ]
     passed = all(sweep.passed for sweep in sweeps)
@@ -139,12 +143,13 @@ def write_sweeps(folder: Path, sweeps: Sequence[Sweep]) -> Entry:
         data=data,
         tables=[Table("Errors", ["scenario", *map(short, x), "result"], rows)],
         failures=[f"{s.scenario.name}: {text}" for s in sweeps for text in s.violations],
+        again=again,
     )
     worst = max(sweeps, key=lambda sweep: np.nan_to_num(sweep.errors[-1], nan=np.inf))
     return _write_study(folder, page, worst.errors[-1], f"at {short(x[-1])}, {worst.scenario.name}")
 
 
-def write_convergence(folder: Path, study: Convergence) -> Entry:
+def write_convergence(folder: Path, study: Convergence, again: str) -> Entry:
     """Write the page of errors over the communication step; its line in the overview."""
     scenario, steps = study.scenario, np.asarray(study.problem.steps, float)
     model = project.model_folder(scenario.path).name
@@ -152,7 +157,7 @@ def write_convergence(folder: Path, study: Convergence) -> Entry:
     plot = Plot("error of the final state", "", curves, log=True)
     axis = Axis("communication step", "ms", log=True)
     rows = [
-        [row.name, *(f"{e:.1e}" for e in row.errors), f"{row.slope:.2f}", verdict(row.holds)]
+        [row.name, *(short(e, 1) for e in row.errors), f"{row.slope:.2f}", verdict(row.holds)]
         for row in study.rows
     ]
     head = ["known of the inputs", *map(milliseconds, steps), "slope", "result"]
@@ -166,6 +171,7 @@ def write_convergence(folder: Path, study: Convergence) -> Entry:
         tables=[Table("Errors", head, rows)],
         notes=[UPDATE_NOTE] if updated else [],
         failures=study.violations,
+        again=again,
     )
     worst = max(study.rows, key=lambda row: row.errors[-1])
     where = f"at {milliseconds(steps[-1])}, {worst.name}"
@@ -182,7 +188,7 @@ def _write_study(folder: Path, page: RunPage, error: float, detail: str) -> Entr
         page.data.name,
         page,
         "Errors over all scenarios",
-        title=f"{page.title}: {error:.1e} {detail}",
+        title=f"{page.title}: {short(error, 1)} {detail}",
         detail=detail,
         line=line,
         line_scale=f"{short(errors[0])} to {short(errors[-1])}, {page.data.axis.title} {axis}",
