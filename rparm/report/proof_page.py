@@ -43,6 +43,11 @@ def write(
         )
         for i, name in enumerate(enclosure.names)
     ]
+    scales = np.abs(enclosure.high).max(axis=0)
+    every = {x: (e / np.where(scales > 0, scales, 1.0)).max(axis=1) for x, e in errors.items()}
+    drawn = [Curve(x, np.where(e < SMALLEST, 0.0, e)) for x, e in every.items()]
+    note = "The largest over all states, each by its largest value: no state is farther from exact."
+    plots.insert(0, Plot("proven error", "", drawn, log=True, note=note))
     rows = thinned([values for plot in plots for values in plot.columns])
     title = f"{scenario.title}: proven errors"
     shown = [plot.at(rows) for plot in plots]
