@@ -109,15 +109,17 @@ def rank_correlation(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def bars(values: np.ndarray) -> str:
-    """Return a histogram of numbers, (runs,), as the path of an SVG, BINS wide and 10 high."""
+    """Return a histogram of numbers, (runs,), as the path of an SVG, 1 wide and 10 high."""
     if not varies(values):
         return ""
     numbers = values[np.isfinite(values)]
     low, high = numbers.min(), numbers.max()
-    places = np.minimum(((numbers - low) / (high - low) * BINS).astype(int), BINS - 1)
-    counts = np.bincount(places, minlength=BINS)
+    different = len(np.unique(numbers))  # of a grid: its points must not share bins unevenly
+    count = different if different < 2 * BINS else BINS
+    places = np.minimum(((numbers - low) / (high - low) * count).astype(int), count - 1)
+    counts = np.bincount(places, minlength=count)
     heights = 10 - 10 * counts / counts.max()
-    return "M0 10" + "".join(f"V{height:.3g}h1" for height in heights) + "V10z"
+    return "M0 10" + "".join(f"V{height:.3g}h{1 / count:.5g}" for height in heights) + "V10z"
 
 
 def saltelli_groups(campaign: Campaign, values: np.ndarray) -> np.ndarray:
@@ -178,7 +180,6 @@ class Page:
             scatter=charts.script(self.scatter(found)),
             drawn=len(self.sample),
             note=self.note,
-            bins=BINS,
             missing=self.missing(),
             indices=self.indices_table(found),
             bars=[
@@ -231,6 +232,7 @@ class Page:
             "values": {name: values[runs] for name, values in columns.items()},
             "labels": {name: self.labels.get(name, name) for name in columns},
             "parameters": [*parameters],
+            "first": next((x for x in self.campaign.worst if x in self.drawn), ""),
             "results": {
                 name: {
                     "ranks": [rank_correlation(ranked[x], ranked[name]) for x in parameters],
@@ -363,7 +365,8 @@ def map_chart(
     Returns also how many runs with a value are drawn: of a large grid, every k-th each way.
     """
     xs, ys = np.unique(x), np.unique(y)
-    scale = {"colorscale": COLOURS, "colorbar": {"title": {"text": escape(labels[2])}}}
+    bar = {"orientation": "h", "y": 1.02, "yanchor": "bottom", "thickness": 12}
+    scale = {"colorscale": COLOURS, "colorbar": bar}
     hover = "%{x:.5~g}, %{y:.5~g}<br>"
     is_grid = min(len(xs), len(ys)) > 1 and np.isfinite([*xs, *ys]).all()
     if is_grid and len(xs) * len(ys) == len(x) == len(set(zip(x, y, strict=True))):

@@ -42,14 +42,11 @@ def write(
         failures=found.warnings,
         again=again,
     )
-    known = found.known
+    known, parameters = found.known, _parameters(found, true)
     drawn = [correlations_chart(known, found.covariances.scatter)] if known else []
-    values = {"page": page, "data": page.data and page.data.json(), "root": "../"}
-    values["charts"] = [*drawn, autocorrelations_chart(found.whiteness)]
-    name = f"{found.model}.html"
-    pages.write_page(
-        folder / name, "identification.html", parameters=_parameters(found, true), **values
-    )
+    drawn.append(autocorrelations_chart(found.whiteness))
+    file = folder / f"{found.model}.html"
+    charts.write_page(file, page, parameters, drawn, "Residuals and logs")
     return page
 
 
@@ -200,8 +197,7 @@ def correlations_chart(names: Sequence[str], covariance: np.ndarray) -> Chart:
     trace |= {"x": [str(i + 1) for i in range(len(names))], "y": short, "customdata": hover}
     trace |= {"colorscale": [[0, "--curve2"], [0.5, "--paper"], [1, "--curve1"]]}
     trace |= {"hovertemplate": "%{customdata}<extra></extra>", "xgap": 1, "ygap": 1}
-    if len(names) <= MOST_NUMBERS:
-        trace["texttemplate"] = "%{text}"
+    trace |= {"showscale": False, "texttemplate": "%{text}"} if len(names) <= MOST_NUMBERS else {}
     layout = {
         "xaxis": charts.axis("", type="category", side="top", nticks=0),
         "yaxis": charts.axis("", type="category", autorange="reversed", nticks=0),

@@ -9,9 +9,13 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import cycle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from rparm.report import pages
+from rparm.report.pages import RunPage, Table
 
 Trace = dict[str, Any]
 DIGITS = 7  # of numbers
@@ -32,6 +36,13 @@ class Chart:
     @property
     def json(self) -> str:
         return script({"traces": self.traces, "layout": self.layout})
+
+
+def write_page(path: Path, page: RunPage, first: Table, drawn: Sequence[Chart], rest: str) -> Path:
+    """Write a page of a section with a table and charts before the plots, headed `rest`."""
+    values = {"page": page, "data": page.data and page.data.json(), "root": "../"}
+    more = {"first": first, "charts": drawn, "rest": rest}
+    return pages.write_page(path, "answers.html", **values, **more)
 
 
 def script(content: object) -> str:

@@ -120,6 +120,7 @@ const Campaign = (() => {
 
   async function start() {
     result.append(...Object.keys(data.results).map((name) => new Option(data.labels[name], name)));
+    if (data.first) result.value = data.first;
     result.addEventListener('change', draw);
     order?.addEventListener('change', draw);
     number.addEventListener('change', () => {

@@ -15,7 +15,7 @@ const Charts = (() => {
   /** The same content with colours for their names. */
   function coloured(content, style) {
     if (typeof content === 'string') return content.startsWith('--') ? style.getPropertyValue(content).trim() : content;
-    if (Array.isArray(content)) return typeof content[0] === 'number' ? content : content.map((part) => coloured(part, style));
+    if (Array.isArray(content)) return typeof content[1] === 'number' ? content : content.map((part) => coloured(part, style));
     if (content === null || typeof content !== 'object') return content;
     return Object.fromEntries(Object.entries(content).map(([name, part]) => [name, coloured(part, style)]));
   }
