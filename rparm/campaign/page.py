@@ -6,7 +6,6 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +41,6 @@ NO_VALUE = {
 }
 BINS = 40
 FLAT = 1e-12  # relative: a smaller variation is rounding
-COLOURS = "Viridis"  # in order of brightness, also for the colour-blind
 
 
 # ---- Statistics of the table ---------------------------------------------------------------------
@@ -342,19 +340,9 @@ def _lacking(values: np.ndarray) -> int:
 # ---- Charts -------------------------------------------------------------------------------------
 def indices_chart(label: str, rows: Sequence[Index]) -> Chart:
     """Draw Sobol' indices of a column as bars, with their confidence intervals."""
-    names = [escape(row.parameter) for row in reversed(rows)]
-    traces = []
-    for kind, colour in (("total", "--curve2"), ("first", "--curve1")):
-        values = [getattr(row, kind) for row in reversed(rows)]
-        half = [getattr(row, f"{kind}_confidence") for row in reversed(rows)]
-        error = {"type": "data", "array": half, "color": "--ink", "thickness": 1}
-        trace = {"type": "bar", "orientation": "h", "x": values, "y": names, "error_x": error}
-        hover = "%{y}: %{x:.3f} ± %{error_x.array:.3f}<extra></extra>"
-        name = "first order" if kind == "first" else "total"
-        traces.append(trace | {"marker": {"color": colour}, "name": name, "hovertemplate": hover})
-    layout = {"xaxis": charts.axis("Sobol' index"), "yaxis": charts.axis("", type="category")}
     text = f"Sobol' indices of {label}, as in the table"
-    return Chart(label, text, traces, layout | {"barmode": "group"}, height=7 + 3 * len(rows))
+    data = {"rows": [vars(row) for row in rows]}
+    return Chart(label, text, "indices", data, height=7 + 3 * len(rows))
 
 
 def map_chart(
@@ -365,25 +353,16 @@ def map_chart(
     Returns also how many runs with a value are drawn: of a large grid, every k-th each way.
     """
     xs, ys = np.unique(x), np.unique(y)
-    bar = {"orientation": "h", "y": 1.02, "yanchor": "bottom", "thickness": 12}
-    scale = {"colorscale": COLOURS, "colorbar": bar}
-    hover = "%{x:.5~g}, %{y:.5~g}<br>"
     is_grid = min(len(xs), len(ys)) > 1 and np.isfinite([*xs, *ys]).all()
     if is_grid and len(xs) * len(ys) == len(x) == len(set(zip(x, y, strict=True))):
         runs = np.empty((len(ys), len(xs)), int)
         runs[np.searchsorted(ys, y), np.searchsorted(xs, x)] = np.arange(len(x))
         every = -(-len(ys) // MOST_CELLS), -(-len(xs) // MOST_CELLS)
-        runs = runs[:: every[0], :: every[1]]
-        trace = {"type": "heatmap", "x": xs[:: every[1]], "y": ys[:: every[0]], "z": colour[runs]}
-        trace |= scale | {"customdata": runs, "hovertemplate": hover + "%{z:.5~g}<extra></extra>"}
-        count = int(np.isfinite(colour[runs]).sum())
+        runs, x, y = runs[:: every[0], :: every[1]], xs[:: every[1]], ys[:: every[0]]
     else:
-        runs = some[np.isfinite([x, y, colour]).all(axis=0)[some]][: MOST_CELLS * MOST_CELLS // 8]
-        marker = {"color": colour[runs], "size": 6, **scale}
-        trace = {"x": x[runs], "y": y[runs], "mode": "markers", "marker": marker}
-        hover += "%{marker.color:.5~g}<extra></extra>"
-        trace |= {"customdata": runs, "hovertemplate": hover}
-        count = len(runs)
-    layout = {"xaxis": charts.axis(labels[0]), "yaxis": charts.axis(labels[1])}
+        runs = some[np.isfinite([x, y, colour]).all(axis=0)[some]][: MOST_CELLS**2 // 8]
+        x, y = x[runs], y[runs]
+    data = {"runs": runs, "x": x, "y": y, "z": colour[runs], "labels": labels}
     text = f"Map of {labels[2]} over {labels[0]} and {labels[1]}"
-    return Chart(labels[2], text, [trace], layout, height=34), count
+    count = int(np.isfinite(colour[runs]).sum())
+    return Chart(labels[2], text, "map", data, height=34), count

@@ -14,7 +14,7 @@ from rparm.report import charts, pages
 from rparm.report.charts import Chart
 from rparm.report.overview import FAILED, RAN
 from rparm.report.run_data import Curve, Plot, RunData, thinned
-from rparm.units import exponents, minus, number, shortened, unit
+from rparm.units import exponents, number, shortened, unit
 
 LONGEST = 24  # characters of a name beside the correlations
 MOST_NUMBERS = 10  # parameters, whose correlations are written into their cells
@@ -172,37 +172,18 @@ def correlations(covariance: np.ndarray) -> np.ndarray:
 # ---- Charts -------------------------------------------------------------------------------------
 def autocorrelations_chart(tests: Mapping[str, Whiteness]) -> Chart:
     """Draw them as bars, and the lines between which 95 % of those of noise are."""
-    traces = [
-        {"type": "bar", "x": np.arange(1, len(test.correlations) + 1), "y": test.correlations,
-         "name": name, "marker": {"color": colour}}
-        for (name, test), colour in zip(tests.items(), charts.curves(), strict=False)
-    ]  # fmt: skip
     bound = max((test.bound for test in tests.values()), default=0.0)
-    line = {"type": "line", "x0": 0, "x1": 1, "xref": "paper"}
-    line |= {"line": {"color": "--ink", "width": 1, "dash": charts.DASHED}}
-    shapes = [line | {"y0": level, "y1": level} for level in (-bound, bound)]
-    layout = {"xaxis": charts.axis("lag in rows"), "yaxis": charts.axis("autocorrelation")}
+    rows = [{"name": name, "values": test.correlations} for name, test in tests.items()]
     title = "Autocorrelation of the residuals: 95 % of noise is between the lines"
-    return Chart(title, title, traces, layout | {"barmode": "group", "shapes": shapes})
+    return Chart(title, title, "autocorrelations", {"rows": rows, "bound": bound})
 
 
 def correlations_chart(names: Sequence[str], covariance: np.ndarray) -> Chart:
     """Draw the correlations of parameters (n,), whose covariance (n, n) is given."""
     values = correlations(covariance)
     short = [f"{i + 1} {shortened(name, LONGEST)}" for i, name in enumerate(names)]
-    texts = [[minus(f"{value:.2f}") for value in row] for row in values]
-    hover = [[f"{a}, {b}: {text}" for b, text in zip(names, row, strict=True)]
-             for a, row in zip(names, texts, strict=True)]  # fmt: skip
-    trace = {"type": "heatmap", "z": values, "zmin": -1, "zmax": 1, "text": texts}
-    trace |= {"x": [str(i + 1) for i in range(len(names))], "y": short, "customdata": hover}
-    trace |= {"colorscale": [[0, "--curve2"], [0.5, "--paper"], [1, "--curve1"]]}
-    trace |= {"hovertemplate": "%{customdata}<extra></extra>", "xgap": 1, "ygap": 1}
-    trace |= {"showscale": False, "texttemplate": "%{text}"} if len(names) <= MOST_NUMBERS else {}
-    layout = {
-        "xaxis": charts.axis("", type="category", side="top", nticks=0),
-        "yaxis": charts.axis("", type="category", autorange="reversed", nticks=0),
-    }
-    pairs = [(abs(values[i, k]), f"{names[i]} and {names[k]} {texts[i][k]}")
+    data = {"names": names, "short": short, "values": values, "most": MOST_NUMBERS}
+    pairs = [(abs(values[i, k]), f"{names[i]} and {names[k]} {values[i, k]:.2f}")
              for i in range(len(names)) for k in range(i)]  # fmt: skip
     text = f"Correlations of parameters; the largest: {max(pairs)[1]}" if pairs else names[0]
-    return Chart("Correlations of the parameters", text, [trace], layout)
+    return Chart("Correlations of the parameters", text, "correlations", data)

@@ -13,8 +13,8 @@ from rparm.linearization.linear import Linear, participations, zeros
 from rparm.linearization.margins import Crossing, Margins, closed, lag, searched
 from rparm.linearization.responses import frequencies, frequency_response
 from rparm.linearization.study import Study
-from rparm.report import charts, pages
-from rparm.report.charts import Chart, Trace
+from rparm.report import pages
+from rparm.report.charts import Chart, Data
 from rparm.units import exponents, milliseconds, unit
 
 Part = tuple[pages.Table, str, list[Chart]]
@@ -72,10 +72,6 @@ ON_AXIS = 1e-7  # damping below which the peak of a pole is infinite: its height
 POLE_GAIN = 1e6  # gain beyond which a Nyquist diagram breaks its line: a pole may be on the axis
 
 
-HERTZ = "%{x:.4~g} Hz<br>"  # at the pointer
-SECONDS = "%{x:.4~g} s<br>%{y:.5~g}<extra></extra>"
-NYQUIST = "L at %{text:.4~g} Hz:<br>%{x:.4~g} %{y:+.4~g}i<extra></extra>"
-MOST_TURNS = 720  # degrees of phase that a scale of 45 degrees still suits
 LEAST_PART = 0.01  # of a state in a pole; less is not said
 MOST_PARTS = 4  # states that are named of a pole
 
@@ -314,8 +310,10 @@ class Mark:
         return self.crossing.frequency / (2 * math.pi)
 
     @property
-    def colour(self) -> str:
-        return "--effort" if self.lag is None else "--good"
+    def data(self) -> Data:
+        text = f"{self.text}, at {exponents(f'{self.hertz:.4g}')} Hz"
+        at = {"hertz": self.hertz, "re": self.crossing.value.real, "im": self.crossing.value.imag}
+        return at | {"name": self.name, "text": text, "lag": self.lag}
 
 
 def marks(found: Margins) -> list[Mark]:
@@ -401,140 +399,68 @@ def bode_chart(model: Linear, step: float | None, found: Margins | None = None) 
     responses = [(label, one, frequency_response(one)(grid)) for label, one in _channels(model)]
     largest = max((np.abs(values).max() for _, _, values in responses), default=0.0)
     shown = [each for each in responses if np.abs(each[2]).max() > ROUNDING * largest]
-    known = _drawn_marks(found)
-    traces: list[Trace] = []
-    for (label, one, values), color in zip(shown, charts.curves(), strict=False):
-        traces += _bode(values, grid, label, charts.line(color))
-        if found is not None:
-            traces += _bode_marks(known, *(trace["y"] for trace in traces[:2]), grid)
+    curves = []
+    for i, (label, one, values) in enumerate(shown):
+        curves.append(_bode(values, grid) | {"name": label, "colour": i})
         if step is not None:
             sampled = one.sampled(step)
             below = _below(grid, sampled)
             name = f"{label}, held for {milliseconds(step)}"
-            style = charts.line(color, dash=charts.DASHED)
-            traces += _bode(frequency_response(sampled)(below), below, name, style)
-    lines = [charts.vertical(0.5 / step)] if step is not None else []
-    lines += [charts.vertical(mark.hertz, "--ink") for mark in known]
-    ends = [math.log10(w / (2 * math.pi)) for w in grid[[0, -1]]]
-    phases = [np.ptp(t["y"]) for t in traces if t.get("yaxis") == "y2" and len(t["y"])]
-    turns = {"dtick": 45, "nticks": 0} if max(phases, default=0.0) < MOST_TURNS else {}
-    layout = charts.stacked(charts.axis("gain (dB)"), charts.axis("phase (degrees)", **turns))
-    layout["xaxis"] = charts.axis("frequency (Hz)", log=True, anchor="y2", range=ends)
+            held = _bode(frequency_response(sampled)(below), below)
+            curves.append(held | {"name": name, "colour": i, "dashed": True})
+    data = {"curves": curves, "marks": [mark.data for mark in _drawn_marks(found)]}
+    data |= {"ends": grid[[0, -1]] / (2 * math.pi), "half": step and 0.5 / step}
     text = f"Gain and phase over the frequency: {', '.join(label for label, _, _ in shown)}"
-    return Chart("Bode diagram", text, traces, {**layout, "shapes": lines}, height=30)
+    return Chart("Bode diagram", text, "bode", data, height=30)
 
 
-def _bode(values: np.ndarray, grid: np.ndarray, label: str, line: Trace) -> list[Trace]:
+def _bode(values: np.ndarray, grid: np.ndarray) -> Data:
     grid, values = grid[np.isfinite(values)], values[np.isfinite(values)]
     with np.errstate(divide="ignore"):
         decibels = 20 * np.log10(np.abs(values))
     turned = np.degrees(np.unwrap(np.angle(values)))
     turned -= 360 * np.round((turned[0] + 90) / 360)
-    both = {"x": grid / (2 * math.pi), "mode": "lines", "line": line, "name": label}
-    gain = {**both, "y": decibels, "hovertemplate": HERTZ + "%{y:.4~g} dB<extra></extra>"}
-    phase = {**both, "y": turned, "hovertemplate": HERTZ + "%{y:.4~g} degrees<extra></extra>"}
-    return [gain, {**phase, "yaxis": "y2", "showlegend": False}]
-
-
-def _bode_marks(
-    found: Sequence["Mark"], decibels: np.ndarray, turned: np.ndarray, grid: np.ndarray
-) -> list[Trace]:
-    """Draw each margin as the piece that is left to 0 dB, or to a phase of -180 degrees."""
-    traces = []
-    for mark in found:
-        w = 2 * math.pi * mark.hertz
-        ends, place = [float(np.interp(w, grid, decibels)), 0.0], {"yaxis": "y"}
-        if mark.lag is not None:
-            phase = float(np.interp(w, grid, turned))
-            ends, place = [phase, phase - mark.lag], {"yaxis": "y2"}
-        traces.append(_mark(mark, [mark.hertz] * 2, ends) | place)
-    return traces
-
-
-def _mark(mark: "Mark", x: list[float], y: list[float]) -> Trace:
-    text = f"{mark.text}, at {exponents(f'{mark.hertz:.4g}')} Hz"
-    style = {"mode": "lines+markers", "marker": {"color": mark.colour, "size": 9}}
-    style |= {"line": charts.line(mark.colour, 4), "hovertemplate": f"{text}<extra></extra>"}
-    return {"x": x, "y": y, "name": text, "meta": mark.name, **style}
+    return {"hertz": grid / (2 * math.pi), "gain": decibels, "phase": turned}
 
 
 def nyquist_chart(loop: Linear, step: float | None, found: Margins | None = None) -> Chart:
     """Draw L along the frequencies; -1 is where it becomes unstable."""
     grid = searched(loop)
-    traces = _nyquist(
-        frequency_response(loop)(grid), grid, "sampled" if loop.dt else "continuous", "solid"
-    )
+    name = "sampled" if loop.dt else "continuous"
+    curves = [_nyquist(frequency_response(loop)(grid), grid) | {"name": name}]
     if step is not None:
-        sampled, name = loop.sampled(step), f"held for {milliseconds(step)}"
+        sampled = loop.sampled(step)
         below = _below(grid, sampled)
-        traces += _nyquist(frequency_response(sampled)(below), below, name, charts.DASHED)
-    traces.append(_circle() | {"line": charts.line("--muted", 1, "2px,3px")})
-    for mark in _drawn_marks(found):
-        traces.append(
-            _mark(mark, [mark.crossing.value.real], [mark.crossing.value.imag])
-            | {"mode": "markers"}
-        )
-    critical = {"color": "--bad", "size": 12, "symbol": "cross-thin-open", "line": {"width": 3}}
-    traces.append({"x": [-1], "y": [0], "mode": "markers", "marker": critical, "name": "-1"})
-    layout = {
-        "xaxis": charts.axis("real part of L", range=[-FARTHEST, FARTHEST], constrain="domain"),
-        "yaxis": charts.axis("imaginary part of L", range=[-FARTHEST, FARTHEST], scaleanchor="x"),
-    }
+        held = _nyquist(frequency_response(sampled)(below), below)
+        curves.append(held | {"name": f"held for {milliseconds(step)}", "dashed": True})
+    data = {"curves": curves, "marks": [mark.data for mark in _drawn_marks(found)]}
     text = "The loop L in the complex plane, along the frequencies, beside the critical point -1"
-    return Chart("Nyquist diagram", text, traces, layout, height=30)
+    return Chart("Nyquist diagram", text, "nyquist", data | {"reach": FARTHEST}, height=30)
 
 
-def _nyquist(values: np.ndarray, grid: np.ndarray, label: str, dash: str) -> list[Trace]:
+def _nyquist(values: np.ndarray, grid: np.ndarray) -> Data:
     values = np.where(np.abs(values) < POLE_GAIN, values, np.nan)
-    line = charts.line("--curve1", dash=dash)
-    drawn = {"x": values.real, "mode": "lines", "line": line, "name": label}
-    hertz = {"text": grid / (2 * math.pi), "hovertemplate": NYQUIST}
-    mirrored = {"opacity": 0.35, "hoverinfo": "skip", "hovertemplate": "", "showlegend": False}
-    return [{**drawn, **hertz, "y": values.imag}, {**drawn, **mirrored, "y": -values.imag}]
-
-
-def _circle() -> Trace:
-    circle = np.exp(1j * np.linspace(0, 2 * math.pi, 200))
-    style = {"mode": "lines", "line": charts.line("--ink", 1), "hoverinfo": "skip"}
-    return {"x": circle.real, "y": circle.imag, "hovertemplate": "", **style}
+    return {"hertz": grid / (2 * math.pi), "re": values.real, "im": values.imag}
 
 
 def steps_chart(
     model: Linear, step: float | None, units: Mapping[str, str], title: str = "Step responses"
 ) -> Chart:
     """Draw the response of each output to a step of each input by 1."""
-    traces: list[Trace] = []
-    end = _end(model, step)
+    curves, end = [], _end(model, step)
+    lengths = [end / POINTS, *([step] if step is not None and end <= MOST_DOTS * step else [])]
     for i, output in enumerate(model.outputs):
-        for name, color in zip(model.inputs, charts.curves(), strict=False):
-            one = model.select([name], [output])
-            style = {"mode": "lines", "line": charts.line(color), "showlegend": i == 0}
-            style |= {"name": f"step of {name} by {_with_unit('1', units.get(name))}"}
-            style |= {"yaxis": f"y{i + 1 if i else ''}", "hovertemplate": SECONDS}
-            dots = {"mode": "markers", "marker": {"color": color, "size": 5}, "showlegend": False}
-            if model.dt:
-                style |= {"mode": "lines+markers", "line": charts.line(color, shape="hv"),
-                          "marker": dots["marker"]}  # fmt: skip
-            times, values = _step(one, end / POINTS, end)
-            traces.append({"x": times, "y": values, **style})
-            if step is not None and end <= MOST_DOTS * step:
-                times, values = _step(one, step, end)
-                traces.append({"x": times, "y": values, **style, **dots})
-    axes = [charts.axis(_labelled(name, units.get(name))) for name in model.outputs]
-    layout = charts.stacked(*axes)
-    layout["xaxis"] = charts.axis(
-        "time (s)", range=[0, end], anchor=f"y{len(axes) if axes[1:] else ''}"
-    )
+        for k, name in enumerate(model.inputs):
+            label = f"step of {name} by 1 {unit(units.get(name))}".rstrip()
+            for dots, length in enumerate(lengths):
+                times, values = _step(model.select([name], [output]), length, end)
+                curves.append({"name": label, "output": i, "colour": k, "dots": bool(dots),
+                               "held": model.dt > 0, "x": times, "y": values})  # fmt: skip
+    texts = [(name, unit(units.get(name))) for name in model.outputs]
+    outputs = [f"{name} ({text})" if text else name for name, text in texts]
     text = f"{title}: {', '.join(model.outputs)} over the time after a step of an input by 1"
-    return Chart(title, text, traces, layout, height=8 + 11 * len(axes))
-
-
-def _with_unit(number: str, text: str | None) -> str:
-    return f"{number} {unit(text)}".strip()
-
-
-def _labelled(name: str, text: str | None) -> str:
-    return f"{name} ({unit(text)})" if unit(text) else name
+    data = {"curves": curves, "outputs": outputs, "end": end}
+    return Chart(title, text, "steps", data, height=8 + 11 * len(outputs))
 
 
 def _step(model: Linear, length: float, end: float) -> tuple[np.ndarray, np.ndarray]:
@@ -550,53 +476,36 @@ def _step(model: Linear, length: float, end: float) -> tuple[np.ndarray, np.ndar
 def poles_charts(model: Linear, step: float | None, loop: Linear | None = None) -> list[Chart]:
     """Draw poles in the plane of s, and of the sampled model in the plane of z."""
     if model.dt:
-        return [_sampled_poles(model, f"Poles, sampled every {milliseconds(model.dt)}")]
-    traces = [_poles(model, "poles", "x-thin-open", "--curve1")]
-    if loop is not None:
-        label = "when the loop is closed"
-        traces.append(_poles(closed(loop), label, "cross-thin-open", "--curve2"))
-    everywhere = np.concatenate([model.poles, closed(loop).poles if loop is not None else ()])
-    size = np.abs(everywhere).max(initial=0.0) or 1.0
-    low, high = everywhere.real.min(initial=0.0), everywhere.real.max(initial=0.0)
-    tall = max(np.abs(everywhere.imag).max(initial=0.0), FLATTEST * size)
-    wide = [low - FLATTEST * size, high + FLATTEST * size]
-    growing = {"type": "rect", "x0": 0, "x1": wide[1], "y0": 0, "y1": 1, "yref": "paper"}
-    growing |= {"fillcolor": "--bad", "opacity": 0.12, "line": {"width": 0}, "layer": "below"}
-    layout = {
-        "xaxis": charts.axis("real part (1/s)", range=wide),
-        "yaxis": charts.axis("imaginary part (rad/s)", range=[-1.2 * tall, 1.2 * tall]),
-        "shapes": [growing, charts.vertical(0, "--ink", "solid")],
-    }
-    text = f"Poles in the complex plane: {', '.join(map(str, np.round(model.poles, 3)))}"
-    found = [Chart("Poles", text, traces, layout)]
+        title = f"Poles, sampled every {milliseconds(model.dt)}"
+        return [_poles_chart(title, [("poles", model)], model.dt)]
+    every = [("poles", model), *([("when the loop is closed", closed(loop))] if loop else [])]
+    found = [_poles_chart("Poles", every, 0.0)]
     if step is not None:
-        found.append(_sampled_poles(model.sampled(step), f"Poles, held for {milliseconds(step)}"))
+        every = [("poles", model.sampled(step))]
+        found.append(_poles_chart(f"Poles, held for {milliseconds(step)}", every, step))
     return found
 
 
-def _sampled_poles(model: Linear, title: str) -> Chart:
-    traces = [_circle(), _poles(model, "", "x-thin-open", "--curve1")]
-    layout = {
-        "xaxis": charts.axis("real part", constrain="domain"),
-        "yaxis": charts.axis("imaginary part", scaleanchor="x"),
-    }
-    text = f"Poles beside the unit circle: {', '.join(map(str, np.round(model.poles, 3)))}"
-    return Chart(title, text, traces, layout)
+def _poles_chart(title: str, models: Sequence[tuple[str, Linear]], dt: float) -> Chart:
+    poles = [
+        {"name": name, "re": one.poles.real, "im": one.poles.imag, "texts": _pole_texts(one)}
+        for name, one in models
+    ]
+    text = f"Poles in the complex plane: {', '.join(map(str, np.round(models[0][1].poles, 3)))}"
+    return Chart(title, text, "poles", {"poles": poles, "sampled": dt > 0, "flattest": FLATTEST})
 
 
-def _poles(model: Linear, label: str, symbol: str, color: str) -> Trace:
+def _pole_texts(model: Linear) -> list[str]:
+    """Say at the pointer: the pole, its frequency and damping, the states that take part."""
     texts = []
-    for pole, rate, states in zip(
-        model.poles, model.rates_of(model.poles), taking_part(model), strict=True
-    ):
+    rates = model.rates_of(model.poles)
+    for pole, rate, states in zip(model.poles, rates, taking_part(model), strict=True):
         cells = _pole_cells(pole, rate)
-        place = f"{cells[0]} {'±' if pole.imag > 0 else '∓'} {_short(abs(pole.imag))}i"
-        lines = [f"pole {place if cells[1] != NONE else cells[0]}{'' if model.dt else ' 1/s'}"]
+        sign = "±" if cells[1] != NONE else ""
+        lines = [f"pole {cells[0]} {cells[1] + 'i' if sign else ''}{'' if model.dt else ' 1/s'}"]
         lines += [f"frequency {cells[2]} Hz"] * (cells[2] != NONE) + [f"damping {cells[3]}"]
         texts.append("<br>".join([*lines, *map(escape, states)]))
-    marker = {"symbol": symbol, "size": 11, "color": color, "line": {"width": 2.5, "color": color}}
-    drawn = {"x": model.poles.real, "y": model.poles.imag, "mode": "markers", "marker": marker}
-    return drawn | {"name": label, "text": texts, "hovertemplate": "%{text}<extra></extra>"}
+    return texts
 
 
 def drawn(model: Linear) -> Linear:

@@ -9,7 +9,7 @@ from rparm import proof
 from rparm.fmi.model import Model
 from rparm.proof import Enclosure, ProvenReference
 from rparm.report import charts, overview
-from rparm.report.charts import Chart, Trace
+from rparm.report.charts import Chart
 from rparm.report.overview import FAILED, PASSED, PROOFS
 from rparm.report.pages import RunPage, Table
 from rparm.report.run_data import Curve, Plot, RunData, thinned
@@ -79,16 +79,15 @@ def write(
 def _chart(enclosure: Enclosure, errors: Mapping[str, np.ndarray]) -> Chart:
     """Draw the largest error of all states by each run, relative to their largest values."""
     scales = np.abs(enclosure.high).max(axis=0)
-    traces: list[Trace] = []
-    for (run, each), colour in zip(errors.items(), charts.curves(), strict=False):
+    curves = []
+    for name, each in errors.items():
         largest = (each / np.where(scales > 0, scales, 1.0)).max(axis=1)
-        drawn = np.where(largest < SMALLEST, np.nan, largest)  # a logarithmic axis has no 0
         rows = thinned([np.log10(np.maximum(largest, SMALLEST))])
-        x, y = enclosure.times[rows], drawn[rows]
-        traces.append({"x": x, "y": y, "name": run, "line": charts.line(colour), "mode": "lines"})
+        y = np.where(largest < SMALLEST, np.nan, largest)[rows]  # a logarithmic axis has no 0
+        curves.append({"name": name, "x": enclosure.times[rows], "y": y})
     text = "Proven bound of the error over time, relative to each state's largest value"
-    layout = {"xaxis": charts.axis("time (s)"), "yaxis": charts.axis("relative error", log=True)}
-    return Chart(f"{text}: the largest of all states", text, traces, layout)
+    data = {"curves": curves, "x": "time (s)", "y": "relative error"}
+    return Chart(f"{text}: the largest of all states", text, "bounds", data)
 
 
 def write_references(

@@ -1,7 +1,6 @@
 'use strict';
-// Charts of a page. Each <figure class="chart"> has traces and axes of plotly in a script element, an
-// empty <ul class="values"> for its legend and an empty <div class="drawing">. Texts that begin with
-// -- are colours of page.css.
+// Charts of a page. Each <figure class="chart"> has its data in a script element, whose `kind` is a
+// function of diagrams.js, an empty <ul class="values"> for its legend and an empty <div class="drawing">.
 
 const Charts = (() => {
   const CONFIG = {
@@ -111,7 +110,8 @@ const Charts = (() => {
 
   async function start() {
     for (const figure of document.querySelectorAll('figure.chart')) {
-      await draw(figure.querySelector('.drawing'), JSON.parse(figure.querySelector('script').textContent));
+      const data = JSON.parse(figure.querySelector('script').textContent);
+      await draw(figure.querySelector('.drawing'), Diagrams[data.kind](data));
     }
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', redraw);
     document.documentElement.dataset.charts = 'yes';
