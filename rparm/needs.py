@@ -23,10 +23,10 @@ class Command:
 
 COMMANDS = {
     "run": Command("simulate scenarios, check them, write a report; the default", "run"),
-    "new": Command("write a scenario to start from", "files"),
+    "new": Command("write a scenario to start from", "files", target=""),
     "build": Command("make FMUs of a file with equations", "files"),
     "new-model": Command("write a file with equations to start from", "files", target=""),
-    "new-system": Command("write a file of a system to start from", "files"),
+    "new-system": Command("write a file of a system to start from", "files", target=""),
     "schema": Command("print a JSON Schema by which editors check files", "files", target=""),
     "list": Command("name the scenarios", "files", target=""),
     "system": Command("run systems in Ecos, check them, write a report", "system", "system"),

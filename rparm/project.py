@@ -8,6 +8,7 @@ models/SYSTEM/loop.toml                 connects models to a system
 models/SYSTEM/references/VARIANT/       ecos.csv of a variant of the system
 models/SYSTEM/study.py                  what to measure, draw and study there
 models/*/campaigns/NAME.toml            a campaign
+models/MODEL/start.toml                 values that a new scenario of the model begins with
 models/SYSTEM/system.svg                its components and the signals between them
 models/*/animation.py                   what of a run the report animates
 models/SYSTEM/identification.py         makes a log of the system, to identify parameters from
@@ -50,6 +51,7 @@ PROGRAM = "rparm" if INSTALLED else "./run.sh"
 
 LOOP = "loop.toml"  # the file of a system
 DIAGRAM = "system.svg"
+START = "start.toml"
 STUDY = "study"  # the module of a system's folder that rparm.systems.comparison describes
 IDENTIFICATION = "identification"  # module of a system's folder, read by identification.request
 ANIMATION = "animation"  # the module of a model's or system's folder for rparm.report.motion

@@ -11,7 +11,7 @@ from rparm.runs.scenario import Scenario
 from rparm.systems.comparison import BOUND, Measure, Outcome
 from rparm.units import milliseconds, seconds, short, unit, verdict
 
-NONE = "-"
+NONE, DONE = "-", "completed"
 SWEEP = ("tolerances", "errors", "violations", "passed")  # keys of the document
 
 
@@ -27,7 +27,8 @@ class RunTable:
         if with_tight:
             columns[f"error at {short(TIGHTEST)}"] = 8
         self._with_tight = with_tight
-        self._table = Table("scenario", names, {**columns, "time": 7})
+        result = len(DONE) if not with_tight else len(verdict(True))
+        self._table = Table("scenario", names, {**columns, "time": 7}, result=result)
 
     def row(
         self, name: str, tolerance: float, runs: Sequence[Run], failures: Iterable[str]
@@ -43,7 +44,7 @@ class RunTable:
         ]
         problems = [*failures, *(run.violation for run in runs if not run.passed)]
         compared = all(run.compared for run in runs)
-        good = verdict(True) if compared else "ran"
+        good = verdict(True) if compared else DONE
         self._table.row(name, cells, verdict(False) if problems else good)
         for text in problems:
             console.remark(text)
@@ -98,13 +99,14 @@ class VariantTable:
         self._measures = measures
         columns = {error: max(7, *map(len, error.split()))}
         columns |= {m.name: max(9, *map(len, m.name.split())) for m in measures}
-        self._table = Table("variant", names, {**columns, "time": 7})
+        result = len(verdict(True) if error == "error" else DONE)
+        self._table = Table("variant", names, {**columns, "time": 7}, result=result)
 
     def row(self, outcome: Outcome) -> None:
         measured = (f"{_seven_digits(m.value(outcome))} {m.unit}" for m in self._measures)
         error = short(outcome.error, 1) if outcome.errors else NONE
         cells = [error, *measured, seconds(outcome.run.wall_time)]
-        good = "ran" if outcome.is_estimate else verdict(outcome.passed)
+        good = DONE if outcome.is_estimate else verdict(outcome.passed)
         self._table.row(outcome.variant, cells, good)
         if not outcome.passed:
             bound = f"above its bound {short(BOUND)}"

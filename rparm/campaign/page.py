@@ -160,6 +160,7 @@ class Page:
         """Write the page, on a table with this digest; its path."""
         manifest = json.loads((self.folder / MANIFEST).read_text(encoding="utf-8"))
         found = self.indices()
+        pages.write_assets(self.report)
         return pages.write_page(
             self.folder / PAGE,
             "campaign.html",

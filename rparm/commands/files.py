@@ -4,18 +4,22 @@ import argparse
 import json
 import re
 import shlex
+import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from itertools import count
 from pathlib import Path
+from zipfile import ZipFile
 
 from rparm import console, project, schemas
 from rparm.building import NEEDED
 from rparm.command_line import Ended, add_document, add_flag, add_fmi, add_output
 from rparm.errors import UserError, closest, placed
-from rparm.files import check_for_windows, copied, create, from_folder, written
+from rparm.files import check_for_windows, copied, create, from_folder, read_toml, written
 from rparm.fmi.model import INPUTS, Model, Variable
-from rparm.project import VERSIONS
+from rparm.interruption import temporary_folder
+from rparm.project import START, VERSIONS
 from rparm.runs import scenario
 from rparm.systems.loop_file import NAME
 from rparm.systems.structure import times
@@ -81,8 +85,6 @@ def add_new_options(parser: argparse.ArgumentParser) -> None:
 
 
 def do_new(options: argparse.Namespace) -> Ended:
-    from rparm.fmi.fmu_file import read_model  # takes long
-
     path = _scenario_path(options.name)
     if options.output:
         path = options.output / path
@@ -92,14 +94,32 @@ def do_new(options: argparse.Namespace) -> Ended:
     else:
         subject = project.model(options.model) if options.model else _usual_model()
         key, name = "model", subject.name
-    model = read_model(project.fmu_of(subject))
-    text = scenario.template(path.stem, key, name, model)
+    begin = read_toml(subject / START) if (subject / START).is_file() else {}
+    text = scenario.template(path.stem, key, name, _declared(subject), begin)
     if options.output:
         with written(path):
             options.output.mkdir(parents=True, exist_ok=True)
     create(path, text)
     verdict = f"{path}: written; run it by {project.PROGRAM} {shlex.quote(str(path))}"
     return Ended(0, verdict, {"file": path.absolute(), "model": name}, page=path)
+
+
+def _declared(subject: Path) -> Model:
+    """Read the description of a file, or of a model of the project, which need not be built."""
+    from rparm.fmi.fmu_file import describe, read_model  # takes long
+
+    variables = subject / "variables.toml"
+    try:
+        return read_model(project.fmu_of(subject))
+    except UserError:
+        if not variables.is_file():
+            raise
+    with temporary_folder() as folder:
+        program = [sys.executable, project.model_builder().with_name("generate.py")]
+        subprocess.run([*program, variables, "--output", folder], check=True, capture_output=True)
+        with ZipFile(folder / "described.fmu", "w") as archive:
+            archive.write(folder / "modelDescription.xml", "modelDescription.xml")
+        return describe(folder / "described.fmu").model
 
 
 def _scenario_path(name: str) -> Path:
@@ -181,21 +201,19 @@ def do_new_system(options: argparse.Namespace) -> Ended:
 
 def _components(given: Sequence[str], folder: Path) -> dict[str, tuple[str, Model]]:
     """Return the source of each component, as a file in `folder` names it, and its description."""
-    from rparm.fmi.fmu_file import read_model  # takes long
-
     found: dict[str, tuple[str, Model]] = {}
     for text in given:
         path = Path(text)
         if path.suffix.lower() == ".fmu":
-            source = from_folder(path, folder)
+            model, source, stem = _declared(path), from_folder(path, folder), path.stem
         else:
-            path = project.built(project.model(text), ".fmu")
-            source = path.stem
-        first = re.sub(r"\W", "_", path.stem, flags=re.ASCII)
+            model = _declared(project.model(text))
+            source = stem = model.name
+        first = re.sub(r"\W", "_", stem, flags=re.ASCII)
         first = first if NAME.match(first) else f"c_{first}"
         names = (first if n == 1 else f"{first}{n}" for n in count(1))
         name = next(name for name in names if name not in found)
-        found[name] = source, read_model(path)
+        found[name] = source, model
     return found
 
 
@@ -327,9 +345,7 @@ def do_fmu(options: argparse.Namespace) -> Ended:
     """Copy the FMU; a file that has its name is replaced."""
     file = project.built(project.model(options.name), ".fmu", version=options.fmi)
     path = copied(file, (options.output or Path()) / file.name)
-    verdict = (
-        f"{path}: FMI {options.fmi}, {path.stat().st_size} bytes; to import it: {TOOLS}"
-    )
+    verdict = f"{path}: FMI {options.fmi}, {path.stat().st_size} bytes; to import it: {TOOLS}"
     return Ended(0, verdict, {"file": path.absolute(), "fmi_version": options.fmi})
 
 

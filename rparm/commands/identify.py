@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rparm import console, project
 from rparm.command_line import (
     Ended,
@@ -19,9 +21,11 @@ from rparm.command_line import (
 from rparm.errors import UserError, placed
 from rparm.files import check_writable, from_here, number_in, written
 from rparm.report import overview
+from rparm.report.overview import FAILED, RAN, Entry, sparkline
 from rparm.units import SECONDS, typed_quantity
 
 if TYPE_CHECKING:
+    from rparm.fmi.model import Model
     from rparm.identification.identify import Identification
     from rparm.identification.request import Request
 
@@ -63,7 +67,7 @@ def add_identify_options(parser: argparse.ArgumentParser) -> None:
 def do_identify(options: argparse.Namespace) -> Ended:
     """Identify, print a table, write page and files."""
     from rparm.fmi.fmu_file import Fmu
-    from rparm.identification import identify, page, results
+    from rparm.identification import identify, results
 
     check_writable(options.report)
     path, request, true = _asked(options)
@@ -74,12 +78,7 @@ def do_identify(options: argparse.Namespace) -> Ended:
     with written(options.report):
         options.report.mkdir(parents=True, exist_ok=True)
         files = results.write_files(found, options.report, model)
-        report = project.results_folder(options.report)
-        place = report / PART
-        made = page.write(found, place, model, true, _again(options))
-        entry = overview.entry_of(found.model, made, found.model)
-        overview.record(report, PART, [entry])
-        files.append(place / entry.page)
+        files.append(_written(found, options, model, true))
     verdict = f"identified: {len(found.estimates)} parameters"
     if not found.has_converged:
         verdict = f"failed: the fit has not converged in {found.steps} iterations"
@@ -87,6 +86,28 @@ def do_identify(options: argparse.Namespace) -> Ended:
         verdict = f"{'identified' if found.passed else 'failed'}: {found.misfit}"
     document = results.document(found) | {"files": [file.absolute() for file in files]}
     return Ended(0 if found.passed else 1, verdict, document, page=files[-1])
+
+
+def _written(
+    found: "Identification", options: argparse.Namespace, model: "Model", true: dict[str, float]
+) -> Path:
+    """Write the page, and its line on the start page with the first output."""
+    from rparm.identification import page
+
+    report, command = project.results_folder(options.report), _again(options)
+    name = overview.free_name(report / PART, found.model, command)
+    path = page.write(found, report / PART / name, model, true, command, "../../")
+    first = range(found.of_first)
+    times = np.concatenate([found.segments[i].times for i in first])
+    values = np.concatenate([found.predicted[i][:, 0] for i in first])
+    title = f"{', '.join(found.estimates)}: chi2 {found.chi2:.3g}"
+    entry = Entry(
+        name, title, found.model, path.name, RAN if found.passed else FAILED, command=command,
+        line=sparkline(times, values), line_of=f"simulated {found.checked.outputs[0]}",
+        line_text=f"Simulated {found.checked.outputs[0]} over the first log",
+    )  # fmt: skip
+    overview.record(report, PART, [entry], path.parent)
+    return path
 
 
 def _asked(options: argparse.Namespace) -> tuple[Path, "Request", dict[str, float]]:

@@ -108,7 +108,7 @@ def do_linearize(options: argparse.Namespace) -> Ended:
     name = "_".join(filter(None, (found.path.stem, found.variant)))
     with written(report):
         name = overview.free_name(report / PART, name, command)
-        index = page.write(report / PART / name, found, options.step, command)
+        index = page.write(report / PART / name, found, options.step, command, "../../")
         poles = found.linear.poles
         entry = Entry(
             name, f"Linear model: {n} states, {m} inputs, {p} outputs", found.path.stem, index.name,

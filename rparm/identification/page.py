@@ -21,9 +21,17 @@ MOST_NUMBERS = 10  # parameters, whose correlations are written into their cells
 
 
 def write(
-    found: Identification, folder: Path, model: Model, true: Mapping[str, float], again: str
-) -> pages.RunPage:
-    """Write the page MODEL.html into a folder; `again` is the command that makes it again."""
+    found: Identification,
+    folder: Path,
+    model: Model,
+    true: Mapping[str, float],
+    again: str,
+    root: str = "",
+) -> Path:
+    """Write the page into a folder; its path. `again` is the command that makes it again.
+
+    `root` leads from there to the start page, if there is one.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     logs = ", ".join(recording.path.name for recording in found.recordings)
     page = pages.RunPage(
@@ -45,9 +53,11 @@ def write(
     known, parameters = found.known, _parameters(found, true)
     drawn = [correlations_chart(known, found.covariances.scatter)] if known else []
     drawn.append(autocorrelations_chart(found.whiteness))
-    file = folder / f"{found.model}.html"
-    charts.write_page(file, page, parameters, drawn, "Residuals and logs")
-    return page
+    if not root:
+        pages.write_assets(folder)
+    return charts.write_page(
+        folder / pages.INDEX, page, parameters, drawn, "Residuals and logs", root
+    )
 
 
 # ---- Plots ---------------------------------------------------------------------------------------

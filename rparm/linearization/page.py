@@ -76,12 +76,14 @@ LEAST_PART = 0.01  # of a state in a pole; less is not said
 MOST_PARTS = 4  # states that are named of a pole
 
 
-def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
-    """Write the page into a folder two below that of the start page; return the page.
+def write(folder: Path, found: Study, step: float | None, again: str, root: str = "") -> Path:
+    """Write the page into a folder; return the page. The command `again` makes it again.
 
-    The command `again` makes it again.
+    `root` leads from there to the start page, if there is one.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    if not root:
+        pages.write_assets(folder)
     linear, loop = found.linear, found.loop
     parts: list[Part] = []
     if found.trimmed:
@@ -109,7 +111,7 @@ def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
     return pages.write_page(
         folder / pages.INDEX,
         "linearization.html",
-        root="../../",
+        root=root,
         title=f"{name}: linear model",
         about=ABOUT,
         again=again,

@@ -31,9 +31,11 @@ class Chart:
         return script(self.data | {"kind": self.kind})
 
 
-def write_page(path: Path, page: RunPage, first: Table, drawn: Sequence[Chart], rest: str) -> Path:
-    """Write a page of a section with a table and charts before the plots, headed `rest`."""
-    values = {"page": page, "data": page.data and page.data.json(), "root": "../"}
+def write_page(
+    path: Path, page: RunPage, first: Table, drawn: Sequence[Chart], rest: str, root: str
+) -> Path:
+    """Write a page with a table and charts before its plots, headed `rest`; its path."""
+    values = {"page": page, "data": page.data and page.data.json(), "root": root}
     more = {"first": first, "charts": drawn, "rest": rest}
     return pages.write_page(path, "answers.html", **values, **more)
 

@@ -153,7 +153,7 @@ def _all(report: Path) -> dict[str, Entry]:
 def _found(folder: Path, below: str = "") -> Iterator[tuple[Path, Entry]]:
     """Yield the entries whose pages are there, with their files; what is no entry is ignored."""
     for depth in range(DEEPEST):
-        for file in (folder / below).glob("*/" * depth + f"*{ENTRY}"):
+        for file in sorted((folder / below).glob("*/" * depth + f"*{ENTRY}")):
             with suppress(OSError, ValueError, TypeError, RecursionError):
                 entry = Entry(**json.loads(file.read_text(encoding="utf-8")))
                 if _is_sound(entry) and (file.parent / entry.page).is_file():

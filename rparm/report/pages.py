@@ -118,10 +118,12 @@ def root(report: Path, folder: Path) -> str:
     return "" if path == "." else f"{path}/"
 
 
-def write_alone(folder: Path, page: RunPage) -> Path:
-    """Write a page without a start page, and what it loads; return its path."""
-    write_assets(folder)
-    return write_run(folder / INDEX, page, "")
+def write_alone(folder: Path, page: RunPage, root: str = "") -> Path:
+    """Write a page into a folder of its own; without a start page, `root`, with what it loads."""
+    if not root:
+        write_assets(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    return write_run(folder / INDEX, page, root)
 
 
 def write_page(path: Path, template: str, **values: object) -> Path:

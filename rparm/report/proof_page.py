@@ -71,7 +71,7 @@ def write(
     file = report / PROOFS / f"{scenario.name}.html"
     file.parent.mkdir(parents=True, exist_ok=True)
     first = _largest(model, enclosure, errors)
-    charts.write_page(file, page, first, [_chart(enclosure, errors)], "Each state")
+    charts.write_page(file, page, first, [_chart(enclosure, errors)], "Each state", "../")
     overview.record(report, PROOFS, [overview.entry_of(scenario.name, page, model.name)])
     return file
 

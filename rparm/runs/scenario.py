@@ -11,6 +11,7 @@ import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -322,8 +323,13 @@ class _Reader(Reader):
 
 
 # ---- A scenario to start from --------------------------------------------------------------------
-def template(name: str, key: str, subject: str, model: Model) -> str:
-    """Write the file, which runs as it is; `key` is `model`, or `fmu` with a path from the file."""
+def template(
+    name: str, key: str, subject: str, model: Model, begin: Mapping[str, Any] = MappingProxyType({})
+) -> str:
+    """Write the file, which runs as it is; `key` is `model`, or `fmu` with a path from the file.
+
+    `begin` has values, by section, in place of start values.
+    """
     outputs = model.real_outputs[:2]
     panels = "# Further plots, each of variables of one unit:\n"
     panels += f"# panels = {json.dumps([[output] for output in outputs])}\n"
@@ -331,10 +337,12 @@ def template(name: str, key: str, subject: str, model: Model) -> str:
     given |= {name: _toml_number(number) for name, number in _template_times(model).items()}
     parts = [TEMPLATE.format(program=PROGRAM, **given)]
     parts += _template_section(PARAMETERS, "Parameters.", model)
-    parts += _template_section(INITIAL, "State at the start.", model)
+    parts += _template_section(INITIAL, "State at the start.", model, begin.get(INITIAL, {}))
     inputs = [variable for variable in model.variables.values() if variable.is_a(INPUTS)]
     if inputs:
-        parts.append(INPUT_HELP + "\n".join(_template_input(variable) for variable in inputs))
+        parts.append(
+            INPUT_HELP + "\n".join(_template_input(x, begin.get(INPUTS, {})) for x in inputs)
+        )
     return "\n".join(parts)
 
 
@@ -376,18 +384,22 @@ def toml_text(content: str) -> str:
     return json.dumps(content, ensure_ascii=False)
 
 
-def _template_section(section: str, title: str, model: Model) -> Iterator[str]:
-    """Write a section with the start value of each variable in a comment."""
+def _template_section(
+    section: str, title: str, model: Model, begin: Mapping[str, Value] = MappingProxyType({})
+) -> Iterator[str]:
+    """Write a section with `begin`, and the start value of each other variable in a comment."""
     known = [v for v in model.variables.values() if v.is_a(section) and v.start is not None]
     known = [variable for variable in known if variable.type != "String"]
     if known:
-        lines = [f"{_template_comment(x)}\n# {_template_line(x)}" for x in known]
+        lines = [f"{_template_comment(x)}\n{_template_line(x, begin)}" for x in known]
         yield f"# {title}\n[{section}]\n" + "\n".join(lines) + "\n"
 
 
-def _template_line(variable: Variable) -> str:
+def _template_line(variable: Variable, begin: Mapping[str, Value]) -> str:
     assert variable.start is not None
-    line = f"{_toml_key(variable.name)} = {toml_value(variable.written(variable.start))}"
+    value = begin.get(variable.name, variable.written(variable.start))
+    mark = "" if variable.name in begin else "# "
+    line = f"{mark}{_toml_key(variable.name)} = {toml_value(value)}"
     return f"{line}  # {variable.unit}" if variable.unit not in (None, "", "1") else line
 
 
@@ -414,8 +426,8 @@ def toml_value(value: Value) -> str:
     return toml_text(value) if isinstance(value, str) else repr(value)
 
 
-def _template_input(variable: Variable) -> str:
-    start = variable.start if variable.start is not None else 0.0
+def _template_input(variable: Variable, begin: Mapping[str, Value]) -> str:
+    start = begin.get(variable.name, 0.0 if variable.start is None else variable.start)
     unit = f"  # {variable.unit}" if variable.unit else ""
     header = f"[{INPUTS}.{_toml_key(variable.name)}]\nconstant = {toml_value(start)}{unit}\n"
     if variable.type not in ("Real", "Boolean"):

@@ -41,7 +41,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_page_shows_it_all(done: Path) -> None:
-    page = text_of(done / "output" / "index.html")
+    page = text_of(done / "output" / "campaign.html")
     pictures = re.findall(r'<img src="([^"]+)"', page)
     assert set(pictures) == {"distributions.png", "indices.png", "map_0.png"}
     for name in pictures:
@@ -75,7 +75,7 @@ def test_its_commands_work_in_the_projects_folder(tmp_path: Path) -> None:
     program = [sys.executable, "-P", "-m", "rparm"]
     arguments = ["campaign", "test.toml", "--output", "the output", "--workers", "1"]
     subprocess.run([*program, *arguments], cwd=folder, env=ENVIRONMENT, check=True)
-    page = folder / "the output" / "index.html"
+    page = folder / "the output" / "campaign.html"
     first, second, *_ = commands(text_of(page))
     page.unlink()
     for command in (first, second):
@@ -141,7 +141,7 @@ def test_pictures_have_so_many_columns_at_most(
     monkeypatch.setattr(page, "DRAWN", 2)
     output = copied(done, tmp_path)
     assert console(*of(done, output))[0] == 0
-    text = text_of(output / "index.html")
+    text = text_of(output / "campaign.html")
     assert text.count("The picture leaves out maximum(dq1) and what is below it") == 2
     heights = [height(folder / "indices.png") for folder in (done / "output", output)]
     assert heights[0] == pytest.approx(2 * heights[1], abs=4)
@@ -194,12 +194,6 @@ def test_the_replay_of_a_failed_run_fails(tmp_path: Path, console: Console) -> N
     code, out, _ = console(*of(tmp_path, tmp_path / "output", "--replay", "3"))
     assert code == 1 and "failed: hanging_swing" in out and "is refused" in out
     assert not (tmp_path / "output").exists()
-
-
-def test_a_replay_before_the_campaign_leads_to_no_page(tmp_path: Path, console: Console) -> None:
-    output = tmp_path / "output"
-    assert console(*of(write(tmp_path).parent, output, "--replay", "3"))[0] == 0
-    assert "index.html" not in text_of(output / "replays" / "run_3.html")
 
 
 def test_it_says_what_is_not_installed(

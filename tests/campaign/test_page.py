@@ -46,7 +46,7 @@ def failing(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def shown(browser: Browser, folder: Path, **view) -> str:
     """Text of the page, a row of a table a line."""
-    browser.open(folder / "index.html", **view)
+    browser.open(folder / "campaign.html", **view)
     return browser.run("return document.body.innerText").replace("\N{MINUS SIGN}", "-")
 
 

@@ -170,7 +170,7 @@ def test_the_command_runs_variants_and_writes_their_pages(
     assert "no variant 'heavi', did you mean 'heavy'?" in console.refused(*given, "heavi", *output)
     code, out, _ = console("system", folder / "wave.toml", "heavy", *output)
     assert code == 0 and "law.wanted moves: the master of rparm steps Swing" in out
-    assert out.count(" ran\n") == 1 and "ran: 1 variant" in out
+    assert out.count(" completed\n") == 1 and "completed: 1 variant" in out
 
 
 def test_each_signal_is_drawn_from_block_to_block(loop: OpenedSystem) -> None:

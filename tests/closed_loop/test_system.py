@@ -79,7 +79,7 @@ def test_the_command_checks_and_reports(tmp_path: Path, console: Console) -> Non
     diagram = ROOT / "models" / "closed_loop" / "system.svg"
     assert (tmp_path / "system/closed_loop.svg").read_bytes() == diagram.read_bytes()
     assert 'src="closed_loop.svg"' in (tmp_path / "system/nominal.html").read_text("utf-8")
-    assert len(list((tmp_path / "system").iterdir())) == 6
+    assert len(list((tmp_path / "system").iterdir())) == 7
 
 
 def test_a_run_beyond_the_bound_fails(tmp_path: Path, console: Console) -> None:
@@ -100,7 +100,7 @@ def fails(path: Path, variant: str, folder: Path, console: Console, ran: bool = 
     report = folder / "report"
     (report / "system").mkdir(parents=True, exist_ok=True)
     files = ("index.html", *(f"system/{name.format(variant)}" for name in REPORT))
-    for file in (*files, "system/entries.json"):
+    for file in (*files, f"system/{variant}.entry.json"):
         (report / file).write_text("of an earlier run", encoding="utf-8")
     before = set(folder.iterdir())
     err = console.failed("system", variant, "--ssp", path, "--report", report)

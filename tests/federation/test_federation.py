@@ -129,7 +129,7 @@ def test_it_is_a_document(short: OpenedSystem) -> None:
         "helics", "ecos", "master",
     }  # fmt: skip
     assert max(map(len, done.stderr.splitlines())) <= 80
-    assert done.stderr.endswith("passed: 1 variant\n")
+    assert "passed: 1 variant; " in done.stderr.splitlines()[-1]
 
 
 @pytest.mark.parametrize(("arguments", "words"), MISTAKES["federation"]["rows"])

@@ -2,18 +2,21 @@
 
 import json
 import re
+import tomllib
 import webbrowser
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from rparm.report.overview import Entry, forget, read, record
+from rparm import project
+from rparm.report.overview import Entry, forget, read, record, write
 from rparm.report.scenario_page import describe_signal
 from rparm.runs import scenario
 from rparm.runs.inputs import Table
 from tests.report.conftest import CONTENT, STRANGE, show
 from tests.support.browser import Browser
-from tests.support.rparm_project import FMUS, MISTAKES, Console, declared
+from tests.support.rparm_project import FMUS, MISTAKES, Console, check_near, declared
 
 
 @pytest.fixture(autouse=True)
@@ -28,9 +31,13 @@ def in_a_folder_of_the_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 def test_a_new_scenario_runs_as_written(console: Console, tmp_path: Path, model: str) -> None:
     assert console("new", "first", "--model", model)[0] == 0
     loaded = scenario.load(tmp_path / "first.toml", declared(model))
-    assert loaded.model == model and loaded.start_values == declared(model).start_values
+    begin = project.model(model) / project.START
+    given = tomllib.loads(begin.read_text(encoding="utf-8"))["initial"] if begin.exists() else {}
+    assert loaded.model == model and loaded.start_values == declared(model).start_values | given
     code, out, err = console("run", "first.toml", "--report", "out")
-    assert (code, err) == (0, "") and "first: out/files/first.html\nreport: out/index.html" in out
+    assert (code, err) == (0, "") and "; out/files/first.html; open it: ./run.sh run first" in out
+    if given:
+        check_near(np.genfromtxt("out/files/first.csv", delimiter=",", names=True))
 
 
 @pytest.mark.parametrize("model", FMUS)
@@ -47,7 +54,8 @@ def test_every_line_in_a_comment_can_be_used(console: Console, tmp_path: Path, m
         and (variable.is_a("parameters") or variable.is_a("initial"))
     }  # fmt: skip
     assert set(given) == settable and loaded.panels
-    assert given == {name: loaded.defaults[name] for name in settable}
+    moved = {name for name in settable if given[name] != loaded.defaults[name]}
+    assert moved == ({"q1"} if (project.model(model) / project.START).exists() else set())
 
 
 def test_the_usual_model_has_the_most_scenarios(console: Console) -> None:
@@ -113,7 +121,10 @@ def test_a_run_that_fails_is_in_the_report(console: Console, browser: Browser) -
     assert code == 2 and err.count("\n") == 1 and "the integrator took all" in err
     assert "FAILED" in out and "b: out/files/b.html" in out
     entries = {entry.name: entry for entry in read(Path("out"), "files")}
-    assert {name: entry.status for name, entry in entries.items()} == {"a": "FAILED", "b": "ran"}
+    assert {name: entry.status for name, entry in entries.items()} == {
+        "a": "FAILED",
+        "b": "completed",
+    }
     browser.open(Path("out/index.html"))
     assert "1 of 2 failed" in browser.run("return document.body.innerText")
     assert err.removeprefix("error: ").strip() in entries["a"].detail
@@ -238,26 +249,40 @@ def test_without_a_browser_the_page_is_named(
 # ---- overview ------------------------------------------------------------------------------------
 
 ENTRY = Entry("a", "A", "Model", "a.html", "passed", 1e-9, 1e-6, "worst: x", "M0 0L1 1", "text")
+WRONG = (
+    '{"name": "a", "title": 1, "group": "M", "page": "a.html", "status": "", "section": "system"}'
+)
+
+
+def written(report: Path) -> Path:
+    """Two pages with entries, and the start page."""
+    for section in ("scenarios", "system"):
+        (report / section).mkdir()
+        (report / section / "a.html").touch()
+        index = record(report, section, [ENTRY])
+    return index
 
 
 @pytest.mark.parametrize(
-    "damaged", ["", "{", "[1]", '[{"name": "a"}]', "null", '{"a": 1}', "\ud800", "[" * 10_000]
+    "damaged", ["", "{", "[1]", '{"name": "a"}', "null", WRONG, "\ud800", "[" * 10_000]
 )
 def test_damaged_entries_do_not_count(tmp_path: Path, damaged: str) -> None:
-    record(tmp_path, "scenarios", [ENTRY])
-    record(tmp_path, "system", [ENTRY])
-    file = tmp_path / "system/entries.json"
+    written(tmp_path)
+    file = tmp_path / "system/a.entry.json"
     file.write_text(damaged, encoding="utf-8", errors="surrogatepass")
     index = record(tmp_path, "scenarios", [ENTRY])
-    assert "Variants" not in index.read_text(encoding="utf-8")
+    assert [entry.section for entry in read(tmp_path, "scenarios")] == ["scenarios"]
+    assert 'href="system/' not in index.read_text(encoding="utf-8")
 
 
 def test_what_is_forgotten_is_no_longer_shown(tmp_path: Path) -> None:
-    record(tmp_path, "scenarios", [ENTRY])
-    index = record(tmp_path, "system", [ENTRY])
-    assert json.loads((tmp_path / "system/entries.json").read_text())[0]["name"] == "a"
+    index = written(tmp_path)
+    assert json.loads((tmp_path / "system/a.entry.json").read_text())["name"] == "a"
     forget(tmp_path, "system")
     page = index.read_text(encoding="utf-8")
-    assert "Scenarios" in page and "Variants" not in page
+    assert 'href="scenarios/a.html"' in page and 'href="system/' not in page
+    record(tmp_path, "system", [ENTRY])
+    (tmp_path / "system/a.html").unlink()  # by the user
+    assert 'href="system/' not in write(tmp_path).read_text(encoding="utf-8")
     forget(tmp_path, "scenarios")
     assert not index.exists()

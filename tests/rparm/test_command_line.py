@@ -32,7 +32,9 @@ def test_run_passes(project: Path, fmu: Path, console: Console) -> None:
     for row in rows:  # an error at each tolerance, in rows of one length
         assert len(row) == len(rows[0]) and float(row[2]) < 1e-6 and float(row[5]) < 1e-8
     assert "errors follow the tolerance, 1e-4 to 1e-11: 2 scenarios" in out
-    assert out.endswith(f"report: {folder / 'index.html'}\npassed: 2 scenarios\n")
+    assert out.endswith(
+        " --open\n"
+    ) and f"passed: 2 scenarios; {folder / 'index.html'}; open it: " in (out)
     for page in (f"scenarios/{SHORT}", "studies/accuracy"):
         assert (folder / f"{page}.html").is_file()
 
@@ -41,7 +43,7 @@ def test_run_of_one_scenario_at_one_tolerance(project: Path, fmu: Path, console:
     folder = project / "report"
     arguments = ("run", SHORT, SHORT, "--tolerance", "1e-6", "--fmu", fmu, "--report", folder)
     code, out, _ = console(*arguments)
-    assert code == 0 and "passed: 1 scenario\n" in out
+    assert code == 0 and "passed: 1 scenario; " in out
     assert out.count("1e-6") == 1 and "1e-11" not in out
     assert not (folder / "studies/accuracy.html").exists()
 

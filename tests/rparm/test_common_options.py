@@ -74,7 +74,8 @@ def test_the_picture_of_the_coupling_is_shown(
     code, out, _ = console("coupling", "--output", tmp_path, "--open", "--json")
     picture = Path(json.loads(out)["picture"])
     assert code == 0 and picture.is_file() and picture.parent == tmp_path
-    assert shown == [picture.as_uri()]
+    page = tmp_path / "coupling" / "closed_loop.html"
+    assert shown == [page.as_uri()] and 'src="../coupling.png"' in page.read_text("utf-8")
 
 
 def test_a_command_without_a_page_writes_its_document_and_says_that_there_is_none(

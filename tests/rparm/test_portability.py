@@ -191,7 +191,7 @@ def test_the_scenarios_are_those_of_the_given_fmus_model(project: Path, console:
     code, out, err = console(*arguments)
     assert (code, err) == (0, "")
     rows = [line.split()[0] for line in out.splitlines() if line.endswith("passed")]
-    assert rows == [other.name] and "passed: 1 scenario\n" in out
+    assert rows == [other.name] and "passed: 1 scenario; " in out
 
 
 def test_fmu_of_a_model_without_scenarios(project: Path, fmu: Path, console: Console) -> None:

@@ -4,7 +4,7 @@ import functools
 import os
 import shutil
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -101,6 +101,13 @@ def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, s
     code = cli.main([str(argument) for argument in arguments])
     out, err = capsys.readouterr()
     return code, out, err
+
+
+def check_near(result: Mapping[str, np.ndarray]) -> None:
+    """The motion of an example stays near the arm: within 2 m and a turn, below 100 J."""
+    largest = [np.abs(result[name]).max() for name in ("q1", "q2", "kinetic_energy")]
+    assert np.all(np.array(largest) < (2 * np.pi, 2.0, 100.0)), largest
+    assert np.ptp(result["q1"]) > 0.1
 
 
 def assert_one_line(error: str) -> None:
