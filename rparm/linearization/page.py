@@ -503,9 +503,10 @@ def _pole_texts(model: Linear) -> list[str]:
     rates = model.rates_of(model.poles)
     for pole, rate, states in zip(model.poles, rates, taking_part(model), strict=True):
         cells = _pole_cells(pole, rate)
-        sign = "±" if cells[1] != NONE else ""
-        lines = [f"pole {cells[0]} {cells[1] + 'i' if sign else ''}{'' if model.dt else ' 1/s'}"]
-        lines += [f"frequency {cells[2]} Hz"] * (cells[2] != NONE) + [f"damping {cells[3]}"]
+        part = f" {cells[1]}i" if cells[1] != NONE else ""
+        lines = [f"pole {cells[0]}{part}{'' if model.dt else ' 1/s'}"]
+        lines += [f"frequency {cells[2]} Hz"] * (cells[2] != NONE)
+        lines += [f"damping {cells[3]}"] * (cells[3] != NONE)
         texts.append("<br>".join([*lines, *map(escape, states)]))
     return texts
 

@@ -64,7 +64,7 @@ const Diagrams = (() => {
     return {
       traces,
       layout: {
-        xaxis: axis('frequency (Hz)', { type: 'log', anchor: 'y2', range: ends.map(Math.log10) }),
+        xaxis: axis('frequency (Hz)', { type: 'log', anchor: 'y2', range: ends.map(Math.log10), dtick: 1, nticks: 0 }),
         ...stacked([axis('gain (dB)'), axis('phase (degrees)', scale)]),
         shapes: [...(half ? [across(half)] : []), ...marks.map(({ hertz }) => across(hertz, '--ink'))],
       },
@@ -117,7 +117,7 @@ const Diagrams = (() => {
     if (sampled) {
       return {
         traces: [circle({ color: '--ink', width: 1 }), ...traces],
-        layout: { xaxis: axis('real part', { constrain: 'domain' }), yaxis: axis('imaginary part', { scaleanchor: 'x' }) },
+        layout: { xaxis: axis('real part; within the circle it dies out', { constrain: 'domain' }), yaxis: axis('imaginary part', { scaleanchor: 'x' }) },
       };
     }
     const real = [0, ...sets.flatMap(({ re }) => re)];
