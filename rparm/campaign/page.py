@@ -64,6 +64,10 @@ class Index:
     total_confidence: float
 
 
+def is_wide(index: Index) -> bool:
+    return max(index.first_confidence, index.total_confidence) > WIDE
+
+
 def quantiles(values: np.ndarray) -> list[float]:
     """Return the quantiles of the numbers in `values`, (runs,); NaN if there are none."""
     numbers = values[np.isfinite(values)]
@@ -174,19 +178,25 @@ class Page:
             steps=self.job.steps,
             failed=self.failed,
             failures=self.failures_table(),
-            results=self.distributions(self.kept),
-            inputs=self.distributions({x: self.table[x] for x in self.campaign.parameters}),
+            results=self.kept,
+            inputs={name: self.table[name] for name in self.campaign.parameters},
+            labels=self.labels,
+            bars_of=bars,
+            quantiles=quantiles,
+            lacking=_lacking,
+            measures=self.job.measures,
+            no_value=NO_VALUE,
             scatter=charts.script(self.scatter(found)),
             drawn=len(self.sample),
             note=self.note,
-            missing=self.missing(),
-            indices=self.indices_table(found),
+            indices=found,
+            groups={x: len(saltelli_groups(self.campaign, self.kept[x])) for x in found},
             bars=[
                 indices_chart(self.labels[name], found[name])
                 for name in self.drawn
                 if name in found
             ],
-            doubts=self.doubts(found),
+            wide=[name for name, rows in found.items() if any(map(is_wide, rows))],
             worst=[self.worst(name) for name in self.campaign.worst],
             maps=[self.map(i) for i in range(len(self.campaign.maps))],
         )
@@ -201,14 +211,6 @@ class Page:
         return f"Charts leave out {left[0]} and what is below it in the table." if left else ""
 
     # ---- Distributions and scatter ---------------------------------------------------------------
-
-    def distributions(self, columns: Mapping[str, np.ndarray]) -> list[tuple]:
-        """Return label, histogram, quantiles and the number of runs without a value of columns."""
-        return [
-            (self.labels.get(name, name), bars(values), [*map(_rounded, quantiles(values))],
-             _lacking(values))
-            for name, values in columns.items()
-        ]  # fmt: skip
 
     @property
     def sample(self) -> np.ndarray:
@@ -241,16 +243,6 @@ class Page:
             },
         }
 
-    def missing(self) -> list[str]:
-        """Say which columns have no value in runs that did not fail."""
-        texts = []
-        for measure in self.job.measures:
-            count = _lacking(self.kept[measure.column]) - self.failed
-            what = NO_VALUE.get(measure.kind, "is no finite number")
-            if count:
-                texts.append(f"{measure.column} {what} in {count} of {self.campaign.count} runs.")
-        return texts
-
     # ---- Sobol' indices --------------------------------------------------------------------------
 
     def indices(self) -> dict[str, list[Index]]:
@@ -258,42 +250,6 @@ class Page:
             return {}
         found = {name: sobol_indices(self.campaign, x) for name, x in self.kept.items()}
         return {name: rows for name, rows in found.items() if rows}
-
-    def indices_table(self, found: Mapping[str, list[Index]]) -> pages.Table | None:
-        """Return the table; None if there are none."""
-        if not found:
-            return None
-        head = ["kept", "parameter", "first order", "±", "total", "±", "groups of runs"]
-        rows = []
-        for name, indices in found.items():
-            groups = len(saltelli_groups(self.campaign, self.kept[name]))
-            for x in indices:
-                numbers = (x.first, x.first_confidence, x.total, x.total_confidence)
-                rows.append([name, x.parameter, *(f"{number:.3f}" for number in numbers), groups])
-        return pages.Table("Sobol' indices", head, rows)
-
-    def doubts(self, found: Mapping[str, list[Index]]) -> list[str]:
-        """Warn about indices that say little."""
-        if self.campaign.sampling != "indices":
-            return []
-        texts = []
-        groups = {name: len(saltelli_groups(self.campaign, self.kept[name])) for name in found}
-        if any(count < self.campaign.runs for count in groups.values()):
-            texts.append(
-                f"There are {self.campaign.runs} groups of runs. One is left out where a run of it "
-                "has no value: then the indices are not those of all that the file describes."
-            )
-        wide = [
-            name
-            for name, rows in found.items()
-            if any(max(x.first_confidence, x.total_confidence) > WIDE for x in rows)
-        ]
-        if wide:
-            texts.append(f"Too few runs: a ± is above {WIDE:g} for {', '.join(wide)}.")
-        none = [name for name in self.kept if name not in found]
-        if none:
-            texts.append(f"No indices, as it does not vary or lacks values: {', '.join(none)}.")
-        return texts
 
     # ---- Runs ------------------------------------------------------------------------------------
 

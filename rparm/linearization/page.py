@@ -1,9 +1,8 @@
 """The page of a linear model: tables, texts and charts."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from html import escape
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,22 +36,12 @@ STEPS = (
     "grow, though each component is integrated exactly. The frequency is that of the motion that "
     "grows."
 )
-ABOUT = "How small deviations move about one point: x' = A x + B u, y = C x + D u."
-POINT = (
-    "Values about which the model is linearized. Far from them it is less accurate: compare it "
-    "with a run."
-)
 EQUILIBRIUM = (
     "All derivatives are 0, except those of positions in a steady motion, and ticks of samplers "
     "change nothing. Where dry friction or a "
     "stop holds a joint, every value between the two ends is an equilibrium while the others stay "
     "as they are; the value shown is in the middle."
 )
-BODE = (
-    "Bode: amplitude and phase of an output's oscillation relative to an input's. "
-    "Dashed, and dots: the same, sampled, with inputs held between samples."
-)
-PARTS = "A state takes part in a pole as its left and right eigenvectors say; equal poles share."
 MATRICES = (
     "A row for each derivative of a state and each output, a column for each state and input. "
     "Units are those of the variables, and s.",
@@ -72,6 +61,7 @@ ON_AXIS = 1e-7  # damping below which the peak of a pole is infinite: its height
 POLE_GAIN = 1e6  # gain beyond which a Nyquist diagram breaks its line: a pole may be on the axis
 
 
+MARGIN = {"up": "gain_up", "down": "gain_down"}  # attributes of Margins
 LEAST_PART = 0.01  # of a state in a pole; less is not said
 MOST_PARTS = 4  # states that are named of a pole
 
@@ -90,71 +80,37 @@ def write(folder: Path, found: Study, step: float | None, again: str, root: str 
         parts.append((equilibrium_table(found), EQUILIBRIUM, []))
     if loop is not None and found.margins is not None:
         made = bode_chart(loop, step, found.margins), nyquist_chart(loop, step, found.margins)
-        parts.append((margins_table(found.margins), f"{MARGINS} {BODE}", [*made]))
+        parts.append((margins_table(found.margins), MARGINS, [*made]))
         title = "Step response of the closed loop"
         made = [steps_chart(closed(loop), None, found.units, title)]
-        parts.append((pages.Table(title, [], []), "From the request at the break.", made))
+        parts.append((pages.Table(title, [], []), "", made))
     shown = drawn(linear)
     if loop is None and shown.inputs and shown.outputs:
         responses = [bode_chart(shown, step), steps_chart(shown, step, found.units)]
-        parts.append((pages.Table("Responses", [], []), BODE, responses))
+        parts.append((pages.Table("Responses", [], []), "", responses))
     if len(linear.states):
         table = poles_table(found)
         rows = zip(table.rows, _rows_of(linear, taking_part(linear)), strict=True)
         cells = [[*row, ", ".join(states)] for row, states in rows]
         table = replace(table, head=[*table.head, "states that take part"], rows=cells)
-        parts.append((table, f"{POLES[linear.dt > 0]} {PARTS}", poles_charts(linear, step, loop)))
+        parts.append((table, POLES[linear.dt > 0], poles_charts(linear, step, loop)))
     if found.largest:
         parts.append((steps_table(list(found.largest)), STEPS, []))
-    parts.append((point_table(found), POINT, []))
     name = f"{found.path.stem}, {found.variant}" if found.variant else found.path.stem
+    rates = linear.rates_of(linear.poles)
     return pages.write_page(
         folder / pages.INDEX,
         "linearization.html",
         root=root,
         title=f"{name}: linear model",
-        about=ABOUT,
         again=again,
-        facts=_facts(found),
+        growing=int((rates.real > REAL * np.abs(rates)).sum()),
+        found=found,
         notes=[*notes(found), *_not_drawn(found)],
         parts=parts,
-        matrices=_matrices(found),
+        point=point_table(found),
         about_matrices=MATRICES[linear.dt > 0],
     )
-
-
-def _facts(found: Study) -> list[tuple[str, str]]:
-    """Say in a few words what it is, and whether it is stable."""
-    linear, counts = found.linear, [len(found.linear.states), len(found.linear.inputs)]
-    rates = linear.rates_of(linear.poles)
-    growing = int((rates.real > REAL * np.abs(rates)).sum())
-    facts = [(name, str(n)) for name, n in zip(("states", "inputs"), counts, strict=True)]
-    facts += [("outputs", str(len(linear.outputs))), ("poles that grow", str(growing))]
-    if found.margins is not None:
-        facts.append(("closed loop", "stable" if found.margins.stable else "unstable"))
-    return facts
-
-
-def _matrices(found: Study) -> list[tuple[str, list, list, list]]:
-    """Return name, rows, columns (names and units) and entries of A, B, C and D."""
-    linear = found.linear
-    u = {name: unit(text) for name, text in found.units.items()}
-    states, inputs, outputs = (
-        [(name, u.get(name, "")) for name in names]
-        for names in (linear.states, linear.inputs, linear.outputs)
-    )
-    mark, rate = ("+", "{}") if linear.dt else ("'", "{} per s")
-    moved = [(name + mark, rate.format(text).strip()) for name, text in states]
-    parts = (
-        ("A", moved, states),
-        ("B", moved, inputs),
-        ("C", outputs, states),
-        ("D", outputs, inputs),
-    )
-    return [
-        (name, rows, columns, [[_short(float(x)) for x in row] for row in getattr(linear, name)])
-        for name, rows, columns in parts if rows and columns
-    ]  # fmt: skip
 
 
 def _not_drawn(found: Study) -> list[str]:
@@ -298,69 +254,44 @@ def _without_rounding(pole: complex) -> complex:
     return complex(*(float(x) if abs(x) > least else 0.0 for x in (pole.real, pole.imag)))
 
 
-@dataclass(frozen=True)
-class Mark:
-    """A margin in the charts, at the frequency where the loop would oscillate without it."""
-
-    name: str
-    text: str
-    crossing: Crossing
-    lag: float | None  # degrees of phase that are left; None: gain is
-
-    @property
-    def hertz(self) -> float:
-        return self.crossing.frequency / (2 * math.pi)
-
-    @property
-    def data(self) -> Data:
-        text = f"{self.text}, at {exponents(f'{self.hertz:.4g}')} Hz"
-        at = {"hertz": self.hertz, "re": self.crossing.value.real, "im": self.crossing.value.imag}
-        return at | {"name": self.name, "text": text, "lag": self.lag}
-
-
-def marks(found: Margins) -> list[Mark]:
-    """Return the margins that a loop has; of an unstable one where it crosses gain 1 and -180."""
+def marks(found: Margins) -> dict[str, Crossing]:
+    """Return where a loop has its margins: the crossing that each is measured at."""
     gains, turns = found.gain_crossings, found.phase_crossings
-    if not found.stable:
-        made = [Mark("gain 1", "gain 1", x, 0.0) for x in gains]
-        return made + [Mark("-180", f"-180 degrees, gain {abs(x.value):.4g}", x, None)
-                       for x in turns if 0 < x.frequency < math.inf]  # fmt: skip
-    made = []
-    for name, factor in (("up", found.gain_up), ("down", found.gain_down)):
-        text = f"gain margin, {name}: {factor:.4g} times"
-        made += [Mark(name, text, x, None) for x in turns if math.isclose(1 / abs(x.value), factor)]
-    for name, text, value, over in (
-        ("phase", f"phase margin: {found.phase:.4g} degrees", math.radians(found.phase), None),
-        ("delay", f"delay margin: {milliseconds(found.delay)}", found.delay, "frequency"),
-    ):
-        made += [
-            Mark(name, text, x, math.degrees(lag(x)))
-            for x in gains
-            if math.isclose(lag(x) / (getattr(x, over) if over else 1.0), value)
-        ][:1]
-    return made
+    every: dict[str, tuple[tuple[Crossing, ...], Callable[[Crossing], float], float]] = {
+        "up": (turns, lambda x: 1 / abs(x.value), found.gain_up),
+        "down": (turns, lambda x: 1 / abs(x.value), found.gain_down),
+        "phase": (gains, lag, math.radians(found.phase)),
+        "delay": (gains, lambda x: lag(x) / x.frequency, found.delay),
+    }
+    return {
+        name: x for name, (crossings, value, margin) in every.items()
+        for x in crossings if math.isclose(value(x), margin)
+    }  # fmt: skip
 
 
-def _drawn_marks(found: Margins | None) -> list[Mark]:
-    """Return marks that a logarithmic axis has a place for, one for margins at one crossing."""
-    known = [mark for mark in (marks(found) if found else ()) if 0 < mark.hertz < math.inf]
-    if len(known) > 1 and known[-1].name == "delay" and known[-1].crossing == known[-2].crossing:
-        text = f"{known[-2].text}, {known[-1].text}"
-        known[-2:] = [replace(known[-2], text=text)]
-    return known
+def _marks(found: Margins | None) -> list[Data]:
+    """Return the margins that have a place on a logarithmic axis, for the charts."""
+    return [
+        {"name": name, "margin": getattr(found, MARGIN.get(name, name)), "hertz": _hertz(x),
+         "lag": math.degrees(lag(x)), "re": x.value.real, "im": x.value.imag}
+        for name, x in (marks(found) if found else {}).items() if 0 < x.frequency < math.inf
+    ]  # fmt: skip
+
+
+def _hertz(crossing: Crossing) -> float:
+    return crossing.frequency / (2 * math.pi)
 
 
 def margins_table(found: Margins) -> pages.Table:
     """Return the margins of a loop; those that it does not have are "–"."""
-    at = {mark.name: _or_none(mark.hertz) for mark in marks(found)}
+    at = {name: _or_none(_hertz(x)) for name, x in marks(found).items()}
     delay = milliseconds(found.delay) if math.isfinite(found.delay) else NONE
     rows = [
         ["gain margin, up (times)", _or_none(found.gain_up), at.get("up", NONE)],
         ["gain margin, down (times)", _or_none(found.gain_down or math.inf), at.get("down", NONE)],
         ["phase margin (degrees)", _or_none(found.phase), at.get("phase", NONE)],
         ["delay margin", delay, at.get("delay", NONE)],
-        *(["the loop's gain is 1", NONE, _short(x.frequency / (2 * math.pi))]
-          for x in found.gain_crossings),
+        *(["the loop's gain is 1", NONE, _short(_hertz(x))] for x in found.gain_crossings),
     ]  # fmt: skip
     return pages.Table("Margins", ["margin", "value", "at (Hz)"], rows)
 
@@ -410,8 +341,9 @@ def bode_chart(model: Linear, step: float | None, found: Margins | None = None) 
             name = f"{label}, held for {milliseconds(step)}"
             held = _bode(frequency_response(sampled)(below), below)
             curves.append(held | {"name": name, "colour": i, "dashed": True})
-    data = {"curves": curves, "marks": [mark.data for mark in _drawn_marks(found)]}
+    data = {"curves": curves, "marks": _marks(found)}
     data |= {"ends": grid[[0, -1]] / (2 * math.pi), "half": step and 0.5 / step}
+    data["crossings"] = [_hertz(x) for x in found.gain_crossings] if found else []
     text = f"Gain and phase over the frequency: {', '.join(label for label, _, _ in shown)}"
     return Chart("Bode diagram", text, "bode", data, height=30)
 
@@ -435,7 +367,7 @@ def nyquist_chart(loop: Linear, step: float | None, found: Margins | None = None
         below = _below(grid, sampled)
         held = _nyquist(frequency_response(sampled)(below), below)
         curves.append(held | {"name": f"held for {milliseconds(step)}", "dashed": True})
-    data = {"curves": curves, "marks": [mark.data for mark in _drawn_marks(found)]}
+    data = {"curves": curves, "marks": _marks(found)}
     text = "The loop L in the complex plane, along the frequencies, beside the critical point -1"
     return Chart("Nyquist diagram", text, "nyquist", data | {"reach": FARTHEST}, height=30)
 
@@ -490,25 +422,12 @@ def poles_charts(model: Linear, step: float | None, loop: Linear | None = None) 
 
 def _poles_chart(title: str, models: Sequence[tuple[str, Linear]], dt: float) -> Chart:
     poles = [
-        {"name": name, "re": one.poles.real, "im": one.poles.imag, "texts": _pole_texts(one)}
+        {"name": name, "re": one.poles.real, "im": one.poles.imag, "states": taking_part(one),
+         "cells": [*map(_pole_cells, one.poles, one.rates_of(one.poles))]}
         for name, one in models
-    ]
+    ]  # fmt: skip
     text = f"Poles in the complex plane: {', '.join(map(str, np.round(models[0][1].poles, 3)))}"
     return Chart(title, text, "poles", {"poles": poles, "sampled": dt > 0, "flattest": FLATTEST})
-
-
-def _pole_texts(model: Linear) -> list[str]:
-    """Say at the pointer: the pole, its frequency and damping, the states that take part."""
-    texts = []
-    rates = model.rates_of(model.poles)
-    for pole, rate, states in zip(model.poles, rates, taking_part(model), strict=True):
-        cells = _pole_cells(pole, rate)
-        part = f" {cells[1]}i" if cells[1] != NONE else ""
-        lines = [f"pole {cells[0]}{part}{'' if model.dt else ' 1/s'}"]
-        lines += [f"frequency {cells[2]} Hz"] * (cells[2] != NONE)
-        lines += [f"damping {cells[3]}"] * (cells[3] != NONE)
-        texts.append("<br>".join([*lines, *map(escape, states)]))
-    return texts
 
 
 def drawn(model: Linear) -> Linear:

@@ -25,9 +25,28 @@ const Diagrams = (() => {
     return { x: angles.map(Math.cos), y: angles.map(Math.sin), mode: 'lines', line: style, hoverinfo: 'skip', hovertemplate: '' };
   }
 
+  const isGain = ({ name }) => name === 'up' || name === 'down';
+
+  function described({ name, margin }) {
+    if (name === 'phase') return `phase margin: ${Charts.shown(margin, 4)} degrees`;
+    if (name === 'delay') return `delay margin: ${Charts.shown(1e3 * margin, 4)} ms`;
+    return `gain margin, ${name}: ${Charts.shown(margin, 4)} times`;
+  }
+
+  /** Margins by their crossings: those at the same one share a mark. */
+  function shared(marks) {
+    const found = [];
+    for (const mark of marks) {
+      const same = found.find(({ hertz, name }) => hertz === mark.hertz && isGain({ name }) === isGain(mark));
+      if (same) same.texts.push(described(mark));
+      else found.push({ ...mark, texts: [described(mark)] });
+    }
+    return found.map((mark) => ({ ...mark, text: `${mark.texts.join(', ')}, at ${Charts.shown(mark.hertz, 4)} Hz` }));
+  }
+
   /** A margin: the piece that is left, with a marker at its ends. */
   function piece(mark, x, y) {
-    const color = mark.lag === null ? '--effort' : '--good';
+    const color = isGain(mark) ? '--effort' : '--good';
     return {
       x, y, name: mark.text, meta: mark.name, mode: 'lines+markers', line: { color, width: 4 }, marker: { color, size: 9 },
       hovertemplate: `${mark.text}<extra></extra>`,
@@ -40,7 +59,8 @@ const Diagrams = (() => {
     return y[i - 1] + part * (y[i] - y[i - 1]);
   }
 
-  function bode({ curves, marks, ends, half }) {
+  function bode({ curves, marks: margins, crossings, ends, half }) {
+    const marks = shared(margins);
     const traces = curves.flatMap(({ name, colour: i, dashed, hertz, gain, phase }) => {
       const both = { x: hertz, name, mode: 'lines', line: line(colour(i), dashed) };
       const at = (unit) => `%{x:.4~g} Hz<br>%{y:.4~g} ${unit}<extra></extra>`;
@@ -52,7 +72,7 @@ const Diagrams = (() => {
     for (const mark of marks) {
       const { hertz, gain, phase } = curves[0];
       const place = [mark.hertz, mark.hertz];
-      if (mark.lag === null) traces.push(piece(mark, place, [interpolated(hertz, gain, mark.hertz), 0]));
+      if (isGain(mark)) traces.push(piece(mark, place, [interpolated(hertz, gain, mark.hertz), 0]));
       else {
         const angle = interpolated(hertz, phase, mark.hertz);
         traces.push({ ...piece(mark, place, [angle, angle - mark.lag]), yaxis: 'y2' });
@@ -66,7 +86,7 @@ const Diagrams = (() => {
       layout: {
         xaxis: axis('frequency (Hz)', { type: 'log', anchor: 'y2', range: ends.map(Math.log10), dtick: 1, nticks: 0 }),
         ...stacked([axis('gain (dB)'), axis('phase (degrees)', scale)]),
-        shapes: [...(half ? [across(half)] : []), ...marks.map(({ hertz }) => across(hertz, '--ink'))],
+        shapes: [...(half ? [across(half)] : []), ...[...crossings, ...marks.filter(isGain).map(({ hertz }) => hertz)].map((x) => across(x, '--ink'))],
       },
     };
   }
@@ -81,7 +101,7 @@ const Diagrams = (() => {
       ];
     });
     traces.push(circle({ color: '--muted', width: 1, dash: '2px,3px' }));
-    for (const mark of marks) traces.push({ ...piece(mark, [mark.re], [mark.im]), mode: 'markers' });
+    for (const mark of shared(marks)) traces.push({ ...piece(mark, [mark.re], [mark.im]), mode: 'markers' });
     const critical = { color: '--bad', size: 12, symbol: 'cross-thin-open', line: { width: 3, color: '--bad' } };
     traces.push({ x: [-1], y: [0], mode: 'markers', marker: critical, name: '-1' });
     const range = [-reach, reach];
@@ -110,8 +130,15 @@ const Diagrams = (() => {
   }
 
   function poles({ poles: sets, sampled, flattest }) {
-    const traces = sets.map(({ name, re, im, texts }, i) => ({
-      x: re, y: im, text: texts, name: sets.length > 1 ? name : '', mode: 'markers', hovertemplate: '%{text}<extra></extra>',
+    const none = '–';
+    const text = ([real, imaginary, hertz, damping], states) => [
+      `pole ${real}${imaginary === none ? '' : ` ${imaginary}i`}${sampled ? '' : ' 1/s'}`,
+      ...(hertz === none ? [] : [`frequency ${hertz} Hz`]),
+      ...(damping === none ? [] : [`damping ${damping}`]),
+      ...states.map(Charts.escaped),
+    ].join('<br>');
+    const traces = sets.map(({ name, re, im, cells, states }, i) => ({
+      x: re, y: im, text: cells.map((own, k) => text(own, states[k])), name: sets.length > 1 ? name : '', mode: 'markers', hovertemplate: '%{text}<extra></extra>',
       marker: { symbol: i ? 'cross-thin-open' : 'x-thin-open', size: 11, color: colour(i), line: { width: 2.5, color: colour(i) } },
     }));
     if (sampled) {
