@@ -1,6 +1,7 @@
 """The page of a linear model: tables, texts and charts."""
 
 import math
+import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -20,34 +21,9 @@ Part = tuple[pages.Table, str, list[Chart]]
 NONE = "–"
 LISTED = 12  # names in a sentence
 REAL = 1e-6  # of a pole: a smaller real or imaginary part is rounding, as of poles that are equal
-POLES = (  # of a continuous model, and of a sampled one
-    "A deviation along a pole grows or dies out as e to the power of its real part times the time. "
-    "Damping is 1 without oscillation, 0 if it does not decay, below 0 if it grows.",
-    "From sample to sample a deviation along a pole is multiplied by it: it dies out within the "
-    "unit circle. Damping and time are those of a continuous pole with the same samples.",
-)
-MARGINS = (
-    "Each says how far one quantity may change at the break, all else fixed, before the loop "
-    "oscillates without decay. A gain of 2 means twice the effort; the delay is that of computing "
-    "and transmission."
-)
-STEPS = (
-    "Up to this communication step a small deviation dies out; beyond it the coupling makes it "
-    "grow, though each component is integrated exactly. The frequency is that of the motion that "
-    "grows."
-)
-EQUILIBRIUM = (
-    "All derivatives are 0, except those of positions in a steady motion, and ticks of samplers "
-    "change nothing. Where dry friction or a "
-    "stop holds a joint, every value between the two ends is an equilibrium while the others stay "
-    "as they are; the value shown is in the middle."
-)
-MATRICES = (
-    "A row for each derivative of a state and each output, a column for each state and input. "
-    "Units are those of the variables, and s.",
-    "A row for each state one sample later and each output, a column for each state and input. "
-    "Units are those of the variables.",
-)
+TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
+MARGINS, STEPS, EQUILIBRIUM = (TEXTS[name] for name in ("margins", "steps", "equilibrium"))
+POLES, MATRICES = TEXTS["poles"], TEXTS["matrices"]  # of a continuous model, and of a sampled one
 MOST_DRAWN = 2  # inputs and outputs that are drawn: with more, curves would share a colour
 ROUNDING = 1e-12  # of the largest response: less is none
 AROUND = 2.0  # decades beyond the poles that a Bode diagram shows
