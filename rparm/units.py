@@ -177,10 +177,15 @@ def short(number: float, digits: int | None = None) -> str:
     return f"{mantissa}e{int(exponent)}"
 
 
+def exponents(text: str) -> str:
+    """Write 1e-8 for 1e-08, and 1e6 for 1e+06."""
+    return re.sub(r"(?<=\d)e\+?(-?)0*(?=\d)", r"e\1", text)
+
+
 def rounded_up(value: float, digits: int) -> str:
-    """Write an upper bound, rounded up: 1.3e-08 for 1.21e-8 and one digit behind the point."""
+    """Write an upper bound, rounded up: 1.3e-8 for 1.21e-8 and one digit behind the point."""
     upwards = Context(prec=digits + 1, rounding=ROUND_CEILING)
-    return f"{float(upwards.create_decimal_from_float(value)):.{digits}e}"
+    return exponents(f"{float(upwards.create_decimal_from_float(value)):.{digits}e}")
 
 
 def shortened(text: str, width: int) -> str:
@@ -239,5 +244,5 @@ def verdict(passed: bool) -> str:
 
 
 def number(value: float) -> str:
-    """Write a number with at most nine digits, 1e-8 for 1e-08."""
-    return f"{value:.9g}".replace("e-0", "e-")
+    """Write a number with at most nine digits."""
+    return exponents(f"{value:.9g}")

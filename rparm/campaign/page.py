@@ -1,4 +1,4 @@
-"""The page of a campaign: distributions, worst cases, Sobol' indices, maps, failures."""
+"""The page of a campaign: distributions, scatter, Sobol' indices, maps, worst cases, failures."""
 
 import json
 import math
@@ -7,22 +7,19 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from textwrap import fill
+from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 from SALib.analyze import sobol
+from scipy.stats import rankdata
 
 from rparm import project
 from rparm.campaign.campaign_file import Campaign
 from rparm.campaign.job import LYAPUNOV, Job
 from rparm.campaign.planning import FAILURE, RUN, sampling_problem
 from rparm.campaign.results import MANIFEST, Results
-from rparm.report import pages
-from rparm.units import minus
+from rparm.report import charts, pages
+from rparm.report.charts import Chart
 
 QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 WORST = 10  # runs that are listed
@@ -31,7 +28,10 @@ CONFIDENCE = 0.95
 NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\.?\d[\d.]*(?:[eE][-+]?\d+)?|(?:inf|nan)\b)")
 PAGE = "campaign.html"
 MOST = 10**7  # runs, whose table is held in memory
-DRAWN = 24  # columns in a picture at most
+DRAWN = 24  # columns in charts at most
+POINTS = 1500  # runs in a scatter plot at most, besides the extreme ones
+RANKED = 100_000  # runs for rank correlations at most
+MOST_CELLS = 200  # of a map, in each direction
 LISTED = 10  # reasons of failed runs at most
 WIDE = 0.5  # half a confidence interval of an index that says little
 NOTHING = "–"
@@ -39,14 +39,8 @@ NO_VALUE = {
     "settling": "does not settle",
     LYAPUNOV: "has no value, as a discrete output changes (an impact, friction that holds),",
 }
-BINS = 50
-COLUMNS = 3
-LONGEST_LINE = 40  # characters of a label below a column
-FEWEST = 6  # of these, below many bars
-COLOURS = "viridis"  # in order of brightness, also for the colour-blind
-NARROW = 1e-3  # of a value: a smaller variation is drawn as a difference, to be written short
-# names come from a user's file: no mathematics
-TEXTS = pages.STYLE | {"text.parse_math": False}
+BINS = 40
+FLAT = 1e-12  # relative: a smaller variation is rounding
 
 
 # ---- Statistics of the table ---------------------------------------------------------------------
@@ -68,6 +62,10 @@ class Index:
     first_confidence: float
     total: float
     total_confidence: float
+
+
+def is_wide(index: Index) -> bool:
+    return max(index.first_confidence, index.total_confidence) > WIDE
 
 
 def quantiles(values: np.ndarray) -> list[float]:
@@ -94,6 +92,36 @@ def failures(reasons: Iterable[str]) -> list[Failure]:
             firsts.setdefault(kind, (reason, run))
     ordered = ((firsts[kind], count) for kind, count in counts.most_common())
     return [Failure(reason, count, run) for (reason, run), count in ordered]
+
+
+def varies(values: np.ndarray) -> bool:
+    """Say whether numbers, (runs,), differ by more than rounding, and not beyond all doubles."""
+    numbers = values[np.isfinite(values)]
+    with np.errstate(over="ignore"):
+        width = np.ptp(numbers) if len(numbers) else 0.0
+    return bool(np.isfinite(width) and width > FLAT * np.abs(numbers).max(initial=0.0))
+
+
+def rank_correlation(one: np.ndarray, other: np.ndarray) -> float:
+    """Return Spearman's correlation of runs that have both values; NaN if one does not vary."""
+    there = np.isfinite(one) & np.isfinite(other)
+    if not (varies(one[there]) and varies(other[there])):
+        return math.nan
+    return float(np.corrcoef(rankdata(one[there]), rankdata(other[there]))[0, 1])
+
+
+def bars(values: np.ndarray) -> str:
+    """Return a histogram of numbers, (runs,), as the path of an SVG, 1 wide and 10 high."""
+    if not varies(values):
+        return ""
+    numbers = values[np.isfinite(values)]
+    low, high = numbers.min(), numbers.max()
+    different = len(np.unique(numbers))  # of a grid: its points must not share bins unevenly
+    count = different if different < 2 * BINS else BINS
+    places = np.minimum(((numbers - low) / (high - low) * count).astype(int), count - 1)
+    counts = np.bincount(places, minlength=count)
+    heights = 10 - 10 * counts / counts.max()
+    return "M0 10" + "".join(f"V{height:.3g}h{1 / count:.5g}" for height in heights) + "V10z"
 
 
 def saltelli_groups(campaign: Campaign, values: np.ndarray) -> np.ndarray:
@@ -127,6 +155,8 @@ class Page:
         self.table = results.table([*results.columns, FAILURE])
         self.kept = {measure.column: self.table[measure.column] for measure in job.measures}
         self.labels = {name: f"{name} [{unit}]" if unit else name for name, unit in units.items()}
+        self.drawn = dict(list(self.kept.items())[:DRAWN])
+        self.order = np.random.default_rng(campaign.seed).permutation(campaign.count)
         self.failures = failures(self.table[FAILURE].tolist())
         self.failed = sum(failure.count for failure in self.failures)
 
@@ -148,10 +178,25 @@ class Page:
             steps=self.job.steps,
             failed=self.failed,
             failures=self.failures_table(),
-            distributions=self.distributions(),
-            missing=self.missing(),
-            indices=self.indices_table(found),
-            doubts=self.doubts(found),
+            results=self.kept,
+            inputs={name: self.table[name] for name in self.campaign.parameters},
+            labels=self.labels,
+            bars_of=bars,
+            quantiles=quantiles,
+            lacking=_lacking,
+            measures=self.job.measures,
+            no_value=NO_VALUE,
+            scatter=charts.script(self.scatter(found)),
+            drawn=len(self.sample),
+            note=self.note,
+            indices=found,
+            groups={x: len(saltelli_groups(self.campaign, self.kept[x])) for x in found},
+            bars=[
+                indices_chart(self.labels[name], found[name])
+                for name in self.drawn
+                if name in found
+            ],
+            wide=[name for name, rows in found.items() if any(map(is_wide, rows))],
             worst=[self.worst(name) for name in self.campaign.worst],
             maps=[self.map(i) for i in range(len(self.campaign.maps))],
         )
@@ -159,39 +204,44 @@ class Page:
     def command(self, run: int) -> pages.Command:
         return pages.Command(f"{self.again} --replay {run}")
 
-    def drawn(self, columns: Iterable[str]) -> tuple[list[str], str]:
-        """Return the columns that fit into a picture, and a note on the others."""
-        columns = list(columns)
-        left = columns[DRAWN:]
-        rest = "and what is below it in the table."
-        return columns[:DRAWN], f"The picture leaves out {left[0]} {rest}" if left else ""
+    @property
+    def note(self) -> str:
+        """Say what charts leave out."""
+        left = [*self.kept][DRAWN:]
+        return f"Charts leave out {left[0]} and what is below it in the table." if left else ""
 
-    # ---- Distributions ---------------------------------------------------------------------------
+    # ---- Distributions and scatter ---------------------------------------------------------------
 
-    def distributions(self) -> pages.Table | None:
-        """Return table and picture; None if no run has a value."""
-        there = [name for name, values in self.kept.items() if np.isfinite(values).any()]
-        if not there:
-            return None
-        drawn, note = self.drawn(there)
-        picture = distributions_figure({self.labels[name]: self.kept[name] for name in drawn})
-        pages.save_figure(picture, self.folder / "distributions.png")
-        head = ["kept", "smallest", "5 %", "median", "95 %", "largest", "runs without a value"]
-        rows = [
-            [self.labels[name], *map(_rounded, quantiles(values)), _lacking(values)]
-            for name, values in self.kept.items()
-        ]
-        return pages.Table("Distributions", head, rows, note)
+    @property
+    def sample(self) -> np.ndarray:
+        """Numbers of the runs in scatter plots: some at random, and those with extreme results."""
+        there = [x for x in self.drawn.values() if np.isfinite(x).any()]
+        ends = [f(np.where(np.isfinite(x), x, s * np.inf)) for x in there
+                for f, s in ((np.argmin, 1), (np.argmax, -1))]  # fmt: skip
+        listed = [run for name in self.campaign.worst for run in worst(self.table[name])]
+        return np.unique([*self.order[:POINTS], *ends, *listed]).astype(int)
 
-    def missing(self) -> list[str]:
-        """Say which columns have no value in runs that did not fail."""
-        texts = []
-        for measure in self.job.measures:
-            count = _lacking(self.kept[measure.column]) - self.failed
-            what = NO_VALUE.get(measure.kind, "is no finite number")
-            if count:
-                texts.append(f"{measure.column} {what} in {count} of {self.campaign.count} runs.")
-        return texts
+    def scatter(self, found: Mapping[str, list[Index]]) -> dict[str, Any]:
+        """Return what `assets/campaign.js` draws: values of runs, and what orders the plots."""
+        runs, parameters, some = self.sample, self.campaign.parameters, self.order[:RANKED]
+        columns = {name: self.table[name] for name in (*parameters, *self.drawn)}
+        ranked = {name: values[some] for name, values in columns.items()}
+        return {
+            "again": f"{self.again} --replay ",
+            "count": self.campaign.count,
+            "runs": runs,
+            "values": {name: values[runs] for name, values in columns.items()},
+            "labels": {name: self.labels.get(name, name) for name in columns},
+            "parameters": [*parameters],
+            "first": next((x for x in self.campaign.worst if x in self.drawn), ""),
+            "results": {
+                name: {
+                    "ranks": [rank_correlation(ranked[x], ranked[name]) for x in parameters],
+                    "totals": [x.total for x in found.get(name, [])],
+                }
+                for name in self.drawn
+            },
+        }
 
     # ---- Sobol' indices --------------------------------------------------------------------------
 
@@ -200,45 +250,6 @@ class Page:
             return {}
         found = {name: sobol_indices(self.campaign, x) for name, x in self.kept.items()}
         return {name: rows for name, rows in found.items() if rows}
-
-    def indices_table(self, found: Mapping[str, list[Index]]) -> pages.Table | None:
-        """Return table and picture; None if there are none."""
-        if not found:
-            return None
-        drawn, note = self.drawn(found)
-        picture = indices_figure({self.labels[name]: found[name] for name in drawn})
-        pages.save_figure(picture, self.folder / "indices.png")
-        head = ["kept", "parameter", "first order", "±", "total", "±", "groups of runs"]
-        rows = []
-        for name, indices in found.items():
-            groups = len(saltelli_groups(self.campaign, self.kept[name]))
-            for x in indices:
-                numbers = (x.first, x.first_confidence, x.total, x.total_confidence)
-                rows.append([name, x.parameter, *(f"{number:.3f}" for number in numbers), groups])
-        return pages.Table("Sobol' indices", head, rows, note)
-
-    def doubts(self, found: Mapping[str, list[Index]]) -> list[str]:
-        """Warn about indices that say little."""
-        if self.campaign.sampling != "indices":
-            return []
-        texts = []
-        groups = {name: len(saltelli_groups(self.campaign, self.kept[name])) for name in found}
-        if any(count < self.campaign.runs for count in groups.values()):
-            texts.append(
-                f"There are {self.campaign.runs} groups of runs. One is left out where a run of it "
-                "has no value: then the indices are not those of all that the file describes."
-            )
-        wide = [
-            name
-            for name, rows in found.items()
-            if any(max(x.first_confidence, x.total_confidence) > WIDE for x in rows)
-        ]
-        if wide:
-            texts.append(f"Too few runs: a ± is above {WIDE:g} for {', '.join(wide)}.")
-        none = [name for name in self.kept if name not in found]
-        if none:
-            texts.append(f"No indices, as it does not vary or lacks values: {', '.join(none)}.")
-        return texts
 
     # ---- Runs ------------------------------------------------------------------------------------
 
@@ -261,16 +272,18 @@ class Page:
             note += f" {count} runs with {len(left)} other reasons are not shown."
         return pages.Table("Failed runs", head, rows, note)
 
-    def map(self, number: int) -> tuple[object, list[str], int]:
-        """Draw a map as its file says; return it, its labels, and the number of runs in it."""
+    def map(self, number: int) -> tuple[object, Chart | None, str, int]:
+        """Draw a map as its file says; return it, a chart, a note, and the number of runs in it."""
         drawn = self.campaign.maps[number]
-        names = (drawn.colour, drawn.x, drawn.y)
-        columns = [self.table[name] for name in (drawn.x, drawn.y, drawn.colour)]
-        there = int(np.isfinite(columns).all(axis=0).sum())
-        if there:
-            labels = [self.labels[name] for name in (drawn.x, drawn.y, drawn.colour)]
-            pages.save_figure(heat_map_figure(labels, *columns), self.folder / f"map_{number}.png")
-        return drawn, [self.labels[name] for name in names], there
+        names = (drawn.x, drawn.y, drawn.colour)
+        columns = [self.table[name] for name in names]
+        there = np.isfinite(columns).all(axis=0)
+        if not there.any():
+            return drawn, None, "", 0
+        labels = [self.labels[name] for name in names]
+        chart, shown = map_chart(labels, *columns, some=self.order)
+        note = "" if shown == there.sum() else f"{shown} of {there.sum()} runs are drawn."
+        return drawn, chart, note, int(there.sum())
 
 
 def _rounded(value: float) -> float | str:
@@ -281,99 +294,32 @@ def _lacking(values: np.ndarray) -> int:
     return int((~np.isfinite(values)).sum())
 
 
-# ---- Pictures ------------------------------------------------------------------------------------
-def distributions_figure(table: Mapping[str, np.ndarray]) -> Figure:
-    """Draw histograms of columns, (runs,) each, by their labels."""
-    rows = math.ceil(len(table) / COLUMNS)
-    with mpl.rc_context(TEXTS):
-        figure = Figure(figsize=(11, 2.6 * rows), layout="constrained")
-        axes = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
-        for one, (label, values) in zip(axes, table.items(), strict=False):
-            _histogram(one, values[np.isfinite(values)], label)
-        for one in axes[len(table) :]:
-            one.set_visible(False)
-        return figure
+# ---- Charts -------------------------------------------------------------------------------------
+def indices_chart(label: str, rows: Sequence[Index]) -> Chart:
+    """Draw Sobol' indices of a column as bars, with their confidence intervals."""
+    text = f"Sobol' indices of {label}, as in the table"
+    data = {"rows": [vars(row) for row in rows]}
+    return Chart(label, text, "indices", data, height=7 + 3 * len(rows))
 
 
-def _histogram(axes: Axes, values: np.ndarray, label: str) -> None:
-    """Draw a histogram, or write a text if the numbers do not vary, or too much to be drawn."""
-    smallest, largest = float(values.min()), float(values.max())
-    if 0 < largest - smallest < math.inf:
-        values, label = _centred(values, label)
-        axes.hist(values, bins=BINS, color=pages.RUN_COLOR)
-        axes.xaxis.set_major_locator(MaxNLocator(4))
-        axes.xaxis.set_major_formatter(_tick)
-        axes.yaxis.set_major_locator(MaxNLocator(5, integer=True))
+def map_chart(
+    labels: Sequence[str], x: np.ndarray, y: np.ndarray, colour: np.ndarray, some: np.ndarray
+) -> tuple[Chart, int]:
+    """Draw columns (runs,): cells where x and y form a grid, else points of the first of `some`.
+
+    Returns also how many runs with a value are drawn: of a large grid, every k-th each way.
+    """
+    xs, ys = np.unique(x), np.unique(y)
+    is_grid = min(len(xs), len(ys)) > 1 and np.isfinite([*xs, *ys]).all()
+    if is_grid and len(xs) * len(ys) == len(x) == len(set(zip(x, y, strict=True))):
+        runs = np.empty((len(ys), len(xs)), int)
+        runs[np.searchsorted(ys, y), np.searchsorted(xs, x)] = np.arange(len(x))
+        every = -(-len(ys) // MOST_CELLS), -(-len(xs) // MOST_CELLS)
+        runs, x, y = runs[:: every[0], :: every[1]], xs[:: every[1]], ys[:: every[0]]
     else:
-        ends = f"from {smallest:g} to {largest:g}" if smallest < largest else f"{smallest:g}"
-        axes.text(0.5, 0.5, f"all runs: {ends}", transform=axes.transAxes, ha="center")
-        axes.set_xticks([])
-        axes.set_yticks([])
-    axes.set_xlabel(fill(label, LONGEST_LINE))
-    axes.set_ylabel("runs")
-
-
-def _centred(values: np.ndarray, label: str) -> tuple[np.ndarray, str]:
-    """Return the label and values; rounded differences from one value if they vary little."""
-    there = values[np.isfinite(values)]
-    middle = float(np.median(there))
-    spread = float(np.max(there) - np.min(there))
-    if not 0 < spread < NARROW * abs(middle):
-        return values, label
-    texts = (f"{middle:.{digits}g}" for digits in range(1, 18))
-    text = next(text for text in texts if abs(float(text) - middle) <= spread)
-    sign = "+" if text.startswith("-") else "\N{MINUS SIGN}"
-    return values - float(text), f"{label} {sign} {minus(text.lstrip('-'))}"
-
-
-def _tick(value: float, _: int) -> str:
-    """Write a number with its exponent, for which there is no room at the end of a short axis."""
-    return minus(f"{value:g}")
-
-
-def indices_figure(found: Mapping[str, Sequence[Index]]) -> Figure:
-    """Draw Sobol' indices of columns as bars, with their confidence intervals, by their labels."""
-    with mpl.rc_context(TEXTS):
-        figure = Figure(figsize=(11, 2.8 * len(found)), layout="constrained")
-        axes = figure.subplots(len(found), 1, squeeze=False)[:, 0]
-        for one, (label, rows) in zip(axes, found.items(), strict=True):
-            middle = np.arange(len(rows))
-            kinds = (
-                ("first order", [x.first for x in rows], [x.first_confidence for x in rows]),
-                ("total", [x.total for x in rows], [x.total_confidence for x in rows]),
-            )
-            for i, (kind, values, half) in enumerate(kinds):
-                color = (pages.RUN_COLOR, pages.ERROR_COLORS[0])[i]
-                style = {"color": color, "ecolor": pages.MUTED, "capsize": 4, "label": kind}
-                one.bar(middle + 0.36 * (i - 0.5), values, 0.34, yerr=half, **style)
-            width = max(COLUMNS * LONGEST_LINE // len(rows), FEWEST)
-            one.set_xticks(middle, [fill(row.parameter, width) for row in rows])
-            one.set_ylabel("Sobol' index")
-            one.set_title(label, loc="left")
-            one.legend()
-        return figure
-
-
-def heat_map_figure(
-    labels: Sequence[str], x: np.ndarray, y: np.ndarray, colour: np.ndarray
-) -> Figure:
-    """Draw columns (runs,) of complete runs: cells where x and y form a grid, else points."""
-    there = np.isfinite([x, y, colour]).all(axis=0)
-    with mpl.rc_context(TEXTS):
-        figure = Figure(figsize=(10, 7), layout="constrained")
-        axes = figure.subplots()
-        centred = (_centred(*column) for column in zip((x, y, colour), labels, strict=True))
-        (x, y, colour), labels = zip(*centred, strict=True)
-        xs, ys = np.unique(x), np.unique(y)
-        is_grid = min(len(xs), len(ys)) > 1 and np.isfinite([*xs, *ys]).all()
-        if is_grid and len(xs) * len(ys) == len(x) == len(set(zip(x, y, strict=True))):
-            cells = np.full((len(ys), len(xs)), np.nan)
-            cells[np.searchsorted(ys, y), np.searchsorted(xs, x)] = colour
-            shown = axes.pcolormesh(xs, ys, cells, cmap=COLOURS, shading="nearest")
-        else:
-            shown = axes.scatter(x[there], y[there], c=colour[there], cmap=COLOURS, s=14)
-        axes.grid(False)
-        axes.set_xlabel(labels[0])
-        axes.set_ylabel(labels[1])
-        figure.colorbar(shown, ax=axes).set_label(labels[2])
-        return figure
+        runs = some[np.isfinite([x, y, colour]).all(axis=0)[some]][: MOST_CELLS**2 // 8]
+        x, y = x[runs], y[runs]
+    data = {"runs": runs, "x": x, "y": y, "z": colour[runs], "labels": labels}
+    text = f"Map of {labels[2]} over {labels[0]} and {labels[1]}"
+    count = int(np.isfinite(colour[runs]).sum())
+    return Chart(labels[2], text, "map", data, height=34), count

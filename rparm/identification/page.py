@@ -1,26 +1,22 @@
-"""The page of an identification, with the picture of its residuals and correlations."""
+"""The page of an identification: parameters, correlations, residuals, logs."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from rparm.fmi.model import Model
 from rparm.identification import results
 from rparm.identification.fit import Whiteness
 from rparm.identification.identify import Identification
 from rparm.identification.request import DELAY
-from rparm.report import pages
+from rparm.report import charts, pages
+from rparm.report.charts import Chart
 from rparm.report.overview import FAILED, RAN
 from rparm.report.run_data import Curve, Plot, RunData, thinned
-from rparm.units import minus, number, unit
+from rparm.units import exponents, number, shortened, unit
 
-PICTURE = "correlations.png"
-TEXTS = pages.STYLE | {"text.parse_math": False}
-DARK = 0.6  # cells of a larger correlation
+LONGEST = 24  # characters of a name beside the correlations
 MOST_NUMBERS = 10  # parameters, whose correlations are written into their cells
 
 
@@ -32,13 +28,11 @@ def write(
     again: str,
     root: str = "",
 ) -> Path:
-    """Write the page and its picture into a folder; its path. `again` is what makes it again.
+    """Write the page into a folder; its path. `again` is the command that makes it again.
 
     `root` leads from there to the start page, if there is one.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    picture = figure_of(found.whiteness, found.known, found.covariances.scatter)
-    pages.save_figure(picture, folder / PICTURE)
     logs = ", ".join(recording.path.name for recording in found.recordings)
     page = pages.RunPage(
         title=f"{found.model}: identified parameters",
@@ -52,12 +46,18 @@ def write(
             ("iterations", str(found.steps)),
         ],
         data=_data(found, model),
-        tables=_tables(found, model, true),
+        tables=[_outputs(found, model), *([_second(found, model)] if found.validation else [])],
         failures=found.warnings,
-        diagram=(PICTURE, "Autocorrelations of the residuals, correlations of the parameters"),
         again=again,
     )
-    return pages.write_alone(folder, page, root)
+    known, parameters = found.known, _parameters(found, true)
+    drawn = [correlations_chart(known, found.covariances.scatter)] if known else []
+    drawn.append(autocorrelations_chart(found.whiteness))
+    if not root:
+        pages.write_assets(folder)
+    return charts.write_page(
+        folder / pages.INDEX, page, parameters, drawn, "Residuals and logs", root
+    )
 
 
 # ---- Plots ---------------------------------------------------------------------------------------
@@ -69,13 +69,14 @@ def _data(found: Identification, model: Model) -> RunData:
     predicted = np.vstack(
         [values[s.counts] for s, values in zip(shown, found.predicted, strict=False)]
     )
-    plots = []
+    residuals, plots = [], []
     for k, name in enumerate(found.checked.outputs):
         text = unit(model.variables[name].unit)
-        both = Curve("simulated", predicted[:, k], reference=measured[:, k])
-        plots.append(Plot(name, text, [both], note="Below it: what was measured."))
+        both = [Curve("measured", measured[:, k]), Curve("simulated", predicted[:, k])]
+        plots.append(Plot(name, text, both))
         left = Curve("residual", predicted[:, k] - measured[:, k])
-        plots.append(Plot(f"residuals of {name}", text, [left]))
+        residuals.append(Plot(f"residuals of {name}", text, [left]))
+    plots = residuals + plots
     if found.validation is not None:
         plots += _validation(found, model, times)
     kept = thinned([values for plot in plots for values in plot.columns])
@@ -93,21 +94,13 @@ def _validation(found: Identification, model: Model, times: np.ndarray) -> list[
         simulated = np.interp(times, own, second.predicted[:, k], right=np.nan)
         measured = np.interp(times, own[there], second.measured[there, k], right=np.nan)
         text = unit(model.variables[name].unit)
-        curve = Curve("simulated", simulated, reference=measured)
-        note = "The second log, in one go from its start. Below it: what was measured."
-        plots.append(Plot(f"validation: {name}", text, [curve], note=note))
+        curves = [Curve("measured", measured), Curve("simulated", simulated)]
+        note = "The second log, in one go from its start."
+        plots.append(Plot(f"validation: {name}", text, curves, note=note))
     return plots
 
 
 # ---- Tables --------------------------------------------------------------------------------------
-def _tables(found: Identification, model: Model, true: Mapping[str, float]) -> list[pages.Table]:
-    return [
-        _parameters(found, true),
-        _outputs(found, model),
-        *([] if found.validation is None else [_second(found, model)]),
-    ]
-
-
 def _parameters(found: Identification, true: Mapping[str, float]) -> pages.Table:
     head = ["parameter", "value", "low", "high", "classical low", "classical high", "start", "unit"]
     rows = []
@@ -143,9 +136,9 @@ def _outputs(found: Identification, model: Model) -> pages.Table:
         found.whiteness.items(), found.noise, every.T, strict=True
     ):
         rms = float(np.sqrt(np.mean(values**2)))
-        sizes = f"{noise:.3g}", f"{rms:.3g}", unit(model.variables[name].unit)
+        sizes = exponents(f"{noise:.3g}"), exponents(f"{rms:.3g}"), unit(model.variables[name].unit)
         is_white = "yes" if test.is_white else "no"
-        rows.append([name, *sizes, f"{test.statistic:.4g}", f"{test.p:.2g}", is_white])
+        rows.append([name, *sizes, f"{test.statistic:.4g}", exponents(f"{test.p:.2g}"), is_white])
     return pages.Table(
         "Measured outputs",
         head,
@@ -164,7 +157,7 @@ def _second(found: Identification, model: Model) -> pages.Table:
     second = found.validation
     assert second is not None
     rows = [
-        [name, f"{rms:.3g}", unit(model.variables[name].unit), f"{follows:.2f} s"]
+        [name, exponents(f"{rms:.3g}"), unit(model.variables[name].unit), f"{follows:.2f} s"]
         for name, rms, follows in zip(
             found.checked.outputs, second.rms, second.follows, strict=True
         )
@@ -186,45 +179,21 @@ def correlations(covariance: np.ndarray) -> np.ndarray:
     return covariance / np.outer(deviations, deviations)
 
 
-def figure_of(
-    tests: Mapping[str, Whiteness], names: Sequence[str], covariance: np.ndarray
-) -> Figure:
-    """Draw both; `names` are the covariance's parameters."""
-    with mpl.rc_context(TEXTS):
-        made = Figure(figsize=(11, 4.2), layout="constrained")
-        left, right = made.subplots(1, 2)
-        _autocorrelations(left, tests)
-        _correlations(right, names, correlations(covariance))
-        return made
-
-
-def _autocorrelations(axes: Axes, tests: Mapping[str, Whiteness]) -> None:
-    width = 0.8 / max(len(tests), 1)
-    for i, (name, test) in enumerate(tests.items()):
-        lags = np.arange(1, len(test.correlations) + 1)
-        colour = (pages.RUN_COLOR, *pages.ERROR_COLORS)[i % (1 + len(pages.ERROR_COLORS))]
-        places = lags + (i - (len(tests) - 1) / 2) * width
-        axes.bar(places, test.correlations, width, color=colour, label=name)
+# ---- Charts -------------------------------------------------------------------------------------
+def autocorrelations_chart(tests: Mapping[str, Whiteness]) -> Chart:
+    """Draw them as bars, and the lines between which 95 % of those of noise are."""
     bound = max((test.bound for test in tests.values()), default=0.0)
-    for level in (-bound, bound):
-        axes.axhline(level, color=pages.MUTED, linestyle=(0, (5, 3)), linewidth=1)
-    axes.set_title("autocorrelation of the residuals; 95 % of noise is between the lines", size=9)
-    axes.set_xlabel("lag in rows")
-    axes.legend()
+    rows = [{"name": name, "values": test.correlations} for name, test in tests.items()]
+    title = "Autocorrelation of the residuals: 95 % of noise is between the lines"
+    return Chart(title, title, "autocorrelations", {"rows": rows, "bound": bound})
 
 
-def _correlations(axes: Axes, names: Sequence[str], values: np.ndarray) -> None:
-    axes.set_title("correlations of the parameters", size=9)
-    axes.grid(False)
-    if not names:
-        axes.set_axis_off()
-        return
-    shown = axes.imshow(values, cmap="RdBu", vmin=-1, vmax=1)
-    axes.set_xticks(range(len(names)), names, rotation=40, ha="right")
-    axes.set_yticks(range(len(names)), names)
-    axes.figure.colorbar(shown, ax=axes)
-    if len(names) <= MOST_NUMBERS:
-        for (i, k), value in np.ndenumerate(values):
-            colour = "white" if abs(value) > DARK else "black"
-            middle = {"ha": "center", "va": "center", "size": 8}
-            axes.text(k, i, minus(f"{value:.2f}"), color=colour, **middle)
+def correlations_chart(names: Sequence[str], covariance: np.ndarray) -> Chart:
+    """Draw the correlations of parameters (n,), whose covariance (n, n) is given."""
+    values = correlations(covariance)
+    short = [f"{i + 1} {shortened(name, LONGEST)}" for i, name in enumerate(names)]
+    data = {"names": names, "short": short, "values": values, "most": MOST_NUMBERS}
+    pairs = [(abs(values[i, k]), f"{names[i]} and {names[k]} {values[i, k]:.2f}")
+             for i in range(len(names)) for k in range(i)]  # fmt: skip
+    text = f"Correlations of parameters; the largest: {max(pairs)[1]}" if pairs else names[0]
+    return Chart("Correlations of the parameters", text, "correlations", data)

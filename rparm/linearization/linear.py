@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from control import StateSpace
 
 CANCELLED = 1e-13  # of the terms of a sum: rounding of a sum that is 0
+EQUAL = 1e-4  # relative, of poles that are equal but for rounding
 ROUNDING = 1e-15  # relative, for each row and column: of singular values that are 0
 
 
@@ -228,6 +229,30 @@ def _of_block(A: np.ndarray) -> np.ndarray:
         A = A[np.ix_(rest, rest)] - np.outer(v[rest] / v[k], A[k, rest])
         zeros += 1
     return np.concatenate([np.zeros(zeros, complex), np.linalg.eigvals(A)])
+
+
+def participations(A: np.ndarray, poles: np.ndarray) -> np.ndarray:
+    """Return the parts of states (n,) in each of all poles of A: shape (n, n), each row's sum is 1.
+
+    They are |left| |right| of its eigenvectors: no units change them. Equal poles share one row:
+    the sum over their eigenvectors exists where those are parallel.
+    """
+    from scipy.linalg import schur, solve_sylvester
+
+    n, scale = len(A), scales(A)
+    A = A * scale / scale[:, None]
+    every = schur(A, output="complex")[0].diagonal()
+    rows = np.full((n, n), 1 / max(n, 1))
+    for row, pole in zip(rows, poles, strict=True):
+        count = np.count_nonzero(np.abs(poles - pole) <= EQUAL * abs(pole))
+        distances = np.sort(np.abs(every - pole))
+        if count < n:
+            reach = distances[count - 1 : count + 1].mean()
+            T, Z, k = schur(A, output="complex", sort=lambda p, c=pole, r=reach: abs(p - c) <= r)
+            other = solve_sylvester(T[:k, :k], -T[k:, k:], T[:k, k:])
+            projection = Z[:, :k] @ np.hstack([np.eye(k), other]) @ Z.conj().T
+            row[:] = np.abs(projection.diagonal()) / np.abs(projection.diagonal()).sum()
+    return rows
 
 
 def zeros(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> np.ndarray:

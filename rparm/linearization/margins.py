@@ -75,7 +75,7 @@ def margins(loop: Linear) -> Margins:
         stable=True,
         gain_up=min((factor for factor in factors if factor > 1), default=math.inf),
         gain_down=max((factor for factor in factors if factor < 1), default=0.0),
-        phase=math.degrees(min(map(_lag, gains), default=math.nan)),
+        phase=math.degrees(min(map(lag, gains), default=math.nan)),
         delay=math.inf,
         gain_crossings=gains,
         phase_crossings=turns,
@@ -85,13 +85,13 @@ def margins(loop: Linear) -> Margins:
     return replace(found, delay=min(delays, default=math.inf))
 
 
-def _lag(crossing: Crossing) -> float:
+def lag(crossing: Crossing) -> float:
     """Return the further lag in rad that makes a crossing of gain 1 one of phase -180 degrees."""
     return (math.pi + float(np.angle(crossing.value))) % (2 * math.pi)
 
 
 def _delays(found: Margins) -> list[float]:
-    return [_lag(crossing) / crossing.frequency for crossing in found.gain_crossings]
+    return [lag(crossing) / crossing.frequency for crossing in found.gain_crossings]
 
 
 def _in_w(loop: Linear) -> Linear:

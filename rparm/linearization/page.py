@@ -1,65 +1,29 @@
-"""The page of a linear model: tables, texts and pictures."""
+"""The page of a linear model: tables, texts and charts."""
 
 import math
-from collections.abc import Iterator
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from rparm.linearization.largest_step import LargestStep
-from rparm.linearization.linear import Linear, zeros
-from rparm.linearization.margins import Margins, closed, searched
+from rparm.linearization.linear import Linear, participations, zeros
+from rparm.linearization.margins import Crossing, Margins, closed, lag, searched
 from rparm.linearization.responses import frequencies, frequency_response
 from rparm.linearization.study import Study
 from rparm.report import pages
-from rparm.units import milliseconds
+from rparm.report.charts import Chart, Data
+from rparm.units import exponents, milliseconds, unit
 
-Picture = tuple[str, str]  # file without its suffix, and its description
-Part = tuple[pages.Table, str, list[Picture]]
+Part = tuple[pages.Table, str, list[Chart]]
 NONE = "–"
 LISTED = 12  # names in a sentence
 REAL = 1e-6  # of a pole: a smaller real or imaginary part is rounding, as of poles that are equal
-POLES = (  # of a continuous model, and of a sampled one
-    "A deviation along a pole grows or dies out as e to the power of its real part times the time. "
-    "Damping is 1 without oscillation, 0 if it does not decay, below 0 if it grows.",
-    "From sample to sample a deviation along a pole is multiplied by it: it dies out within the "
-    "unit circle. Damping and time are those of a continuous pole with the same samples.",
-)
-MARGINS = (
-    "Each says how far one quantity may change at the break, all else fixed, before the loop "
-    "oscillates without decay. A gain of 2 means twice the effort; the delay is that of computing "
-    "and transmission."
-)
-STEPS = (
-    "Up to this communication step a small deviation dies out; beyond it the coupling makes it "
-    "grow, though each component is integrated exactly. The frequency is that of the motion that "
-    "grows."
-)
-ABOUT = "How small deviations move about one point: x' = A x + B u, y = C x + D u."
-POINT = (
-    "Values about which the model is linearized. Far from them it is less accurate: compare it "
-    "with a run."
-)
-EQUILIBRIUM = (
-    "All derivatives are 0, except those of positions in a steady motion, and ticks of samplers "
-    "change nothing. Where dry friction or a "
-    "stop holds a joint, every value between the two ends is an equilibrium while the others stay "
-    "as they are; the value shown is in the middle."
-)
-PICTURES = (
-    "Bode: amplitude and phase of an output's oscillation relative to an input's. "
-    "Dashed and dotted: the same, sampled, with inputs held between samples."
-)
-MATRICES = (
-    "A row for each derivative of a state and each output, a column for each state and input. "
-    "Units are those of the variables, and s.",
-    "A row for each state one sample later and each output, a column for each state and input. "
-    "Units are those of the variables.",
-)
-TEXTS = pages.STYLE | {"text.parse_math": False}
+TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
+MARGINS, STEPS, EQUILIBRIUM = (TEXTS[name] for name in ("margins", "steps", "equilibrium"))
+POLES, MATRICES = TEXTS["poles"], TEXTS["matrices"]  # of a continuous model, and of a sampled one
 MOST_DRAWN = 2  # inputs and outputs that are drawn: with more, curves would share a colour
 ROUNDING = 1e-12  # of the largest response: less is none
 AROUND = 2.0  # decades beyond the poles that a Bode diagram shows
@@ -73,59 +37,56 @@ ON_AXIS = 1e-7  # damping below which the peak of a pole is infinite: its height
 POLE_GAIN = 1e6  # gain beyond which a Nyquist diagram breaks its line: a pole may be on the axis
 
 
+MARGIN = {"up": "gain_up", "down": "gain_down"}  # attributes of Margins
+LEAST_PART = 0.01  # of a state in a pole; less is not said
+MOST_PARTS = 4  # states that are named of a pole
+
+
 def write(folder: Path, found: Study, step: float | None, again: str, root: str = "") -> Path:
-    """Write page and pictures into a folder; return the page. `again` makes them again.
+    """Write the page into a folder; return the page. The command `again` makes it again.
 
     `root` leads from there to the start page, if there is one.
     """
     folder.mkdir(parents=True, exist_ok=True)
     if not root:
         pages.write_assets(folder)
-    linear = found.linear
+    linear, loop = found.linear, found.loop
     parts: list[Part] = []
     if found.trimmed:
         parts.append((equilibrium_table(found), EQUILIBRIUM, []))
-    if found.margins is not None:
-        parts.append((margins_table(found.margins), MARGINS, []))
+    if loop is not None and found.margins is not None:
+        made = bode_chart(loop, step, found.margins), nyquist_chart(loop, step, found.margins)
+        parts.append((margins_table(found.margins), MARGINS, [*made]))
+        title = "Step response of the closed loop"
+        made = [steps_chart(closed(loop), None, found.units, title)]
+        parts.append((pages.Table(title, [], []), "", made))
+    shown = drawn(linear)
+    if loop is None and shown.inputs and shown.outputs:
+        responses = [bode_chart(shown, step), steps_chart(shown, step, found.units)]
+        parts.append((pages.Table("Responses", [], []), "", responses))
+    if len(linear.states):
+        table = poles_table(found)
+        rows = zip(table.rows, _rows_of(linear, taking_part(linear)), strict=True)
+        cells = [[*row, ", ".join(states)] for row, states in rows]
+        table = replace(table, head=[*table.head, "states that take part"], rows=cells)
+        parts.append((table, POLES[linear.dt > 0], poles_charts(linear, step, loop)))
     if found.largest:
         parts.append((steps_table(list(found.largest)), STEPS, []))
-    if len(linear.states):
-        pages.save_figure(poles_figure(linear, step, found.loop), folder / "poles.png")
-        parts.append((poles_table(found), POLES[linear.dt > 0], [("poles", "Poles")]))
-    if pictures := _pictures(folder, found, step):
-        parts.append((pages.Table("Responses", [], []), PICTURES, pictures))
-    parts.append((point_table(found), POINT, []))
-    parts.append((matrices_table(found), MATRICES[linear.dt > 0], []))
     name = f"{found.path.stem}, {found.variant}" if found.variant else found.path.stem
+    rates = linear.rates_of(linear.poles)
     return pages.write_page(
         folder / pages.INDEX,
         "linearization.html",
         root=root,
         title=f"{name}: linear model",
-        about=ABOUT,
         again=again,
+        growing=int((rates.real > REAL * np.abs(rates)).sum()),
+        found=found,
         notes=[*notes(found), *_not_drawn(found)],
         parts=parts,
+        point=point_table(found),
+        about_matrices=MATRICES[linear.dt > 0],
     )
-
-
-def _pictures(folder: Path, found: Study, step: float | None) -> list[Picture]:
-    """Draw Bode, Nyquist and steps: of the loop where it is broken, else of inputs and outputs."""
-    if found.loop is not None:
-        pages.save_figure(bode_figure(found.loop, step, found.margins), folder / "bode.png")
-        pages.save_figure(nyquist_figure(found.loop, step), folder / "nyquist.png")
-        pages.save_figure(steps_figure(closed(found.loop), None), folder / "steps.png")
-        return [
-            ("bode", "Bode diagram of the loop"),
-            ("nyquist", "Nyquist diagram of the loop"),
-            ("steps", "The closed loop after a step"),
-        ]
-    shown = drawn(found.linear)
-    if not shown.inputs or not shown.outputs:
-        return []
-    pages.save_figure(bode_figure(shown, step), folder / "bode.png")
-    pages.save_figure(steps_figure(shown, step), folder / "steps.png")
-    return [("bode", "Bode diagram"), ("steps", "Step responses")]
 
 
 def _not_drawn(found: Study) -> list[str]:
@@ -133,7 +94,7 @@ def _not_drawn(found: Study) -> list[str]:
     if found.loop is not None or max(len(linear.inputs), len(linear.outputs)) <= MOST_DRAWN:
         return []
     first = f"the first {MOST_DRAWN} outputs that respond, and inputs"
-    return [f"Pictures show {first}; --inputs and --outputs choose."]
+    return [f"Charts show {first}; --inputs and --outputs choose."]
 
 
 # ---- Tables and texts ----------------------------------------------------------------------------
@@ -208,7 +169,12 @@ def _names(names: list[str] | tuple[str, ...]) -> str:
 
 def point_table(found: Study) -> pages.Table:
     """Return the values of states and inputs."""
-    rows = [[name, value, found.units.get(name, "")] for name, value in found.linear.at.items()]
+    values = found.linear.at
+    least = ROUNDING * max(map(abs, values.values()), default=0.0)
+    rows = [
+        [name, value if abs(value) > least else 0.0, unit(found.units.get(name))]
+        for name, value in values.items()
+    ]
     return pages.Table("The point", ["variable", "value", "unit"], rows)
 
 
@@ -218,30 +184,45 @@ def equilibrium_table(found: Study) -> pages.Table:
     for name in found.trimmed:
         ends = found.linear.intervals.get(name, (math.nan, math.nan))
         numbers = _short(found.linear.at[name]), *map(_or_none, ends)
-        rows.append([name, *numbers, found.units.get(name, "")])
+        rows.append([name, *numbers, unit(found.units.get(name))])
     return pages.Table("Equilibrium", ["variable", "value", "from", "to", "unit"], rows)
 
 
 def poles_table(found: Study) -> pages.Table:
     """Return poles, conjugate pairs in one row."""
-    linear, rows = found.linear, []
-    for exact, exact_rate in zip(linear.poles, linear.rates_of(linear.poles), strict=True):
-        pole, rate = _without_rounding(exact), _without_rounding(exact_rate)
-        if pole.imag < 0:
-            continue  # its conjugate stands for both
-        rows.append(
-            [
-                _short(pole.real),
-                f"± {_short(pole.imag)}" if pole.imag else NONE,
-                _short(abs(rate.imag) / (2 * math.pi)) if rate.imag else NONE,
-                _short(-rate.real / abs(exact_rate) + 0.0) if rate else NONE,
-                _short(1 / abs(rate.real)) if rate.real else NONE,
-            ]
-        )
+    linear = found.linear
+    cells = [*map(_pole_cells, linear.poles, linear.rates_of(linear.poles))]
     head = ["real part (1/s)", "imaginary (rad/s)", "frequency (Hz)", "damping", "1/real (s)"]
     if linear.dt:
         head = ["real part", "imaginary", "frequency (Hz)", "damping", "time constant (s)"]
-    return pages.Table("Poles" if found.loop is None else "Poles of the broken loop", head, rows)
+    title = "Poles" if found.loop is None else "Poles of the broken loop"
+    return pages.Table(title, head, _rows_of(linear, cells))
+
+
+def _rows_of(linear: Linear, items: Sequence[list[str]]) -> list[list[str]]:
+    """Leave out items of poles whose conjugate stands for both."""
+    pairs = zip(linear.poles, items, strict=True)
+    return [item for pole, item in pairs if _without_rounding(pole).imag >= 0]
+
+
+def _pole_cells(exact: complex, exact_rate: complex) -> list[str]:
+    pole, rate = _without_rounding(exact), _without_rounding(exact_rate)
+    return [
+        _short(pole.real),
+        f"± {_short(abs(pole.imag))}" if pole.imag else NONE,
+        _short(abs(rate.imag) / (2 * math.pi)) if rate.imag else NONE,
+        _short(-rate.real / abs(exact_rate) + 0.0) if rate else NONE,
+        _short(1 / abs(rate.real)) if rate.real else NONE,
+    ]
+
+
+def taking_part(linear: Linear) -> list[list[str]]:
+    """Name the states that take part in each pole, and by how much, the most first."""
+    found = []
+    for parts in participations(linear.A, linear.poles):
+        order = [i for i in np.argsort(-parts, kind="stable") if parts[i] >= LEAST_PART]
+        found.append([f"{linear.states[i]} {100 * parts[i]:.0f} %" for i in order[:MOST_PARTS]])
+    return found
 
 
 def _without_rounding(pole: complex) -> complex:
@@ -250,17 +231,46 @@ def _without_rounding(pole: complex) -> complex:
     return complex(*(float(x) if abs(x) > least else 0.0 for x in (pole.real, pole.imag)))
 
 
+def marks(found: Margins) -> dict[str, Crossing]:
+    """Return where a loop has its margins: the crossing that each is measured at."""
+    gains, turns = found.gain_crossings, found.phase_crossings
+    every: dict[str, tuple[tuple[Crossing, ...], Callable[[Crossing], float], float]] = {
+        "up": (turns, lambda x: 1 / abs(x.value), found.gain_up),
+        "down": (turns, lambda x: 1 / abs(x.value), found.gain_down),
+        "phase": (gains, lag, math.radians(found.phase)),
+        "delay": (gains, lambda x: lag(x) / x.frequency, found.delay),
+    }
+    return {
+        name: x for name, (crossings, value, margin) in every.items()
+        for x in crossings if math.isclose(value(x), margin)
+    }  # fmt: skip
+
+
+def _marks(found: Margins | None) -> list[Data]:
+    """Return the margins that have a place on a logarithmic axis, for the charts."""
+    return [
+        {"name": name, "margin": getattr(found, MARGIN.get(name, name)), "hertz": _hertz(x),
+         "lag": math.degrees(lag(x)), "re": x.value.real, "im": x.value.imag}
+        for name, x in (marks(found) if found else {}).items() if 0 < x.frequency < math.inf
+    ]  # fmt: skip
+
+
+def _hertz(crossing: Crossing) -> float:
+    return crossing.frequency / (2 * math.pi)
+
+
 def margins_table(found: Margins) -> pages.Table:
     """Return the margins of a loop; those that it does not have are "–"."""
+    at = {name: _or_none(_hertz(x)) for name, x in marks(found).items()}
+    delay = milliseconds(found.delay) if math.isfinite(found.delay) else NONE
     rows = [
-        ["gain, up to times", _or_none(found.gain_up)],
-        ["gain, down to times", _or_none(found.gain_down or math.inf)],
-        ["further lag (degrees)", _or_none(found.phase)],
-        ["further delay", milliseconds(found.delay) if math.isfinite(found.delay) else NONE],
-    ]
-    crossings = [f"{x.frequency / (2 * math.pi):.4g} Hz" for x in found.gain_crossings]
-    rows.append(["the loop's gain is 1 at", ", ".join(crossings) or NONE])
-    return pages.Table("Margins", ["margin", "value"], rows)
+        ["gain margin, up (times)", _or_none(found.gain_up), at.get("up", NONE)],
+        ["gain margin, down (times)", _or_none(found.gain_down or math.inf), at.get("down", NONE)],
+        ["phase margin (degrees)", _or_none(found.phase), at.get("phase", NONE)],
+        ["delay margin", delay, at.get("delay", NONE)],
+        *(["the loop's gain is 1", NONE, _short(_hertz(x))] for x in found.gain_crossings),
+    ]  # fmt: skip
+    return pages.Table("Margins", ["margin", "value", "at (Hz)"], rows)
 
 
 def steps_table(found: list[LargestStep] | tuple[LargestStep, ...]) -> pages.Table:
@@ -285,114 +295,83 @@ def matrices_table(found: Study) -> pages.Table:
 
 
 def _short(number: float) -> str:
-    return f"{number:.6g}"
+    return exponents(f"{number:.6g}")
 
 
 def _or_none(number: float) -> str:
-    return f"{number:.6g}" if math.isfinite(number) else NONE
+    return _short(number) if math.isfinite(number) else NONE
 
 
-# ---- Pictures ------------------------------------------------------------------------------------
-def bode_figure(model: Linear, step: float | None, found: Margins | None = None) -> Figure:
+# ---- Charts -------------------------------------------------------------------------------------
+def bode_chart(model: Linear, step: float | None, found: Margins | None = None) -> Chart:
     """Draw gain and phase of each output by each input, with margins of a loop."""
-    with mpl.rc_context(TEXTS):
-        figure = Figure(figsize=(9, 6), layout="constrained")
-        gain, phase = figure.subplots(2, 1, sharex=True)
-        grid = _grid(model, found)
-        answers = [(label, one, frequency_response(one)(grid)) for label, one in _channels(model)]
-        largest = max((np.abs(values).max() for _, _, values in answers), default=0.0)
-        shown = [each for each in answers if np.abs(each[2]).max() > ROUNDING * largest]
-        for (label, one, values), color in zip(shown, _colors(), strict=False):
-            _bode(gain, phase, values, grid, color, label)
-            if step is not None:
-                sampled = one.sampled(step)
-                below = _below(grid, sampled)
-                name = f"{label}, held for {milliseconds(step)}"
-                response = frequency_response(sampled)(below)
-                _bode(gain, phase, response, below, color, name, pages.DASHED)
-        for axes, level in ((gain, 0.0), (phase, -180.0)):
-            if step is not None:
-                axes.axvline(0.5 / step, color=pages.MUTED, linewidth=0.8, linestyle=":")
-            for crossing in found.gain_crossings if found else ():
-                axes.axvline(crossing.frequency / (2 * math.pi), color=pages.INK, linewidth=0.8)
-                axes.axhline(level, color=pages.INK, linewidth=0.8)
-        gain.set_ylabel("gain (dB)")
-        phase.set_ylabel("phase (degrees)")
-        phase.set_xlabel("frequency (Hz)")
-        gain.set_xlim(grid[0] / (2 * math.pi), grid[-1] / (2 * math.pi))
-        if gain.get_legend_handles_labels()[0]:
-            gain.legend(fontsize=8)
-    return figure
+    grid = _grid(model, found)
+    responses = [(label, one, frequency_response(one)(grid)) for label, one in _channels(model)]
+    largest = max((np.abs(values).max() for _, _, values in responses), default=0.0)
+    shown = [each for each in responses if np.abs(each[2]).max() > ROUNDING * largest]
+    curves = []
+    for i, (label, one, values) in enumerate(shown):
+        curves.append(_bode(values, grid) | {"name": label, "colour": i})
+        if step is not None:
+            sampled = one.sampled(step)
+            below = _below(grid, sampled)
+            name = f"{label}, held for {milliseconds(step)}"
+            held = _bode(frequency_response(sampled)(below), below)
+            curves.append(held | {"name": name, "colour": i, "dashed": True})
+    data = {"curves": curves, "marks": _marks(found)}
+    data |= {"ends": grid[[0, -1]] / (2 * math.pi), "half": step and 0.5 / step}
+    data["crossings"] = [_hertz(x) for x in found.gain_crossings] if found else []
+    text = f"Gain and phase over the frequency: {', '.join(label for label, _, _ in shown)}"
+    return Chart("Bode diagram", text, "bode", data, height=30)
 
 
-def _bode(
-    gain: Axes,
-    phase: Axes,
-    values: np.ndarray,
-    grid: np.ndarray,
-    color: str,
-    label: str,
-    line: object = "-",
-) -> None:
+def _bode(values: np.ndarray, grid: np.ndarray) -> Data:
     grid, values = grid[np.isfinite(values)], values[np.isfinite(values)]
     with np.errstate(divide="ignore"):
         decibels = 20 * np.log10(np.abs(values))
-    hertz = grid / (2 * math.pi)
-    gain.semilogx(hertz, decibels, color=color, linestyle=line, label=label)
     turned = np.degrees(np.unwrap(np.angle(values)))
     turned -= 360 * np.round((turned[0] + 90) / 360)
-    phase.semilogx(hertz, turned, color=color, linestyle=line)
+    return {"hertz": grid / (2 * math.pi), "gain": decibels, "phase": turned}
 
 
-def nyquist_figure(loop: Linear, step: float | None) -> Figure:
+def nyquist_chart(loop: Linear, step: float | None, found: Margins | None = None) -> Chart:
     """Draw L along the frequencies; -1 is where it becomes unstable."""
-    with mpl.rc_context(TEXTS):
-        figure = Figure(figsize=(6, 6), layout="constrained")
-        axes = figure.subplots()
-        grid = searched(loop)
-        _nyquist(axes, frequency_response(loop)(grid), "-", "sampled" if loop.dt else "continuous")
-        if step is not None:
-            sampled, name = loop.sampled(step), f"held for {milliseconds(step)}"
-            response = frequency_response(sampled)(_below(grid, sampled))
-            _nyquist(axes, response, pages.DASHED, name)
-        circle = np.exp(1j * np.linspace(0, 2 * math.pi, 200))
-        axes.plot(circle.real, circle.imag, color=pages.MUTED, linewidth=0.8, linestyle=":")
-        axes.plot(-1, 0, "+", color=pages.ERROR_COLORS[0], markersize=14, markeredgewidth=2)
-        axes.set_xlim(-FARTHEST, FARTHEST)
-        axes.set_ylim(-FARTHEST, FARTHEST)
-        axes.set_aspect("equal")
-        axes.set_xlabel("real part of L")
-        axes.set_ylabel("imaginary part of L")
-        axes.legend(fontsize=8)
-    return figure
+    grid = searched(loop)
+    name = "sampled" if loop.dt else "continuous"
+    curves = [_nyquist(frequency_response(loop)(grid), grid) | {"name": name}]
+    if step is not None:
+        sampled = loop.sampled(step)
+        below = _below(grid, sampled)
+        held = _nyquist(frequency_response(sampled)(below), below)
+        curves.append(held | {"name": f"held for {milliseconds(step)}", "dashed": True})
+    data = {"curves": curves, "marks": _marks(found)}
+    text = "The loop L in the complex plane, along the frequencies, beside the critical point -1"
+    return Chart("Nyquist diagram", text, "nyquist", data | {"reach": FARTHEST}, height=30)
 
 
-def _nyquist(axes: Axes, values: np.ndarray, line: object, label: str) -> None:
+def _nyquist(values: np.ndarray, grid: np.ndarray) -> Data:
     values = np.where(np.abs(values) < POLE_GAIN, values, np.nan)
-    axes.plot(values.real, values.imag, color=pages.RUN_COLOR, linestyle=line, label=label)
-    axes.plot(values.real, -values.imag, color=pages.RUN_COLOR, linestyle=line, alpha=0.35)
+    return {"hertz": grid / (2 * math.pi), "re": values.real, "im": values.imag}
 
 
-def steps_figure(model: Linear, step: float | None) -> Figure:
-    """Answer of each output to a step of each input by 1."""
-    with mpl.rc_context(TEXTS):
-        count = len(model.outputs)
-        figure = Figure(figsize=(9, 1.2 + 2 * count), layout="constrained")
-        every = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
-        end = _end(model, step)
-        for axes, output in zip(every, model.outputs, strict=True):
-            for name, color in zip(model.inputs, _colors(), strict=False):
-                one = model.select([name], [output])
-                style = {"color": color, "label": f"step of {name}"}
-                style |= {"drawstyle": "steps-post", "marker": "."} if model.dt else {}
-                axes.plot(*_step(one, end / POINTS, end), **style)
-                if step is not None and end <= MOST_DOTS * step:
-                    axes.plot(*_step(one, step, end), ".", color=color)
-            axes.set_ylabel(output)
-        every[0].legend(fontsize=8)
-        every[-1].set_xlim(0, end)
-        every[-1].set_xlabel("time (s)")
-    return figure
+def steps_chart(
+    model: Linear, step: float | None, units: Mapping[str, str], title: str = "Step responses"
+) -> Chart:
+    """Draw the response of each output to a step of each input by 1."""
+    curves, end = [], _end(model, step)
+    lengths = [end / POINTS, *([step] if step is not None and end <= MOST_DOTS * step else [])]
+    for i, output in enumerate(model.outputs):
+        for k, name in enumerate(model.inputs):
+            label = f"step of {name} by 1 {unit(units.get(name))}".rstrip()
+            for dots, length in enumerate(lengths):
+                times, values = _step(model.select([name], [output]), length, end)
+                curves.append({"name": label, "output": i, "colour": k, "dots": bool(dots),
+                               "held": model.dt > 0, "x": times, "y": values})  # fmt: skip
+    texts = [(name, unit(units.get(name))) for name in model.outputs]
+    outputs = [f"{name} ({text})" if text else name for name, text in texts]
+    text = f"{title}: {', '.join(model.outputs)} over the time after a step of an input by 1"
+    data = {"curves": curves, "outputs": outputs, "end": end}
+    return Chart(title, text, "steps", data, height=8 + 11 * len(outputs))
 
 
 def _step(model: Linear, length: float, end: float) -> tuple[np.ndarray, np.ndarray]:
@@ -405,42 +384,27 @@ def _step(model: Linear, length: float, end: float) -> tuple[np.ndarray, np.ndar
     return model.dt * np.arange(count), values
 
 
-def poles_figure(model: Linear, step: float | None, loop: Linear | None = None) -> Figure:
+def poles_charts(model: Linear, step: float | None, loop: Linear | None = None) -> list[Chart]:
     """Draw poles in the plane of s, and of the sampled model in the plane of z."""
-    with mpl.rc_context(TEXTS):
-        figure = Figure(figsize=(9, 4.2), layout="constrained")
-        if model.dt:
-            text = f"sampled every {milliseconds(model.dt)}"
-            _draw_sampled_poles(figure.subplots(), model.poles, text)
-            return figure
-        plain, sampled = figure.subplots(1, 2)
-        plain.axvline(0, color=pages.INK, linewidth=0.8)
-        style = {"color": pages.RUN_COLOR, "label": "poles", "markersize": 9}
-        plain.plot(model.poles.real, model.poles.imag, "x", **style)
-        height = FLATTEST * np.abs(model.poles).max(initial=1.0)
-        low, high = plain.get_ylim()
-        plain.set_ylim(min(low, -height), max(high, height))
-        if loop is not None:
-            found = closed(loop).poles
-            style = {"color": pages.ERROR_COLORS[0], "label": "when it is closed", "markersize": 11}
-            plain.plot(found.real, found.imag, "+", **style)
-        plain.set_xlabel("real part (1/s): left of 0 dies out")
-        plain.set_ylabel("imaginary part (rad/s)")
-        plain.legend(fontsize=8)
-        if step is None:
-            sampled.set_visible(False)
-        else:
-            text = f"held for {milliseconds(step)}"
-            _draw_sampled_poles(sampled, model.sampled(step).poles, text)
-    return figure
+    if model.dt:
+        title = f"Poles, sampled every {milliseconds(model.dt)}"
+        return [_poles_chart(title, [("poles", model)], model.dt)]
+    every = [("poles", model), *([("when the loop is closed", closed(loop))] if loop else [])]
+    found = [_poles_chart("Poles", every, 0.0)]
+    if step is not None:
+        every = [("poles", model.sampled(step))]
+        found.append(_poles_chart(f"Poles, held for {milliseconds(step)}", every, step))
+    return found
 
 
-def _draw_sampled_poles(axes: Axes, found: np.ndarray, text: str) -> None:
-    circle = np.exp(1j * np.linspace(0, 2 * math.pi, 200))
-    axes.plot(circle.real, circle.imag, color=pages.INK, linewidth=0.8)
-    axes.plot(found.real, found.imag, "x", color=pages.RUN_COLOR, markersize=9)
-    axes.set_aspect("equal")
-    axes.set_xlabel(f"{text}: within the circle dies out")
+def _poles_chart(title: str, models: Sequence[tuple[str, Linear]], dt: float) -> Chart:
+    poles = [
+        {"name": name, "re": one.poles.real, "im": one.poles.imag, "states": taking_part(one),
+         "cells": [*map(_pole_cells, one.poles, one.rates_of(one.poles))]}
+        for name, one in models
+    ]  # fmt: skip
+    text = f"Poles in the complex plane: {', '.join(map(str, np.round(models[0][1].poles, 3)))}"
+    return Chart(title, text, "poles", {"poles": poles, "sampled": dt > 0, "flattest": FLATTEST})
 
 
 def drawn(model: Linear) -> Linear:
@@ -448,8 +412,8 @@ def drawn(model: Linear) -> Linear:
     grid = frequencies(model.rates_of(model.poles), (), AROUND)
     s = model.points(grid)[:, None, None]
     states = np.linalg.solve(s * np.eye(len(model.A)) - model.A, model.B + 0 * s)
-    answers = np.abs(model.C @ states + model.D).max(axis=0)  # (outputs, inputs)
-    responds = answers > ROUNDING * answers.max(initial=0.0)
+    gains = np.abs(model.C @ states + model.D).max(axis=0)  # (outputs, inputs)
+    responds = gains > ROUNDING * gains.max(initial=0.0)
     outputs = np.flatnonzero(responds.any(axis=1))[:MOST_DRAWN]
     inputs = np.flatnonzero(responds[outputs].any(axis=0))[:MOST_DRAWN]
     return model.select([model.inputs[i] for i in inputs], [model.outputs[i] for i in outputs])
@@ -459,11 +423,6 @@ def _channels(model: Linear) -> Iterator[tuple[str, Linear]]:
     for output in model.outputs:
         for name in model.inputs:
             yield f"{output} by {name}", model.select([name], [output])
-
-
-def _colors() -> Iterator[str]:
-    while True:
-        yield from (pages.RUN_COLOR, *pages.ERROR_COLORS)
 
 
 def _grid(model: Linear, found: Margins | None = None) -> np.ndarray:

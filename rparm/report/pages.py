@@ -63,6 +63,8 @@ STYLE = {
 }
 
 _templates.filters |= {
+    "exponents": units.exponents,
+    "unit": units.unit,
     "address": lambda path: quote(os.fsencode(path)),
     "minus": units.minus,
     "number": units.number,

@@ -8,7 +8,8 @@ import numpy as np
 from rparm import proof
 from rparm.fmi.model import Model
 from rparm.proof import Enclosure, ProvenReference
-from rparm.report import overview
+from rparm.report import charts, overview
+from rparm.report.charts import Chart
 from rparm.report.overview import FAILED, PASSED, PROOFS
 from rparm.report.pages import RunPage, Table
 from rparm.report.run_data import Curve, Plot, RunData, thinned
@@ -62,12 +63,31 @@ def write(
         status=_status([good] if good else []),
         facts=facts,
         data=RunData(scenario.name, title, enclosure.times[rows], shown),
-        tables=[_largest(model, enclosure, errors)],
+        tables=[],
         notes=[ASSUMES],
         failures=[str(wrong) for wrong in good.wrong] if good else [],
         again=again,
     )
-    return _write(report, scenario.name, page, model.name)
+    file = report / PROOFS / f"{scenario.name}.html"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    first = _largest(model, enclosure, errors)
+    charts.write_page(file, page, first, [_chart(enclosure, errors)], "Each state", "../")
+    overview.record(report, PROOFS, [overview.entry_of(scenario.name, page, model.name)])
+    return file
+
+
+def _chart(enclosure: Enclosure, errors: Mapping[str, np.ndarray]) -> Chart:
+    """Draw the largest error of all states by each run, relative to their largest values."""
+    scales = np.abs(enclosure.high).max(axis=0)
+    curves = []
+    for name, each in errors.items():
+        largest = (each / np.where(scales > 0, scales, 1.0)).max(axis=1)
+        rows = thinned([np.log10(np.maximum(largest, SMALLEST))])
+        y = np.where(largest < SMALLEST, np.nan, largest)[rows]  # a logarithmic axis has no 0
+        curves.append({"name": name, "x": enclosure.times[rows], "y": y})
+    text = "Proven bound of the error over time, relative to each state's largest value"
+    data = {"curves": curves, "x": "time (s)", "y": "relative error"}
+    return Chart(f"{text}: the largest of all states", text, "bounds", data)
 
 
 def write_references(

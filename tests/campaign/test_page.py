@@ -1,6 +1,7 @@
 """The page of a campaign in a browser: it fits, is quiet and readable, and says what is missing."""
 
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from tests.campaign.cluster.processes import completed
 from tests.campaign.files import write
 from tests.support.browser import Browser
+from tests.support.rparm_project import Console
 
 RUNS = 16  # groups
 CHANGES = [
@@ -25,6 +27,20 @@ CHANGES = [
         '[[maps]]\nx = "m2"\ny = "q1"\ncolour = "settling(never)"',
     ),
 ]
+CLICK = """
+const drawing = document.querySelector('#scatter .drawing');
+drawing.scrollIntoView({ block: 'center' });
+const { left, top, width, height } = drawing.querySelector('.point').getBoundingClientRect();
+const target = drawing.querySelector('.nsewdrag');
+const at = { clientX: left + width / 2, clientY: top + height / 2, bubbles: true, view: window };
+for (const kind of ['mousemove', 'mousedown']) target.dispatchEvent(new MouseEvent(kind, at));
+document.querySelector('.dragcover, body').dispatchEvent(new MouseEvent('mouseup', at));
+"""
+CHOOSE = """
+const list = document.getElementById('result');
+list.value = arguments[0];
+list.dispatchEvent(new Event('change'));
+"""
 FAILING = [("uniform = [1.0, 3.0]", "normal = [-50.0, 0.5]")]
 
 
@@ -47,6 +63,7 @@ def failing(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def shown(browser: Browser, folder: Path, **view) -> str:
     """Text of the page, a row of a table a line."""
     browser.open(folder / "campaign.html", **view)
+    browser.wait("document.documentElement.dataset.ready === 'yes'", 60)
     return browser.run("return document.body.innerText").replace("\N{MINUS SIGN}", "-")
 
 
@@ -60,6 +77,46 @@ def test_it_fits_is_quiet_and_accessible(
     browser.check_quiet()
     assert browser.overflow() == 0
     assert browser.violations() == []
+
+
+def test_a_clicked_point_is_a_run_and_its_command_repeats_it(
+    each_browser: Browser, folder: Path, console: Console
+) -> None:
+    browser, name = each_browser, "maximum(dq1)"
+    shown(browser, folder)
+    assert browser.run("return document.getElementById('result').value") == name  # as in `worst`
+    browser.run(CLICK)
+    browser.wait("document.getElementById('chosen').dataset.run", 30)
+    browser.check_quiet()
+    rows = browser.run(
+        "return [...document.querySelectorAll('#chosen dl div')].map("
+        "row => [...row.children].map(cell => cell.textContent.replace('\u2212', '-')))"
+    )
+    found = dict(rows)
+    words = shlex.split(browser.run("return document.querySelector('#chosen code').textContent"))
+    run = int(browser.run("return document.getElementById('chosen').dataset.run"))
+    assert words[-3:] == ["--replay", str(run), "--open"]
+    code, out, _ = console(*words[1:-1])
+    printed = dict(line.split(" = ") for line in out.splitlines() if " = " in line)
+    assert code == 0 and {"m2", name} <= set(printed)
+    for column, value in printed.items():
+        label = next((label for label in found if label.split(" [")[0] == column), None)
+        if label is not None and found[label] != "–":
+            assert float(found[label]) == pytest.approx(float(value), rel=1e-6), column
+
+
+def test_parameters_come_in_the_order_of_their_correlation(browser: Browser, folder: Path) -> None:
+    shown(browser, folder)
+    table = pq.read_table(folder / "blocks").to_pandas()
+    for name in ("maximum(dq1)", "final(q1)"):
+        browser.run(CHOOSE, name)
+        browser.wait(f"document.getElementById('scatter').dataset.result === '{name}'", 30)
+        captions = browser.run("return document.getElementById('scatter').innerText")
+        found = re.findall("(m2|q1): rank correlation (.[\\d.]+)", captions)
+        ranks = table[["m2", "q1"]].corrwith(table[name], method="spearman")
+        assert [x for x, _ in found] == sorted(ranks.index, key=lambda x: -abs(ranks[x]))
+        for x, stated in found:
+            assert float(stated.replace("\N{MINUS SIGN}", "-")) == pytest.approx(ranks[x], rel=0.06)
 
 
 def test_what_is_missing_is_counted_and_told_from_failed_runs(

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rparm.fmi.fmu_file import read_model
@@ -31,19 +32,25 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def shown(browser: Browser, folder: Path, **view) -> None:
+    browser.open(folder / "index.html", **view)
+    for name in ("ready", "charts"):
+        browser.wait(f"document.documentElement.dataset.{name} === 'yes'", 60)
+
+
 @pytest.mark.parametrize("dark", [False, True])
 @pytest.mark.parametrize("width", [400, 1200])
 def test_it_fits_is_quiet_and_accessible(
     folder: Path, width: int, dark: bool, browser: Browser
 ) -> None:
-    browser.open(folder / "index.html", width=width, dark=dark)
+    shown(browser, folder, width=width, dark=dark)
     browser.check_quiet()
     assert browser.overflow() == 0
     assert browser.violations() == []
 
 
 def test_it_says_all(folder: Path, browser: Browser) -> None:
-    browser.open(folder / "index.html")
+    shown(browser, folder)
     text = browser.run("return document.body.innerText")
     for part in (
         "armature1 + I1z",
@@ -56,4 +63,10 @@ def test_it_says_all(folder: Path, browser: Browser) -> None:
         "rparm identify again",
     ):
         assert part in text, part
-    assert (folder / page.PICTURE).stat().st_size > 10_000
+    parts = "Parameters\n", "Correlations of", "residuals of q1", "Ljung-Box"
+    places = [text.index(part) for part in parts]
+    assert places == sorted(places)
+    drawn = browser.run("return document.querySelector('.chart .drawing').data[0]")
+    values = np.array(drawn["z"])
+    assert np.array_equal(values, values.T) and np.allclose(np.diag(values), 1.0)
+    assert len(drawn["y"]) == len(values) >= 5 and np.abs(values).max() <= 1 + 1e-6

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import re
 from pathlib import Path
 
 import control
@@ -12,8 +13,9 @@ from scipy.io import loadmat
 
 import rparm
 from rparm import __main__ as cli
-from rparm.linearization.page import steps_figure
+from rparm.linearization.page import steps_chart
 from rparm.linearization.responses import frequency_response
+from tests.support.browser import Browser
 from tests.support.rparm_project import MISTAKES
 
 POSE = {"q1": "30 deg", "q2": "0.1 m"}
@@ -163,24 +165,49 @@ def test_a_given_velocity_is_a_steady_motion(
     assert "This is no equilibrium: q1' = 0.02, dq1'" in printed(["RPPlant", *at], capsys)
 
 
-def test_a_page_with_pictures_explains_itself(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("width, dark", [(400, True), (900, False), (1400, True)])
+def test_margins_stand_in_the_charts_and_the_page_fits(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    each_browser: Browser,
+    width: int,
+    dark: bool,
 ) -> None:
     command = ["ClosedLoop", "--break", "arm.tau1", "--step", "0.01", "--output", str(tmp_path)]
-    found = document(command, capsys)
+    found, browser = document(command, capsys), each_browser
     assert found["margins"]["phase"] == pytest.approx(76.345, abs=1e-3)
     assert found["margins"]["gain_up"] is None and found["margins"]["stable"]
-    folder = Path(found["page"]).parent
-    page = (folder / "index.html").read_text(encoding="utf-8")
+    page = Path(found["page"]).read_text(encoding="utf-8")
     for text in ("Margins", "76.345", "32.3705 ms", "Held: controller.integral1", "--break"):
         assert text in page
-    for name in ("bode", "nyquist", "steps", "poles"):
-        assert f"{name}.png" in page and (folder / f"{name}.png").stat().st_size > 5000
+    browser.open(Path(found["page"]), width=width, dark=dark)
+    browser.wait("document.documentElement.dataset.ready === 'yes'", 60)
+    browser.check_quiet()
+    assert browser.overflow() == 0 and browser.violations() == []
+    bode, nyquist, step, poles, _ = browser.run(
+        "return [...document.querySelectorAll('.drawing')].map(x => x.data.map("
+        "({ x, y, name, meta, text }) => ({ x, y, name, meta, text })))"
+    )
+    hertz = browser.run(
+        "return [...document.querySelectorAll('tr')].find(row => row.innerText.startsWith('phase'))"
+        ".cells[2].innerText"
+    )
+    gain, phase, *_, mark = bode
+    assert mark["meta"] == "phase" and mark["x"] == pytest.approx([float(hertz)] * 2, rel=1e-5)
+    assert np.interp(mark["x"][0], gain["x"], gain["y"]) == pytest.approx(0.0, abs=1e-3)
+    ends = np.interp(mark["x"][0], phase["x"], phase["y"]), -180.0
+    assert mark["y"] == pytest.approx(ends, abs=1e-3)
+    assert mark["y"][0] - mark["y"][1] == pytest.approx(76.345, abs=1e-3)
+    (dot,) = [trace for trace in nyquist if trace.get("meta") == "phase"]
+    assert np.hypot(dot["x"][0], dot["y"][0]) == pytest.approx(1.0, abs=1e-6)
+    assert step[0]["name"] == "step of arm.tau1 by 1 N·m"
+    for text in poles[0]["text"]:
+        assert re.search(r"pole (0|-20) 1/s<br>(damping 1<br>)?arm\.d?q[12] \d+ %<br>", text)
 
 
 def test_samples_too_dense_to_be_seen_are_not_drawn() -> None:
     model = rparm.linearize("RPManipulator").select(["tau1"], ["q1"])
-    counts = [len(steps_figure(model, step).axes[0].lines) for step in (1e-2, 1e-9)]
+    counts = [len(steps_chart(model, step, {}).data["curves"]) for step in (1e-2, 1e-9)]
     assert counts == [2, 1]
 
 

@@ -15,7 +15,7 @@ import pytest
 from scipy.linalg import block_diag
 
 from rparm.linearization import page
-from rparm.linearization.linear import Linear
+from rparm.linearization.linear import Linear, participations
 from rparm.linearization.margins import Margins, margins
 from rparm.linearization.responses import minimal
 from rparm.linearization.study import Study
@@ -196,7 +196,7 @@ def test_poles_at_0_are_0_and_slow_ones_are_not() -> None:
     assert np.count_nonzero(poles) == 2 and np.abs(poles[2:]) == pytest.approx(np.sqrt(1.03e6))
     slow = linear(np.array([[-1e-7, 1.0], [0.0, -1e4]]), np.eye(2)[:, [1]], np.eye(2)[[0]])
     table = page.poles_table(Study(Path(), slow, {}))
-    assert [row[0] for row in table.rows] == ["-1e-07", "-10000"]
+    assert [row[0] for row in table.rows] == ["-1e-7", "-10000"]
 
 
 def test_pictures_draw_the_peaks() -> None:
@@ -204,18 +204,41 @@ def test_pictures_draw_the_peaks() -> None:
     loop = rational(*LOOPS_BY_NAME["mode of damping 0.001"])
     w = np.linspace(0.999, 1.001, 20001) * W
     peak = np.abs(loop.ss()(1j * w)).max()
-    drawn = page.bode_figure(loop, None, margins(loop)).axes[0].lines[0]
-    hertz, decibels = drawn.get_data()
+    drawn = page.bode_chart(loop, None, margins(loop)).data["curves"][0]
+    hertz, decibels = drawn["hertz"], drawn["gain"]
     near = np.abs(2 * np.pi * hertz / W - 1) < 0.1
     assert decibels[near].max() == pytest.approx(20 * np.log10(peak), abs=0.01)
-    real, imag = page.nyquist_figure(loop, None).axes[0].lines[0].get_data()
+    drawn = page.nyquist_chart(loop, None).data["curves"][0]
+    real, imag = drawn["re"], drawn["im"]
     steps = np.hypot(np.diff(real), np.diff(imag))[np.hypot(real, imag)[1:] < 3]
     assert steps.max() < 0.15 * peak
-    sampled = (
-        page.bode_figure(loop, 0.07).axes[0].lines[1].get_data()
-    )  # the mode folds to 29.8 rad/s
-    near = np.abs(2 * np.pi * sampled[0] / (2 * np.pi / 0.07 - W) - 1) < 0.01
-    assert sampled[1][near].max() > 20 * np.log10(0.3)
+    sampled = page.bode_chart(loop, 0.07).data["curves"][1]  # the mode folds to 29.8 rad/s
+    near = np.abs(2 * np.pi * sampled["hertz"] / (2 * np.pi / 0.07 - W) - 1) < 0.01
+    assert sampled["gain"][near].max() > 20 * np.log10(0.3)
+
+
+def test_states_take_part_in_poles_as_by_hand() -> None:
+    """x'' = -3 x' - 2 x: the pole -1 has the vectors (1, -1) and (2, 1), -2 (1, -2) and (1, 1)."""
+    A, units = np.array([[0.0, 1.0], [-2.0, -3.0]]), np.array([1.0, 1e6])
+    for matrix in (A, A * units / units[:, None]):
+        parts = participations(matrix, np.array([-1.0, -2.0]))
+        assert parts == pytest.approx(np.array([[2, 1], [1, 2]]) / 3, abs=1e-9)
+    twice = np.array([[-5.0, 1.0, 0.0], [0.0, -5.0, 0.0], [0.0, 0.0, -1.0]])  # one eigenvector
+    parts = participations(twice, np.array([-1.0, -5.0, -5.0]))
+    assert parts == pytest.approx(np.array([[0, 0, 1], [0.5, 0.5, 0], [0.5, 0.5, 0]]), abs=1e-7)
+
+
+def test_marks_are_the_margins_of_the_table() -> None:
+    """L = 4 / (s + 1)^3: the phase is -180 degrees at sqrt(3) rad/s, where the gain is 1/2."""
+    found = margins(rational([4.0], [1.0, 3.0, 3.0, 1.0]))
+    at = {name: crossing.frequency for name, crossing in page.marks(found).items()}
+    crossing = np.sqrt(4 ** (2 / 3) - 1)
+    expected = {"up": np.sqrt(3), "phase": crossing, "delay": crossing}
+    assert at == pytest.approx(expected)
+    rows = {row[0]: row[1:] for row in page.margins_table(found).rows}
+    assert rows["gain margin, up (times)"] == ["2", "0.275664"]
+    for name in ("phase margin (degrees)", "delay margin"):
+        assert rows[name][1] == f"{crossing / (2 * np.pi):.6g}"
 
 
 def test_minimal_keeps_the_response_and_drops_what_plays_no_part() -> None:
