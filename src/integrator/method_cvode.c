@@ -1,11 +1,15 @@
 /* The multistep methods of CVODE. */
 #include "sundials.h"
 
+#include "workspace.h"
+
 #include <cvode/cvode.h>
 #include <math.h>
 #include <nvector/nvector_serial.h>
 #include <string.h>
+#include <sundials/sundials_band.h>
 #include <sunlinsol/sunlinsol_dense.h>
+#include <sunmatrix/sunmatrix_band.h>
 #include <sunmatrix/sunmatrix_dense.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
@@ -48,8 +52,9 @@ struct cvode {
 static int evaluate_jacobian(sunrealtype t, N_Vector x, N_Vector dx, SUNMatrix jacobian,
                              void *user_data, N_Vector work1, N_Vector work2, N_Vector work3) {
     const struct sundials *base = user_data;
-    return sundials_callback_flag(
-        problem_jacobian(base->problem, t, small_vector_data(x), SUNDenseMatrix_Data(jacobian)));
+    double *J = base->problem->ode.band != NULL ? SUNBandMatrix_Data(jacobian)
+                                                : SUNDenseMatrix_Data(jacobian);
+    return sundials_callback_flag(problem_jacobian(base->problem, t, small_vector_data(x), J));
 }
 
 static void destroy(void *memory) {
@@ -88,9 +93,63 @@ static bool create_fixed_point_iteration(struct cvode *cvode) {
            CVodeSetNonlinConvCoef(cvode->solver, adams_iteration_error) == CV_SUCCESS;
 }
 
-static bool create_newton_iteration(struct cvode *cvode) {
+/* ---- Linear equations with a band ------------------------------------------------------------
+ * The matrix has the states in the order of the band, vectors have them in their own. */
+
+struct band_solver {
+    const size_t *order;
+    sunindextype pivots[];
+};
+
+static SUNLinearSolver_Type type_of_band_solver(SUNLinearSolver solver) {
+    return SUNLINEARSOLVER_DIRECT;
+}
+
+static int factorize_band(SUNLinearSolver solver, SUNMatrix A) {
+    struct band_solver *own = solver->content;
+    return SUNDlsMat_bandGBTRF(SM_COLS_B(A), SM_COLUMNS_B(A), SM_UBAND_B(A), SM_LBAND_B(A),
+                               SM_SUBAND_B(A), own->pivots) > 0
+               ? SUNLS_LUFACT_FAIL
+               : SUNLS_SUCCESS;
+}
+
+/* Writes x; b is CVODE's, which copies x to it. */
+static int solve_band(SUNLinearSolver solver, SUNMatrix A, N_Vector x, N_Vector b,
+                      sunrealtype tolerance) {
+    struct band_solver *own = solver->content;
+    const sunindextype n = SM_COLUMNS_B(A);
+    double *by_place = small_vector_data(x);
+    double *by_state = small_vector_data(b);
+    for (sunindextype k = 0; k < n; k++) {
+        by_place[k] = by_state[own->order[k]];
+    }
+    SUNDlsMat_bandGBTRS(SM_COLS_B(A), n, SM_SUBAND_B(A), SM_LBAND_B(A), own->pivots, by_place);
+    for (sunindextype k = 0; k < n; k++) {
+        by_state[own->order[k]] = by_place[k];
+    }
+    N_VScale(1.0, b, x);
+    return SUNLS_SUCCESS;
+}
+
+static bool create_band(struct cvode *cvode, const struct band *band, sunindextype n) {
     SUNContext context = cvode->base.context;
-    const sunindextype n = (sunindextype)cvode->base.problem->ode.state_count;
+    struct band_solver *own = workspace_calloc(1, sizeof *own + (size_t)n * sizeof own->pivots[0]);
+    cvode->jacobian =
+        SUNBandMatrix(n, (sunindextype)band->upper, (sunindextype)band->lower, context);
+    cvode->linear_solver = SUNLinSolNewEmpty(context);
+    if (own == NULL || cvode->jacobian == NULL || cvode->linear_solver == NULL) {
+        return false;
+    }
+    own->order = band->order;
+    cvode->linear_solver->content = own;
+    cvode->linear_solver->ops->gettype = type_of_band_solver;
+    cvode->linear_solver->ops->setup = factorize_band;
+    cvode->linear_solver->ops->solve = solve_band;
+    return true;
+}
+
+static bool create_dense(struct cvode *cvode, sunindextype n) {
+    SUNContext context = cvode->base.context;
     cvode->jacobian = SUNDenseMatrix(n, n, context);
     // SUNLinSol_Dense works with any vector that has an array, but takes only a serial one for
     // pattern
@@ -100,8 +159,17 @@ static bool create_newton_iteration(struct cvode *cvode) {
     }
     cvode->linear_solver = SUNLinSol_Dense(pattern, cvode->jacobian, context);
     N_VDestroy(pattern);
-    cvode->nonlinear_solver = SUNNonlinSol_Newton(cvode->base.x, context);
-    return cvode->linear_solver != NULL && cvode->nonlinear_solver != NULL &&
+    return cvode->linear_solver != NULL;
+}
+
+static bool create_newton_iteration(struct cvode *cvode) {
+    const struct ode *ode = &cvode->base.problem->ode;
+    const sunindextype n = (sunindextype)ode->state_count;
+    if (!(ode->band != NULL ? create_band(cvode, ode->band, n) : create_dense(cvode, n))) {
+        return false;
+    }
+    cvode->nonlinear_solver = SUNNonlinSol_Newton(cvode->base.x, cvode->base.context);
+    return cvode->nonlinear_solver != NULL &&
            CVodeSetNonlinearSolver(cvode->solver, cvode->nonlinear_solver) == CV_SUCCESS &&
            CVodeSetLinearSolver(cvode->solver, cvode->linear_solver, cvode->jacobian) ==
                CV_SUCCESS &&
