@@ -25,7 +25,7 @@ set(files
   sundials/sundials_dense sundials/sundials_linearsolver
   sundials/sundials_logger sundials/sundials_math sundials/sundials_matrix
   sundials/sundials_nonlinearsolver sundials/sundials_nvector sundials/sundials_nvector_senswrapper
-  sunlinsol/dense/sunlinsol_dense sunmatrix/band/sunmatrix_band sunmatrix/dense/sunmatrix_dense
+  sunlinsol/band/sunlinsol_band sunlinsol/dense/sunlinsol_dense sunmatrix/band/sunmatrix_band sunmatrix/dense/sunmatrix_dense
   sunnonlinsol/fixedpoint/sunnonlinsol_fixedpoint sunnonlinsol/newton/sunnonlinsol_newton)
 list(TRANSFORM files PREPEND ${SUNDIALS_SOURCE_DIR}/src/)
 list(TRANSFORM files APPEND .c)

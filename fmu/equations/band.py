@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from typing import NamedTuple
 
 FEWEST_STATES, NARROWEST = 50, 4  # a full matrix has NARROWEST times the elements, or more
 
 
-@dataclass(frozen=True)
-class Band:
+class Band(NamedTuple):
     """struct band of src/model/model.h."""
 
     lower: int
     upper: int
     order: list[int]
-    places: list[int]  # of the elements, as they were given
-
-    @property
-    def size(self) -> int:
-        """Elements with the room to factorize."""
-        return len(self.order) * (2 * self.lower + self.upper + 1)
+    places: list[int]  # of the elements that were given
+    size: int
 
 
 def band(count: int, elements: Collection[tuple[int, int]]) -> Band | None:
@@ -34,7 +29,8 @@ def band(count: int, elements: Collection[tuple[int, int]]) -> Band | None:
     upper = max([0, *(j - i for i, j in moved)])
     length = 2 * lower + upper + 1
     places = [lower + upper + i - j + length * j for i, j in moved]
-    return Band(lower, upper, order, places) if NARROWEST * length <= count else None
+    found = Band(lower, upper, order, places, count * length)
+    return found if NARROWEST * length <= count else None
 
 
 def _ordered(count: int, elements: Collection[tuple[int, int]]) -> list[int]:
@@ -48,7 +44,7 @@ def _ordered(count: int, elements: Collection[tuple[int, int]]) -> list[int]:
     for start in sorted(range(count), key=lambda k: len(near[k])):
         if start not in order:
             for _ in range(2):  # the last one from anywhere is at an end
-                start = [*_walk(start, near)][-1]
+                *_, start = _walk(start, near)
             order |= _walk(start, near)
     return [*order][::-1]
 

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <nvector/nvector_serial.h>
 #include <string.h>
-#include <sundials/sundials_band.h>
+#include <sunlinsol/sunlinsol_band.h>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_band.h>
 #include <sunmatrix/sunmatrix_dense.h>
@@ -93,83 +93,57 @@ static bool create_fixed_point_iteration(struct cvode *cvode) {
            CVodeSetNonlinConvCoef(cvode->solver, adams_iteration_error) == CV_SUCCESS;
 }
 
-/* ---- Linear equations with a band ------------------------------------------------------------
- * The matrix has the states in the order of the band, vectors have them in their own. */
-
-struct band_solver {
+/* Solver of SUNDIALS for a band. The matrix has the states in the order of the band. */
+struct banded {
+    struct _SUNLinearSolverContent_Band base; /* first */
     const size_t *order;
-    sunindextype pivots[];
 };
 
-static SUNLinearSolver_Type type_of_band_solver(SUNLinearSolver solver) {
-    return SUNLINEARSOLVER_DIRECT;
-}
-
-static int factorize_band(SUNLinearSolver solver, SUNMatrix A) {
-    struct band_solver *own = solver->content;
-    return SUNDlsMat_bandGBTRF(SM_COLS_B(A), SM_COLUMNS_B(A), SM_UBAND_B(A), SM_LBAND_B(A),
-                               SM_SUBAND_B(A), own->pivots) > 0
-               ? SUNLS_LUFACT_FAIL
-               : SUNLS_SUCCESS;
-}
-
-/* Writes x; b is CVODE's, which copies x to it. */
-static int solve_band(SUNLinearSolver solver, SUNMatrix A, N_Vector x, N_Vector b,
-                      sunrealtype tolerance) {
-    struct band_solver *own = solver->content;
+/* Writes x; b may change, too. */
+static int solve_in_order(SUNLinearSolver solver, SUNMatrix A, N_Vector x, N_Vector b,
+                          sunrealtype tolerance) {
+    const size_t *order = ((const struct banded *)solver->content)->order;
     const sunindextype n = SM_COLUMNS_B(A);
-    double *by_place = small_vector_data(x);
-    double *by_state = small_vector_data(b);
     for (sunindextype k = 0; k < n; k++) {
-        by_place[k] = by_state[own->order[k]];
+        small_vector_data(x)[k] = small_vector_data(b)[order[k]];
     }
-    SUNDlsMat_bandGBTRS(SM_COLS_B(A), n, SM_SUBAND_B(A), SM_LBAND_B(A), own->pivots, by_place);
+    const int flag = SUNLinSolSolve_Band(solver, A, x, x, tolerance);
     for (sunindextype k = 0; k < n; k++) {
-        by_state[own->order[k]] = by_place[k];
+        small_vector_data(b)[order[k]] = small_vector_data(x)[k];
     }
     N_VScale(1.0, b, x);
-    return SUNLS_SUCCESS;
+    return flag;
 }
 
-static bool create_band(struct cvode *cvode, const struct band *band, sunindextype n) {
-    SUNContext context = cvode->base.context;
-    struct band_solver *own = workspace_calloc(1, sizeof *own + (size_t)n * sizeof own->pivots[0]);
-    cvode->jacobian =
-        SUNBandMatrix(n, (sunindextype)band->upper, (sunindextype)band->lower, context);
-    cvode->linear_solver = SUNLinSolNewEmpty(context);
-    if (own == NULL || cvode->jacobian == NULL || cvode->linear_solver == NULL) {
-        return false;
+static SUNLinearSolver create_band_solver(N_Vector pattern, SUNMatrix A, const size_t order[]) {
+    struct banded *own = workspace_calloc(1, sizeof *own);
+    SUNLinearSolver solver = own != NULL ? SUNLinSol_Band(pattern, A, pattern->sunctx) : NULL;
+    if (solver != NULL) {
+        own->base = *(SUNLinearSolverContent_Band)solver->content;
+        own->order = order;
+        solver->content = own;
+        solver->ops->solve = solve_in_order;
     }
-    own->order = band->order;
-    cvode->linear_solver->content = own;
-    cvode->linear_solver->ops->gettype = type_of_band_solver;
-    cvode->linear_solver->ops->setup = factorize_band;
-    cvode->linear_solver->ops->solve = solve_band;
-    return true;
+    return solver;
 }
 
-static bool create_dense(struct cvode *cvode, sunindextype n) {
+static bool create_newton_iteration(struct cvode *cvode) {
     SUNContext context = cvode->base.context;
-    cvode->jacobian = SUNDenseMatrix(n, n, context);
-    // SUNLinSol_Dense works with any vector that has an array, but takes only a serial one for
-    // pattern
+    const struct band *band = cvode->base.problem->ode.band;
+    const sunindextype n = (sunindextype)cvode->base.problem->ode.state_count;
+    cvode->jacobian = band != NULL ? SUNBandMatrix(n, (sunindextype)band->upper,
+                                                   (sunindextype)band->lower, context)
+                                   : SUNDenseMatrix(n, n, context);
+    // the solvers work with any vector that has an array, but take only a serial one for pattern
     N_Vector pattern = cvode->jacobian != NULL ? N_VNew_Serial(n, context) : NULL;
     if (pattern == NULL) {
         return false;
     }
-    cvode->linear_solver = SUNLinSol_Dense(pattern, cvode->jacobian, context);
+    cvode->linear_solver = band != NULL ? create_band_solver(pattern, cvode->jacobian, band->order)
+                                        : SUNLinSol_Dense(pattern, cvode->jacobian, context);
     N_VDestroy(pattern);
-    return cvode->linear_solver != NULL;
-}
-
-static bool create_newton_iteration(struct cvode *cvode) {
-    const struct ode *ode = &cvode->base.problem->ode;
-    const sunindextype n = (sunindextype)ode->state_count;
-    if (!(ode->band != NULL ? create_band(cvode, ode->band, n) : create_dense(cvode, n))) {
-        return false;
-    }
-    cvode->nonlinear_solver = SUNNonlinSol_Newton(cvode->base.x, cvode->base.context);
-    return cvode->nonlinear_solver != NULL &&
+    cvode->nonlinear_solver = SUNNonlinSol_Newton(cvode->base.x, context);
+    return cvode->linear_solver != NULL && cvode->nonlinear_solver != NULL &&
            CVodeSetNonlinearSolver(cvode->solver, cvode->nonlinear_solver) == CV_SUCCESS &&
            CVodeSetLinearSolver(cvode->solver, cvode->linear_solver, cvode->jacobian) ==
                CV_SUCCESS &&
