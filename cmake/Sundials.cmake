@@ -21,10 +21,11 @@ set(files
   arkode/arkode_erkstep_io arkode/arkode_interp arkode/arkode_io arkode/arkode_root
   cvode/cvode cvode/cvode_io cvode/cvode_ls cvode/cvode_nls cvode/cvode_proj
   nvector/serial/nvector_serial
-  sundials/sundials_context sundials/sundials_dense sundials/sundials_linearsolver
+  sundials/sundials_context sundials/sundials_band
+  sundials/sundials_dense sundials/sundials_linearsolver
   sundials/sundials_logger sundials/sundials_math sundials/sundials_matrix
   sundials/sundials_nonlinearsolver sundials/sundials_nvector sundials/sundials_nvector_senswrapper
-  sunlinsol/dense/sunlinsol_dense sunmatrix/band/sunmatrix_band sunmatrix/dense/sunmatrix_dense
+  sunlinsol/band/sunlinsol_band sunlinsol/dense/sunlinsol_dense sunmatrix/band/sunmatrix_band sunmatrix/dense/sunmatrix_dense
   sunnonlinsol/fixedpoint/sunnonlinsol_fixedpoint sunnonlinsol/newton/sunnonlinsol_newton)
 list(TRANSFORM files PREPEND ${SUNDIALS_SOURCE_DIR}/src/)
 list(TRANSFORM files APPEND .c)

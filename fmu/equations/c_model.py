@@ -2,9 +2,11 @@
 
 import re
 from collections.abc import Mapping
+from typing import Any
 
 from equations_content import OPTIONS, ModelFile
 
+from equations.band import band
 from equations.c_code import Code, declared, filled, indented, number, shortened, text
 from equations.c_events import Events, arrays, leaves, ticks
 from equations.c_series import Series
@@ -51,13 +53,14 @@ def source(file: ModelFile) -> str:
     events = Events(file)
     series = Series(file.graph, *_followed(file, events), leaves(file))
     has_domains = bool(events.located) and _may_end(file)
+    smooth = _smooth(file)
     text = filled(
         "equations.c.in",
-        **_smooth(file),
+        **smooth,
         tables=[HERE],
         **_series(series, has_domains),
         **_calculated(file, events),
-        **_domains(file, events, series, has_domains),
+        **_domains(file, events, series, has_domains, smooth["jacobian_size"]),
         events=events.functions("_in_domain" * has_domains),
         followed=[f"{STRUCTURE} copy;", f"values = {FOLLOWED};"] if events else [],
         checks=_checks(file),
@@ -129,25 +132,46 @@ def _range_lines(ranges: Mapping[str, list[str]]) -> list[str]:
     ]
 
 
-def _smooth(file: ModelFile) -> dict[str, list[str]]:
+def _smooth(file: ModelFile) -> dict[str, Any]:
     """What the methods of integration evaluate, a smooth function between events."""
     states = file.of("states")
     rates, count = [state.value for state in states], len(states)
     rows = file.graph.gradients(rates, [state.leaf for state in states])
-    entries = {
-        f"J[{j * count + i}]": rows[i][state.leaf]
+    slopes = {
+        (i, j): rows[i][state.leaf]
         for j, state in enumerate(states)
         for i in range(count)
         if state.leaf in rows[i] and not is_number(rows[i][state.leaf], 0.0)
     }
-    clear = [f"for (size_t i = 0; i < {count * count}; i++) {{", "    J[i] = 0.0;", "}"]
+    narrow = band(count, slopes)
+    size = narrow.size if narrow else count * count
+    places = (
+        [f"places[{k}]" for k in range(len(slopes))]
+        if narrow
+        else ([j * count + i for i, j in slopes])
+    )
+    entries = {f"J[{place}]": slope for place, slope in zip(places, slopes.values(), strict=True)}
+    clear = [f"for (size_t i = 0; i < {size}; i++) {{", "    J[i] = 0.0;", "}"]
     motion = {f"dx[{i}]": rate for i, rate in enumerate(rates)}
     (right_hand_side,) = rolled(Code(arrays(file)).assign(motion).lines)
     (jacobian,) = rolled(Code(arrays(file)).assign(entries).lines)
     return {
         "right_hand_side": right_hand_side,
-        "jacobian": clear * (len(entries) < count * count) + jacobian,
+        "jacobian": clear * (len(entries) < size) + jacobian,
+        "jacobian_size": size,
+        "places": _array("places", narrow.places) if narrow else [],
+        "band": [
+            *_array("order", narrow.order),
+            f"static const struct band band = {{{narrow.lower}, {narrow.upper}, order}};",
+        ]
+        if narrow
+        else [],
+        "band_of_jacobian": [".band = &band,"] if narrow else [],
     }
+
+
+def _array(name: str, numbers: list[int]) -> list[str]:
+    return [f"static const size_t {name}[] = {{{', '.join(map(str, numbers))}}};"]
 
 
 def _followed(file: ModelFile, events: Events) -> tuple[dict[Value, Value], list[Value]]:
@@ -176,7 +200,7 @@ def _may_end(file: ModelFile) -> bool:
 
 
 def _domains(
-    file: ModelFile, events: Events, series: Series, has_domains: bool
+    file: ModelFile, events: Events, series: Series, has_domains: bool, jacobian_size: int
 ) -> dict[str, object]:
     """The parts that keep values finite beyond an event (src/model/domains.h), if that is asked."""
     if not has_domains:
@@ -192,6 +216,7 @@ def _domains(
         distances=Code(leaves(file)).assign(distances).lines,
         ranges=_range_lines(groups),
         own_row=series.row_count,
+        jacobian_size=jacobian_size,
         located=len(events.located),
     )
     declared = [

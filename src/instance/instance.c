@@ -181,6 +181,7 @@ static enum status setup(struct instance *instance) {
     instance->ode.state_count = count_of(model->states);
     instance->ode.rhs = instance_rhs;
     instance->ode.jacobian = instance_jacobian;
+    instance->ode.band = model->band;
     instance->ode.context = instance;
     if (model->series != NULL) {
         instance->ode.series = instance_series;

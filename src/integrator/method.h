@@ -66,7 +66,7 @@ static inline enum status problem_jacobian(struct problem *problem, double t, co
                                            double J[]) {
     const struct ode *ode = &problem->ode;
     if (ode->jacobian(t, x, J, ode->context) == STATUS_OK &&
-        problem_are_finite(J, ode->state_count * ode->state_count)) {
+        problem_are_finite(J, ode_jacobian_size(ode))) {
         return STATUS_OK;
     }
     return problem_fail(problem, t, x);

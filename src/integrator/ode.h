@@ -13,8 +13,8 @@
  * step. context: the pointer in struct ode. */
 typedef enum status ode_rhs(double t, const double x[], double dx[], void *context);
 
-/* Writes the Jacobian of f: J[i + state_count j] is the derivative of f_i by x_j. Otherwise like
- * ode_rhs. */
+/* Writes the Jacobian of f: J[i + state_count j] is the derivative of f_i by x_j, or as a
+ * band (model.h). Otherwise like ode_rhs. */
 typedef enum status ode_jacobian(double t, const double x[], double J[], void *context);
 
 /* Writes the Taylor coefficients of orders first to last of the solution through rows[i][0] at the
@@ -35,7 +35,8 @@ typedef void ode_reach(const double x[], double reach[], void *context);
 /* The fields that each step of `taylor` reads stand last, next to the rest of struct problem. */
 struct ode {
     ode_rhs *rhs;
-    ode_jacobian *jacobian; /* for INTEGRATOR_CVODE_BDF only */
+    ode_jacobian *jacobian;  /* for INTEGRATOR_CVODE_BDF only */
+    const struct band *band; /* of the Jacobian; NULL: a full one */
     ode_indicators *indicators;
     ode_rounding *rounding; /* NULL if it follows from the limits of the indicators */
     ode_reach *reach;       /* called if events are searched; NULL if any distance is allowed */
@@ -46,6 +47,12 @@ struct ode {
     size_t state_count;             /* > 0 */
     void *context;
 };
+
+/* Returns the number of elements of J. */
+static inline size_t ode_jacobian_size(const struct ode *ode) {
+    const struct band *band = ode->band;
+    return ode->state_count * (band == NULL ? ode->state_count : 2 * band->lower + band->upper + 1);
+}
 
 /* List of all methods: the code, whose number is the value of solver_method, and the struct method
  * that its file defines. A new method is a file and a line here. */

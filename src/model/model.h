@@ -153,6 +153,14 @@ struct series {
                           double rows[][SERIES_LENGTH]);
 };
 
+/* ---- Jacobian ------------------------------------------------------------------------------- */
+
+/* Order of the states in which all elements of a Jacobian are close to its diagonal. */
+struct band {
+    size_t lower, upper; /* number of diagonals below and above the main one */
+    const size_t *order; /* state at each place */
+};
+
 /* ---- Texts ---------------------------------------------------------------------------------- */
 
 /* An expression of the file from which a model is made, for messages about its value. */
@@ -178,9 +186,11 @@ struct model {
 
     /* Writes the Jacobian: J[i + state_count j] is the derivative of x'_i by x_j, or 0 if x_j rests
      * in these modes. Implicit methods need it. A pure function like right_hand_side. NULL if the
-     * model has no states. */
+     * model has no states. With a band, of the states at the places i and j, where it is not 0:
+     * J[lower + upper + i - j + (2 lower + upper + 1) j], which leaves room to factorize. */
     enum status (*jacobian)(const void *values, double t, const double x[], const double u[],
                             double J[]);
+    const struct band *band; /* NULL: of the full Jacobian */
 
     /* Taylor series of the states. NULL if the model offers none: only a model whose right-hand
      * side has all derivatives everywhere may offer one. */

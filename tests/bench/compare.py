@@ -18,6 +18,7 @@ from collections import defaultdict
 from importlib.metadata import version
 from pathlib import Path
 
+import by_models
 from by_heyoka import Peer, Work
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -50,19 +51,14 @@ RATIOS = [
     (C1, "erk", "plain loop", 0.15),
     (C1, "taylor", "plain loop", 0.04),
     (C1, "taylor", "erk", 0.42),
-    (C1, "erk", "MuJoCo RK4", None),
     (C1, "taylor", "MuJoCo RK4", 0.13),
     (C10, "cvode_adams", "plain loop", 0.5),
     (C10, "erk", "plain loop", 0.2),
     (C10, "taylor", "erk", 0.42),
-    (C10, "erk", "MuJoCo RK4", None),
-    (C10, "taylor", "MuJoCo RK4", None),
     (C100, "taylor", "erk", 0.2),
-    (C100, "taylor", "MuJoCo RK4", None),
     (K1, "cvode_adams", "plain loop", 0.6),
     (K1, "taylor", "cvode_adams", 0.95),
     (K10, "taylor", "cvode_adams", 0.45),
-    (OTHERS[-1].name, "taylor", "erk", None),
     (FREE[1e-8].name, "erk", "heyoka", 8.0),
     (FREE[1e-8].name, "taylor", "heyoka", 0.9),
     (FREE[1e-14].name, "taylor", "heyoka", 0.9),
@@ -83,6 +79,7 @@ LARGEST_ERROR_OF_TAYLOR = 1e-12  # in steps of 1 ms
 GROUPS = {
     "steps": ("Communication steps", ("us", "ratio", "error")),
     "against": ("One against another", ("ratio", "error", "error_of_peer")),
+    "models": ("Models in equations", ("us", "ratio", "error", "error_of_peer")),
     "plant": ("Friction and stops, steps of 1 ms", ("us", "ratio", "events")),
     "life": ("An instance", ("us", "kib")),
 }
@@ -251,8 +248,8 @@ def miss(row: dict) -> str:
 
 def summary(report: dict) -> str:
     """Return the table of ratios to the plain loop, and a list of the targets that are missed."""
-    rows = [row for row in report["rows"] if row["group"] == "steps" and "us" in row]
-    ratios = {(row["run"], row["work"]): row["ratio"] for row in rows}
+    rows = [row for row in report["rows"] if row["group"] in ("steps", "models") and "us" in row]
+    ratios = {(row["run"], row.get("column", row["work"])): row["ratio"] for row in rows}
     cells = [
         [run, *(number(ratios.get((run, work))) for work in WORKS.values())]
         for run in dict.fromkeys(run for run, _ in ratios)
@@ -314,7 +311,7 @@ def main() -> None:
         "machine": about | first["machine"],
         "rounds": options.rounds,
         "repeats": options.repeats,
-        "rows": judge(rows + rest["rows"]),
+        "rows": judge(rows + by_models.rows(output, options.repeats) + rest["rows"]),
     }
     (output / "benchmark.json").write_text(
         json.dumps(result, indent=1) + "\n", encoding="utf-8", newline="\n"

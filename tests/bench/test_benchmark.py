@@ -11,14 +11,13 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import by_models
 import compare
-from by_heyoka import STATES, Work, run_heyoka
+from by_heyoka import STATES
 
 BUILD = Path(os.environ["RP_BUILD"])
 BENCH = [str(path) for path in (BUILD / "tests/bench/bench", *compare.libraries(BUILD))]
 METHODS = {"cvode_adams", "cvode_bdf", "erk", "taylor"}
-SHORT = Work("1 ms steps, inputs changing", 1e-3, 50, "changing")
-FREE = Work("one step of 2 s, free motion", 2.0, 1, "zero")
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +28,7 @@ def result() -> dict:
 
 
 def test_bench_writes_every_group(result: dict) -> None:
-    assert {row["group"] for row in result["rows"]} == {*compare.GROUPS}
+    assert {row["group"] for row in result["rows"]} == {*compare.GROUPS} - {"models"}
     assert result["repeats"] == 1
     assert result["machine"]["MuJoCo"], "MuJoCo is a requirement of the tests"
     runs = {
@@ -145,8 +144,9 @@ def test_program_refuses_nonsense() -> None:
             compare.run_bench(BENCH, *options)
 
 
-def test_heyoka_does_the_same_work() -> None:
-    for work, bound in ((SHORT, 1e-10), (FREE, 1e-8)):
-        seconds, states = run_heyoka(work, 1e-10)
-        assert seconds > 0.0
-        assert work.error(states) <= bound
+def test_models_in_equations_do_the_same_as_their_peers(tmp_path: Path) -> None:
+    stars, chain = by_models.rows(tmp_path, 1)
+    assert stars["error_of_peer"] <= stars["error"] < 1e-10
+    assert max(chain["error"], chain["error_of_peer"]) < 1e-3
+    table = compare.summary({"rows": compare.judge([stars, chain])})
+    assert f"| {stars['run']} |  |  |  |  |  | {compare.number(stars['ratio'])} |" in table

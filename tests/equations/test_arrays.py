@@ -116,6 +116,28 @@ def test_a_rod_follows_its_series(method: int, folder: Path) -> None:
     assert found == pytest.approx(rod, abs=3 * d**2)
 
 
+@pytest.mark.parametrize("seed", range(2))
+def test_a_band_has_the_solution_of_a_full_matrix(seed: int, folder: Path) -> None:
+    """Of random sparse equations in any order; a state that follows all others has a full row."""
+    chance, n = np.random.default_rng(seed), 64
+    order, near = chance.permutation(n), np.tri(n, k=2) * np.tri(n, k=2).T
+    matrix = near * (chance.random((n, n)) < 0.7) * chance.normal(size=(n, n))
+    matrix = (matrix - np.diag(np.geomspace(2.0, 1e3, n)))[order][:, order]
+    rates = [" + ".join(f"{a} * x{j}" for j, a in enumerate(row) if a) for row in matrix]
+    text = 'name = "Sparse"\n[parameters]\np = { start = 0 }\n[states]\n'
+    text += "".join(f'x{i} = {{ start = 1, derivative = "{r}" }}\n' for i, r in enumerate(rates))
+    full = f'y = {{ derivative = "p * ({" + ".join(f"x{i}" for i in range(n))})" }}'
+    works = []
+    for own in (text, text.replace("Sparse", "Full") + full):
+        assert ("struct band band" in c_model.source(read_text(folder, own))) == (own is text)
+        counted = ["solver_steps", "solver_rhs_evaluations"]
+        run = simulated(made(folder, own), 1.0, 1.0, {"solver_method": 2}, also=counted)
+        found = [run[f"x{i}"][-1] for i in range(n)]
+        assert found == pytest.approx(expm(matrix) @ np.ones(n), abs=1e-8)
+        works.append([run[name][-1] for name in counted])
+    assert works[0] == pytest.approx(works[1], rel=0.05)
+
+
 def test_a_plate_has_two_indexes(folder: Path) -> None:
     n = 6
     run = simulated(made(folder, TEXTS["PLATE"]), 1.0, 1.0, {"solver_method": 4})
