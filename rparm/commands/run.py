@@ -15,7 +15,7 @@ from rparm.command_line import (
     add_report,
     add_tolerance,
     retyped,
-)  # fmt: skip
+)
 from rparm.commands.files import do_list
 from rparm.console import Progress
 from rparm.errors import UserError, did_you_mean, placed, together

@@ -15,7 +15,7 @@ from rparm.command_line import (
     add_step,
     add_system,
     retyped,
-)  # fmt: skip
+)
 from rparm.console import Progress
 from rparm.errors import UserError, did_you_mean, together
 from rparm.files import check_writable, written
