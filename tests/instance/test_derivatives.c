@@ -49,18 +49,6 @@ static void test_new_derivatives_start_from_the_value_set_last(void) {
     TEST_ASSERT_DOUBLE_WITHIN(1e-13, -4.0 * get(OSCILLATOR_A), derivative(OSCILLATOR_A, 2));
 }
 
-static void test_directional_derivatives(void) {
-    const unsigned unknowns[] = {OSCILLATOR_A, OSCILLATOR_V, OSCILLATOR_X};
-    const unsigned knowns[] = {OSCILLATOR_X, OSCILLATOR_U, OSCILLATOR_V};
-    const double v[] = {0.5, 3.0, 7.0};
-    double result[3];
-    ASSERT_OK(instance_get_directional_derivative(instance, KNOWN_MOTION, unknowns, 3, knowns, 3, v,
-                                                  result));
-    TEST_ASSERT_EQUAL_DOUBLE(-4.0 * 0.5 + 3.0, result[0]);
-    TEST_ASSERT_EQUAL_DOUBLE(7.0, result[1]);
-    TEST_ASSERT_EQUAL_DOUBLE(0.5, result[2]);
-}
-
 static void test_knowns_and_unknowns_that_are_none_are_refused(void) {
     const unsigned x = OSCILLATOR_X;
     const unsigned omega = OSCILLATOR_OMEGA;

@@ -1,11 +1,9 @@
-/* What a step does on its way: inputs at four times, reports of internal steps, and nothing at all
- * where it fails. With each method, on the oscillator. */
-#include "allocations.h"
+/* What a step does on its way: inputs at four times, and the limit of internal steps that are
+ * reported. With each method, on the oscillator. The rest: tests/fmi3. */
 #include "clock.h"
 #include "each_method.h"
 #include "one_instance.h"
 #include "oscillator_by_hand.h"
-#include "snapshot.h"
 
 void setUp(void) {
     create(&oscillator_description);
@@ -90,14 +88,6 @@ static void begin_noting(double end_at, enum status status) {
     reports.status = status;
 }
 
-EACH_METHOD static void test_internal_steps_and_the_end_are_reported(void) {
-    begin_noting(0.0, STATUS_OK);
-    ASSERT_OK(instance_do_step_with(instance, 1.0, 3.0, &noting));
-    TEST_ASSERT_GREATER_THAN_UINT(10, reports.count);
-    TEST_ASSERT_TRUE(reports.last == 4.0);
-    TEST_ASSERT_TRUE(reports.largest_error < 1e-6);
-}
-
 /* Asked for the end of internal steps, a step may take as many of them as without. */
 EACH_METHOD static void test_the_limit_of_internal_steps_holds_over_early_ends(void) {
     create(&oscillator_description);
@@ -108,25 +98,4 @@ EACH_METHOD static void test_the_limit_of_internal_steps_holds_over_early_ends(v
     TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS,
                           instance_do_step_with(instance, 1.0, 99.0, &noting));
     TEST_ASSERT_LESS_OR_EQUAL_UINT(12, reports.count);
-}
-
-/* ---- Undo ----------------------------------------------------------------------------------- */
-
-/* The rest is in the tests of the FMU of FMI 3.0. */
-EACH_METHOD static void test_a_failed_step_is_undone_and_allocates_nothing(void) {
-    struct instance_snapshot *undo = NULL;
-    ASSERT_OK(instance_save(instance, 0, &undo));
-    const struct step_options options = {.undo = undo};
-    ASSERT_OK(instance_do_step_with(instance, 1.0, 0.5, &options));
-    const double x = get(OSCILLATOR_X);
-    const long before = allocation_count();
-    set(OSCILLATOR_U, 1.7e308);
-    const enum status failed = instance_do_step_with(instance, 1.5, 10.0, &options);
-    TEST_ASSERT_EQUAL_INT(before, allocation_count());
-    TEST_ASSERT_EQUAL_INT(SEVERITY_DISCARD, status_severity(failed));
-    TEST_ASSERT_TRUE(instance_time(instance) == 1.5);
-    TEST_ASSERT_TRUE(x == get(OSCILLATOR_X));
-    set(OSCILLATOR_U, 0.0);
-    ASSERT_OK(instance_do_step_with(instance, 1.5, 0.5, &options));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, cos(2.0), get(OSCILLATOR_X));
 }
