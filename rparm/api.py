@@ -28,7 +28,7 @@ from rparm.runs.comparison import load_reference
 from rparm.runs.simulation import Input
 from rparm.systems import comparison, ecos, master, opened
 from rparm.systems.structure import OpenedSystem
-from rparm.units import unit
+from rparm.units import SECONDS, quantity, unit
 
 if TYPE_CHECKING:
     from rparm.identification.identify import Identification
@@ -334,7 +334,7 @@ class System:
         variant: str | None = None,
         *,
         parameters: Mapping[str, Value] | None = None,
-        step: float | None = None,
+        step: float | str | None = None,
         engine: str = "master",
     ) -> Table:
         """Step a variant from its start to its stop time, in Jacobi order.
@@ -346,8 +346,8 @@ class System:
         parameters : mapping, optional
             Values in place of the variant's by "component.variable": of parameters, states at the
             start, inputs that nothing feeds; numbers, or texts with a unit ("12 kg").
-        step : float, optional
-            s; communication step in place of the file's.
+        step : float or str, optional
+            s, or a text with a unit ("10 ms"); communication step in place of the file's.
         engine : str
             "master", rparm's own; "ecos", where ecospy is installed; "helics", each FMU in its
             own process, where helics is installed. These two take neither parameters nor step.
@@ -372,6 +372,8 @@ class System:
             raise UserError(f"engine: {engine!r} takes neither parameters nor step")
         changed = system.with_values(variant, parameters or {})
         if step is not None:
+            with placed("step"):
+                step = quantity(step, SECONDS)
             times = changed.system.start, changed.system.stop, step
             simulation.communication_points(*times)  # checks them
             changed = replace(changed, system=replace(changed.system, step=step))

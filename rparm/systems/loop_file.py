@@ -376,6 +376,8 @@ class LoopReader(Reader):
                 if any(variable in values.get(component, {}) for values in variants.values()):
                     self.fail(f"[{INPUTS}.{name}]: moves, but has a value among the parameters")
                 continue
+            if variable in variants[ALONE].get(component, {}):
+                self.fail(f"[{INPUTS}.{name}]: has a value in [{PARAMETERS}], too: give it once")
             for values in variants.values():
                 values.setdefault(component, {}).setdefault(variable, held)
         return replace(system, inputs=moving)

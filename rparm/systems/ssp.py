@@ -1,13 +1,14 @@
 """SSP 1.0 archives: unpacked, read and checked, once.
 
 Accepted is what the engines run: one flat system of FMUs, with outputs connected to inputs and
-parameter sets bound at the components. The same set name at several components is one variant of
-the system. Times that the SSP does not say are chosen by the default experiments of the FMUs.
-Nothing runs before a system is checked against its FMUs.
+parameter sets bound at the components. All sets of a component apply; but where one is bound first
+and last, each set name is a variant of the system. Times that the SSP does not say are chosen by
+the default experiments of the FMUs. Nothing runs before a system is checked against its FMUs.
 """
 
 import math
 import re
+from collections import ChainMap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from copy import deepcopy
@@ -90,6 +91,7 @@ class SspReader:
         self.descriptions: dict[str, str] = {}  # of parameter sets, by name
         # Ecos reads one prefix, no sets in the structure, no connections to the system's own
         self.is_plain = True
+        self.are_variants = False  # else all sets of a component apply, the last wins
         self.own: dict[str, str] = {}  # kinds of the system's own connectors, by name
         self.models: dict[str, Model] = {}  # of the components
 
@@ -240,6 +242,7 @@ class SspReader:
                 message = f"component {component!r}: bind only parameter sets, by path or within"
                 self.fail(STRUCTURE, message, binding)
             if source in sources:  # bound first and last: importers take one or the other
+                self.are_variants = True
                 continue
             if source:
                 sources.add(source)
@@ -295,9 +298,10 @@ class SspReader:
         if not any(bound.values()):
             return {ALONE: {}}
         names = list(dict.fromkeys(name for sets in bound.values() for name in sets))
-        if len(names) > 1 and all(len(sets) <= 1 for sets in bound.values()):  # each has its own
+        each_has_its_own = all(len(sets) <= 1 for sets in bound.values())
+        if len(names) > 1 and (each_has_its_own or not self.are_variants):
             self.is_plain = False
-            return {ALONE: {c: next(iter(sets.values()), {}) for c, sets in bound.items()}}
+            return {ALONE: {c: dict(ChainMap(*reversed(of.values()))) for c, of in bound.items()}}
         for component, sets in bound.items():
             missing = [name for name in names if name not in sets]
             if sets and missing:

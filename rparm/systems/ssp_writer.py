@@ -21,7 +21,7 @@ from rparm.fmi.model import Value, Variable
 from rparm.interruption import temporary_folder
 from rparm.systems import loop_file
 from rparm.systems.python_component import ANY
-from rparm.systems.ssp import FMU_TYPE, STRUCTURE
+from rparm.systems.ssp import FMU_TYPE, NAMESPACES, STRUCTURE
 from rparm.systems.structure import ALONE, SETTABLE, Component, OpenedSystem
 
 BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset")
@@ -29,11 +29,10 @@ TYPED = ("Real", "Integer", "Boolean", "String")  # connectors
 DATE = (1980, 1, 1, 0, 0, 0)
 UNIX = 3
 HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
-COMMON = 'xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon"'
-VALUES = 'xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues"'
-SPACES = f"""xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"
+STRUCTURES, COMMON, VALUES, OSP = (f'xmlns:{k}="{uri}"' for k, uri in NAMESPACES.items())
+SPACES = f"""{STRUCTURES}
     {COMMON}
-    xmlns:osp="http://opensimulationplatform.com/SSP/OSPAnnotations"
+    {OSP}
     xmlns:oms="https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd\""""
 Sets = Mapping[str, Mapping[str, Mapping[str, Value]]]  # by variant, component and variable
 

@@ -147,6 +147,16 @@ def test_sets_of_one_component_each_are_one_variant(tmp_path: Path) -> None:
         assert ecos.run(found, "default", ["arm.q1"]).values[-1] != 0.0
 
 
+def test_all_sets_of_a_component_apply_and_the_last_wins(tmp_path: Path) -> None:
+    """By the standard, in the SSPs of others, which bind none first and last."""
+    others = r'<ssd:ParameterBinding source="\w+/(?!arm_h\w+(oad|plane)\.)\w+\.ssv"/>'
+    none = r"<ssd:ParameterBindings>\s*</ssd:ParameterBindings>"
+    more = {"resources/arm_horizontal_plane.ssv": replace('name="m2"', 'name="m1"')}
+    with ssp.unpacked(without(tmp_path / "two.ssp", others, none, more=more)) as found:
+        (only,) = found.system.parameter_sets.values()
+    assert only["arm"] == {"relative_tolerance": 1e-11, "m2": 1.2, "g": 0.0, "m1": 1.0}
+
+
 def test_an_input_that_is_not_connected_keeps_its_start(tmp_path: Path) -> None:
     """The references of computed torque with poles at -20: a step, also from a parameter set.
 

@@ -163,7 +163,7 @@ def test_a_system_of_a_file_runs_with_other_values_and_steps(tmp_path: Path) -> 
     assert system.variants == ("default", "heavy")
     for expected, step, table in (
         (0.75, 0.01, system.run()),
-        (0.375, 0.05, system.run("heavy", step=0.05)),
+        (0.375, 0.05, system.run("heavy", step="50 ms")),
         (0.25, 0.01, system.run("heavy", parameters={"arm.m2": "6 kg", "arm.f2": 3})),
         (0.5, 0.01, system.run(parameters={"arm.f2": np.float64(2.0)})),
     ):
