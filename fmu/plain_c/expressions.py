@@ -170,9 +170,7 @@ class Expressions(Memory):
                 return kind, self.initialized(node.init, kind, scope, state)
             case c_ast.ExprList():
                 raise refused(node, "the comma operator is not read: write two statements")
-        raise refused(
-            node, f"{type(node).__name__} is no part of the equations' C: write it as a function"
-        )
+        raise refused(node, f"{type(node).__name__} is no part of the equations' C: use a function")
 
     def number(self, node: c_ast.Constant) -> tuple[Any, Any]:
         if node.type == "int" and not re.fullmatch("0[0-9]+|.{30,}", node.value):

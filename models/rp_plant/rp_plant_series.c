@@ -103,8 +103,8 @@ static void series_add_wrench(const struct series_motion *m, int k, double row[]
 }
 
 /* Returns order k of plant_stribeck_decay: e' = -2 r' (r e). */
-static double series_exponential(const struct series_motion *m, int i, int k,
-                                 double row[][SERIES_LENGTH]) {
+ALWAYS_INLINE double series_exponential(const struct series_motion *m, int i, int k,
+                                        double row[][SERIES_LENGTH]) {
     double *r = row[RATIO + i];
     double *rate = row[RATE + i];
     double *e = row[EXPONENTIAL + i];
@@ -130,7 +130,7 @@ static double series_exponential(const struct series_motion *m, int i, int k,
 /* Returns order k of plant_friction. Above order 0 the law is that of the forces Fb - Fc and 0. */
 ALWAYS_INLINE double series_friction(const struct series_motion *m, int i, int k,
                                      double row[][SERIES_LENGTH]) {
-    if (m->direction[i] == 0.0) {
+    if (!plant_slides(m->modes.joint[i])) {
         return 0.0;
     }
     const double coulomb = m->p->coulomb_friction[i];
@@ -144,8 +144,8 @@ ALWAYS_INLINE double series_friction(const struct series_motion *m, int i, int k
 }
 
 /* Returns order k of plant_compliant_force. */
-static double series_compliant_force(const struct series_motion *m, int i, int k,
-                                     double row[][SERIES_LENGTH]) {
+ALWAYS_INLINE double series_compliant_force(const struct series_motion *m, int i, int k,
+                                            double row[][SERIES_LENGTH]) {
     const int contact = m->modes.contact[i];
     if (abs(contact) != RP_PLANT_PUSHED) {
         return 0.0;
@@ -162,11 +162,10 @@ static double series_compliant_force(const struct series_motion *m, int i, int k
  * joints. */
 ALWAYS_INLINE double series_effort(const struct series_motion *m, int i, int k,
                                    double row[][SERIES_LENGTH]) {
-    const int contact = m->modes.contact[i];
     const double friction = series_friction(m, i, k, row);
-    const double stop = contact == RP_PLANT_APART ? 0.0 : series_compliant_force(m, i, k, row);
-    return plant_effort(m->p, contact, i, row[W + i][k], jet_input(m->origin, i, k), friction,
-                        stop);
+    const double stop = series_compliant_force(m, i, k, row);
+    const double applied = jet_input(m->origin, i, k);
+    return plant_effort(m->p, &m->modes, i, row[W + i][k], applied, friction, stop);
 }
 
 /* ---- Constants ------------------------------------------------------------------------------ */

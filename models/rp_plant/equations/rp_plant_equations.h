@@ -226,11 +226,12 @@ static inline struct plant_hold plant_hold(const struct rp_plant_parameters *p,
 /* ---- Efforts -------------------------------------------------------------------------------- */
 
 /* applied: tau + Q. friction, stop: as in struct plant_hold. */
-static inline real plant_effort(const struct rp_plant_parameters *p, int contact, int i, real dq,
-                                real applied, real friction, real stop) {
+static inline real plant_effort(const struct rp_plant_parameters *p,
+                                const struct rp_plant_modes *modes, int i, real dq, real applied,
+                                real friction, real stop) {
     const real damped = applied - p->damping[i] * dq;
-    const real rubbed = damped - friction;
-    return contact == RP_PLANT_APART ? rubbed : rubbed + stop;
+    const real rubbed = plant_slides(modes->joint[i]) ? damped - friction : damped;
+    return modes->contact[i] == RP_PLANT_APART ? rubbed : rubbed + stop;
 }
 
 static inline void plant_efforts(const struct plant *plant, const struct rp_plant_parameters *p,
@@ -238,11 +239,11 @@ static inline void plant_efforts(const struct plant *plant, const struct rp_plan
                                  const real Q[2], real efforts[2]) {
     for (int i = 0; i < 2; i++) {
         const real q = plant->arm.q[i], dq = plant->arm.dq[i];
-        const int contact = modes->contact[i];
         const real friction = plant_friction(p, modes->joint[i], i, dq);
+        const int contact = modes->contact[i];
         const real stop =
             contact == RP_PLANT_APART ? 0.0 : plant_compliant_force(p, contact, i, q, dq);
-        efforts[i] = plant_effort(p, contact, i, dq, tau[i] + Q[i], friction, stop);
+        efforts[i] = plant_effort(p, modes, i, dq, tau[i] + Q[i], friction, stop);
     }
 }
 
