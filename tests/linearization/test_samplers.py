@@ -148,7 +148,7 @@ REFUSED = {
     "no point": (
         "AXIS",
         {"trim": ["x", "y", "u"]},
-        "found by x, u: sampler control changes sum by",
+        "by x, y, u: sampler control changes sum by",
     ),
     "moving": ("DEADBEAT", {"at": {"r": 1}, "trim": ["x2", "u"]}, "the derivative of x1 stays at"),
     "sampled twice": ("DEADBEAT", {}, "step: the model is sampled already, every 1 s"),
