@@ -107,14 +107,13 @@ def of_system(opened: OpenedSystem, request: Request) -> Study:
             whole = connected(parts, subject.kept)
         found = _chosen(whole, trimmed, request)
         units = _units(subject, found)
-        limits: dict[str, Any] = {}
+        limits: dict[str, Any] = {"python": tuple(subject.python)}
         if subject.cut is not None:
             loop = open_loop(whole.select([request.cut], [subject.cut.start]))
-            limits = {"loop": loop, "margins": margins(loop)}
+            limits |= {"loop": loop, "margins": margins(loop)}
         elif not ticks:
             steps = largest_steps(parts, subject.connections, subject.ways, subject.law)
-            limits = {"largest": steps}
-        limits["python"] = tuple(subject.python)
+            limits |= {"largest": steps}
         return Study(path, found, units, request.free, variant, **limits)
 
 

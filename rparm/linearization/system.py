@@ -194,11 +194,10 @@ class SystemSubject(ExitStack):
             raise UserError(f"{self.ssp.path}: component {name!r} {wrong}")
 
     def _way_out(self, name: str) -> str:
-        try:
+        with suppress(UserError):
             bypassed(self.ssp, self.connections, name)
-        except UserError:
-            return ""
-        return f"take it as ideal by --without {name}"
+            return f"take it as ideal by --without {name}"
+        return ""
 
 
 def bypassed(ssp: OpenedSystem, connections: Sequence[Connection], name: str) -> list[Connection]:

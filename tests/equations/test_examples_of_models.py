@@ -75,8 +75,7 @@ def kepler(t: np.ndarray) -> dict[str, np.ndarray]:
     return {"x": MAJOR * (np.cos(E) - e), "y": MAJOR * np.sqrt(1 - e**2) * np.sin(E)}
 
 
-def mode(t: np.ndarray) -> dict[str, np.ndarray]:
-    """Of twenty masses."""
+def masses(t: np.ndarray) -> dict[str, np.ndarray]:
     cosine = np.cos(2 * np.sqrt(40.0 / 0.25) * np.sin(np.pi / 42) * t)
     return {f"x[{i}]": 0.1 * np.sin(np.pi * i / 21) * cosine for i in (1, 7, 20)}
 
@@ -123,7 +122,7 @@ CASES = {
     "lorenz": (lorenz, 10.0, 0.1, 1e-13, {}, 0, 1e-9),
     "dc_motor": (dc_motor, 0.5, 0.05, 1e-10, {"torque": 0.5}, 1e-7, 1e-8),
     "two_body_orbit": (kepler, 2 * PERIOD, PERIOD / 8, 1e-11, {}, 0, 0.1),
-    "masses": (mode, 20.0, 0.5, 1e-11, {}, 0, 1e-8),
+    "masses": (masses, 20.0, 0.5, 1e-11, {}, 0, 1e-8),
     "pwm": (pwm, 0.02, 3.7e-4, 1e-11, {"load": 0.02}, 0, 1e-8),
     "pwm off": (partial(pwm, duty=0), 0.02, 3.7e-4, 1e-11, {"load": 0.02, "duty": 0.0}, 0, 1e-8),
     "drive": (drive, 149 * 0.002, 0.002, 1e-11, {"load": 0.1}, 0, 2e-6),
