@@ -30,7 +30,8 @@ WORDS_OF_EVENTS = ["indicator_count", "indicator_names"]
 WORDS_OF_EVENTS += [f"{part}_{key}" for part in ("modes", "discrete_states", "discrete_inputs")
                     for key in ("offset", "size")]  # fmt: skip
 WORDS_OF_EVENTS += ["starts_follow", "next_time"]
-WORDS += ["right_hand_side", "jacobian", "series", "outputs", "propagate", "check", "events"]
+WORDS += ["right_hand_side", "jacobian", "band", "series", "outputs", "propagate", "check"]
+WORDS += ["events"]
 
 
 class Words(ctypes.Structure):
