@@ -210,7 +210,7 @@ def test_stopped_in_the_middle(
         time.sleep(0.3)
         process.send_signal(stop)
         out, err = process.communicate(timeout=20)
-    if "report: " not in out:  # else it had ended before
+    if "open it: " not in out:  # else it had ended before
         assert (process.returncode, err) == (code, said)
     place.assert_clean()
 
@@ -242,7 +242,7 @@ def test_without_a_home_and_with_the_plainest_locale(place: Place) -> None:
     environment = {"LC_ALL": "C", "LANG": "C", "HOME": "/nonexistent"}
     code, out, err = place.call(RUN, env=environment)
     assert (code, err) == (0, "")
-    assert "report: report/index.html\n" in out  # relative to the current folder
+    assert "; report/index.html; open it: " in out  # relative to the current folder
     place.assert_clean()
 
 

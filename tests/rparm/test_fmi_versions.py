@@ -83,7 +83,7 @@ def test_one_bit_that_differs_fails(
     assert (code, err) == (1, "")
     assert rows(out)[0][-1] == "FAILED" and "same bits in FMI 2.0 and 3.0: 0 scenarios" in out
     assert "  tolerance 1e-8: other bits in FMI 3.0: ee_x\n" in out
-    assert out.endswith(f"failed: 1 scenario: {SHORT}\n")
+    assert f"\nfailed: 1 scenario: {SHORT}; " in out
     page = (report / "scenarios" / f"{SHORT}.html").read_text(encoding="utf-8")
     assert "<td>other bits</td>" in page and "other bits in FMI 3.0: ee_x" in page
 
