@@ -49,6 +49,8 @@ set(shared ${CMAKE_SHARED_LIBRARY_CREATE_C_FLAGS})
 if(NOT WASM)
   list(APPEND compile ${CMAKE_C_COMPILE_OPTIONS_PIC})
   set(shared -shared)
+elseif(OWN_LIBM)
+  list(APPEND compile -include ${PROJECT_BINARY_DIR}/musl/names.h) # of the elementary functions
 endif()
 separate_arguments(link UNIX_COMMAND "${CMAKE_SHARED_LINKER_FLAGS}")
 list(APPEND link ${FMU_LINK_OPTIONS} ${shared}) # -static behind it would ask zig for an archive
@@ -61,7 +63,7 @@ file(GENERATE OUTPUT ${PROJECT_BINARY_DIR}/runtime/runtime.json CONTENT "{
 \"version\": \"${PROJECT_VERSION}\",
 \"platform\": \"${PLATFORM}\",
 \"compiler\": [\"$<JOIN:${compiler},\"$<COMMA> \">\"],
-\"options\": [\"$<JOIN:${compile};$<TARGET_PROPERTY:runtime_fmi2,COMPILE_OPTIONS>,\"$<COMMA> \">\"],
+\"options\": [\"$<JOIN:${compile};$<FILTER:$<TARGET_PROPERTY:runtime_fmi2,COMPILE_OPTIONS>,EXCLUDE,^SHELL:>,\"$<COMMA> \">\"],
 \"include\": [\"$<JOIN:${include},\"$<COMMA> \">\"],
 \"versions\": {${runtime_versions}},
 \"libraries\": [\"$<JOIN:${runtime_libraries},\"$<COMMA> \">\"],

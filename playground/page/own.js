@@ -95,6 +95,7 @@ class Own {
     fmu.onWarning = text => say(text);
     this.#build();
     this.reset();
+    this.controls.refresh();
     this.play(!matchMedia('(prefers-reduced-motion: reduce)').matches);
     requestAnimationFrame(now => this.#frame(now, now));
   }
@@ -143,7 +144,7 @@ class Own {
   }
 
   static isSolver(name) {
-    return /^solver_|tolerance|^max_step$|^min_step$|^initial_step$/.test(name);
+    return /^solver_|tolerance$|^max_(step|internal_steps|events)$/.test(name);
   }
 
   #addGroup(element, title, isIn) {
@@ -163,7 +164,8 @@ class Own {
     const isFinite = value => value !== null && Math.abs(value) < 1e9;
     const least = isFinite(min) ? min : Math.min(-size, isFinite(max) ? max - size : 0);
     const most = isFinite(max) ? max : Math.max(size, least + size);
-    return [least, most, type === 'Integer' ? 1 : (most - least) / 200];
+    const step = 10 ** Math.floor(Math.log10((most - least) / 100));
+    return [least, most, type === 'Real' ? step : 1];
   }
 
   // ---- what users do

@@ -3,7 +3,7 @@
 /** The drawing of the arm: the hand that pulls at it, its path, and the colours of the page. */
 class Stage {
   static PUSH = 20; // N, of an arrow key
-  static ZOOM = 1.1; // from one size of the view to the next
+  static GROWS = 0.3; // of the length of link 1, by which the view grows
   static PATH = 300; // points
   static GRIP = 70; // px from the end effector within which it can be taken
   static SLIDE = [-0.5, 0.5]; // m, least range in view where joint 2 has no stops
@@ -14,6 +14,8 @@ class Stage {
     this.canvas = canvas;
     this.simulation = simulation;
     this.path = [];
+    /** What the arm has covered, m. @type {?{left: number, right: number, bottom: number, top: number}} */
+    this.box = null;
     this.pressed = new Set();
     /** Where a pointer holds the end effector, px. @type {?[number, number]} */
     this.held = null;
@@ -53,28 +55,42 @@ class Stage {
     this.canvas.height = Math.round(this.canvas.clientHeight * ratio);
     this.colours = Stage.readColours();
     this.geometry = this.arm();
-    this.#choose(this.#reach());
+    if (!this.path.length) this.box = null; // another motion begins
+    this.#cover();
+    this.#choose();
     this.draw();
   }
 
-  /** Distance from joint 1, m, within which the whole arm is now, and a little more. */
-  #reach() {
-    const {a, l1, stops} = this.geometry;
+  /** Widen the box, m, that the arm has covered since its path began; whether it grew. */
+  #cover() {
+    const {l1, stops} = this.geometry;
     const [low, high] = stops.q2 ?? Stage.SLIDE;
-    const [, q2] = this.simulation.motion.get();
+    const [q1, q2] = this.simulation.motion.get();
+    const {elbow, sleeve, endEffector} = Arm.forward(this.geometry, q1, q2);
     // link 2 is so long that it is in its sleeve wherever it is: it ends `low` before the end
     // effector and `high` behind it
-    const along = [l1 + q2 - low, l1 + q2 - high, l1];
-    const reach = Math.hypot(Math.max(...along.map(Math.abs)), a);
-    return Stage.ZOOM ** Math.ceil(Math.log(reach) / Math.log(Stage.ZOOM)); // so that it seldom changes
+    const ends = [low, high].map(end => Arm.forward(this.geometry, q1, q2 - end).endEffector);
+    const points = [elbow, sleeve, endEffector, ...ends];
+    const step = Stage.GROWS * Math.max(l1, 0.1), before = this.box;
+    const beyond = (axis, sign) => {
+      const far = sign * Math.max(...points.map(point => sign * point[axis]), step);
+      return sign * Math.ceil(sign * far / step) * step;
+    };
+    const now = {
+      left: beyond(0, -1), right: beyond(0, 1), bottom: beyond(1, -1), top: beyond(1, 1),
+    };
+    this.box = before === null ? now : {
+      left: Math.min(before.left, now.left), right: Math.max(before.right, now.right),
+      bottom: Math.min(before.bottom, now.bottom), top: Math.max(before.top, now.top),
+    };
+    return before === null || Object.keys(now).some(side => this.box[side] !== before[side]);
   }
 
-  /** Choose the view for a reach in m; the point under the pointer stays there. */
-  #choose(reach) {
+  /** Choose the view of the box; the point under the pointer stays there. */
+  #choose() {
     const {g, stops} = this.geometry;
-    this.reach = reach;
     this.view = Arm.fit({
-      left: -reach, right: reach, bottom: -reach, top: reach, slide: stops.q2 ?? Stage.SLIDE,
+      ...this.box, slide: stops.q2 ?? Stage.SLIDE,
       torque: 40, force: 80, contact: 80, gravity: g, ghost: this.simulation.isControlled, modes: true,
       stops: stops.q1 !== null || stops.q2 !== null, trace: true,
     }, this.canvas.clientWidth, this.canvas.clientHeight, this.colours);
@@ -105,8 +121,7 @@ class Stage {
   /** The arm as it is now; where it leaves the view, this follows. */
   draw() {
     if (!this.canvas.clientWidth) return;
-    const reach = this.#reach();
-    if (reach > this.reach) this.#choose(reach);
+    if (this.#cover()) this.#choose();
     const context = this.canvas.getContext('2d');
     const ratio = window.devicePixelRatio || 1;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);

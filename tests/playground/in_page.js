@@ -169,3 +169,67 @@ function stepped(count, names) {
   for (const chart of own.charts) chart.draw();
   return [own.time, ...names.map(name => own.fmu.get(name))];
 }
+
+// ---- Running, time and memory -------------------------------------------------------------------
+
+/** Start, and keep what the last chart gets in window.rows. */
+function recorded() {
+  window.tested.reset();
+  window.rows = [];
+  const chart = window.tested.charts.at(-1), add = chart.add.bind(chart);
+  chart.add = time => {
+    window.rows.push([time, ...chart.source.get()]);
+    add(time);
+  };
+  window.tested.play(true);
+}
+
+/** States that are left of a benchmark whose force becomes too large in step 100. */
+function leaksOfBenchmark() {
+  const {advance, save, free} = simulation, end = simulation.steps + 100;
+  let count = 0;
+  simulation.save = () => { count++; return save.call(simulation); };
+  simulation.free = saved => { count--; free.call(simulation, saved); };
+  simulation.advance = () => {
+    if (simulation.steps === end) simulation.efforts[0] = 1e300;
+    advance.call(simulation);
+  };
+  document.getElementById('measure').click();
+  Object.assign(simulation, {advance, save, free});
+  return count;
+}
+
+/** A second, its q1 in window.q1, then the slider of the history. */
+function backInHistory(time) {
+  window.tested.reset();
+  window.q1 = [];
+  for (let n = 0; n <= 1000; n++) {
+    window.q1.push(plant.get('q1'));
+    simulation.step();
+  }
+  window.tested.show();
+  const slider = document.getElementById('history');
+  slider.value = time;
+  slider.dispatchEvent(new Event('input'));
+}
+
+/** Bytes of both FMUs after each of three runs of 15 s. */
+function sizesOfMemory() {
+  const sizes = [];
+  simulation.hand.target = [0.3, 0.3];
+  for (let turn = 0; turn < 3; turn++) {
+    for (let n = 0; n < 15000; n++) simulation.step();
+    window.tested.save();
+    sizes.push([plant.buffer.byteLength, controller.buffer.byteLength]);
+  }
+  return sizes;
+}
+
+/** How many colours the drawing has. */
+function coloursOfStage() {
+  const canvas = document.getElementById('stage');
+  const {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+  const found = new Set();
+  for (let i = 0; i < data.length; i += 4) found.add(data.slice(i, i + 4).join());
+  return found.size;
+}

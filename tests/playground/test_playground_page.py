@@ -36,16 +36,7 @@ def test_licenses(opened: OpenedPage) -> None:
 def test_ten_seconds_have_finite_energy(opened: OpenedPage) -> None:
     """At real time, ten times as fast; without efforts friction and impacts only take energy."""
     choose(opened, "#speed", "10")
-    opened.run("""
-        window.tested.reset();
-        window.rows = [];
-        const chart = window.tested.charts.at(-1), add = chart.add.bind(chart);
-        chart.add = time => {
-          window.rows.push([time, ...chart.source.get()]);
-          add(time);
-        };
-        window.tested.play(true);
-    """)
+    opened.call("recorded")
     opened.browser.wait("window.tested.simulation.time >= 10", 30)
     rows = opened.run("return window.rows")
     assert rows[-1][0] >= 9.99 and len(rows) >= 990
@@ -105,20 +96,7 @@ def test_a_benchmark_that_fails(opened: OpenedPage) -> None:
     click(opened, "#reset")
     state = "return [simulation.steps, ...simulation.motion.get(), simulation.efforts[0]]"
     before = opened.run(state)
-    result = opened.run("""
-        const {advance, save, free} = simulation, end = simulation.steps + 100;
-        let count = 0;
-        simulation.save = () => { count++; return save.call(simulation); };
-        simulation.free = saved => { count--; free.call(simulation, saved); };
-        simulation.advance = () => {
-          if (simulation.steps === end) simulation.efforts[0] = 1e300;
-          advance.call(simulation);
-        };
-        document.getElementById('measure').click();
-        Object.assign(simulation, {advance, save, free});
-        return count;
-    """)
-    assert result == 0
+    assert opened.call("leaksOfBenchmark") == 0
     assert opened.run(state) == before
     head, said = opened.text("#message").split("\n", 1)
     assert head == "The speed cannot be measured from here:"
@@ -167,19 +145,7 @@ def test_a_state_knows_its_scene(opened: OpenedPage) -> None:
 
 
 def test_history(opened: OpenedPage) -> None:
-    opened.run("""
-        window.tested.reset();
-        window.q1 = [];
-        for (let n = 0; n <= 1000; n++) {
-          window.q1.push(plant.get('q1'));
-          simulation.step();
-        }
-        window.tested.show();
-    """)
-    opened.browser.run(
-        "const slider = document.getElementById('history');"
-        "slider.value = 0.5; slider.dispatchEvent(new Event('input'))"
-    )
+    opened.call("backInHistory", 0.5)
     assert opened.run("return simulation.steps") == 500
     assert opened.value("q1") == opened.run("return window.q1[500]")
     click(opened, "#back")
@@ -226,16 +192,7 @@ def test_random_changes(opened: OpenedPage, seed: int) -> None:
 
 def test_memory_stays_as_large(opened: OpenedPage) -> None:
     """Once the history is full, states that are kept take the place of old ones."""
-    sizes = opened.run("""
-        const sizes = [];
-        simulation.hand.target = [0.3, 0.3];
-        for (let turn = 0; turn < 3; turn++) {
-          for (let n = 0; n < 15000; n++) simulation.step();
-          window.tested.save();
-          sizes.push([plant.buffer.byteLength, controller.buffer.byteLength]);
-        }
-        return sizes;
-    """)
+    sizes = opened.call("sizesOfMemory")
     assert sizes[0] == sizes[1] == sizes[2]
     assert max(sizes[0]) < 64e6
 
