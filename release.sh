@@ -19,3 +19,4 @@ cd build/release
 sha256sum --check --quiet SHA256SUMS
 echo "in build/release, bytes:"
 cut -c 67- SHA256SUMS | xargs wc -c
+echo "install: pip install build/release/$(ls | grep '\.whl$'); import build/release/NAME.fmu: docs/use-in-your-tool.md"

@@ -214,24 +214,14 @@ def names(given: Sequence[str]) -> list[str]:
 
 def retyped(command: str, positional: Iterable[object], given: Mapping[str, object]) -> str:
     """Write a command as it is typed again in the project's folder; without options not given."""
-    return shlex.join([project.PROGRAM, command, *map(_typed, positional)]) + retyped_options(given)
-
-
-def retyped_options(given: Mapping[str, object]) -> str:
-    """Write options as `retyped` does, each after a blank."""
-    parts: list[str] = []
+    parts = [project.PROGRAM, command, *map(_typed, positional)]
     for name, value in given.items():
         if value is True:
             parts.append(f"--{name}")
         elif value is not None and value is not False and value != "" and value != []:
             values = value if isinstance(value, list) else [value]
             parts += [f"--{name}", *map(_typed, values)]
-    return "".join(f" {shlex.quote(part)}" for part in parts)
-
-
-def other_folder(folder: Path, part: str = "") -> dict[str, Path]:
-    """Return the option --output, for `retyped`, if it is not the usual folder."""
-    return {} if folder == project.report_folder(part) else {"output": folder}
+    return shlex.join(parts)
 
 
 def file_or_name(given: str, suffixes: Iterable[str]) -> str | Path:

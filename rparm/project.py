@@ -338,7 +338,7 @@ def plotly_script() -> Path:
 def version() -> str:
     if INSTALLED:
         return metadata.version("rparm")
-    text = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
+    text = (PACKAGE.parent / "CMakeLists.txt").read_text(encoding="utf-8")
     found = re.search(r"^project\(\w+ VERSION (\S+)", text, re.MULTILINE)
     assert found is not None
     return found[1]
@@ -347,9 +347,18 @@ def version() -> str:
 @functools.cache
 def commit() -> str:
     """Return the commit of a checkout, with -dirty if files have changed; "" if it is not known."""
-    if not (ROOT / ".git").exists():
+    if not (PACKAGE.parent / ".git").exists():
         return ""
-    command = ["git", "-C", str(ROOT), "describe", "--always", "--dirty", "--exclude", "*"]
+    command = [
+        "git",
+        "-C",
+        str(PACKAGE.parent),
+        "describe",
+        "--always",
+        "--dirty",
+        "--exclude",
+        "*",
+    ]
     with suppress(OSError):
         return subprocess.run(command, capture_output=True, text=True).stdout.strip()
     return ""

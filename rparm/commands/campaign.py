@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from rparm import console, project
 from rparm.command_line import Ended, add_flag, add_output, count, number, retyped
 from rparm.console import Progress
@@ -14,7 +16,7 @@ from rparm.errors import UserError, one_line
 from rparm.files import from_here, written
 from rparm.interruption import arrived
 from rparm.report import overview
-from rparm.report.overview import RAN, Entry, dots
+from rparm.report.overview import RAN, Entry, sparkline
 from rparm.runs.scenario import title
 
 if TYPE_CHECKING:
@@ -118,15 +120,13 @@ def do_campaign(options: argparse.Namespace) -> Ended:
 
 
 def _record(name: str, made: "Work", page: Path, command: str, failed: int) -> None:
-    """Put the campaign on the start page, with its first result over its first parameter."""
-    campaign, kept = made.campaign, made.job.measures[0].column
-    first = next(iter(campaign.parameters))
-    table = made.results.table([first, kept])
-    title = f"{campaign.title}: {campaign.count} runs" + f", {failed} of them failed" * bool(failed)
+    """Put the campaign on the start page, with the distribution of its first result."""
+    count, kept = made.campaign.count, made.job.measures[0].column
+    values = np.sort(made.results.table([kept])[kept])
     entry = Entry(
-        name, title, made.base.path.stem, page.name, RAN, command=command,
-        line_of=f"{kept} over {first}", line_text=f"Runs: {kept} over {first}",
-        shapes=dots(table[first], table[kept]),
+        name, f"{made.campaign.title}: {count} runs" + f", {failed} failed" * bool(failed),
+        made.base.path.stem, page.name, RAN, command=command, line_of=f"distribution of {kept}",
+        line=sparkline(values, np.arange(count)), line_text=f"Runs with a smaller {kept}",
     )  # fmt: skip
     report = project.results_folder(page.parent)
     overview.record(report, overview.CAMPAIGNS, [entry], page.parent)

@@ -13,7 +13,6 @@ from rparm.command_line import (
     add_step,
     add_system,
     file_or_name,
-    other_folder,
     retyped,
 )
 from rparm.console import Progress
@@ -89,7 +88,7 @@ def _halved(system: OpenedSystem, variant: str, options: argparse.Namespace) -> 
         console.remark(note)
     first = found[0]
     title = f"{name}, {variant}: errors of the coupling"
-    curves = [Curve(f"{x.order.replace('_', '-')}, {x.inputs}", x.errors) for x in found]
+    curves = [Curve(f"{x.order.replace('_', '-')}, {x.inputs}", x.errors[::-1]) for x in found]
     axis = Axis("communication step", "ms", log=True)
     plot = Plot("error of the coupling", "", curves, log=True)
     page = RunPage(
@@ -97,7 +96,7 @@ def _halved(system: OpenedSystem, variant: str, options: argparse.Namespace) -> 
         description=ABOUT,
         status=RAN,
         facts=[("system", name), ("variant", variant)],
-        data=RunData(title, "", 1e3 * first.steps, [plot], axis),
+        data=RunData(title, "", 1e3 * first.steps[::-1], [plot], axis),
         tables=tables,
         notes=[note] if note else [],
         again=_again(options, [file_or_name(options.what, SUFFIXES), variant]),
@@ -120,7 +119,7 @@ def _halved(system: OpenedSystem, variant: str, options: argparse.Namespace) -> 
 
 
 def _again(options: argparse.Namespace, positional: Sequence[str | Path]) -> str:
-    given = {"ssp": options.ssp, "step": options.step} | other_folder(options.report, PART)
+    given = {"ssp": options.ssp, "step": options.step}
     given["fmi"] = options.fmi if options.fmi != project.VERSIONS[0] else None
     return retyped("coupling", positional, given)
 

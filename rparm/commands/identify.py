@@ -8,20 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rparm import console, project
-from rparm.command_line import (
-    Ended,
-    add_flag,
-    add_report,
-    file_or_name,
-    names,
-    other_folder,
-    pairs,
-    retyped,
-)
+from rparm.command_line import Ended, add_flag, add_report, file_or_name, names, pairs, retyped
 from rparm.errors import UserError, placed
 from rparm.files import check_writable, from_here, number_in, written
 from rparm.report import overview
-from rparm.report.overview import FAILED, RAN, Entry, sparkline
+from rparm.report.overview import FAILED, RAN, sparkline
 from rparm.units import SECONDS, typed_quantity
 
 if TYPE_CHECKING:
@@ -94,20 +85,17 @@ def _written(
     """Write the page, and its line on the start page with the first output."""
     from rparm.identification import page
 
-    report, command = project.results_folder(options.report), _again(options)
-    name = overview.free_name(report / PART, found.model, command)
-    path = page.write(found, report / PART / name, model, true, command, "../../")
-    first = range(found.of_first)
+    again, first = _again(options), range(found.of_first)
+    output = next(iter(found.checked.outputs))
     times = np.concatenate([found.segments[i].times for i in first])
     values = np.concatenate([found.predicted[i][:, 0] for i in first])
-    title = f"{', '.join(found.estimates)}: chi2 {found.chi2:.3g}"
-    entry = Entry(
-        name, title, found.model, path.name, RAN if found.passed else FAILED, command=command,
-        line=sparkline(times, values), line_of=f"simulated {found.checked.outputs[0]}",
-        line_text=f"Simulated {found.checked.outputs[0]} over the first log",
+    return overview.write_in_folder(
+        project.results_folder(options.report), PART, found.model,
+        lambda folder, root: page.write(found, folder, model, true, again, root),
+        title=f"Parameters: {', '.join(found.estimates)}", group=found.model, command=again,
+        status=RAN if found.passed else FAILED, line=sparkline(times, values), line_of=output,
+        line_text=f"Simulated {output}",
     )  # fmt: skip
-    overview.record(report, PART, [entry], path.parent)
-    return path
 
 
 def _asked(options: argparse.Namespace) -> tuple[Path, "Request", dict[str, float]]:
@@ -166,8 +154,7 @@ def _again(options: argparse.Namespace) -> str:
     files = [file_or_name(options.fmu, (".fmu",)), *options.logs] if options.fmu else []
     given = {name: getattr(options, name) for name in (*SEVERAL, "validate")}
     given["segment"] = options.segment if options.segment != SEGMENT else None
-    given |= {"delay": options.delay, "demo": options.demo} | other_folder(options.report, PART)
-    return retyped("identify", files, given)
+    return retyped("identify", files, given | {"delay": options.delay, "demo": options.demo})
 
 
 def _values(option: str, given: Sequence[str]) -> dict[str, Any]:

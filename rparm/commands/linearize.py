@@ -10,7 +10,6 @@ from rparm.command_line import (
     add_report,
     file_or_name,
     names,
-    other_folder,
     pairs,
     positive_seconds,
     retyped,
@@ -19,7 +18,7 @@ from rparm.command_line import (
 from rparm.errors import UserError
 from rparm.files import check_writable, from_here, written
 from rparm.report import overview
-from rparm.report.overview import RAN, Entry, dots
+from rparm.report.overview import RAN, crosses
 
 PART = overview.LINEAR
 MOST_COLUMNS, MOST_ROWS = 6, 12  # of matrices in the terminal
@@ -104,18 +103,18 @@ def do_linearize(options: argparse.Namespace) -> Ended:
     for path in options.save:
         study.save(path, found, options.step)
         print(f"saved: {from_here(path)}")
-    report, command = project.results_folder(options.report), _command(options)
-    name = "_".join(filter(None, (found.path.stem, found.variant)))
+    report, again, poles = (
+        project.results_folder(options.report),
+        _command(options),
+        found.linear.poles,
+    )
     with written(report):
-        name = overview.free_name(report / PART, name, command)
-        index = page.write(report / PART / name, found, options.step, command, "../../")
-        poles = found.linear.poles
-        entry = Entry(
-            name, f"Linear model: {n} states, {m} inputs, {p} outputs", found.path.stem, index.name,
-            RAN, line_text=f"{len(poles)} poles", shapes=dots(poles.real, poles.imag, cross=True),
-            command=command,
+        index = overview.write_in_folder(
+            report, PART, "_".join(filter(None, (found.path.stem, found.variant))),
+            lambda folder, root: page.write(folder, found, options.step, again, root),
+            title=f"{n} states, {m} inputs, {p} outputs", group=found.path.stem, status=RAN,
+            line_text=f"{len(poles)} poles", shapes=crosses(poles), command=again,
         )  # fmt: skip
-        overview.record(report, PART, [entry], index.parent)
     document = study.document(found, options.step) | {"page": index.absolute()}
     verdict = f"linear: {n} states, {m} inputs, {p} outputs"
     return Ended(0, verdict, document, page=index)
@@ -123,7 +122,6 @@ def do_linearize(options: argparse.Namespace) -> Ended:
 
 def _command(options: argparse.Namespace) -> str:
     given = {"fmi": options.fmi if options.fmi != project.VERSIONS[0] else None}
-    given |= other_folder(options.report, PART)
     for name in ("variant", "at", "time", "trim", "inputs", "outputs", "without", "cut", "step"):
         given["break" if name == "cut" else name] = getattr(options, name)
     return retyped("linearize", [file_or_name(options.what, SUFFIXES)], given)

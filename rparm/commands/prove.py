@@ -7,7 +7,7 @@ from dataclasses import asdict
 import numpy as np
 
 from rparm import console, project, proof
-from rparm.command_line import Ended, add_flag, add_report, add_tolerance, other_folder, retyped
+from rparm.command_line import Ended, add_flag, add_report, add_tolerance, retyped
 from rparm.console import Progress
 from rparm.errors import UserError, WrongValueError, placed
 from rparm.files import check_writable, written
@@ -101,7 +101,7 @@ def _verdict(references: Collection[ProvenReference]) -> str:
 def _command(options: argparse.Namespace) -> str:
     names = [options.name] if options.name else []
     given = {name: getattr(options, name) for name in ("method", "tolerance", "within")}
-    given |= {"check": options.check} | other_folder(options.report)
+    given["check"] = options.check
     return retyped("prove", names, given)
 
 

@@ -7,15 +7,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from rparm import console, project, result_tables
-from rparm.command_line import (
-    Ended,
-    add_flag,
-    add_fmi,
-    add_report,
-    add_tolerance,
-    other_folder,
-    retyped_options,
-)
+from rparm.command_line import Ended, add_flag, add_fmi, add_report, add_tolerance, retyped
 from rparm.commands.files import do_list
 from rparm.console import Progress
 from rparm.errors import UserError, did_you_mean, placed, together
@@ -73,8 +65,7 @@ def do_run(options: argparse.Namespace) -> Ended:
             runs.reference(scenario)  # so that a missing reference is reported before anything runs
         check_writable(options.report)
         given = {name: getattr(options, name) for name in ("fmu", "fmi", "tolerance")}
-        more = retyped_options(given | other_folder(options.report))
-        writer = ReportWriter(options.report, more)
+        writer = ReportWriter(options.report, retyped("run", [], given).partition(" run")[2])
         with written(options.report):
             writer.begin()
             if chosen:
@@ -237,7 +228,7 @@ def _runs(
     for scenario in chosen:
         ended, why = [], []
         for tolerance in dict.fromkeys(own[scenario]):
-            label = f"{scenario.name} at {tolerance:g}"
+            label = f"{scenario.name} at {short(tolerance)}"
             ahead = runs.steps_ahead(scenario, [tolerance], compared=True)
             found = _one(runs, failures, runs.compared, scenario, tolerance, label, ahead)
             ended += found

@@ -7,15 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rparm import console, project
-from rparm.command_line import (
-    Ended,
-    add_flag,
-    add_report,
-    add_step,
-    add_system,
-    other_folder,
-    retyped_options,
-)
+from rparm.command_line import Ended, add_flag, add_report, add_step, add_system, retyped
 from rparm.console import Progress
 from rparm.errors import UserError, did_you_mean, together
 from rparm.files import check_writable, written
@@ -184,9 +176,9 @@ def _run(chosen: Sequence[tuple[Section, Sequence[str]]], options: argparse.Name
                     save_figure(figure, options.pictures / f"{name}.png")
             outcomes.append(outcome)
         print()
-    given = {"ssp": options.ssp, "step": options.step} | other_folder(options.report)
+    given = {"ssp": options.ssp, "step": options.step}
     given["fmi"] = options.fmi if options.fmi != project.VERSIONS[0] else None
-    more = retyped_options(given)
+    more = retyped("system", [], given).partition(" system")[2]
     with written(options.report):
         entries = [replace(entry, command=entry.command + more) for entry in entries]
         index = overview.record(options.report, overview.SYSTEM, entries)

@@ -5,7 +5,8 @@ found in the folder and below, so that commands that run at the same time lose n
 """
 
 import json
-from collections.abc import Collection, Iterator, Mapping, Sequence
+import shlex
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, fields, replace
 from datetime import datetime
@@ -23,7 +24,7 @@ from rparm.report.run_data import Plot
 from rparm.units import number
 
 ENTRY = ".entry.json"
-DEEPEST = 4  # folders below that of the start page in which entries are looked for
+DEEPEST = 4  # folders in which entries are looked for, that of the start page among them
 PASSED, FAILED, RAN = "passed", "FAILED", "completed"  # RAN: there was nothing to compare with
 SCENARIOS, STUDIES, SYSTEM, FILES = "scenarios", "studies", "system", "files"
 LINEAR, COUPLING, CAMPAIGNS = "linearize", "coupling", "campaigns"
@@ -41,13 +42,13 @@ SECTIONS = {
     PROOFS: "proof",
     STUDIES: "accuracy study",
 }
-WIDTH, HEIGHT, MARGIN = 100.0, 60.0, 4.0  # of the view box
+WIDTH, HEIGHT, MARGIN = 100.0, 60.0, 5.0  # of the view box
 SPACE = "\N{NO-BREAK SPACE}"  # before a unit
 THIN = 'vector-effect="non-scaling-stroke"'
 COLUMNS = 60  # the curve's extremes in each are drawn
 NOTHING = 1e-12  # SI: a curve on a linear axis that stays below is rounding
-INSET = 8.0  # of points
 POSES, DOTS = 6, 300  # most in a thumbnail
+CROSS = "M{:.4g} {:.4g}m-3-3l6 6m0-6l-6 6"
 
 
 @dataclass(frozen=True)
@@ -92,16 +93,16 @@ def entry_of(name: str, page: RunPage, group: str, **more: Any) -> Entry:
     known |= {"page": f"{name}.html", "command": page.again}
     if page.data is not None:
         plot, x = page.data.plots[0], page.data.x
-        values = plot.curves[0].values
+        curve = plot.curves[0]
+        values = curve.values
         if plot.log:
             values = np.log10(np.where(values > 0, values, np.nan))
         elif np.abs(values[np.isfinite(values)]).max(initial=0.0) < NOTHING:
             values = np.zeros(len(x))
+        known |= {"line": sparkline(x, values), "shapes": poses(page.data.motion or {})}
+        known["line_text"] = "Motion of the arm; " * bool(known["shapes"]) + plot.text
         scale = sparkline_scale(x, plot, page.data.axis.unit)
-        shapes = poses(page.data.motion or {})
-        known |= {"line": sparkline(x, values), "shapes": shapes}
-        known["line_text"] = f"Motion of the arm; {plot.text}" if shapes else plot.text
-        known |= {"line_of": plot.curves[0].name, "line_scale": scale}
+        known |= {"line_of": curve.name, "line_scale": scale}
     return Entry(**known | more)
 
 
@@ -109,23 +110,37 @@ def record(
     report: Path, section: str, entries: Sequence[Entry], folder: Path | None = None
 ) -> Path:
     """Keep the entries of pages in `folder`, by default the section's; write the start page."""
-    stamp = {"date": datetime.now().astimezone().isoformat(timespec="seconds"), "section": section}
-    stamp["commit"] = project.commit()
-    for entry in entries:
-        text = json.dumps(asdict(replace(entry, **stamp)), ensure_ascii=False, indent=1)
-        write_text(_file(folder or report / section, entry), text + "\n")
+    now = datetime.now().astimezone().isoformat(timespec="seconds")
+    for each in entries:
+        stamp = {"date": now, "commit": project.commit(), "section": section}
+        stamp["command"] = _whole(report, each.command)
+        text = json.dumps(asdict(replace(each, **stamp)), ensure_ascii=False, indent=1)
+        name = each.page.removesuffix(".html")
+        write_text((folder or report / section) / f"{name}{ENTRY}", text + "\n")
     return write(report)
 
 
-def _file(folder: Path, entry: Entry) -> Path:
-    return folder / f"{entry.page.removesuffix('.html')}{ENTRY}"
+def _whole(report: Path, command: str) -> str:
+    """Add the folder to a command that has none, unless it is the usual one."""
+    if " --output " in command or report.absolute() == project.report_folder().absolute():
+        return command
+    return f"{command} --output {shlex.quote(str(project.from_root(report)))}"
 
 
-def free_name(folder: Path, name: str, command: str) -> str:
-    """Return the name of a folder in `folder` that has no page yet, or that of the same command."""
-    taken = {file.parent.name: entry.command for file, entry in _found(folder)}
+def write_in_folder(
+    report: Path, section: str, name: str, write: Callable[[Path, str], Path], **known: Any
+) -> Path:
+    """Write a page by `write(folder, root)`, and its entry; its path.
+
+    Its folder in the section has its name, unless that has the page of another command.
+    """
+    taken = {file.parent.name: entry.command for file, entry in _found(report / section)}
+    whole = _whole(report, known["command"])
     names = (name if i == 1 else f"{name}_{i}" for i in count(1))
-    return next(each for each in names if taken.get(each, command) == command)
+    name = next(each for each in names if taken.get(each, whole) == whole)
+    path = write(report / section / name, "../../")
+    record(report, section, [Entry(name=name, page=path.name, **known)], path.parent)
+    return path
 
 
 def forget(report: Path, section: str, names: Collection[str] | None = None) -> None:
@@ -140,37 +155,29 @@ def forget(report: Path, section: str, names: Collection[str] | None = None) -> 
 
 def read(report: Path, section: str) -> list[Entry]:
     """Read the entries of the pages in a section's folder."""
-    there = report / section
-    return [entry for file, entry in _found(report, section) if file.parent == there]
+    folder = report / section
+    return [entry for file, entry in _found(folder) if file.parent == folder]
 
 
 def _all(report: Path) -> dict[str, Entry]:
     """Return all entries, by the addresses of their pages."""
-    found = {(f.parent / e.page).relative_to(report).as_posix(): e for f, e in _found(report)}
-    return dict(sorted(found.items()))
+    return {(f.parent / e.page).relative_to(report).as_posix(): e for f, e in _found(report)}
 
 
-def _found(folder: Path, below: str = "") -> Iterator[tuple[Path, Entry]]:
+def _found(folder: Path) -> Iterator[tuple[Path, Entry]]:
     """Yield the entries whose pages are there, with their files; what is no entry is ignored."""
-    for depth in range(DEEPEST):
-        for file in sorted((folder / below).glob("*/" * depth + f"*{ENTRY}")):
-            with suppress(OSError, ValueError, TypeError, RecursionError):
-                entry = Entry(**json.loads(file.read_text(encoding="utf-8")))
-                if _is_sound(entry) and (file.parent / entry.page).is_file():
-                    yield file, entry
-
-
-def _is_sound(entry: Entry) -> bool:
-    """Return whether an entry of a file has values of its types, and a page beside it."""
-    texts = [getattr(entry, field.name) for field in fields(Entry) if field.type == "str"]
-    numbers = entry.error, entry.bound
-    return (
-        all(isinstance(text, str) for text in (*texts, *(x for s in entry.shapes for x in s)))
-        and all(isinstance(x, float | int | None) for x in numbers)
-        and all(len(shape) == 2 for shape in entry.shapes)
-        and entry.section in SECTIONS
-        and Path(entry.page).name == entry.page
-    )
+    texts = [field.name for field in fields(Entry) if field.type is str]
+    for file in sorted(
+        file for i in range(DEEPEST) for file in folder.glob("*/" * i + f"*{ENTRY}")
+    ):
+        with suppress(OSError, ValueError, TypeError, RecursionError):
+            entry = Entry(**json.loads(file.read_text(encoding="utf-8")))
+            _ = "".join(getattr(entry, name) for name in texts), entry.group.partition(" ")
+            _ = [f"{kind}" + path for kind, path in entry.shapes]
+            _ = abs(entry.error or 0), abs(entry.bound or 0)
+            is_beside = Path(entry.page).name == entry.page and (file.parent / entry.page).is_file()
+            if is_beside and entry.section in SECTIONS:
+                yield file, entry
 
 
 def write(report: Path) -> Path:
@@ -178,81 +185,61 @@ def write(report: Path) -> Path:
     pages.write_assets(report)
     while True:
         found = _all(report)
-        path = _write(report, found)
+        _write(report, found)
         if _all(report) == found:
-            return path
+            return report / pages.INDEX
 
 
-def _write(report: Path, found: Mapping[str, Entry]) -> Path:
-    ranks = {name.replace("_", ""): len(list((folder / "scenarios").iterdir()))
-             for name, folder in project.models().items()}  # fmt: skip
-    kinds = list(SECTIONS)
-
-    def rank(item: tuple[str, Entry]) -> tuple:
-        entry = item[1]
-        known = ranks.get(entry.model.lower(), 0)  # models with many scenarios first
-        return -known, entry.model, kinds.index(entry.section), entry.name
-
+def _write(report: Path, found: Mapping[str, Entry]) -> None:
+    scenarios = {
+        name.replace("_", ""): len(list(folder.glob("scenarios/*")))
+        for name, folder in project.models().items()
+    }
     groups: dict[str, list[tuple[str, Entry]]] = {}
-    for item in sorted(found.items(), key=rank):
+    kinds = list(SECTIONS)
+    in_order = sorted(found.items(), key=lambda x: (kinds.index(x[1].section), x[1].name))
+    for item in sorted(in_order, key=lambda x: (-scenarios.get(x[1].model.lower(), 0), x[1].model)):
         groups.setdefault(item[1].model, []).append(item)
     statuses = [entry.status for entry in found.values()]
-    return pages.write_page(
+    pages.write_page(
         report / pages.INDEX, "overview.html", root="", groups=groups, kinds=SECTIONS,
-        count=len(statuses), failed=statuses.count(FAILED), passed=statuses.count(PASSED),
-        statuses=[x for x in (FAILED, PASSED, RAN) if x in statuses],
-        version=project.version(), commit=project.commit(), width=WIDTH, height=HEIGHT,
+        statuses=statuses, version=project.version(), commit=project.commit(),
+        width=WIDTH, height=HEIGHT,
     )  # fmt: skip
 
 
 # ---- Thumbnails ----------------------------------------------------------------------------------
 def poses(moving: Mapping[str, Any]) -> list[list[str]]:
     """Draw the path of an arm's end effector, and poses from the first to the last."""
-    if not {"q1", "q2", "arm"} <= set(moving):
-        return []
-    arm, q1, q2 = moving["arm"], np.array(moving["q1"]), np.array(moving["q2"])
+    arm, q1, q2 = moving.get("arm"), *(np.array(moving.get(x) or ()) for x in ("q1", "q2"))
     there = np.isfinite(q1) & np.isfinite(q2)
-    along, across = np.exp(1j * q1[there]), 1j * np.exp(1j * q1[there])
-    sleeve = arm["l1"] * along
-    tip = (arm["l1"] + q2[there]) * along + arm["a"] * across
-    joints = np.array([0 * tip, sleeve, sleeve + arm["a"] * across, tip])
-    if not joints.size:
+    if arm is None or not there.any():
         return []
-    low, high = (complex(f(joints.real), f(joints.imag)) for f in (np.min, np.max))
+    along = np.exp(1j * q1[there])  # a point x + i y in frame 0
+    across = 1j * arm["a"] * along
+    tip = (arm["l1"] + q2[there]) * along + across
+    joints = _placed(np.array([0 * tip, arm["l1"] * along, arm["l1"] * along + across, tip]))
+    shown = np.unique(np.linspace(0, len(tip) - 1, POSES).astype(int))
+    kept = np.unique(np.linspace(0, len(tip) - 1, DOTS).astype(int))
+    drawn = [_path(joints[:, i].real, joints[:, i].imag) for i in shown]
+    trace = _path(joints[-1, kept].real, joints[-1, kept].imag)
+    return [["trace", trace], *(["ghost", path] for path in drawn[:-1]), ["arm", drawn[-1]]]
+
+
+def crosses(poles: np.ndarray) -> list[list[str]]:
+    """Draw poles, and the imaginary axis."""
+    zero, *points = _placed(np.array([0, *poles])).tolist()
+    path = "".join(CROSS.format(p.real, p.imag) for p in points)
+    return [["axis", f"M{zero.real:.4g} 0V{HEIGHT:g}"], ["curve", path]]
+
+
+def _placed(points: np.ndarray) -> np.ndarray:
+    """Place points x + i y in the view box, to scale; upwards is down there."""
+    low, high = (f(points.real) + 1j * f(points.imag) for f in (np.min, np.max))
     size = high - low
     room = WIDTH - 2 * MARGIN, HEIGHT - 2 * MARGIN
     scale = min(room[0] / max(size.real, 1e-9), room[1] / max(size.imag, 1e-9))
-    middle = (low + high) / 2
-
-    def path(points: np.ndarray) -> str:
-        placed = scale * (points - middle)
-        return _path(WIDTH / 2 + placed.real, HEIGHT / 2 - placed.imag)
-
-    shown = np.unique(np.linspace(0, len(tip) - 1, POSES).astype(int))
-    kept = np.unique(np.linspace(0, len(tip) - 1, DOTS).astype(int))
-    ghosts = [["ghost", path(joints[:, i])] for i in shown[:-1]]
-    return [["trace", path(tip[kept])], *ghosts, ["arm", path(joints[:, shown[-1]])]]
-
-
-def dots(x: np.ndarray, y: np.ndarray, cross: bool = False) -> list[list[str]]:
-    """Draw points (n,), or poles as crosses with the axis of the imaginary ones."""
-    there = np.isfinite(x) & np.isfinite(y)
-    x, y = x[there][:DOTS], y[there][:DOTS]
-    if not len(x):
-        return []
-    ends = [(min(v.min(), 0.0), max(v.max(), 0.0)) if cross else (v.min(), v.max()) for v in (x, y)]
-    placed = []
-    for values, (low, high), room in zip((x, y), ends, (WIDTH, HEIGHT), strict=True):
-        share = (values - low) / (high - low) if high > low else np.full(len(values), 0.5)
-        placed.append(INSET + share * (room - 2 * INSET))
-    across, up = placed[0], HEIGHT - placed[1]
-    mark = "M{0:.4g} {1:.4g}m-3-3l6 6m0-6l-6 6" if cross else "M{0:.4g} {1:.4g}h0"
-    path = "".join(mark.format(a, b) for a, b in zip(across, up, strict=True))
-    if not cross:
-        return [["dots", path]]
-    low, high = ends[0]
-    zero = INSET - low / (high - low) * (WIDTH - 2 * INSET) if high > low else WIDTH / 2
-    return [["axis", f"M{zero:.4g} 0V{HEIGHT:g}"], ["curve", path]]
+    return np.conj(scale * (points - (low + high) / 2)) + (WIDTH + 1j * HEIGHT) / 2
 
 
 def sparkline_scale(x: np.ndarray, plot: Plot, unit: str) -> str:
@@ -291,7 +278,7 @@ def sparkline(x: np.ndarray, y: np.ndarray) -> str:
 
 
 def _path(x: np.ndarray, y: np.ndarray) -> str:
-    return "M" + "L".join(f"{a:.4g} {b:.4g}" for a, b in zip(x, y, strict=True))
+    return "M" + "L".join(f"{a:.4g} {b:.4g}" for a, b in zip(x, y, strict=True)) + "h0"
 
 
 def sparkline_svg(x: np.ndarray, y: np.ndarray) -> str:

@@ -194,7 +194,7 @@ class Run(Compared):
             return f"{at} other bits in FMI {self.twin.fmi_version}: {others}"
         if self.compared and not self.error <= self.bound:
             bound = f"above its bound {short(self.bound)}"
-            return f"{at} error {self.error:.1e} of {self.worst}, {bound}"
+            return f"{at} error {short(self.error, 1)} of {self.worst}, {bound}"
         return ""
 
 
@@ -372,17 +372,16 @@ def sweep_violations(tolerances: Sequence[float], errors: Sequence[float]) -> li
     for tolerance, error in zip(tolerances, errors, strict=True):
         largest = error_bound(tolerance)
         if not error <= largest:
-            found = f"error {error:.2e} at tolerance {tolerance:g}"
-            texts.append(f"{found} is above its bound {largest:.0e}")
+            found = f"error {short(error, 2)} at tolerance {short(tolerance)}"
+            texts.append(f"{found} is above its bound {short(largest, 0)}")
+    e, t = [short(error, 2) for error in errors], [*map(short, tolerances)]
     for i in range(1, len(errors)):
         if not errors[i] <= LARGEST_RISE * errors[i - 1]:
             texts.append(
-                f"error {errors[i]:.2e} at tolerance {tolerances[i]:g} is more than "
-                f"{LARGEST_RISE:g} times the {errors[i - 1]:.2e} at {tolerances[i - 1]:g}"
+                f"error {e[i]} at tolerance {t[i]} is more than {LARGEST_RISE:g} times the "
+                f"{e[i - 1]} at {t[i - 1]}"
             )
     if not (errors[-1] <= errors[0] / SMALLEST_GAIN or errors[-1] < SMALL_ENOUGH):
-        texts.append(
-            f"error {errors[-1]:.2e} at tolerance {tolerances[-1]:g} is above 1/{SMALLEST_GAIN:g} "
-            f"of the {errors[0]:.2e} at {tolerances[0]:g}"
-        )
+        above = f"is above 1/{SMALLEST_GAIN:g} of the {e[0]} at {t[0]}"
+        texts.append(f"error {e[-1]} at tolerance {t[-1]} {above}")
     return texts

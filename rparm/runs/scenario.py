@@ -22,7 +22,7 @@ from rparm.files import difference, is_file, missing, read_toml, show
 from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, TOLERANCE, Model, Value, Variable
 from rparm.project import PROGRAM
 from rparm.runs.inputs import MEASURED, InputReader, Logged, Reader, Signal
-from rparm.units import SECONDS
+from rparm.units import SECONDS, number
 
 MODEL, FMU = "model", "fmu"  # keys of a file that is in no model's folder: one of them
 REQUIRED = ("title", "description", "tolerance", "time")
@@ -407,9 +407,9 @@ def _template_comment(variable: Variable) -> str:
     """Write meaning and limits of a variable, above the line that may be uncommented."""
     limits = []
     if math.isfinite(variable.least) and variable.type == "Real":
-        limits.append(f"at least {variable.least:g}")
+        limits.append(f"at least {number(variable.least)}")
     if math.isfinite(variable.greatest) and variable.type == "Real":
-        limits.append(f"at most {variable.greatest:g}")
+        limits.append(f"at most {number(variable.greatest)}")
     if variable.items:
         limits.append("one of " + ", ".join(map(toml_text, variable.items)))
     meaning = "; ".join([" ".join(variable.description.split()) or variable.name, *limits])

@@ -137,7 +137,7 @@ def test_what_moves_is_an_input_of_the_system(folder: Path, console: Console) ->
     """Other tools see it; here it keeps its start value, and Ecos gets a system without it."""
     path = folder / "Moving.ssp"
     code, out, err = console("ssp", folder / "moving.toml", "-o", path)
-    assert (code, out) == (0, f"{path}: written\n")
+    assert code == 0 and out == f"{path}: written; run it by ./run.sh system {path}\n"
     assert "inputs of the system, which Ecos and libcosim do not load: class.reference" in err
     assert "class needs Python 3." in err
     system = rparm.System(path)

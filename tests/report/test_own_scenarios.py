@@ -171,20 +171,6 @@ def test_two_files_of_one_name_are_refused(console: Console) -> None:
     assert "b/x.toml: its page would have the name of that of a/x.toml" in error
 
 
-def test_files_stay_in_the_overview_and_scenarios_beside_them(
-    console: Console,
-) -> None:
-    for name in ("a", "b", "a"):
-        Path(f"{name}.toml").write_text(CONTENT, encoding="utf-8")
-        assert console("run", f"{name}.toml", "--report", "out")[0] == 0
-    quick = ("constant_effort_single_step", "--tolerance", "1e-8")
-    assert console("run", *quick, "--report", "out")[0] == 0
-    assert [entry.name for entry in read(Path("out"), "files")] == ["a", "b"]
-    page = Path("out/index.html").read_text(encoding="utf-8")
-    for href in ("files/a", "files/b", "scenarios/constant_effort_single_step"):
-        assert page.count(f'href="{href}.html"') == 1
-
-
 def test_capitals_of_a_suffix_do_not_matter(console: Console) -> None:
     assert console("new", "Swing.TOML")[0] == 0
     assert [path.name for path in Path.cwd().iterdir()] == ["Swing.TOML"]
@@ -208,15 +194,6 @@ def test_files_of_one_name_have_pages_of_their_own(console: Console) -> None:
         for name in entries
     ]
     assert sorted(starts) == ["0.3", "0.4"]
-
-
-def test_other_scenarios_stay_when_some_run_again(console: Console) -> None:
-    for name in ("late_start", "constant_effort_single_step"):
-        arguments = (name, "--tolerance", "1e-8", "--report", "out")
-        assert console("run", *arguments)[0] == 0
-    page = Path("out/index.html").read_text(encoding="utf-8")
-    for name in ("late_start", "constant_effort_single_step"):
-        assert page.count(f'href="scenarios/{name}.html"') == 1
 
 
 def test_a_long_table_is_summed_up() -> None:

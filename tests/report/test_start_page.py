@@ -1,22 +1,29 @@
 """The start page: the door to the results of all commands in a folder."""
 
 import random
+from dataclasses import replace
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import lxml.html
 import pytest
 
-from tests.report.conftest import CONTENT
+from tests.identification.synthetic import ARM, write
+from tests.report.conftest import CONTENT, LATE, STRANGE, VARIANT
+from tests.support.browser import Browser
 from tests.support.rparm_project import Console
 
 LOOP = """name = "Bench"
 step = 0.01
 stop = 0.2
 [components]
-plant = "RPPlant"
-[inputs]
-"plant.tau1" = { constant = 20.0 }
+arm = "RPManipulator"
+control = "RPController"
+[connections]
+"control.q1" = "arm.q1"
+"arm.tau1" = "control.tau1"
+[parameters]
+"arm.q1" = 0.3
 """
 CAMPAIGN = """title = "Payload"
 description = "Another second link."
@@ -29,16 +36,21 @@ uniform = [0.5, 1.5]
 [keep]
 final = ["q1"]
 """
+IDENTIFY = (
+    *("--inputs", "tau1", "f2", "--measured", "q1", "q2", "--parameters", "m2"),
+    *("--set", "I1z=0.12", "a=110mm", "l1=0.55"),
+)
 QUICK = "constant_effort_single_step"
 # a command -> the names of its results
 COMMANDS = {
     ("run", QUICK, "--tolerance", "1e-8"): [QUICK],
+    ("run", "late_start", "--tolerance", "1e-8"): ["late_start"],
     ("run", "mine.toml"): ["mine"],
     ("system", "bench.toml"): ["Bench_default"],
     ("coupling", "bench.toml"): ["Bench_default"],
     ("linearize", "RPPlant"): ["RPPlant"],
     ("linearize", "RPPlant", "--at", "q1=30deg"): ["RPPlant"],
-    ("identify", "--demo"): ["RPPlant"],
+    ("identify", "RPManipulator", "log.csv", *IDENTIFY): ["RPManipulator"],
     ("campaign", "payload.toml", "--workers", "1", "--no-dashboard"): ["payload"],
     ("campaign", "payload.toml", "--replay", "3"): ["run_3"],
     ("prove", QUICK): [QUICK],
@@ -59,8 +71,9 @@ def test_each_result_is_listed_once_and_opens(
     monkeypatch.chdir(tmp_path)
     for name, text in (("mine", CONTENT), ("bench", LOOP), ("payload", CAMPAIGN)):
         Path(f"{name}.toml").write_text(text, encoding="utf-8")
+    write(replace(ARM, duration=2.0), Path("log.csv"), 1)
     order = random.Random(45).sample(list(COMMANDS), len(COMMANDS))
-    for command in order:
+    for command in (*order, order[0]):
         code, out, err = console(*command, "--output", "all")
         assert code == 0, (command, out, err)
         assert "all/" in out.splitlines()[-1] and " --open" in out.splitlines()[-1], command
@@ -74,3 +87,22 @@ def test_each_result_is_listed_once_and_opens(
         assert index in links(page), page
     for style in lxml.html.fromstring(index.read_bytes()).xpath("//link[@rel='stylesheet']/@href"):
         assert (index.parent / style).is_file()
+
+
+def test_it_searches_filters_and_sorts(browser: Browser, report: Path) -> None:
+    """Without scripts all lines are there; with them those that were asked for."""
+    browser.open(report / "index.html")
+    shown = (
+        "Object.entries(arguments[0]).forEach(([id, value]) => {"
+        " document.getElementById(id).value = value;"
+        " document.getElementById(id).dispatchEvent(new Event('input', {bubbles: true})); });"
+        "return [...document.querySelectorAll('.what a')].filter(x => x.offsetParent)"
+        ".map(x => x.innerText)"
+    )
+    every = browser.run(shown, {})
+    assert browser.run(shown, {"search": LATE.upper(), "kind": "scenario"}) == [LATE]
+    assert browser.run(shown, {"search": "", "kind": "", "verdict": "completed"}) == [STRANGE]
+    assert browser.run(shown, {"verdict": "", "kind": "system"}) == [VARIANT]
+    by_name = browser.run(shown, {"kind": "", "sort": "name"})
+    assert by_name == sorted(every, key=str.lower) != every
+    assert browser.run(shown, {"sort": ""}) == every

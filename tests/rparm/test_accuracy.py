@@ -84,7 +84,7 @@ def test_rules_on_errors_over_tolerances() -> None:
     assert not comparison.sweep_violations(tolerances, (2e-10, 5e-11, 9e-11))
     assert not comparison.sweep_violations(tolerances, (0.0, 0.0, 0.0))
     (above,) = comparison.sweep_violations(tolerances, (0.2, 1e-5, 1e-6))
-    assert "2.00e-01 at tolerance 0.0001 is above its bound 1e-01" in above
+    assert "2.00e-1 at tolerance 1e-4 is above its bound 1e-1" in above
     (rise,) = comparison.sweep_violations(tolerances, (1e-2, 1e-6, 3.1e-6))
     assert "more than 3 times" in rise
     (gain,) = comparison.sweep_violations(tolerances, (1e-4, 1e-5, 1.1e-7))

@@ -14,6 +14,7 @@ import pytest
 from rparm import command_line, result_tables
 from rparm import project as project_folders
 from rparm.command_line import COMMANDS
+from rparm.commands import run as run_command
 from rparm.console import json_line, results_stream, stage, verdict_line
 from rparm.fmi.fmu_file import Fmu
 from rparm.result_tables import RunTable, SweepTable
@@ -216,9 +217,14 @@ def test_the_folder_for_results_has_two_names(capsys: pytest.CaptureFixture[str]
         assert "--output DIR" in parser.format_help() and "--report" not in parser.format_help()
 
 
-def test_without_a_command_there_is_help(console: Console) -> None:
-    code, out, err = console()
-    assert (code, out) == (2, "") and err == f"{command_line.overview()}\n"
+def test_without_a_command_all_scenarios_run(
+    console: Console, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As the usage says: `run` is the default."""
+    wanted = []
+    ended = command_line.Ended(0, "ran")
+    monkeypatch.setattr(run_command, "do_run", lambda options: wanted.append(options) or ended)
+    assert console()[0] == 0 and wanted[0].names == [] and wanted[0].command == "run"
 
 
 @pytest.mark.parametrize(
