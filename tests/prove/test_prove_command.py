@@ -359,7 +359,9 @@ def test_the_page_of_a_proof(own: Path, tmp_path: Path, capsys: pytest.CaptureFi
         assert f"proven error of {name}" in page
         assert f"{rounded_up(error['error'], 2)} at {error['at']:.4g} s" in page
     main(["prove", str(own), "--within", "1mrad", "--method", "erk", "--output", str(tmp_path)])
-    assert "--within</span> 1mrad" in (tmp_path / "proofs" / "own.html").read_text()
+    page = (tmp_path / "proofs" / "own.html").read_text()
+    assert "--within</span>" in page and "1mrad" in page
+    assert '"kind":"bounds"' in page and '"name":"erk at ' in page
 
 
 @pytest.mark.parametrize("value", [1.21e-8, 1.2e-8, 9.99e-14, 1.0, 0.0, 2.0**-1074])

@@ -109,6 +109,7 @@ const Charts = (() => {
   }
 
   async function start() {
+    await plotlyReady; // diagrams.js needs this object, which is complete by then
     for (const figure of document.querySelectorAll('figure.chart')) {
       const data = JSON.parse(figure.querySelector('script').textContent);
       await draw(figure.querySelector('.drawing'), Diagrams[data.kind](data));
