@@ -27,14 +27,14 @@ def drag_place(opened: OpenedPage) -> tuple[float, float]:
 def test_drag_by_mouse(opened: OpenedPage) -> None:
     x, y = (round(number) for number in drag_place(opened))
     mouse = ActionChains(opened.browser.driver, duration=0).w3c_actions
-    mouse.pointer_action.move_to_location(x, y).pointer_down().move_to_location(x - 40, y + 60)
+    mouse.pointer_action.move_to_location(x, y).pointer_down().move_to_location(x - 60, y + 150)
     mouse.perform()
     opened.run("simulation.step()")
     fx, fy = opened.value("ee_fx"), opened.value("ee_fy")
     assert fx < -1 and fy < -1
     opened.browser.driver.execute_cdp_cmd(
         "Input.dispatchMouseEvent",
-        {"type": "mouseReleased", "x": x - 40, "y": y + 60, "button": "left", "clickCount": 1},
+        {"type": "mouseReleased", "x": x - 60, "y": y + 150, "button": "left", "clickCount": 1},
     )
     mouse.clear_actions()
     opened.run("simulation.step()")
