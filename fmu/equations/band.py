@@ -17,6 +17,15 @@ class Band(NamedTuple):
     places: list[int]  # of the elements that were given
     size: int
 
+    @property
+    def lines(self) -> list[str]:
+        """Its declarations in C."""
+        tables = {"order": self.order, "places": self.places}
+        return [
+            *(f"static const size_t {n}[] = {{{str(t)[1:-1]}}};" for n, t in tables.items()),
+            f"static const struct band band = {{{self.lower}, {self.upper}, order}};",
+        ]
+
 
 def band(count: int, elements: Collection[tuple[int, int]]) -> Band | None:
     """Return the band of `count` states for the elements (i, j); None where it does not pay."""

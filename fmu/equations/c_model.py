@@ -145,12 +145,10 @@ def _smooth(file: ModelFile) -> dict[str, Any]:
     }
     narrow = band(count, slopes)
     size = narrow.size if narrow else count * count
-    places = (
-        [f"places[{k}]" for k in range(len(slopes))]
-        if narrow
-        else ([j * count + i for i, j in slopes])
-    )
-    entries = {f"J[{place}]": slope for place, slope in zip(places, slopes.values(), strict=True)}
+    entries = {
+        f"J[places[{k}]]" if narrow else f"J[{j * count + i}]": slope
+        for k, ((i, j), slope) in enumerate(slopes.items())
+    }
     clear = [f"for (size_t i = 0; i < {size}; i++) {{", "    J[i] = 0.0;", "}"]
     motion = {f"dx[{i}]": rate for i, rate in enumerate(rates)}
     (right_hand_side,) = rolled(Code(arrays(file)).assign(motion).lines)
@@ -159,19 +157,9 @@ def _smooth(file: ModelFile) -> dict[str, Any]:
         "right_hand_side": right_hand_side,
         "jacobian": clear * (len(entries) < size) + jacobian,
         "jacobian_size": size,
-        "places": _array("places", narrow.places) if narrow else [],
-        "band": [
-            *_array("order", narrow.order),
-            f"static const struct band band = {{{narrow.lower}, {narrow.upper}, order}};",
-        ]
-        if narrow
-        else [],
+        "band": narrow.lines if narrow else [],
         "band_of_jacobian": [".band = &band,"] if narrow else [],
     }
-
-
-def _array(name: str, numbers: list[int]) -> list[str]:
-    return [f"static const size_t {name}[] = {{{', '.join(map(str, numbers))}}};"]
 
 
 def _followed(file: ModelFile, events: Events) -> tuple[dict[Value, Value], list[Value]]:
