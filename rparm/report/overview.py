@@ -20,7 +20,7 @@ from rparm import project
 from rparm.files import write_text
 from rparm.report import pages
 from rparm.report.pages import RunPage
-from rparm.report.run_data import Plot
+from rparm.report.run_data import LINKS, Plot
 from rparm.units import number
 
 ENTRY = ".entry.json"
@@ -99,7 +99,8 @@ def entry_of(name: str, page: RunPage, group: str, **more: Any) -> Entry:
             values = np.log10(np.where(values > 0, values, np.nan))
         elif np.abs(values[np.isfinite(values)]).max(initial=0.0) < NOTHING:
             values = np.zeros(len(x))
-        known |= {"line": sparkline(x, values), "shapes": poses(page.data.motion or {})}
+        shapes = poses(np.array(page.data.motion[LINKS])) if page.data.motion else []
+        known |= {"line": sparkline(x, values), "shapes": shapes}
         known["line_text"] = "Motion of the arm; " * bool(known["shapes"]) + plot.text
         scale = sparkline_scale(x, plot, page.data.axis.unit)
         known |= {"line_of": curve.name, "line_scale": scale}
@@ -209,18 +210,13 @@ def _write(report: Path, found: Mapping[str, Entry]) -> None:
 
 
 # ---- Thumbnails ----------------------------------------------------------------------------------
-def poses(moving: Mapping[str, Any]) -> list[list[str]]:
-    """Draw the path of an arm's end effector, and poses from the first to the last."""
-    arm, q1, q2 = moving.get("arm"), *(np.array(moving.get(x) or ()) for x in ("q1", "q2"))
-    there = np.isfinite(q1) & np.isfinite(q2)
-    if arm is None or not there.any():
+def poses(links: np.ndarray) -> list[list[str]]:
+    """Draw the path of the end effector, and poses from the first to the last."""
+    if not (there := np.isfinite(links).all(axis=(0, 1))).any():
         return []
-    along = np.exp(1j * q1[there])  # a point x + i y in frame 0
-    across = 1j * arm["a"] * along
-    tip = (arm["l1"] + q2[there]) * along + across
-    joints = _placed(np.array([0 * tip, arm["l1"] * along, arm["l1"] * along + across, tip]))
-    shown = np.unique(np.linspace(0, len(tip) - 1, POSES).astype(int))
-    kept = np.unique(np.linspace(0, len(tip) - 1, DOTS).astype(int))
+    joints = _placed(links[0][:, there] + 1j * links[1][:, there])
+    last = joints.shape[1] - 1
+    shown, kept = (np.unique(np.linspace(0, last, n).astype(int)) for n in (POSES, DOTS))
     drawn = [_path(joints[:, i].real, joints[:, i].imag) for i in shown]
     trace = _path(joints[-1, kept].real, joints[-1, kept].imag)
     return [["trace", trace], *(["ghost", path] for path in drawn[:-1]), ["arm", drawn[-1]]]
