@@ -92,7 +92,8 @@ def entry_of(name: str, page: RunPage, group: str, **more: Any) -> Entry:
     known = {"name": name, "title": page.title, "group": group, "status": page.status}
     known |= {"page": f"{name}.html", "command": page.again}
     if page.data is not None:
-        plot, x = page.data.plots[0], page.data.x
+        moving = (p for p in page.data.plots if p.log or np.ptp(p.curves[0].values) > NOTHING)
+        plot, x = next(moving, page.data.plots[0]), page.data.x
         curve = plot.curves[0]
         values = curve.values
         if plot.log:

@@ -78,6 +78,10 @@ const Diagrams = (() => {
         traces.push({ ...piece(mark, place, [angle, angle - mark.lag]), yaxis: 'y2' });
       }
     }
+    // a resonance without damping must not press all else flat
+    const gains = curves.flatMap(({ gain }) => gain.filter(Number.isFinite)).sort((a, b) => a - b);
+    const [few, most] = [0.05, 0.95].map((part) => gains[Math.round(part * (gains.length - 1))]);
+    const [low, high] = [Math.max(gains[0] - 5, few - 40), Math.min(gains.at(-1) + 5, most + 40)];
     const angles = curves.flatMap(({ phase }) => phase.filter(Number.isFinite));
     const turns = Math.max(...angles) - Math.min(...angles);
     const scale = turns < 720 ? { dtick: turns < 270 ? 45 : 90, nticks: 0 } : {};
@@ -85,7 +89,7 @@ const Diagrams = (() => {
       traces,
       layout: {
         xaxis: axis('frequency (Hz)', { type: 'log', anchor: 'y2', range: ends.map(Math.log10), dtick: 1, nticks: 0 }),
-        ...stacked([axis('gain (dB)'), axis('phase (degrees)', scale)]),
+        ...stacked([axis('gain (dB)', { range: [low, high] }), axis('phase (degrees)', scale)]),
         shapes: [...(half ? [across(half)] : []), ...[...crossings, ...marks.filter(isGain).map(({ hertz }) => hertz)].map((x) => across(x, '--ink'))],
       },
     };
