@@ -63,6 +63,7 @@ class Entry:
     error: float | None = None  # the worst one; None if it is NaN or unknown
     bound: float | None = None
     detail: str = ""  # which output is worst, or why the run failed
+    difference: str = ""  # largest one from another result
     line: str = ""  # path of the sparkline
     line_text: str = ""  # its description
     line_of: str = ""  # the variable of the sparkline
@@ -94,16 +95,17 @@ def entry_of(name: str, page: RunPage, group: str, **more: Any) -> Entry:
     if page.data is not None:
         moving = (p for p in page.data.plots if p.log or np.ptp(p.curves[0].values) > NOTHING)
         plot, x = next(moving, page.data.plots[0]), page.data.x
-        curve = plot.curves[0]
-        values = curve.values
+        curve, values = plot.curves[0], plot.curves[0].values
         if plot.log:
             values = np.log10(np.where(values > 0, values, np.nan))
         elif np.abs(values[np.isfinite(values)]).max(initial=0.0) < NOTHING:
             values = np.zeros(len(x))
         known |= {"line": sparkline(x, values), "shapes": poses(page.data.motion or {})}
         known["line_text"] = "Motion of the arm; " * bool(known["shapes"]) + plot.text
-        scale = sparkline_scale(x, plot, page.data.axis.unit)
-        known |= {"line_of": curve.name, "line_scale": scale}
+        known |= {
+            "line_of": curve.name,
+            "line_scale": sparkline_scale(x, plot, page.data.axis.unit),
+        }
     return Entry(**known | more)
 
 
