@@ -74,4 +74,4 @@ def lay(
     scales = [max(np.abs(curve.values).max(), SMALLEST_SCALE) for _, curve in drawn]
     i = int(np.argmax(np.divide(sizes, scales)))
     largest = f"{drawn[i][1].name} {exponents(f'{sizes[i]:.3g} {drawn[i][0]}'.strip())}"
-    return plots, other | {"largest": f"{largest} from {log.path}"}
+    return plots, other | {"largest": f"largest difference {largest} from {log.path}"}

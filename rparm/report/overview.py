@@ -102,10 +102,8 @@ def entry_of(name: str, page: RunPage, group: str, **more: Any) -> Entry:
             values = np.zeros(len(x))
         known |= {"line": sparkline(x, values), "shapes": poses(page.data.motion or {})}
         known["line_text"] = "Motion of the arm; " * bool(known["shapes"]) + plot.text
-        known |= {
-            "line_of": curve.name,
-            "line_scale": sparkline_scale(x, plot, page.data.axis.unit),
-        }
+        known["line_scale"] = sparkline_scale(x, plot, page.data.axis.unit)
+        known["line_of"] = curve.name
     return Entry(**known | more)
 
 
