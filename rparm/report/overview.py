@@ -100,7 +100,10 @@ def entry_of(name: str, page: RunPage, group: str, **more: Any) -> Entry:
             values = np.log10(np.where(values > 0, values, np.nan))
         elif np.abs(values[np.isfinite(values)]).max(initial=0.0) < NOTHING:
             values = np.zeros(len(x))
-        known |= {"line": sparkline(x, values), "shapes": poses(page.data.motion or {})}
+        known |= {
+            "line": sparkline(np.abs(x - x[0]), values),
+            "shapes": poses(page.data.motion or {}),
+        }
         known["line_text"] = "Motion of the arm; " * bool(known["shapes"]) + plot.text
         known["line_scale"] = sparkline_scale(x, plot, page.data.axis.unit)
         known["line_of"] = curve.name
@@ -252,7 +255,8 @@ def sparkline_scale(x: np.ndarray, plot: Plot, unit: str) -> str:
         values = np.zeros(1)
     low, high = (number(float(f"{value:.3g}")) for value in (values.min(), values.max()))
     between = low if low == high else f"{low} to {high}"
-    parts = (f"{between} {plot.unit}".strip(), f"{x[-1] - x[0]:.3g} {unit}")
+    span = f"{x[-1] - x[0]:.3g}" if unit == "s" else f"{x[0]:.3g} to {x[-1]:.3g}"
+    parts = (f"{between} {plot.unit}".strip(), f"{span} {unit}")
     return ", ".join(SPACE.join(part.rsplit(" ", 1)) for part in parts)
 
 
