@@ -94,18 +94,15 @@ def entry_of(name: str, page: RunPage, group: str, **more: Any) -> Entry:
     known |= {"page": f"{name}.html", "command": page.again}
     if page.data is not None:
         moving = (p for p in page.data.plots if p.log or np.ptp(p.curves[0].values) > NOTHING)
-        plot, x = next(moving, page.data.plots[0]), page.data.x
+        plot, x = next(moving, page.data.plots[0]), np.abs(page.data.x - page.data.x[0])
         curve, values = plot.curves[0], plot.curves[0].values
         if plot.log:
             values = np.log10(np.where(values > 0, values, np.nan))
         elif np.abs(values[np.isfinite(values)]).max(initial=0.0) < NOTHING:
             values = np.zeros(len(x))
-        known |= {
-            "line": sparkline(np.abs(x - x[0]), values),
-            "shapes": poses(page.data.motion or {}),
-        }
+        known |= {"line": sparkline(x, values), "shapes": poses(page.data.motion or {})}
         known["line_text"] = "Motion of the arm; " * bool(known["shapes"]) + plot.text
-        known["line_scale"] = sparkline_scale(x, plot, page.data.axis.unit)
+        known["line_scale"] = sparkline_scale(page.data.x, plot, page.data.axis.unit)
         known["line_of"] = curve.name
     return Entry(**known | more)
 
