@@ -79,9 +79,14 @@ const Diagrams = (() => {
       }
     }
     // a resonance without damping must not press all else flat
-    const gains = curves.flatMap(({ gain }) => gain.filter(Number.isFinite)).sort((a, b) => a - b);
-    const [few, most] = [0.05, 0.95].map((part) => gains[Math.round(part * (gains.length - 1))]);
-    const [low, high] = [Math.max(gains[0] - 5, few - 40), Math.min(gains.at(-1) + 5, most + 40)];
+    const gains = curves.flatMap(({ gain }) => gain.filter(Number.isFinite));
+    const [from, to] = ends.map(Math.log10);
+    const coarse = Array.from({ length: 101 }, (_, i) => 10 ** (from + (i * (to - from)) / 100));
+    const usual = curves.flatMap(({ hertz, gain }) => coarse
+      .filter((at) => at >= hertz[0] && at <= hertz.at(-1)).map((at) => interpolated(hertz, gain, at)))
+      .filter(Number.isFinite);
+    const low = Math.max(Math.min(...gains) - 5, Math.min(...usual) - 20);
+    const high = Math.min(Math.max(...gains) + 5, Math.max(...usual) + 20);
     const angles = curves.flatMap(({ phase }) => phase.filter(Number.isFinite));
     const turns = Math.max(...angles) - Math.min(...angles);
     const scale = turns < 720 ? { dtick: turns < 270 ? 45 : 90, nticks: 0 } : {};
