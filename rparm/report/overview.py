@@ -93,8 +93,8 @@ def entry_of(name: str, page: RunPage, group: str, **more: Any) -> Entry:
     known = {"name": name, "title": page.title, "group": group, "status": page.status}
     known |= {"page": f"{name}.html", "command": page.again}
     if page.data is not None:
-        moving = (p for p in page.data.plots if p.log or np.ptp(p.curves[0].values) > NOTHING)
-        plot, x = next(moving, page.data.plots[0]), np.abs(page.data.x - page.data.x[0])
+        moving = (p for p in page.data.plots if p.log or len({*p.curves[0].values}) > 1)
+        plot, x = next(moving, page.data.plots[0]), np.abs(page.data.x - page.data.x[:1])
         curve, values = plot.curves[0], plot.curves[0].values
         if plot.log:
             values = np.log10(np.where(values > 0, values, np.nan))
