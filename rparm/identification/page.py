@@ -51,7 +51,7 @@ def write(
         again=again,
     )
     known, parameters = found.known, _parameters(found, true)
-    drawn = [correlations_chart(known, found.covariances.scatter)] if known else []
+    drawn = [correlations_chart(known, found.covariances.scatter)] if len(known) > 1 else []
     drawn.append(autocorrelations_chart(found.whiteness))
     if not root:
         pages.write_assets(folder)
