@@ -227,8 +227,8 @@ const Diagrams = (() => {
   }
 
   function bounds({ curves, x, y }) {
-    const mode = ({ y: values }) => (values.filter(Number.isFinite).length > 1 ? 'lines' : 'markers');
-    const traces = curves.map((curve, i) => ({ ...curve, mode: mode(curve), line: line(colour(i)) }));
+    const mode = ({ y: values }) => (values.filter(Number.isFinite).length > 1 ? 'lines' : 'lines+markers');
+    const traces = curves.map((curve, i) => ({ ...curve, mode: mode(curve), line: line(colour(i)), marker: { color: colour(i) } }));
     return { traces, layout: { xaxis: axis(x), yaxis: axis(y, { type: 'log' }) } };
   }
 
