@@ -101,7 +101,7 @@ def do_run(options: argparse.Namespace) -> Ended:
             print_measured(group[0])
         with written(options.report), Progress("report", len(groups), "pages") as progress:
             page = writer.write(groups, done.sweeps, done.studies, progress, done.failures)
-    print()
+    print(*writer.differences, "", sep="\n")
     for name, file in writer.files.items():
         print(f"{name}: {from_here(file)}")
     return _ended(done, (options.report / pages.INDEX).absolute(), page)

@@ -63,6 +63,7 @@ class Entry:
     error: float | None = None  # the worst one; None if it is NaN or unknown
     bound: float | None = None
     detail: str = ""  # which output is worst, or why the run failed
+    difference: str = ""  # largest one from another result
     line: str = ""  # path of the sparkline
     line_text: str = ""  # its description
     line_of: str = ""  # the variable of the sparkline
@@ -92,9 +93,9 @@ def entry_of(name: str, page: RunPage, group: str, **more: Any) -> Entry:
     known = {"name": name, "title": page.title, "group": group, "status": page.status}
     known |= {"page": f"{name}.html", "command": page.again}
     if page.data is not None:
-        plot, x = page.data.plots[0], page.data.x
-        curve = plot.curves[0]
-        values = curve.values
+        moving = (p for p in page.data.plots if p.log or len({*p.curves[0].values}) > 1)
+        plot, x = next(moving, page.data.plots[0]), np.abs(page.data.x - page.data.x[:1])
+        curve, values = plot.curves[0], plot.curves[0].values
         if plot.log:
             values = np.log10(np.where(values > 0, values, np.nan))
         elif np.abs(values[np.isfinite(values)]).max(initial=0.0) < NOTHING:
@@ -102,8 +103,8 @@ def entry_of(name: str, page: RunPage, group: str, **more: Any) -> Entry:
         shapes = poses(np.array(page.data.motion[LINKS])) if page.data.motion else []
         known |= {"line": sparkline(x, values), "shapes": shapes}
         known["line_text"] = "Motion of the arm; " * bool(known["shapes"]) + plot.text
-        scale = sparkline_scale(x, plot, page.data.axis.unit)
-        known |= {"line_of": curve.name, "line_scale": scale}
+        known["line_scale"] = sparkline_scale(page.data.x, plot, page.data.axis.unit)
+        known["line_of"] = curve.name
     return Entry(**known | more)
 
 
@@ -247,7 +248,8 @@ def sparkline_scale(x: np.ndarray, plot: Plot, unit: str) -> str:
         values = np.zeros(1)
     low, high = (number(float(f"{value:.3g}")) for value in (values.min(), values.max()))
     between = low if low == high else f"{low} to {high}"
-    parts = (f"{between} {plot.unit}".strip(), f"{x[-1] - x[0]:.3g} {unit}")
+    span = f"{x[-1] - x[0]:.3g}" if unit == "s" else f"{x[0]:.3g} to {x[-1]:.3g}"
+    parts = (f"{between} {plot.unit}".strip(), f"{span} {unit}")
     return ", ".join(SPACE.join(part.rsplit(" ", 1)) for part in parts)
 
 

@@ -47,6 +47,7 @@ class ReportWriter:
         """`options` are those of the command, for its pages; `others` what to draw over results."""
         self.folder, self.options, self._others = folder, options, others
         self.files: dict[str, Path] = {}  # pages of users' own files that were written, by name
+        self.differences: list[str] = []  # from other results, a text each
 
     def begin(self) -> None:
         """Write what all pages share: fails now, not after all runs, if there is no room."""
@@ -86,6 +87,7 @@ class ReportWriter:
             if group:
                 over = self._others.get((section, scenario.name))
                 entry = scenario_page.write(folder, name, group, again, others, over)
+                self.differences += [f"{name}: {entry.difference}"] if over else []
             else:
                 entry = scenario_page.write_failed(folder, name, others[0], again)
             entries.append(entry if ours else replace(entry, source=str(path)))
