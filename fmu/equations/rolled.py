@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain, islice
+from operator import attrgetter, sub
 
 SHORTEST = 400  # lines of a function that gains by loops
 FEWEST_TURNS = 4
@@ -21,6 +23,7 @@ NUMBER = re.compile(rf"{STRING}|\b([nvzc])(\d+)\b|\[(\d+)|{STATE}(\d+)")  # stri
 LITERAL = re.compile(r"(?<![\w.])(?:\d+\.\d+(?:e[-+]?\d+)?|\d+e[-+]?\d+)(?![\w.])")
 RARE, FEWEST_LITERALS = 16, 20  # occurrences of a number, and such numbers, for a table of them
 TABLE = "numbers"
+NUMBERS = attrgetter("numbers")
 DEFINITION = re.compile(r"const (double|int) ([nvzc])(\d+) = ")
 
 
@@ -30,19 +33,6 @@ class Line:
 
     form: str
     numbers: tuple[int, ...]
-
-    @classmethod
-    def of(cls, text: str) -> Line:
-        """Take a statement apart."""
-        numbers: list[int] = []
-
-        def hole(number: re.Match[str]) -> str:
-            if not number.lastindex:
-                return number[0]
-            numbers.append(int(number[number.lastindex]))
-            return f"{number[1] or '[' * bool(number[3])}#"
-
-        return cls(NUMBER.sub(hole, text), tuple(numbers))
 
     def text(self, terms: Sequence[str], depth: int) -> Iterator[str]:
         """Yield the lines of C; terms: added to the numbers."""
@@ -58,6 +48,41 @@ class Line:
             return f"{found[0][:-1]}{value}"
 
         yield re.sub(rf"{STRING}|(?:\b[nvzc]|\[|{STATE})#", number, self.form)
+
+
+class Statement:
+    """A statement, taken apart at its numbers once."""
+
+    def __init__(self, text: str) -> None:
+        definition, end = DEFINITION.match(text), 0
+        self.defined = f"{definition[2]}{definition[3]}" if definition else ""
+        self.array = f"{definition[2]}_{definition[1]}s" if definition else ""
+        self.pieces: list[str] = []
+        self.names: list[str] = []  # of the numbers that are constants
+        numbers: list[int] = []
+        for number in NUMBER.finditer(text):
+            if number.lastindex:
+                head = number[1] or "[" * bool(number[3])
+                self.pieces.append(f"{text[end : number.start()]}{head}")
+                self.names.append(number[0] if number[1] else "")
+                numbers.append(int(number[number.lastindex]))
+                end = number.end()
+        self.pieces.append(text[end:])
+        self.line = Line("#".join(self.pieces), tuple(numbers))
+
+    def with_arrays(self, kept: Mapping[str, tuple[str, int]]) -> Line:
+        """Return its line, where elements of arrays replace constants."""
+        if kept.keys().isdisjoint(self.names):
+            return self.line
+        pieces, numbers = [*self.pieces], [*self.line.numbers]
+        for i, name in enumerate(self.names):
+            if name in kept:
+                array, numbers[i] = kept[name]
+                pieces[i] = f"{pieces[i][:-1]}{array}["
+                pieces[i + 1] = f"]{pieces[i + 1]}"
+        if self.defined in kept:
+            pieces[0] = pieces[0].removeprefix("const ").partition(" ")[2]
+        return Line("#".join(pieces), tuple(numbers))
 
 
 @dataclass(frozen=True)
@@ -104,20 +129,18 @@ def rolled(*sections: list[str]) -> list[list[str]]:
     table: list[str] = []  # numbers that are other ones in each turn
     if len(rare) >= FEWEST_LITERALS:
         sections = tuple([_with_table(line, rare, table) for line in s] for s in sections)
-    constants = [DEFINITION.match(line) for section in sections for line in section]
-    arrays = {f"{c[2]}{c[3]}": f"{c[2]}_{c[1]}s" for c in constants if c}  # in their order
-    kept: dict[str, str] = {}  # elements of arrays, by constant
+    statements = [[Statement(line) for line in section] for section in sections]
+    arrays = {s.defined: s.array for section in statements for s in section if s.defined}
+    kept: dict[str, tuple[str, int]] = {}  # elements of arrays, by constant
     sizes: Counter[str] = Counter()
     while True:
-        texts = [[_with_arrays(line, kept) for line in section] for section in sections]
-        found = [_loops([Line.of(text) for text in section]) for section in texts]
-        new = _read_by_others(texts, found)
+        found = [_loops([s.with_arrays(kept) for s in section]) for section in statements]
+        new = _read_by_others(statements, kept, found)
         if not new:
             break
         sizes.clear()
-        names = [name for name in arrays if name in new or name in kept]
-        for name in names:
-            kept[name] = f"{arrays[name]}[{sizes[arrays[name]]}]"
+        for name in [name for name in arrays if name in new or name in kept]:
+            kept[name] = arrays[name], sizes[arrays[name]]
             sizes[arrays[name]] += 1
     lines = [
         _split(text for item in items for text in item.text([""] * len(item.numbers), 0))
@@ -142,13 +165,6 @@ def _with_table(line: str, rare: set[str], table: list[str]) -> str:
         return f"{TABLE}[{len(table) - 1}]"
 
     return LITERAL.sub(moved, line)
-
-
-def _with_arrays(line: str, kept: dict[str, str]) -> str:
-    definition = DEFINITION.match(line)
-    if definition and f"{definition[2]}{definition[3]}" in kept:
-        line = line.removeprefix(f"const {definition[1]} ")
-    return NUMBER.sub(lambda number: kept.get(number[0], number[0]), line) if kept else line
 
 
 def _loops(items: list[Line | Loop]) -> list[Line | Loop]:
@@ -183,50 +199,64 @@ def _loop_at(
     other = following[begin]
     for _ in range(MOST_TRIED):
         length = other - begin
-        if other + length > len(items):
+        if begin + FEWEST_TURNS * length > len(items):
             break
-        turns, steps = 1, _steps(items, forms, begin, other, length)
-        while steps is not None and (
-            _steps(items, forms, begin + (turns - 1) * length, begin + turns * length, length)
-            == steps
-        ):
-            turns += 1
-        if turns >= FEWEST_TURNS:
+        steps = _steps(items, forms, begin, length)
+        if steps is not None:
+            turns, turn = FEWEST_TURNS, forms[begin:other]
+            for b in range(begin + turns * length, len(items), length):
+                if forms[b : b + length] != turn or _rise(items, b - length, length) != steps:
+                    break
+                turns += 1
             return Loop(tuple(items[begin:other]), turns, steps), turns * length
         other = following[other]
     return None, 1
 
 
 def _steps(
-    items: list[Line | Loop], forms: list[int], a: int, b: int, length: int
+    items: list[Line | Loop], forms: list[int], a: int, length: int
 ) -> tuple[int, ...] | None:
-    """Return by how much numbers rise from turn a to turn b; None if these are no turns."""
-    if forms[a : a + length] != forms[b : b + length]:
+    """Return by how much numbers rise from turn to turn; None if these are not enough turns."""
+    begins = range(a, a + (FEWEST_TURNS - 1) * length, length)
+    if any(forms[b + length] != forms[a] for b in begins):
         return None
-    found: list[int] = []
-    for i in range(length):
-        pairs = zip(items[b + i].numbers, items[a + i].numbers, strict=True)
-        found += [later - earlier for later, earlier in pairs]
-    return tuple(found) if min(found, default=0) >= 0 else None
+    first = _rise(items, a, 1, length)
+    if min(first, default=0) < 0 or any(_rise(items, b, 1, length) != first for b in begins[1:]):
+        return None
+    if forms[a : begins.stop] != forms[a + length : begins.stop + length]:
+        return None
+    steps = _rise(items, a, length)
+    if min(steps, default=0) < 0 or any(_rise(items, b, length) != steps for b in begins[1:]):
+        return None
+    return steps
 
 
-def _read_by_others(texts: list[list[str]], found: list[list[Line | Loop]]) -> set[str]:
+def _rise(
+    items: list[Line | Loop], a: int, count: int, distance: int | None = None
+) -> tuple[int, ...]:
+    """Return by how much the numbers of `count` items rise over a distance: their count, or it."""
+    b = a + (distance or count)
+    pairs = (map(NUMBERS, items[begin : begin + count]) for begin in (b, a))
+    return tuple(map(sub, *map(chain.from_iterable, pairs)))
+
+
+def _read_by_others(
+    statements: list[list[Statement]], kept: Container[str], found: list[list[Line | Loop]]
+) -> set[str]:
     """Return the constants that are read where their names do not mean them."""
     where: dict[str, tuple[int, ...]] = {}  # turns in which a constant is defined
     others: set[str] = set()
-    count = iter(range(sum(map(len, texts)) + 1))
-    for section, items in zip(texts, found, strict=True):
-        places = [place for item in items for place in _places(item, (), (), count)]
-        for text, (turns, steps) in zip(section, places, strict=True):
-            is_definition = DEFINITION.match(text) is not None
-            numbers = (number for number in NUMBER.finditer(text) if number.lastindex)
-            for i, number in enumerate(numbers):
-                if is_definition and i == 0:
-                    where[number[0]] = turns
-                elif number[1]:
-                    own = where[number[0]]
+    count = iter(range(sum(map(len, statements)) + 1))
+    for section, items in zip(statements, found, strict=True):
+        places = (place for item in items for place in _places(item, (), (), count))
+        for statement, (turns, steps) in zip(section, places, strict=True):
+            for i, name in enumerate(statement.names):
+                if i == 0 and statement.defined:
+                    where[name] = turns
+                elif name and name not in kept:
+                    own = where[name]
                     if own != turns[: len(own)] or any(step[i] for step in steps[len(own) :]):
-                        others.add(number[0])
+                        others.add(name)
     return others
 
 
@@ -240,10 +270,11 @@ def _places(
     if isinstance(item, Line):
         yield turns, steps
         return
-    for _ in range(item.turns):
-        turn, used = next(count), 0
-        for line in item.lines:
-            end = used + len(line.numbers)
-            own = (*(step[used:end] for step in steps), item.steps[used:end])
+    inside, used = [], 0
+    for line in item.lines:
+        end = used + len(line.numbers)
+        inside.append((line, (*(step[used:end] for step in steps), item.steps[used:end])))
+        used = end
+    for turn in islice(count, item.turns):
+        for line, own in inside:
             yield from _places(line, (*turns, turn), own, count)
-            used = end
