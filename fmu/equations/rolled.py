@@ -24,7 +24,7 @@ LITERAL = re.compile(r"(?<![\w.])(?:\d+\.\d+(?:e[-+]?\d+)?|\d+e[-+]?\d+)(?![\w.]
 RARE, FEWEST_LITERALS = 16, 20  # occurrences of a number, and such numbers, for a table of them
 TABLE = "numbers"
 NUMBERS = attrgetter("numbers")
-DEFINITION = re.compile(r"const (double|int) ([nvzc])(\d+) = ")
+DEFINITION = re.compile(r"const (double|int) ([nvzc])\d+ = ")
 
 
 @dataclass(frozen=True)
@@ -54,21 +54,16 @@ class Statement:
     """A statement, taken apart at its numbers once."""
 
     def __init__(self, text: str) -> None:
-        definition, end = DEFINITION.match(text), 0
-        self.defined = f"{definition[2]}{definition[3]}" if definition else ""
+        found = [number for number in NUMBER.finditer(text) if number.lastindex]
+        begins = [number.start(number.lastindex) for number in found]
+        ends = [0, *(number.end() for number in found)]
+        self.pieces = [text[end:begin] for end, begin in zip(ends, [*begins, None], strict=True)]
+        self.names = [number[0] if number[1] else "" for number in found]  # of constants
+        numbers = tuple([int(number[number.lastindex]) for number in found])
+        self.line = Line("#".join(self.pieces), numbers)
+        definition = DEFINITION.match(text)
+        self.defined = self.names[0] if definition else ""
         self.array = f"{definition[2]}_{definition[1]}s" if definition else ""
-        self.pieces: list[str] = []
-        self.names: list[str] = []  # of the numbers that are constants
-        numbers: list[int] = []
-        for number in NUMBER.finditer(text):
-            if number.lastindex:
-                head = number[1] or "[" * bool(number[3])
-                self.pieces.append(f"{text[end : number.start()]}{head}")
-                self.names.append(number[0] if number[1] else "")
-                numbers.append(int(number[number.lastindex]))
-                end = number.end()
-        self.pieces.append(text[end:])
-        self.line = Line("#".join(self.pieces), tuple(numbers))
 
     def with_arrays(self, kept: Mapping[str, tuple[str, int]]) -> Line:
         """Return its line, where elements of arrays replace constants."""
@@ -205,7 +200,10 @@ def _loop_at(
         if steps is not None:
             turns, turn = FEWEST_TURNS, forms[begin:other]
             for b in range(begin + turns * length, len(items), length):
-                if forms[b : b + length] != turn or _rise(items, b - length, length) != steps:
+                if (
+                    forms[b : b + length] != turn
+                    or _rise(items, b - length, length, length) != steps
+                ):
                     break
                 turns += 1
             return Loop(tuple(items[begin:other]), turns, steps), turns * length
@@ -217,26 +215,21 @@ def _steps(
     items: list[Line | Loop], forms: list[int], a: int, length: int
 ) -> tuple[int, ...] | None:
     """Return by how much numbers rise from turn to turn; None if these are not enough turns."""
-    begins = range(a, a + (FEWEST_TURNS - 1) * length, length)
-    if any(forms[b + length] != forms[a] for b in begins):
+    if forms[a : a + FEWEST_TURNS * length : length].count(forms[a]) < FEWEST_TURNS:
         return None
-    first = _rise(items, a, 1, length)
-    if min(first, default=0) < 0 or any(_rise(items, b, 1, length) != first for b in begins[1:]):
-        return None
-    if forms[a : begins.stop] != forms[a + length : begins.stop + length]:
-        return None
-    steps = _rise(items, a, length)
-    if min(steps, default=0) < 0 or any(_rise(items, b, length) != steps for b in begins[1:]):
-        return None
+    begins, steps = range(a, a + (FEWEST_TURNS - 1) * length, length), ()
+    for count in (1, length):  # most differ in the first line
+        if any(forms[b : b + count] != forms[b + length : b + length + count] for b in begins):
+            return None
+        steps, *others = [_rise(items, b, count, length) for b in begins]
+        if min(steps, default=0) < 0 or any(other != steps for other in others):
+            return None
     return steps
 
 
-def _rise(
-    items: list[Line | Loop], a: int, count: int, distance: int | None = None
-) -> tuple[int, ...]:
-    """Return by how much the numbers of `count` items rise over a distance: their count, or it."""
-    b = a + (distance or count)
-    pairs = (map(NUMBERS, items[begin : begin + count]) for begin in (b, a))
+def _rise(items: list[Line | Loop], a: int, count: int, distance: int) -> tuple[int, ...]:
+    """Return by how much the numbers of `count` items rise over a distance."""
+    pairs = (map(NUMBERS, items[b : b + count]) for b in (a + distance, a))
     return tuple(map(sub, *map(chain.from_iterable, pairs)))
 
 
