@@ -122,9 +122,8 @@ class Code:
         """Return the C expression of a value, without operators."""
         if self.outer and not root.moves:
             return self.outer.of(root)
-        if root not in self.known:
-            for value in in_order([root], self.known):
-                self.known[value] = self._expression(value)
+        for value in () if root in self.known else in_order([root], self.known):
+            self.known[value] = self._expression(value)
         return self.known[root]
 
     def _expression(self, value: Value) -> str:

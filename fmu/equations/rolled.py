@@ -20,7 +20,7 @@ MOST_TRIED = 40  # lengths of a turn
 STRING = r'"(?:\\.|[^"\\])*"'
 STATE = r"(?<=state_indicator\()"
 NUMBER = re.compile(rf"{STRING}|\b([nvzc])(\d+)\b|\[(\d+)|{STATE}(\d+)")  # strings have none
-LITERAL = re.compile(r"(?<![\w.])(?:\d+\.\d+(?:e[-+]?\d+)?|\d+e[-+]?\d+)(?![\w.])")
+LITERAL = re.compile(r"\d(?<![\w.]\d)\d*(?:\.\d+(?:e[-+]?\d+)?|e[-+]?\d+)(?![\w.])")
 RARE, FEWEST_LITERALS = 16, 20  # occurrences of a number, and such numbers, for a table of them
 TABLE = "numbers"
 NUMBERS = attrgetter("numbers")
