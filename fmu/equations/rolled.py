@@ -93,8 +93,7 @@ class Loop:
     def __post_init__(self) -> None:
         shape = (tuple(line.form for line in self.lines), self.turns, self.steps)
         object.__setattr__(self, "form", shape)
-        numbers = tuple(number for line in self.lines for number in line.numbers)
-        object.__setattr__(self, "numbers", numbers)
+        object.__setattr__(self, "numbers", (*chain(*map(NUMBERS, self.lines)),))
 
     def text(self, terms: Sequence[str], depth: int = 0) -> Iterator[str]:
         """Yield the lines of C."""
