@@ -83,7 +83,8 @@ def do_run(options: argparse.Namespace) -> Ended:
         with written(options.report):
             writer.begin()
             if chosen:
-                writer.forget({scenario.name for scenario in chosen} if options.names else None)
+                some = {scenario.name for scenario in chosen} if options.names else None
+                writer.forget(some, studies=options.tolerance is None)
         done = Done(chosen, own)
         if options.tolerance is not None:
             done.runs = _runs(runs, chosen, bool(twins), done.failures, options.tolerance)

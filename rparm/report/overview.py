@@ -146,9 +146,10 @@ def write_in_folder(
 
 
 def forget(report: Path, section: str, names: Collection[str] | None = None) -> None:
-    """Remove entries of a section, all or some; and the start page if nothing is left in it."""
+    """Remove pages of a section, all or some; and the start page if nothing is left in it."""
     for name in [entry.name for entry in read(report, section)] if names is None else names:
-        (report / section / f"{name}{ENTRY}").unlink(missing_ok=True)
+        for suffix in (ENTRY, ".html"):
+            (report / section / f"{name}{suffix}").unlink(missing_ok=True)
     if _all(report):
         write(report)
     else:

@@ -53,10 +53,11 @@ class ReportWriter:
         """Write what all pages share: fails now, not after all runs, if there is no room."""
         pages.write_assets(self.folder)
 
-    def forget(self, names: Collection[str] | None = None) -> None:
-        """Take what an earlier run found of all scenarios, or of some, out of the overview."""
+    def forget(self, names: Collection[str] | None, studies: bool) -> None:
+        """Remove what an earlier run found of all scenarios, or of some, and of their studies."""
         overview.forget(self.folder, SCENARIOS, names)
-        overview.forget(self.folder, STUDIES, None if names is None else [ACCURACY])
+        if studies:
+            overview.forget(self.folder, STUDIES, None if names is None else [ACCURACY])
 
     @staticmethod
     def grouped(runs: Sequence[Run]) -> dict[Path, list[Run]]:
