@@ -181,7 +181,7 @@ def correlations(covariance: np.ndarray) -> np.ndarray:
 
 # ---- Charts -------------------------------------------------------------------------------------
 def autocorrelations_chart(tests: Mapping[str, Whiteness]) -> Chart:
-    """Draw them as bars, and the lines between which 95 % of those of noise are."""
+    """Draw them as bars, and lines between which noise stays in 95 % of cases."""
     bound = max((test.bound for test in tests.values()), default=0.0)
     rows = [{"name": name, "values": test.correlations} for name, test in tests.items()]
     title = "Autocorrelation of the residuals: 95 % of noise is between the lines"
