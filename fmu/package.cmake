@@ -76,7 +76,8 @@ function(add_equations name file terminals folder)
   add_library(${name}_equations STATIC ${folder}/equations.c)
   target_include_directories(${name}_equations PUBLIC ${folder})
   target_compile_options(${name}_equations PRIVATE -w) # what warnings are about, nobody has written
-  target_link_libraries(${name}_equations PUBLIC model_interface PRIVATE relations elementary_functions)
+  target_link_libraries(${name}_equations PUBLIC model_interface PRIVATE relations elementary_functions
+                        $<LINK_ONLY:integrator>) # the solver of a band
 endfunction()
 
 function(add_fmu name)

@@ -23,7 +23,8 @@ class Band(NamedTuple):
         tables = {"order": self.order, "places": self.places}
         return [
             *(f"static const size_t {n}[] = {{{str(t)[1:-1]}}};" for n, t in tables.items()),
-            f"static const struct band band = {{{self.lower}, {self.upper}, order}};",
+            f"static const struct band band = {{{self.lower}, {self.upper}, order,",
+            "                                 &integrator_band_solver};",
         ]
 
 

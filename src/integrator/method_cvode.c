@@ -7,7 +7,6 @@
 #include <math.h>
 #include <nvector/nvector_serial.h>
 #include <string.h>
-#include <sunlinsol/sunlinsol_band.h>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_band.h>
 #include <sunmatrix/sunmatrix_dense.h>
@@ -52,8 +51,7 @@ struct cvode {
 static int evaluate_jacobian(sunrealtype t, N_Vector x, N_Vector dx, SUNMatrix jacobian,
                              void *user_data, N_Vector work1, N_Vector work2, N_Vector work3) {
     const struct sundials *base = user_data;
-    double *J = base->problem->ode.band != NULL ? SUNBandMatrix_Data(jacobian)
-                                                : SUNDenseMatrix_Data(jacobian);
+    double *J = base->problem->ode.band != NULL ? SM_DATA_B(jacobian) : SM_DATA_D(jacobian);
     return sundials_callback_flag(problem_jacobian(base->problem, t, small_vector_data(x), J));
 }
 
@@ -93,53 +91,18 @@ static bool create_fixed_point_iteration(struct cvode *cvode) {
            CVodeSetNonlinConvCoef(cvode->solver, adams_iteration_error) == CV_SUCCESS;
 }
 
-/* Solver of SUNDIALS for a band. The matrix has the states in the order of the band. */
-struct banded {
-    struct _SUNLinearSolverContent_Band base; /* first */
-    const size_t *order;
-};
-
-/* Writes x; b may change, too. */
-static int solve_in_order(SUNLinearSolver solver, SUNMatrix A, N_Vector x, N_Vector b,
-                          sunrealtype tolerance) {
-    const size_t *order = ((const struct banded *)solver->content)->order;
-    const sunindextype n = SM_COLUMNS_B(A);
-    for (sunindextype k = 0; k < n; k++) {
-        small_vector_data(x)[k] = small_vector_data(b)[order[k]];
-    }
-    const int flag = SUNLinSolSolve_Band(solver, A, x, x, tolerance);
-    for (sunindextype k = 0; k < n; k++) {
-        small_vector_data(b)[order[k]] = small_vector_data(x)[k];
-    }
-    N_VScale(1.0, b, x);
-    return flag;
-}
-
-static SUNLinearSolver create_band_solver(N_Vector pattern, SUNMatrix A, const size_t order[]) {
-    struct banded *own = workspace_calloc(1, sizeof *own);
-    SUNLinearSolver solver = own != NULL ? SUNLinSol_Band(pattern, A, pattern->sunctx) : NULL;
-    if (solver != NULL) {
-        own->base = *(SUNLinearSolverContent_Band)solver->content;
-        own->order = order;
-        solver->content = own;
-        solver->ops->solve = solve_in_order;
-    }
-    return solver;
-}
-
 static bool create_newton_iteration(struct cvode *cvode) {
     SUNContext context = cvode->base.context;
     const struct band *band = cvode->base.problem->ode.band;
     const sunindextype n = (sunindextype)cvode->base.problem->ode.state_count;
-    cvode->jacobian = band != NULL ? SUNBandMatrix(n, (sunindextype)band->upper,
-                                                   (sunindextype)band->lower, context)
+    cvode->jacobian = band != NULL ? band->solver->create_matrix(band, n, context)
                                    : SUNDenseMatrix(n, n, context);
     // the solvers work with any vector that has an array, but take only a serial one for pattern
     N_Vector pattern = cvode->jacobian != NULL ? N_VNew_Serial(n, context) : NULL;
     if (pattern == NULL) {
         return false;
     }
-    cvode->linear_solver = band != NULL ? create_band_solver(pattern, cvode->jacobian, band->order)
+    cvode->linear_solver = band != NULL ? band->solver->create(band, pattern, cvode->jacobian)
                                         : SUNLinSol_Dense(pattern, cvode->jacobian, context);
     N_VDestroy(pattern);
     cvode->nonlinear_solver = SUNNonlinSol_Newton(cvode->base.x, context);

@@ -5,6 +5,7 @@
 #include "small_vector.h"
 
 #include <sundials/sundials_context.h>
+#include <sundials/sundials_linearsolver.h>
 
 /* First member of each method's memory, and user data of its solver. */
 struct sundials {
@@ -14,6 +15,13 @@ struct sundials {
     N_Vector x;
     N_Vector absolute_tolerances;
     N_Vector work;
+};
+
+/* Creates the Jacobian of n states and its solver, for which pattern is a serial vector; NULL if
+ * memory is short. */
+struct band_solver {
+    SUNMatrix (*create_matrix)(const struct band *band, sunindextype n, SUNContext context);
+    SUNLinearSolver (*create)(const struct band *band, N_Vector pattern, SUNMatrix A);
 };
 
 /* Returns the number of bytes for the context and the largest method, the one with matrices. */

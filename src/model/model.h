@@ -159,7 +159,11 @@ struct series {
 struct band {
     size_t lower, upper; /* number of diagonals below and above the main one */
     const size_t *order; /* state at each place */
+    const struct band_solver *solver;
 };
+
+/* Of all bands. FMUs whose model does not name it are linked without it. */
+extern const struct band_solver integrator_band_solver;
 
 /* ---- Texts ---------------------------------------------------------------------------------- */
 
