@@ -76,13 +76,15 @@ enum status taylor_series_add_orders(struct taylor_series *series, int last) {
                           series->row);
 }
 
-/* Returns the sum of the terms of an order, one time scale ahead, in tolerances of the states. */
-static double size_of_terms(const struct taylor_series *series, int order) {
-    double size = 0.0;
+/* Writes the sums of the terms of the orders first to last, one time scale ahead, in tolerances of
+ * the states. */
+static void write_sizes(const struct taylor_series *series, int first, int last, double size[]) {
+    memset(size + first, 0, (size_t)(last - first + 1) * sizeof *size);
     for (size_t i = 0; i < series->problem->ode.state_count; i++) {
-        size += fabs(series->row[i][order]) * series->weight[i];
+        for (int k = first; k <= last; k++) {
+            size[k] += fabs(series->row[i][k]) * series->weight[i];
+        }
     }
-    return size;
 }
 
 /* Returns a number near log2 x, for x >= 0. */
@@ -109,19 +111,21 @@ static double step_of_last_terms(const double size[2], int last, double bound) {
  * of even order the errors of a swing cancel, and cease to cancel at a smaller tolerance if some
  * steps have one order more. */
 static enum status find_order(struct taylor_series *series) {
+    double size[SERIES_LENGTH];
+    write_sizes(series, LEAST_ORDER - 1, series->order, size);
     for (int order = LEAST_ORDER;; order += 2) {
         if (order > series->order) {
             const enum status status = taylor_series_add_orders(series, order);
             if (status != STATUS_OK) {
                 return status;
             }
+            write_sizes(series, order - 1, order, size);
         }
         // the terms are within the tolerance and become smaller
-        const double size[2] = {size_of_terms(series, order - 1), size_of_terms(series, order)};
-        const bool is_enough = size[0] <= 1.0 && size[1] <= size[0];
+        const bool is_enough = size[order - 1] <= 1.0 && size[order] <= size[order - 1];
         if (is_enough || order == series->largest_order) {
             series->order = order;
-            series->step = is_enough ? 1.0 : step_of_last_terms(size, order, 1.0);
+            series->step = is_enough ? 1.0 : step_of_last_terms(size + order - 1, order, 1.0);
             return STATUS_OK;
         }
     }
@@ -135,8 +139,9 @@ enum status taylor_series_expand(struct taylor_series *series, double t, double 
     if (status != STATUS_OK || !is_long) {
         return status != STATUS_OK ? status : find_order(series);
     }
-    const double size[2] = {size_of_terms(series, last - 1), size_of_terms(series, last)};
-    series->step = step_of_last_terms(size, last, longest);
+    double size[SERIES_LENGTH];
+    write_sizes(series, last - 1, last, size);
+    series->step = step_of_last_terms(size + last - 1, last, longest);
     return STATUS_OK;
 }
 

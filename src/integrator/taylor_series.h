@@ -75,26 +75,26 @@ ALWAYS_INLINE void taylor_series_evaluate_of(const struct taylor_series *series,
  * are left out: a quarter of a step of two joints. */
 static inline void taylor_series_evaluate(const struct taylor_series *series, double s, double x[],
                                           double dx[]) {
-    double four_x[4];
-    double four_dx[4];
+    double few_x[4];
+    double few_dx[4];
     const size_t n = series->problem->ode.state_count;
-    if (n != 4) {
+    if (n != 3 && n != 4) {
         taylor_series_evaluate_of(series, s, n, x, dx);
         return;
     }
-    if (dx == NULL) {
-        taylor_series_evaluate_of(series, s, 4, four_x, NULL);
+    if (n == 3) {
+        taylor_series_evaluate_of(series, s, 3, few_x, dx != NULL ? few_dx : NULL);
+    } else if (dx == NULL) {
+        taylor_series_evaluate_of(series, s, 4, few_x, NULL);
     } else if (s == 1.0) {
-        taylor_series_evaluate_of(series, 1.0, 4, four_x, four_dx);
+        taylor_series_evaluate_of(series, 1.0, 4, few_x, few_dx);
     } else {
-        taylor_series_evaluate_of(series, s, 4, four_x, four_dx);
+        taylor_series_evaluate_of(series, s, 4, few_x, few_dx);
     }
-    for (int i = 0; i < 4; i++) {
-        x[i] = four_x[i];
-    }
-    if (dx != NULL) {
-        for (int i = 0; i < 4; i++) {
-            dx[i] = four_dx[i];
+    for (size_t i = 0; i < n; i++) {
+        x[i] = few_x[i];
+        if (dx != NULL) {
+            dx[i] = few_dx[i];
         }
     }
 }
