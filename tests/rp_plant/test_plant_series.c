@@ -21,14 +21,6 @@ void setUp(void) {
     random_source.state = 37;
 }
 
-static void clear(row all[MAX_ROWS]) {
-    memset(all, 0xff, sizeof(row) * MAX_ROWS); // NaN: what is read has been written
-    for (int i = 0; i < 2; i++) {
-        all[i][0] = plant.q[i];
-        all[2 + i][0] = plant.dq[i];
-    }
-}
-
 /* A step over which the series converges fast, and inputs that are not 0 in polynomials over it. */
 static void next_step(void) {
     double u[PLANT_INPUTS];
@@ -46,15 +38,19 @@ static void next_step(void) {
     }
 }
 
-static void extend(const struct series *series, const void *values, int first, int last,
-                   row all[MAX_ROWS]) {
+static void expand(int last, row all[MAX_ROWS]) {
     const struct series_origin origin = {
-        .values = values,
+        .values = &plant,
         .time_scale = time_scale,
         .inputs = (const double(*)[SERIES_INPUT_LENGTH])inputs,
     };
-    TEST_ASSERT_LESS_OR_EQUAL_size_t(MAX_ROWS, series->row_count);
-    ASSERT_OK(series->extend(&origin, first, last, all));
+    TEST_ASSERT_LESS_OR_EQUAL_size_t(MAX_ROWS, rp_plant_series.row_count);
+    memset(all, 0xff, sizeof(row) * MAX_ROWS); // NaN: what is read has been written
+    for (int i = 0; i < 2; i++) {
+        all[i][0] = plant.q[i];
+        all[2 + i][0] = plant.dq[i];
+    }
+    ASSERT_OK(rp_plant_series.extend(&origin, 0, last, all));
 }
 
 /* ---- Equations of motion -------------------------------------------------------------------- */
@@ -129,8 +125,7 @@ static void test_the_polynomials_satisfy_the_equations(void) {
             plant.modes.payload = RP_PLANT_RELEASED;
         }
         next_step();
-        clear(rows);
-        extend(&rp_plant_series, &plant, 0, DEGREE, rows);
+        expand(DEGREE, rows);
         assert_model_at(1.0);
     }
 }
@@ -141,8 +136,7 @@ static void test_modes_that_are_not_decided_yet(void) {
         plant.modes = (struct rp_plant_modes){.payload = RP_PLANT_UNDECIDED};
         plant.dq[n % 2] = 0.0;
         next_step();
-        clear(rows);
-        extend(&rp_plant_series, &plant, 0, DEGREE, rows);
+        expand(DEGREE, rows);
         assert_model_at(0.0);
     }
 }
@@ -193,12 +187,10 @@ static void test_friction_of_a_fast_joint_is_constant(void) {
     memset(inputs, 0, sizeof inputs);
     for (int n = 0; n < 2; n++) {
         plant.dq[1] = n == 0 ? 2.0 : 1.5; // 8 vs, 6 vs
-        clear(rows);
-        clear(constant);
         plant.parameters.breakaway_friction[1] = 1.0;
-        extend(&rp_plant_series, &plant, 0, 8, constant);
+        expand(8, constant);
         plant.parameters.breakaway_friction[1] = 1000.0;
-        extend(&rp_plant_series, &plant, 0, 8, rows);
+        expand(8, rows);
         const bool same = memcmp(constant[3], rows[3], 9 * sizeof(double)) == 0;
         TEST_ASSERT_TRUE(same == (n == 0));
     }
