@@ -40,6 +40,7 @@ NEVER_CALLED = "rp_plant_first_modes"  # while no mode is decided
 STUCK, FREE = 0, 2
 ATTACHED, RELEASED = 1, 2
 NONE, COMPLIANT = 1, 3
+FEATURES = ("armature", "damping", "breakaway", "contact", "payload")
 INPUTS = [("tau", 0), ("tau", 1), ("wrench", 0), ("wrench", 1), ("wrench", 2)]
 DEGREE = 3  # of inputs
 ORDER = 20
@@ -62,14 +63,15 @@ def some(draw: random.Random, high: float) -> float:
 
 
 def random_plant(plant: Any, draw: random.Random, joints: Sequence[int]) -> Any:
-    """Any size, each feature off in some draws, and all but Coulomb's friction in others."""
-    p, modes, is_plain = plant.parameters, plant.modes, draw.random() < 0.25
+    """Any size, with few features or with most; friction is there, if only Coulomb's."""
+    p, modes, share = plant.parameters, plant.modes, draw.choice((0.2, 0.8))
+    has = {feature: draw.random() < share for feature in FEATURES}
     for name in ("m1", "m2", "I1z", "I2z"):
         setattr(p.arm, name, 10.0 ** draw.uniform(-2.0, 1.5))
     p.arm.l1, p.arm.lc1 = some(draw, 2.0), some(draw, 2.0)
     p.arm.a, p.arm.g = draw.uniform(-1.5, 1.5), draw.uniform(-20.0, 20.0)
     plant.q[:] = draw.uniform(-3.2, 3.2), draw.uniform(-3.0, 2.0)
-    modes.payload = RELEASED if is_plain else draw.choice((ATTACHED, RELEASED))
+    modes.payload = ATTACHED if has["payload"] else RELEASED
     p.payload_mass, p.payload_inertia = some(draw, 4.0), some(draw, 1.0)
     p.payload_x, p.payload_z = draw.uniform(-0.5, 0.5), draw.uniform(-0.5, 0.5)
     for i, mode in enumerate(joints):
@@ -77,13 +79,13 @@ def random_plant(plant: Any, draw: random.Random, joints: Sequence[int]) -> Any:
         p.stops[i] = NONE
         p.coulomb_friction[i] = draw.uniform(0.1, 5.0)
         speed = draw.uniform(0.0, 5.0)
-        if not is_plain:
-            p.armature[i], p.damping[i] = some(draw, 2.0), some(draw, 3.0)
-            if draw.random() < 0.5:
-                p.breakaway_friction[i] = p.coulomb_friction[i] + draw.uniform(0.125, 5.0)
-                p.stribeck_velocity[i] = speed / draw.choice((draw.uniform(0.1, 5.0), 11.0))
-            if draw.random() < 0.5:
-                touch(plant, i, draw)
+        p.armature[i] = has["armature"] * some(draw, 2.0)
+        p.damping[i] = has["damping"] * some(draw, 3.0)
+        if has["breakaway"]:  # of a joint that is fast, or not nearly so
+            p.breakaway_friction[i] = p.coulomb_friction[i] + draw.uniform(0.125, 5.0)
+            p.stribeck_velocity[i] = speed / draw.choice((draw.uniform(0.1, 6.9), 11.0))
+        if has["contact"] and draw.random() < 0.5:
+            touch(plant, i, draw)
         # a joint that has turned back is beyond an event; a stuck one may turn for an instant
         plant.dq[i] = speed * (mode if abs(mode) == 1 else draw.choice((-1, 0, 1)))
     return plant
