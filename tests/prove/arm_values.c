@@ -4,7 +4,7 @@
 
 #include <stdio.h>
 
-enum { LAST = 4, NUMBERS = VARIABLES + 4 * EFFORTS };
+enum { LAST = 8, NUMBERS = VARIABLES + 4 * EFFORTS };
 
 static void write_ball(struct ball x) {
     printf(" %a %a %a", x.hi, x.lo, x.radius);

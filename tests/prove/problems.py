@@ -18,6 +18,7 @@ sys.path.insert(0, str(SOURCES))
 import check as check  # noqa: E402
 import check_operations as check_operations  # noqa: E402
 import motion_series as motion_series  # noqa: E402
+import operands as operands  # noqa: E402
 
 PARAMETERS = (2.0, 1.0, 0.1, 0.05, 0.5, 0.25, 0.1, 9.81)  # m1 m2 I1z I2z l1 lc1 a g
 Cubic = Sequence[float]  # value and derivatives, at the begin of a communication step

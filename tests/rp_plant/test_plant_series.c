@@ -1,5 +1,5 @@
-/* The series of the plant against its right-hand side and its indicators. test_plant_fmu.py has the
- * manipulator's bits. */
+/* The series of the plant over short steps, at a closed stop too. test_plant_series.py has all
+ * orders, test_plant_fmu.py the manipulator's bits. */
 #include "last_text.h"
 #include "plant_test_support.h"
 #include "unity.h"
@@ -21,74 +21,36 @@ void setUp(void) {
     random_source.state = 37;
 }
 
-static void clear(row all[MAX_ROWS]) {
+/* A step over which the series converges fast, and inputs that are not 0 in polynomials over it. */
+static void next_step(void) {
+    double u[PLANT_INPUTS];
+    double dx[PLANT_STATES];
+    const double x[PLANT_STATES] = {plant.q[0], plant.q[1], plant.dq[0], plant.dq[1]};
+    memcpy(u, &plant.inputs, sizeof u);
+    ASSERT_OK(rp_plant_model.right_hand_side(&plant, 3.0, x, u, dx));
+    time_scale = 5e-4 / (1.0 + 0.01 * (fabs(dx[2]) + fabs(dx[3])));
+    for (int i = 0; i < PLANT_INPUTS; i++) {
+        inputs[i][0] = u[i];
+        for (int k = 1; k < SERIES_INPUT_LENGTH; k++) {
+            const double rate = rp_test_uniform(&random_source, -20.0, 20.0);
+            inputs[i][k] = u[i] != 0.0 ? rate * pow(time_scale, k) : 0.0;
+        }
+    }
+}
+
+static void expand(int last, row all[MAX_ROWS]) {
+    const struct series_origin origin = {
+        .values = &plant,
+        .time_scale = time_scale,
+        .inputs = (const double(*)[SERIES_INPUT_LENGTH])inputs,
+    };
+    TEST_ASSERT_LESS_OR_EQUAL_size_t(MAX_ROWS, rp_plant_series.row_count);
     memset(all, 0xff, sizeof(row) * MAX_ROWS); // NaN: what is read has been written
     for (int i = 0; i < 2; i++) {
         all[i][0] = plant.q[i];
         all[2 + i][0] = plant.dq[i];
     }
-}
-
-/* The inputs of the sample, which move in one of two draws. */
-static void next_inputs(void) {
-    const bool move = rp_test_random_bits(&random_source) % 2 == 0;
-    time_scale = pow(2.0, rp_test_uniform(&random_source, -12.0, -6.0));
-    double u[PLANT_INPUTS];
-    memcpy(u, &plant.inputs, sizeof u);
-    for (int i = 0; i < PLANT_INPUTS; i++) {
-        inputs[i][0] = u[i];
-        for (int k = 1; k < SERIES_INPUT_LENGTH; k++) {
-            inputs[i][k] =
-                move ? rp_test_uniform(&random_source, -20.0, 20.0) * pow(time_scale, k) : 0.0;
-        }
-    }
-}
-
-static void next_plant(void) {
-    plant_test_random_plant(&random_source, &plant);
-    next_inputs();
-}
-
-static void extend(const struct series *series, const void *values, int first, int last,
-                   row all[MAX_ROWS]) {
-    const struct series_origin origin = {
-        .values = values,
-        .time_scale = time_scale,
-        .inputs = (const double(*)[SERIES_INPUT_LENGTH])inputs,
-    };
-    TEST_ASSERT_LESS_OR_EQUAL_size_t(MAX_ROWS, series->row_count);
-    ASSERT_OK(series->extend(&origin, first, last, all));
-}
-
-/* Each feature that is on adds to the series what it adds to the right-hand side. */
-static void test_each_feature_counts(void) {
-    double *const features[] = {&plant.parameters.armature[0],
-                                &plant.parameters.armature[1],
-                                &plant.parameters.damping[0],
-                                &plant.parameters.damping[1],
-                                &plant.inputs.wrench[0],
-                                &plant.inputs.wrench[1],
-                                &plant.inputs.wrench[2],
-                                &plant.parameters.payload_mass,
-                                &plant.parameters.payload_inertia,
-                                &plant.parameters.coulomb_friction[0],
-                                &plant.parameters.coulomb_friction[1]};
-    for (size_t i = 0; i < sizeof features / sizeof features[0]; i++) {
-        double expected[PLANT_STATES];
-        plant_test_random_arm(&random_source, &plant);
-        plant.payload_attached = 1;
-        *features[i] = 1.0;
-        plant_test_update(&plant, -1);
-        next_inputs();
-        clear(rows);
-        extend(&rp_plant_series, &plant, 0, 1, rows);
-        const double x[PLANT_STATES] = {plant.q[0], plant.q[1], plant.dq[0], plant.dq[1]};
-        ASSERT_OK(rp_plant_model.right_hand_side(&plant, 3.0, x, (const double *)&plant.inputs,
-                                                 expected));
-        for (int k = 0; k < PLANT_STATES; k++) {
-            ASSERT_CLOSE(expected[k], rows[k][1] / time_scale, 1e-12 * (1.0 + fabs(expected[k])));
-        }
-    }
+    ASSERT_OK(rp_plant_series.extend(&origin, 0, last, all));
 }
 
 /* ---- Equations of motion -------------------------------------------------------------------- */
@@ -108,59 +70,6 @@ static struct sum sum_of(const double c[], double s) {
         sum.size += (k + 1) * fabs(c[k]);
     }
     return sum;
-}
-
-static bool row_has_converged(const double c[]) {
-    const double last = fabs(c[DEGREE]) + fabs(c[DEGREE - 1]);
-    return last <= 1e-18 * (1.0 + sum_of(c, 1.0).size);
-}
-
-/* The terms at the end are nothing beside the others, and velocities move no farther than they may.
- */
-static bool has_converged(const struct indicator kinds[]) {
-    double reach[PLANT_STATES];
-    const double x[PLANT_STATES] = {plant.q[0], plant.q[1], plant.dq[0], plant.dq[1]};
-    rp_plant_reach(&plant, x, reach);
-    for (int i = 0; i < PLANT_STATES; i++) {
-        double way = 0.0;
-        for (int k = 1; k <= DEGREE; k++) {
-            way += fabs(rows[i][k]);
-        }
-        if (!row_has_converged(rows[i]) || !(way <= reach[i])) {
-            return false;
-        }
-    }
-    for (int i = 0; i < RP_PLANT_INDICATORS; i++) {
-        if (kinds[i].kind == INDICATOR_OF_MODEL &&
-            !row_has_converged(rows[rp_plant_series.row_of_indicator[i]])) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/* The series with a time_scale as long as it converges fast. */
-static void expand_far(void) {
-    double begin[PLANT_INPUTS][SERIES_INPUT_LENGTH];
-    struct indicator kinds[RP_PLANT_INDICATORS];
-    memcpy(begin, inputs, sizeof begin);
-    rp_plant_model.events->describe(&plant, kinds);
-    const double first_unit = time_scale;
-    for (int exponent = 10; exponent > -20; exponent--) {
-        const double part = ldexp(1.0, exponent);
-        time_scale = part * first_unit;
-        for (int i = 0; i < PLANT_INPUTS; i++) {
-            for (int k = 1; k < SERIES_INPUT_LENGTH; k++) {
-                inputs[i][k] = begin[i][k] * pow(part, k);
-            }
-        }
-        clear(rows);
-        extend(&rp_plant_series, &plant, 0, DEGREE, rows);
-        if (has_converged(kinds)) {
-            return;
-        }
-    }
-    TEST_FAIL_MESSAGE("the series does not converge");
 }
 
 static void assert_model_at(double s) {
@@ -198,7 +107,7 @@ static void assert_model_at(double s) {
 
 static void test_the_polynomials_satisfy_the_equations(void) {
     for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        next_plant();
+        plant_test_random_plant(&random_source, &plant);
         if (n % 3 == 0) { // on a stop
             plant.parameters.stops[n % 2] = RP_PLANT_STOPS_RIGID;
             plant.parameters.lower[n % 2] = plant.q[n % 2];
@@ -214,32 +123,21 @@ static void test_the_polynomials_satisfy_the_equations(void) {
             plant.modes.joint[0] = RP_PLANT_FORWARD;
             plant.modes.joint[1] = RP_PLANT_BACKWARD;
             plant.modes.payload = RP_PLANT_RELEASED;
-            next_inputs();
-            memset(inputs[2], 0, 3 * sizeof inputs[0]);
         }
-        expand_far();
-        assert_model_at(0.0);
-        assert_model_at(0.5);
+        next_step();
+        expand(DEGREE, rows);
         assert_model_at(1.0);
     }
 }
 
 static void test_modes_that_are_not_decided_yet(void) {
     for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        next_plant();
+        plant_test_random_plant(&random_source, &plant);
         plant.modes = (struct rp_plant_modes){.payload = RP_PLANT_UNDECIDED};
         plant.dq[n % 2] = 0.0;
-        time_scale = 1e-3;
-        clear(rows);
-        extend(&rp_plant_series, &plant, 0, DEGREE, rows);
+        next_step();
+        expand(DEGREE, rows);
         assert_model_at(0.0);
-    }
-}
-
-static void test_rows_of_indicators_exist(void) {
-    for (int i = 0; i < RP_PLANT_INDICATORS; i++) {
-        TEST_ASSERT_LESS_THAN_size_t(rp_plant_series.row_count,
-                                     rp_plant_series.row_of_indicator[i]);
     }
 }
 
@@ -289,12 +187,10 @@ static void test_friction_of_a_fast_joint_is_constant(void) {
     memset(inputs, 0, sizeof inputs);
     for (int n = 0; n < 2; n++) {
         plant.dq[1] = n == 0 ? 2.0 : 1.5; // 8 vs, 6 vs
-        clear(rows);
-        clear(constant);
         plant.parameters.breakaway_friction[1] = 1.0;
-        extend(&rp_plant_series, &plant, 0, 8, constant);
+        expand(8, constant);
         plant.parameters.breakaway_friction[1] = 1000.0;
-        extend(&rp_plant_series, &plant, 0, 8, rows);
+        expand(8, rows);
         const bool same = memcmp(constant[3], rows[3], 9 * sizeof(double)) == 0;
         TEST_ASSERT_TRUE(same == (n == 0));
     }
