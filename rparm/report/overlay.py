@@ -56,6 +56,9 @@ def lay(
         missed = "time of this run" if names else "variable that a plot of this run shows"
         raise UserError(f"--with: {log.path}: has no {missed}")
     columns = dict(zip(names, found.values.T, strict=True))
+    after = np.minimum(np.searchsorted(found.times, elapsed - EARLY), len(found.times) - 1)
+    both = np.flatnonzero(np.abs(found.times[after] - elapsed) <= EARLY)
+    is_thinned = 2 * len(both) >= min(len(found.times), len(inside))  # some rows of such a run
 
     def laid(curve: Curve) -> Curve:
         if curve.name not in columns:
@@ -63,11 +66,12 @@ def lay(
         signal = Logged(found.times, columns[curve.name], False, "")
         other = np.where(signal.covers(elapsed), signal.values(elapsed), np.nan)
         left = curve.values - other
+        if is_thinned:  # elsewhere they differ by what is between the rows
+            left = np.interp(elapsed, elapsed[both], left[both]) + 0 * other
         rounding = ROUNDING * max(np.abs(curve.values).max(), SMALLEST_SCALE)
         return replace(curve, other=other, difference=np.where(np.abs(left) < rounding, 0.0, left))
 
-    after = np.minimum(np.searchsorted(found.times, inside - EARLY), len(found.times) - 1)
-    other = {"name": str(log.path), "between": bool((found.times[after] > inside + EARLY).any())}
+    other = {"name": str(log.path), "between": len(both) < len(inside)}
     plots = [replace(plot, curves=[*map(laid, plot.curves)]) for plot in plots]
     drawn = [(plot.unit, c) for plot in plots for c in plot.curves if c.difference is not None]
     sizes = [np.nanmax(np.abs(curve.difference)) for _, curve in drawn]

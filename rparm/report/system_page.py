@@ -151,7 +151,8 @@ def write_variant(
         section.page(outcome.variant),
         page,
         section.title,
-        title=", ".join(f"{name} {value}" for name, value in _measures(section, outcome)),
+        title=_said(section, outcome.variant),
+        difference=data.other["largest"] if data.other else "",
         **known,
     )
 
@@ -183,7 +184,7 @@ def write_failed(report: Path, section: Section, variant: str, error: UserError)
         **values,
         **_texts(section, variant),
     )
-    name, more = section.page(variant), {"title": "", "detail": str(error)}
+    name, more = section.page(variant), {"title": _said(section, variant), "detail": str(error)}
     return overview.write_page(folder, name, page, section.title, **more)
 
 
@@ -279,10 +280,15 @@ def _measures(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
     return [(m.name, f"{m.value(outcome):.3g} {m.unit}") for m in section.measures]
 
 
+def _said(section: Section, variant: str) -> str:
+    """Return what the system says of a variant, or a user's of itself."""
+    system = section.ssp.system
+    return system.descriptions.get(variant, "" if section.folder else system.description)
+
+
 def _description(section: Section, variant: str) -> str:
     """Describe the variant, and how it is run."""
-    system = section.ssp.system
-    said = system.descriptions.get(variant, "" if section.folder else system.description)
+    system, said = section.ssp.system, _said(section, variant)
     why_not = "" if section.folder else ecos.unsuited(section.ssp)
     by = f"rparm's own master ({why_not})" if why_not else "Ecos"
     how = f"Run by {by} with steps of {milliseconds(system.step)}."

@@ -47,7 +47,7 @@ class ReportWriter:
         """`options` are those of the command, for its pages; `others` what to draw over results."""
         self.folder, self.options, self._others = folder, options, others
         self.files: dict[str, Path] = {}  # pages of users' own files that were written, by name
-        self.differences: list[str] = []  # from other results, a text each
+        self.entries: list[Entry] = []  # of scenarios and files
 
     def begin(self) -> None:
         """Write what all pages share: fails now, not after all runs, if there is no room."""
@@ -88,7 +88,6 @@ class ReportWriter:
             if group:
                 over = self._others.get((section, scenario.name))
                 entry = scenario_page.write(folder, name, group, again, others, over)
-                self.differences += [f"{name}: {entry.difference}"] if over else []
             else:
                 entry = scenario_page.write_failed(folder, name, others[0], again)
             entries.append(entry if ours else replace(entry, source=str(path)))
@@ -98,6 +97,7 @@ class ReportWriter:
         whole = f"{project.PROGRAM} run{self.options}"
         swept = dict.fromkeys(sweep.scenario.name for sweep in sweeps)
         some = whole if studies else " ".join((whole, *swept))
+        self.entries = [*scenarios, *files]
         written = [write_sweeps(self.folder / STUDIES, sweeps, some)] if sweeps else []
         written += [write_convergence(self.folder / STUDIES, x, whole) for x in studies]
         index = self._record(scenarios, files, written)
