@@ -121,9 +121,7 @@ def _written(options: argparse.Namespace, name: str, page: RunPage, group: str) 
     """Write a page into the folder of the results, and its line on the start page."""
     report = project.results_folder(options.report)
     with written(report):
-        entry = overview.write_page(report / PART, name, page, group)
-        overview.record(report, PART, [entry])
-    return report / PART / entry.page
+        return overview.add_run(report, PART, name, page, group)
 
 
 def _finite(numbers: Sequence[float]) -> list[float | None]:

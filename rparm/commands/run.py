@@ -26,14 +26,7 @@ from rparm.project import PROGRAM, VERSIONS
 from rparm.report import overlay, pages
 from rparm.report.overview import FILES, SCENARIOS
 from rparm.report.writer import ReportWriter
-from rparm.result_tables import (
-    Done,
-    RunTable,
-    SweepTable,
-    print_convergence,
-    print_differences,
-    print_measured,
-)
+from rparm.result_tables import Done, RunTable, SweepTable, print_convergence, print_measured
 from rparm.runs import convergence
 from rparm.runs import scenario as scenarios
 from rparm.runs.comparison import TIGHTEST, TOLERANCES, Failure, Run, Runs, Sweep, sweep
@@ -109,7 +102,7 @@ def do_run(options: argparse.Namespace) -> Ended:
             print_measured(group[0])
         with written(options.report), Progress("report", len(groups), "pages") as progress:
             page = writer.write(groups, done.sweeps, done.studies, progress, done.failures)
-    print_differences(writer.entries)
+    result_tables.print_differences(writer.entries)
     for name, file in writer.files.items():
         print(f"{name}: {from_here(file)}")
     return _ended(done, (options.report / pages.INDEX).absolute(), page)
