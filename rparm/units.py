@@ -174,7 +174,7 @@ def short(number: float, digits: int | None = None) -> str:
     mantissa, exponent = f"{number:.{3 if digits is None else digits}e}".split("e")
     if digits is None:
         mantissa = mantissa.rstrip("0").rstrip(".")
-    return f"{mantissa}e{int(exponent)}"
+    return f"{mantissa}e{int(exponent)}" if int(exponent) else mantissa
 
 
 def exponents(text: str) -> str:

@@ -192,9 +192,8 @@ class Page:
             indices=found,
             groups={x: len(saltelli_groups(self.campaign, self.kept[x])) for x in found},
             bars=[
-                indices_chart(self.labels[name], found[name])
-                for name in self.drawn
-                if name in found
+                indices_chart(self.labels[name], found[name], i == 0)
+                for i, name in enumerate(x for x in self.drawn if x in found)
             ],
             wide=[name for name, rows in found.items() if any(map(is_wide, rows))],
             worst=[self.worst(name) for name in self.campaign.worst],
@@ -295,10 +294,10 @@ def _lacking(values: np.ndarray) -> int:
 
 
 # ---- Charts -------------------------------------------------------------------------------------
-def indices_chart(label: str, rows: Sequence[Index]) -> Chart:
+def indices_chart(label: str, rows: Sequence[Index], legend: bool = True) -> Chart:
     """Draw Sobol' indices of a column as bars, with their confidence intervals."""
     text = f"Sobol' indices of {label}, as in the table"
-    data = {"rows": [vars(row) for row in rows]}
+    data = {"rows": [vars(row) for row in rows], "legend": legend}
     return Chart(label, text, "indices", data, height=7 + 3 * len(rows))
 
 

@@ -131,11 +131,10 @@ def _finite(numbers: Sequence[float]) -> list[float | None]:
 def _table(found: Sequence[Halved]) -> Table:
     rows = []
     for x in found:
-        orders = [*(f"{p:.2f}" if math.isfinite(p) else "–" for p in x.orders), "", ""]
-        for i, (step, error) in enumerate(zip(x.steps.tolist(), x.errors.tolist(), strict=True)):
-            names = [x.order.replace("_", "-"), x.inputs] if i == 0 else ["", ""]
-            worst = x.worst if i == 0 else ""
-            rows.append([*names, milliseconds(step), short(error, 1), orders[i], worst])
+        orders = [*(f"{p:.2f}" if math.isfinite(p) else "–" for p in x.orders), "–", "–"]
+        for step, error, p in zip(x.steps.tolist(), x.errors.tolist(), orders, strict=True):
+            names = x.order.replace("_", "-"), x.inputs, milliseconds(step)
+            rows.append([*names, short(error, 1), p, x.worst])
     head = ["order", "inputs", "step", "error", "of order", "largest of"]
     return Table("Errors of the coupling", head, rows)
 
