@@ -355,16 +355,8 @@ def commit() -> str:
     """Return the commit of a checkout, with -dirty if files have changed; "" if it is not known."""
     if not (PACKAGE.parent / ".git").exists():
         return ""
-    command = [
-        "git",
-        "-C",
-        str(PACKAGE.parent),
-        "describe",
-        "--always",
-        "--dirty",
-        "--exclude",
-        "*",
-    ]
+    here = ["git", "-C", str(PACKAGE.parent)]
+    command = [*here, "describe", "--always", "--dirty", "--exclude", "*"]
     with suppress(OSError):
         return subprocess.run(command, capture_output=True, encoding="utf-8").stdout.strip()
     return ""

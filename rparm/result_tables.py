@@ -148,11 +148,8 @@ def print_measured(run: Run) -> None:
 
 def print_differences(entries: Iterable[Entry]) -> None:
     """Print how far results are from others that were given, and an empty line."""
-    print(
-        *(f"{entry.name}: {entry.difference}" for entry in entries if entry.difference),
-        "",
-        sep="\n",
-    )
+    texts = [f"{entry.name}: {entry.difference}" for entry in entries if entry.difference]
+    print(*texts, "", sep="\n")
 
 
 # ---- The document --------------------------------------------------------------------------------

@@ -20,6 +20,7 @@ from rparm.campaign.planning import FAILURE, RUN, sampling_problem
 from rparm.campaign.results import MANIFEST, Results
 from rparm.report import charts, pages
 from rparm.report.charts import Chart
+from rparm.units import prefixed
 
 QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 WORST = 10  # runs that are listed
@@ -152,7 +153,12 @@ class Page:
     ) -> None:
         self.campaign, self.job, self.folder, self.again = campaign, job, results.folder, command
         self.report = project.results_folder(self.folder)
-        self.table = results.table([*results.columns, FAILURE])
+        self.table, units = results.table([*results.columns, FAILURE]), dict(units)
+        for name in (measure.column for measure in job.measures):
+            values = self.table[name]
+            largest = np.abs(values[np.isfinite(values)]).max(initial=0.0)
+            units[name], factor = prefixed(units.get(name, ""), largest)
+            self.table[name] = factor * values
         self.kept = {measure.column: self.table[measure.column] for measure in job.measures}
         self.labels = {name: f"{name} [{unit}]" if unit else name for name, unit in units.items()}
         self.drawn = dict(list(self.kept.items())[:DRAWN])

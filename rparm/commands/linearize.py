@@ -103,11 +103,8 @@ def do_linearize(options: argparse.Namespace) -> Ended:
     for path in options.save:
         study.save(path, found, options.step)
         print(f"saved: {from_here(path)}")
-    report, again, poles = (
-        project.results_folder(options.report),
-        _command(options),
-        found.linear.poles,
-    )
+    report, again = project.results_folder(options.report), _command(options)
+    poles = found.linear.poles
     with written(report):
         entry = Entry(
             "_".join(filter(None, (found.path.stem, found.variant))),

@@ -11,7 +11,7 @@ from rparm.files import is_file, missing
 from rparm.report.run_data import ROUNDING, TIME, Curve, Plot
 from rparm.runs.comparison import SMALLEST_SCALE
 from rparm.runs.inputs import EARLY, Log, Logged, read_log
-from rparm.units import counted, exponents
+from rparm.units import counted, exponents, prefixed
 
 Others = Mapping[tuple[str, str], Log]  # by section and name of results
 
@@ -77,5 +77,6 @@ def lay(
     sizes = [np.nanmax(np.abs(curve.difference)) for _, curve in drawn]
     scales = [max(np.abs(curve.values).max(), SMALLEST_SCALE) for _, curve in drawn]
     i = int(np.argmax(np.divide(sizes, scales)))
-    largest = f"{drawn[i][1].name} {exponents(f'{sizes[i]:.3g} {drawn[i][0]}'.strip())}"
+    unit, factor = prefixed(drawn[i][0], sizes[i])
+    largest = f"{drawn[i][1].name} {exponents(f'{factor * sizes[i]:.3g} {unit}'.strip())}"
     return plots, other | {"largest": f"largest difference {largest} from {log.path}"}

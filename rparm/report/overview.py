@@ -151,8 +151,7 @@ def add(report: Path, section: str, entry: Entry, write: Callable[[Path, str], P
 def add_run(report: Path, section: str, name: str, page: RunPage, group: str) -> Path:
     """Write a page of a run or a study, called `name`, and its entry; its path."""
     entry = entry_of(name, page, group)
-    write = pages.write_run
-    return add(report, section, entry, lambda folder, root: write(folder / entry.page, page, root))
+    return add(report, section, entry, lambda to, _: pages.write_run(to / entry.page, page))
 
 
 def forget(report: Path, section: str, names: Collection[str] | None = None) -> None:

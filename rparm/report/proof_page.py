@@ -70,9 +70,8 @@ def write(
     )
     answers = page, _largest(model, enclosure, errors), [_chart(enclosure, errors)], "Each state"
     entry = overview.entry_of(scenario.name, page, model.name)
-    write = charts.write_page
     return overview.add(
-        report, PROOFS, entry, lambda to, root: write(to / entry.page, *answers, root)
+        report, PROOFS, entry, lambda to, root: charts.write_page(to / entry.page, *answers, root)
     )
 
 

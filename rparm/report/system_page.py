@@ -82,6 +82,11 @@ class Section:
         ]
         return list(dict.fromkeys([*comparison.kept(self.ssp), *moving]))
 
+    def said(self, variant: str) -> str:
+        """Return what the system says of a variant, or a user's of itself."""
+        system = self.ssp.system
+        return system.descriptions.get(variant, "" if self.folder else system.description)
+
     def page(self, variant: str) -> str:
         """Name the page of a variant, and its file of values."""
         return variant if self.folder else _file_name(f"{self.name}_{variant}")
@@ -151,7 +156,7 @@ def write_variant(
         section.page(outcome.variant),
         page,
         section.title,
-        title=_said(section, outcome.variant),
+        title=section.said(outcome.variant),
         difference=data.other["largest"] if data.other else "",
         **known,
     )
@@ -184,7 +189,7 @@ def write_failed(report: Path, section: Section, variant: str, error: UserError)
         **values,
         **_texts(section, variant),
     )
-    name, more = section.page(variant), {"title": _said(section, variant), "detail": str(error)}
+    name, more = section.page(variant), {"title": section.said(variant), "detail": str(error)}
     return overview.write_page(folder, name, page, section.title, **more)
 
 
@@ -280,15 +285,9 @@ def _measures(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
     return [(m.name, f"{m.value(outcome):.3g} {m.unit}") for m in section.measures]
 
 
-def _said(section: Section, variant: str) -> str:
-    """Return what the system says of a variant, or a user's of itself."""
-    system = section.ssp.system
-    return system.descriptions.get(variant, "" if section.folder else system.description)
-
-
 def _description(section: Section, variant: str) -> str:
     """Describe the variant, and how it is run."""
-    system, said = section.ssp.system, _said(section, variant)
+    system, said = section.ssp.system, section.said(variant)
     why_not = "" if section.folder else ecos.unsuited(section.ssp)
     by = f"rparm's own master ({why_not})" if why_not else "Ecos"
     how = f"Run by {by} with steps of {milliseconds(system.step)}."

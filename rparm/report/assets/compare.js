@@ -109,7 +109,7 @@ const Compare = (() => {
         if (!difference) continue;
         const most = difference.reduce((size, x) => (Math.abs(x) > size ? Math.abs(x) : size), 0);
         const { unit, factor } = scaled(plot.unit, [most]);
-        largest.set(name, `${name} ${shown(most / factor, 3)}${unit ? ` ${unit}` : ''}`);
+        largest.set(name, `${name} ${shown(most / factor, 3)}${unit ? `\u00a0${unit}` : ''}`);
       }
     }
     const between = other.between
