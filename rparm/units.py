@@ -55,8 +55,6 @@ class Unit:
 
 
 Units = Mapping[str, Unit]  # by name, the variable's own first
-
-
 Displays = Mapping[str, Units]  # display units, by the unit that they belong to
 
 
@@ -105,11 +103,7 @@ def _alternatives(symbol: str, displays: Displays) -> dict[str, Unit]:
 
 # units of other values in scenarios and campaigns than variables of models
 SECONDS = units_of("s", {})
-
-
 HERTZ = units_of("Hz", {})
-
-
 RADIANS = units_of(ANGLE, {ANGLE: {"deg": Unit(DEGREE)}})
 
 

@@ -19,7 +19,7 @@ from rparm.systems import comparison, master
 from rparm.systems.comparison import HALVINGS, CouplingStudy, Halved
 from rparm.systems.opened import SUFFIXES, given_file, opened, system_file
 from rparm.systems.structure import OpenedSystem
-from rparm.units import milliseconds, short
+from rparm.units import exponents, milliseconds, short
 from rparm.units import verdict as passed_or_failed
 
 PART = overview.COUPLING
@@ -134,7 +134,7 @@ def _table(found: Sequence[Halved]) -> Table:
         orders = [*(f"{p:.2f}" if math.isfinite(p) else "–" for p in x.orders), "–", "–"]
         for step, error, p in zip(x.steps.tolist(), x.errors.tolist(), orders, strict=True):
             names = x.order.replace("_", "-"), x.inputs, milliseconds(step)
-            rows.append([*names, short(error, 1), p, x.worst])
+            rows.append([*names, exponents(f"{error:.2g}"), p, x.worst])
     head = ["order", "inputs", "step", "error", "of order", "largest of"]
     return Table("Errors of the coupling", head, rows)
 

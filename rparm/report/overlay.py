@@ -8,11 +8,12 @@ import numpy as np
 
 from rparm.errors import UserError, placed
 from rparm.files import is_file, missing
-from rparm.report.run_data import ROUNDING, TIME, Curve, Plot
+from rparm.report.run_data import TIME, Curve, Plot, without_rounding
 from rparm.runs.comparison import SMALLEST_SCALE
 from rparm.runs.inputs import EARLY, Log, Logged, read_log
 from rparm.units import counted, exponents, prefixed
 
+FILED = 5e-12  # of a variable's scale: less is rounding of files, which have twelve digits
 Others = Mapping[tuple[str, str], Log]  # by section and name of results
 
 
@@ -68,8 +69,9 @@ def lay(
         left = curve.values - other
         if is_thinned:  # elsewhere they differ by what is between the rows
             left = np.interp(elapsed, elapsed[both], left[both]) + 0 * other
-        rounding = ROUNDING * max(np.abs(curve.values).max(), SMALLEST_SCALE)
-        return replace(curve, other=other, difference=np.where(np.abs(left) < rounding, 0.0, left))
+        rounding = FILED * max(np.abs(curve.values).max(), SMALLEST_SCALE)
+        left = np.where(np.abs(left) < rounding, 0.0, left)
+        return replace(curve, other=without_rounding(other), difference=left)
 
     other = {"name": str(log.path), "between": len(both) < len(inside)}
     plots = [replace(plot, curves=[*map(laid, plot.curves)]) for plot in plots]

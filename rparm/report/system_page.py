@@ -24,7 +24,7 @@ from rparm.runs.inputs import Log
 from rparm.systems import comparison, ecos
 from rparm.systems.comparison import BOUND, Diagram, Measure, Outcome, Study, load_study
 from rparm.systems.structure import OpenedSystem
-from rparm.units import milliseconds, seconds, short, unit
+from rparm.units import exponents, milliseconds, seconds, short, unit
 
 MOST_ROWS = 350  # of a file of values, which has many columns
 DIGITS = 12  # there; errors have a bound of 1e-7
@@ -166,7 +166,8 @@ def estimate(outcome: Outcome) -> str:
     """Say how large the coupling error is, or why that is not known."""
     if not outcome.errors:
         return f"coupling error not estimated: {outcome.why}"
-    return f"coupling error about {short(outcome.error, 1)} ({outcome.worst}), by half the step"
+    size = exponents(f"{outcome.error:.2g}")
+    return f"coupling error about {size} ({outcome.worst}), by half the step"
 
 
 def write_failed(report: Path, section: Section, variant: str, error: UserError) -> Entry:

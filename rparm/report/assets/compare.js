@@ -108,6 +108,7 @@ const Compare = (() => {
       for (const { name, difference } of plot.curves) {
         if (!difference) continue;
         const most = difference.reduce((size, x) => (Math.abs(x) > size ? Math.abs(x) : size), 0);
+        if (!most) continue;
         const { unit, factor } = scaled(plot.unit, [most]);
         largest.set(name, `${name} ${shown(most / factor, 3)}${unit ? `\u00a0${unit}` : ''}`);
       }
@@ -115,7 +116,7 @@ const Compare = (() => {
     const between = other.between
       ? ' Its times differ: its values are interpolated linearly at the times of this run.' : '';
     return `Dashed: ${other.name}. Below the curves (\u0394): this run less that, at most `
-      + `${[...largest.values()].join(', ')}.${between}`;
+      + `${[...largest.values()].join(', ') || 0}.${between}`;
   }
 
   return { Refused, over, alone, label, described };
