@@ -9,6 +9,7 @@ bytes.
 
 import argparse
 import html
+import re
 import shutil
 import sys
 import xml.etree.ElementTree as ET
@@ -226,7 +227,7 @@ def document(pages: list[Path], model_description: Path, output: Path) -> None:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    templates.filters["text"] = html.escape
+    templates.filters["text"] = lambda text: html.escape(re.sub(r"(?<=\de-)0+(?=\d)", "", text))
     page = templates.get_template(TEMPLATE.name).render(
         title=": ".join(root.attrib[k] for k in ("modelName", "description") if k in root.attrib),
         style=read_text(STYLE_SHEET),

@@ -294,7 +294,10 @@ def runtimes(all_platforms: bool, web: bool = False) -> list[Path]:
         return sorted(built_for_all().glob("*.json"))
     if web:
         runtime = ROOT / "build" / "platforms" / "wasm32-wasi" / "runtime" / "runtime.json"
-        way_out = "./run.sh playground, in a checkout, makes it"
+        way_out = "./run.sh playground makes it"
+        if INSTALLED:
+            need = "a checkout of the project: ./run.sh playground, ./run.sh build --web FILE.toml"
+            raise UserError(f"--web: needs what is not in this package, {need}")
     elif INSTALLED:
         runtime = built_for_all() / f"{platform_name()}.json"
         way_out = f"{PROGRAM} build --platforms builds for others"
@@ -352,16 +355,8 @@ def commit() -> str:
     """Return the commit of a checkout, with -dirty if files have changed; "" if it is not known."""
     if not (PACKAGE.parent / ".git").exists():
         return ""
-    command = [
-        "git",
-        "-C",
-        str(PACKAGE.parent),
-        "describe",
-        "--always",
-        "--dirty",
-        "--exclude",
-        "*",
-    ]
+    here = ["git", "-C", str(PACKAGE.parent)]
+    command = [*here, "describe", "--always", "--dirty", "--exclude", "*"]
     with suppress(OSError):
         return subprocess.run(command, capture_output=True, encoding="utf-8").stdout.strip()
     return ""

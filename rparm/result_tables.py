@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from rparm import console
 from rparm.console import Table
+from rparm.report.overview import Entry
 from rparm.runs.comparison import TIGHTEST, Failure, Run, Sweep, comparisons
 from rparm.runs.convergence import Convergence
 from rparm.runs.scenario import Scenario
@@ -143,6 +144,12 @@ def print_measured(run: Run) -> None:
         known = unit(run.fmu.model.variables[compared.name].unit)
         rms = f"{compared.rms:.3g} {known} RMS from {compared.source}"
         console.remark(f"{run.scenario.name}: {compared.name} is {rms}")
+
+
+def print_differences(entries: Iterable[Entry]) -> None:
+    """Print how far results are from others that were given, and an empty line."""
+    texts = [f"{entry.name}: {entry.difference}" for entry in entries if entry.difference]
+    print(*texts, "", sep="\n")
 
 
 # ---- The document --------------------------------------------------------------------------------

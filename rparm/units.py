@@ -32,6 +32,7 @@ QUANTITY = re.compile(rf"({NUMBER})[ \t]*([^\s\d.,+-].*|1/.*)?", re.ASCII)
 FACTOR = re.compile(r"([A-Za-z]+)(-?\d)?", re.ASCII)
 PRODUCT = re.compile(r"([^/()]+)(?:/(?:([^./()]+)|\(([^/()]+)\)))?")  # a.b, a/b or a/(b.c)
 TYPED = str.maketrans({"·": ".", "²": "2", "³": "3"})  # as pages write units
+PREFIXABLE = re.compile(r"(m|s|rad|N|J|W|V|A|Hz|Pa|H)(?!\w)")
 SMALLEST = 1e-99  # smaller numbers are shown as ~0
 GAP = ".."  # in a text that is shortened
 
@@ -54,8 +55,6 @@ class Unit:
 
 
 Units = Mapping[str, Unit]  # by name, the variable's own first
-
-
 Displays = Mapping[str, Units]  # display units, by the unit that they belong to
 
 
@@ -104,11 +103,7 @@ def _alternatives(symbol: str, displays: Displays) -> dict[str, Unit]:
 
 # units of other values in scenarios and campaigns than variables of models
 SECONDS = units_of("s", {})
-
-
 HERTZ = units_of("Hz", {})
-
-
 RADIANS = units_of(ANGLE, {ANGLE: {"deg": Unit(DEGREE)}})
 
 
@@ -174,7 +169,7 @@ def short(number: float, digits: int | None = None) -> str:
     mantissa, exponent = f"{number:.{3 if digits is None else digits}e}".split("e")
     if digits is None:
         mantissa = mantissa.rstrip("0").rstrip(".")
-    return f"{mantissa}e{int(exponent)}"
+    return f"{mantissa}e{int(exponent)}" if int(exponent) else mantissa
 
 
 def exponents(text: str) -> str:
@@ -221,6 +216,14 @@ def unit(text: str | None) -> str:
     """Write a unit of FMI as N·m for N.m, m/s² for m/s2; nothing for none."""
     raised = re.sub(r"(?<=[a-z])[23]", lambda found: {"2": "²", "3": "³"}[found[0]], text or "")
     return raised.replace(".", "·")
+
+
+def prefixed(text: str, largest: float) -> tuple[str, float]:
+    """Return a unit for values of this size, mm for m, and how many of it are one of the other."""
+    if not PREFIXABLE.match(text) or not 1e-12 < largest < 0.1:
+        return text, 1.0
+    thousands = min(math.ceil(-(math.log10(largest) + 1) / 3), 4)
+    return " mµnp"[thousands] + text, 1e3**thousands
 
 
 def counted(things: Sized, name: str) -> str:

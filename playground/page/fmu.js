@@ -9,7 +9,7 @@ class FmuError extends Error {
   }
 }
 
-/** An FMU of FMI 2.0 in WebAssembly, with one instance of it for Co-Simulation. */
+/** An FMU in WebAssembly, with one instance of it for Co-Simulation; here of FMI 2.0. */
 class Fmu {
   static CO_SIMULATION = 1;
   static WARNING = 1; // the worst fmi2Status of a call that succeeded
@@ -22,14 +22,20 @@ class Fmu {
     fd_write: () => Fmu.NO_FILE,
     sched_yield: () => 0,
   };
-  // a module that exports the function of six int32 that it imports: only functions of modules fit into the table
-  // of an FMU, where functions of JavaScript have no place
-  static LOGGER = new Uint8Array([
-    0, 0x61, 0x73, 0x6d, 1, 0, 0, 0,
-    1, 10, 1, 0x60, 6, 0x7f, 0x7f, 0x7f, 0x7f, 0x7f, 0x7f, 0, // type 0
-    2, 7, 1, 1, 0x65, 1, 0x66, 0, 0, // import function 0, e.f
-    7, 5, 1, 1, 0x66, 0, 0, // export it as f
-  ]);
+  static LOGGED = 6; // arguments of the logger
+
+  /**
+   * A module that exports the function of int32 that it imports: only functions of modules fit into the table of an
+   * FMU, where functions of JavaScript have no place. @param {number} count of its arguments
+   */
+  static logger(count) {
+    return new Uint8Array([
+      0, 0x61, 0x73, 0x6d, 1, 0, 0, 0,
+      1, count + 4, 1, 0x60, count, ...Array(count).fill(0x7f), 0, // type 0
+      2, 7, 1, 1, 0x65, 1, 0x66, 0, 0, // import function 0, e.f
+      7, 5, 1, 1, 0x66, 0, 0, // export it as f
+    ]);
+  }
 
   /**
    * @param {Uint8Array} bytes of the module
@@ -37,52 +43,62 @@ class Fmu {
    */
   static async load(bytes, description) {
     const module = await WebAssembly.instantiate(bytes, {wasi_snapshot_preview1: Fmu.SYSTEM});
-    const fmu = new Fmu(module.instance.exports, description);
-    const log = (_environment, _name, status, _category, text) => fmu.#log(status, fmu.#text(text));
-    const logger = await WebAssembly.instantiate(Fmu.LOGGER, {e: {f: log}});
-    fmu.#instantiate(logger.instance.exports.f);
+    const kind = description.version === '3.0' ? Fmu3 : Fmu;
+    const fmu = new kind(module.instance.exports, description);
+    const log = (...given) => fmu.#log(...fmu.logged(...given));
+    const logger = await WebAssembly.instantiate(Fmu.logger(kind.LOGGED), {e: {f: log}});
+    const table = fmu.exports.__indirect_function_table;
+    table.set(table.grow(1), logger.instance.exports.f);
+    fmu.component = fmu.instantiate(table.length - 1);
+    if (!fmu.component) throw fmu.#failure('instantiate');
     return fmu;
   }
 
-  /** @type {WebAssembly.Exports} */ #exports;
-  #component = 0;
   #messages = [];
-  #scratch = 0; // a reference and a value, for get and set; the address of a state, for states
 
   constructor(exports, description) {
     this.description = description;
     /** Called with the text of each warning. @type {(text: string) => void} */
     this.onWarning = () => {};
-    this.#exports = exports;
+    /** @type {WebAssembly.Exports} */
+    this.exports = exports;
+    this.component = 0;
     exports._initialize();
-    this.#scratch = this.allocate(16);
+    this.scratch = this.allocate(32); // a reference and a value, for get and set; the address of a state, for states
   }
 
-  #instantiate(logger) {
-    const table = this.#exports.__indirect_function_table;
-    table.set(table.grow(1), logger);
+  /** @param {number} logger its place in the table @returns {number} handle of the instance; 0 if it fails */
+  instantiate(logger) {
     const callbacks = this.allocate(20); // four functions and the environment
-    new Uint32Array(this.#exports.memory.buffer, callbacks, 5).set([table.length - 1, 0, 0, 0, 0]);
-    const name = this.#cString(this.description.name), guid = this.#cString(this.description.guid);
-    this.#component =
-      this.#exports.fmi2Instantiate(name, Fmu.CO_SIMULATION, guid, 0, callbacks, 0, 0);
-    this.#exports.free(name);
-    this.#exports.free(guid);
-    if (!this.#component) throw this.#failure('fmi2Instantiate');
+    new Uint32Array(this.buffer, callbacks, 5).set([logger, 0, 0, 0, 0]);
+    return this.named((name, guid) => this.exports.fmi2Instantiate(name, Fmu.CO_SIMULATION, guid, 0, callbacks, 0, 0));
+  }
+
+  /** Call `make` with the name of the instance and the GUID, as C has them. */
+  named(make) {
+    const texts = [this.description.name, this.description.guid].map(text => this.#cString(text));
+    const made = make(...texts);
+    for (const text of texts) this.exports.free(text);
+    return made;
+  }
+
+  /** Status and text of a call of the logger. */
+  logged(_environment, _name, status, _category, text) {
+    return [status, this.text(text).replace(/##|%%/g, (twice) => twice[0])]; // FMI 2.0, section 2.1.5
   }
 
   // ---- memory
 
   /** Address of `size` bytes, for as long as the page is open. */
   allocate(size) {
-    const address = this.#exports.malloc(size);
+    const address = this.exports.malloc(size);
     if (!address) throw new FmuError(this.description.name, `no memory for ${size} bytes`);
     return address;
   }
 
   /** The memory as it is now: it moves when it grows. */
   get buffer() {
-    return this.#exports.memory.buffer;
+    return this.exports.memory.buffer;
   }
 
   #cString(text) {
@@ -92,15 +108,14 @@ class Fmu {
     return address;
   }
 
-  #text(address) {
+  text(address) {
     const bytes = new Uint8Array(this.buffer, address);
-    return new TextDecoder().decode(bytes.subarray(0, bytes.indexOf(0))).replaceAll('##', '#');
+    return new TextDecoder().decode(bytes.subarray(0, bytes.indexOf(0)));
   }
 
   // ---- calls
 
-  #log(status, sent) {
-    const text = sent.replace(/##|%%/g, (twice) => twice[0]); // FMI 2.0, section 2.1.5
+  #log(status, text) {
     if (status === Fmu.WARNING) this.onWarning(text);
     else this.#messages.push(text);
   }
@@ -113,8 +128,12 @@ class Fmu {
 
   /** Call a function of FMI with this instance; throws an FmuError where it fails. */
   call(name, ...values) {
-    const status = this.#exports[name](this.#component, ...values);
+    const status = this.exports[name](this.component, ...values);
     if (status > Fmu.WARNING) throw this.#failure(name);
+  }
+
+  reset() {
+    this.call('fmi2Reset');
   }
 
   /** From instantiation or reset to initialization mode. @param {number} time in s */
@@ -138,22 +157,22 @@ class Fmu {
 
   #single(variable) {
     const size = variable.type === 'Real' ? Float64Array : Int32Array;
-    new Uint32Array(this.buffer, this.#scratch, 1)[0] = variable.reference;
-    return new size(this.buffer, this.#scratch + 8, 1);
+    new Uint32Array(this.buffer, this.scratch, 1)[0] = variable.reference;
+    return new size(this.buffer, this.scratch + 8, 1);
   }
 
   /** Value of a variable of any type; of a Boolean, 0 or 1. */
   get(name) {
     const variable = this.description.find(name);
     const value = this.#single(variable);
-    this.call(`fmi2Get${Fmu.KIND[variable.type]}`, this.#scratch, 1, this.#scratch + 8);
+    this.call(`fmi2Get${Fmu.KIND[variable.type]}`, this.scratch, 1, this.scratch + 8);
     return value[0];
   }
 
   set(name, value) {
     const variable = this.description.find(name);
     this.#single(variable)[0] = value;
-    this.call(`fmi2Set${Fmu.KIND[variable.type]}`, this.#scratch, 1, this.#scratch + 8);
+    this.call(`fmi2Set${Fmu.KIND[variable.type]}`, this.scratch, 1, this.scratch + 8);
   }
 
   /** @param {string[]} names of Reals */
@@ -165,10 +184,10 @@ class Fmu {
 
   /** @returns {number} handle of a copy of the whole state; `freeState` when it is not needed */
   saveState() {
-    const place = new Uint32Array(this.buffer, this.#scratch, 1);
+    const place = new Uint32Array(this.buffer, this.scratch, 1);
     place[0] = 0;
-    this.call('fmi2GetFMUstate', this.#scratch);
-    return new Uint32Array(this.buffer, this.#scratch, 1)[0];
+    this.call('fmi2GetFMUstate', this.scratch);
+    return new Uint32Array(this.buffer, this.scratch, 1)[0];
   }
 
   restoreState(state) {
@@ -176,8 +195,8 @@ class Fmu {
   }
 
   freeState(state) {
-    new Uint32Array(this.buffer, this.#scratch, 1)[0] = state;
-    this.call('fmi2FreeFMUstate', this.#scratch);
+    new Uint32Array(this.buffer, this.scratch, 1)[0] = state;
+    this.call('fmi2FreeFMUstate', this.scratch);
   }
 }
 
@@ -210,5 +229,67 @@ class Reals {
   set(numbers) {
     this.values().set(numbers);
     this.fmu.call('fmi2SetReal', this.references, this.count, this.address);
+  }
+}
+
+/** An FMU of FMI 3.0: its values are read and set one by one. */
+class Fmu3 extends Fmu {
+  static LOGGED = 4;
+  // an array for a value, by its type
+  static KIND = {
+    Float64: Float64Array, Float32: Float32Array, Int8: Int8Array, UInt8: Uint8Array, Int16: Int16Array,
+    UInt16: Uint16Array, Int32: Int32Array, UInt32: Uint32Array, Int64: BigInt64Array, UInt64: BigUint64Array,
+    Boolean: Uint8Array,
+  };
+  #begin = 0; // s
+
+  instantiate(logger) {
+    return this.named((name, token) =>
+      this.exports.fmi3InstantiateCoSimulation(name, token, 0, 0, 0, 0, 0, 0, 0, 0, logger, 0));
+  }
+
+  logged(_environment, status, _category, text) {
+    return [status, this.text(text)];
+  }
+
+  reset() {
+    this.call('fmi3Reset');
+  }
+
+  setUp(time) {
+    this.#begin = time;
+  }
+
+  initialize() {
+    this.call('fmi3EnterInitializationMode', 0, 0, this.#begin, 0, 0);
+    this.call('fmi3ExitInitializationMode');
+  }
+
+  doStep(time, length) {
+    const told = this.scratch; // three Booleans and a time
+    this.call('fmi3DoStep', time, length, 1, told, told + 1, told + 2, told + 8);
+  }
+
+  #single({kind, reference}) {
+    new Uint32Array(this.buffer, this.scratch, 1)[0] = reference;
+    return new Fmu3.KIND[kind](this.buffer, this.scratch + 8, 1);
+  }
+
+  get(name) {
+    const variable = this.description.find(name);
+    const value = this.#single(variable);
+    this.call(`fmi3Get${variable.kind}`, this.scratch, 1, this.scratch + 8, 1);
+    return Number(value[0]);
+  }
+
+  set(name, value) {
+    const variable = this.description.find(name);
+    const place = this.#single(variable);
+    place[0] = typeof place[0] === 'bigint' ? BigInt(value) : value;
+    this.call(`fmi3Set${variable.kind}`, this.scratch, 1, this.scratch + 8, 1);
+  }
+
+  reals(names) {
+    return {get: () => names.map(name => this.get(name))};
   }
 }

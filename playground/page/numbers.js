@@ -27,7 +27,7 @@ class Numbers {
     const unit = variable.unit === '1' ? '' : variable.unit;
     return () => {
       const value = plant.get(name);
-      cell.textContent = `${Numbers.format(variable, value)} ${unit}`.trim();
+      cell.textContent = `${Numbers.format(variable, value).replaceAll('-', '\u2212')} ${unit}`.trim();
     };
   }
 

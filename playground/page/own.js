@@ -58,8 +58,8 @@ class Own {
       if (!archive.names.includes(described)) throw new UnsuitedError(`has no ${described}`);
       const xml = new TextDecoder().decode(await archive.read(described));
       const description = new ModelDescription(xml);
-      if (description.version !== '2.0') {
-        throw new UnsuitedError(`is of FMI ${description.version}: the playground loads FMI 2.0`);
+      if (!['2.0', '3.0'].includes(description.version)) {
+        throw new UnsuitedError(`is of FMI ${description.version}: the playground loads FMI 2.0 and 3.0`);
       }
       const module = archive.names.find(name => /^binaries\/wasm32-wasi\/.*\.wasm$/.test(name));
       if (!module) throw new UnsuitedError('has no WebAssembly: rparm build --web makes an FMU with it');
@@ -181,7 +181,7 @@ class Own {
     this.steps = 0;
     this.debt = 0;
     try {
-      fmu.call('fmi2Reset');
+      fmu.reset();
       fmu.setUp(this.begin);
       for (const [name, value] of this.values) fmu.set(name, value);
       fmu.initialize();

@@ -63,7 +63,6 @@ class Playground {
     own('efforts', find('plant', 'f2'), [-60, 60, 0.5], () => simulation.efforts, 1);
     own('set-point', find('controller', 'q1_ref'), [-3.14, 3.14, 0.01], () => simulation.reference, 0);
     own('set-point', find('controller', 'q2_ref'), [-0.5, 0.5, 0.01], () => simulation.reference, 1);
-    controls.addVariable(document.getElementById('solver'), 'plant', 'solver_method', []);
     controls.addGroups(document.getElementById('groups'));
     this.#addLaw();
     this.#addPayload();

@@ -75,7 +75,7 @@ const Settings = {
     },
     {
       title: 'Solver', fmu: 'plant',
-      controls: [['relative_tolerance', 0, 1e-4, 1e-7], ['max_step', 0, 0.01, 0.0005]],
+      controls: [['solver_method'], ['relative_tolerance', 0, 1e-4, 1e-7], ['max_step', 0, 0.01, 0.0005]],
     },
   ],
 

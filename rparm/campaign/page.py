@@ -20,6 +20,7 @@ from rparm.campaign.planning import FAILURE, RUN, sampling_problem
 from rparm.campaign.results import MANIFEST, Results
 from rparm.report import charts, pages
 from rparm.report.charts import Chart
+from rparm.units import prefixed
 
 QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 WORST = 10  # runs that are listed
@@ -152,7 +153,12 @@ class Page:
     ) -> None:
         self.campaign, self.job, self.folder, self.again = campaign, job, results.folder, command
         self.report = project.results_folder(self.folder)
-        self.table = results.table([*results.columns, FAILURE])
+        self.table, units = results.table([*results.columns, FAILURE]), dict(units)
+        for name in (measure.column for measure in job.measures):
+            values = self.table[name]
+            largest = np.abs(values[np.isfinite(values)]).max(initial=0.0)
+            units[name], factor = prefixed(units.get(name, ""), largest)
+            self.table[name] = factor * values
         self.kept = {measure.column: self.table[measure.column] for measure in job.measures}
         self.labels = {name: f"{name} [{unit}]" if unit else name for name, unit in units.items()}
         self.drawn = dict(list(self.kept.items())[:DRAWN])
@@ -192,9 +198,8 @@ class Page:
             indices=found,
             groups={x: len(saltelli_groups(self.campaign, self.kept[x])) for x in found},
             bars=[
-                indices_chart(self.labels[name], found[name])
-                for name in self.drawn
-                if name in found
+                indices_chart(self.labels[name], found[name], i == 0)
+                for i, name in enumerate(x for x in self.drawn if x in found)
             ],
             wide=[name for name, rows in found.items() if any(map(is_wide, rows))],
             worst=[self.worst(name) for name in self.campaign.worst],
@@ -295,10 +300,10 @@ def _lacking(values: np.ndarray) -> int:
 
 
 # ---- Charts -------------------------------------------------------------------------------------
-def indices_chart(label: str, rows: Sequence[Index]) -> Chart:
+def indices_chart(label: str, rows: Sequence[Index], legend: bool = True) -> Chart:
     """Draw Sobol' indices of a column as bars, with their confidence intervals."""
     text = f"Sobol' indices of {label}, as in the table"
-    data = {"rows": [vars(row) for row in rows]}
+    data = {"rows": [vars(row) for row in rows], "legend": legend}
     return Chart(label, text, "indices", data, height=7 + 3 * len(rows))
 
 

@@ -19,7 +19,7 @@ from rparm.systems import comparison, master
 from rparm.systems.comparison import HALVINGS, CouplingStudy, Halved
 from rparm.systems.opened import SUFFIXES, given_file, opened, system_file
 from rparm.systems.structure import OpenedSystem
-from rparm.units import milliseconds, short
+from rparm.units import exponents, milliseconds, short
 from rparm.units import verdict as passed_or_failed
 
 PART = overview.COUPLING
@@ -121,9 +121,7 @@ def _written(options: argparse.Namespace, name: str, page: RunPage, group: str) 
     """Write a page into the folder of the results, and its line on the start page."""
     report = project.results_folder(options.report)
     with written(report):
-        entry = overview.write_page(report / PART, name, page, group)
-        overview.record(report, PART, [entry])
-    return report / PART / entry.page
+        return overview.add_run(report, PART, name, page, group)
 
 
 def _finite(numbers: Sequence[float]) -> list[float | None]:
@@ -133,11 +131,10 @@ def _finite(numbers: Sequence[float]) -> list[float | None]:
 def _table(found: Sequence[Halved]) -> Table:
     rows = []
     for x in found:
-        orders = [*(f"{p:.2f}" if math.isfinite(p) else "–" for p in x.orders), "", ""]
-        for i, (step, error) in enumerate(zip(x.steps.tolist(), x.errors.tolist(), strict=True)):
-            names = [x.order.replace("_", "-"), x.inputs] if i == 0 else ["", ""]
-            worst = x.worst if i == 0 else ""
-            rows.append([*names, milliseconds(step), short(error, 1), orders[i], worst])
+        orders = [*(f"{p:.2f}" if math.isfinite(p) else "–" for p in x.orders), "–", "–"]
+        for step, error, p in zip(x.steps.tolist(), x.errors.tolist(), orders, strict=True):
+            names = x.order.replace("_", "-"), x.inputs, milliseconds(step)
+            rows.append([*names, exponents(f"{error:.2g}"), p, x.worst])
     head = ["order", "inputs", "step", "error", "of order", "largest of"]
     return Table("Errors of the coupling", head, rows)
 

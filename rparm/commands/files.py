@@ -289,7 +289,7 @@ def add_build_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("file", metavar="FILE.toml", type=Path, help="the file with the equations")
     add_flag(parser, "--platforms", "for all platforms, by zig, not for this machine")
-    add_flag(parser, "--web", "as WebAssembly, by zig: drop NAME.fmu on the playground")
+    add_flag(parser, "--web", "as WebAssembly, by zig, to drop on the playground; in a checkout")
     add_output(parser, "folder for the FMUs (default: the current one)")
 
 
@@ -298,8 +298,9 @@ def do_build(options: argparse.Namespace) -> Ended:
 
     to, where = options.output or Path(), {"platforms": options.platforms, "web": options.web}
     paths = build(options.file, output=to, **where)
-    new = f"{project.PROGRAM} new my_run --model {shlex.quote(str(paths[0]))}"
-    verdict = f"{' and '.join(map(str, paths))}: built; a scenario of it: {new}"
+    then = f"a scenario of it: {project.PROGRAM} new my_run --model {shlex.quote(str(paths[0]))}"
+    then = f"drop one on the page: {project.PROGRAM} playground --open" if options.web else then
+    verdict = f"{' and '.join(map(str, paths))}: built; {then}"
     return Ended(0, verdict, {"fmus": [path.absolute() for path in paths]})
 
 

@@ -11,8 +11,8 @@ from rparm import console, project
 from rparm.command_line import Ended, add_flag, add_report, file_or_name, names, pairs, retyped
 from rparm.errors import UserError, placed
 from rparm.files import check_writable, from_here, number_in, written
-from rparm.report import overview
-from rparm.report.overview import FAILED, RAN, sparkline
+from rparm.report import overview, pages
+from rparm.report.overview import FAILED, RAN, Entry, sparkline
 from rparm.units import SECONDS, typed_quantity
 
 if TYPE_CHECKING:
@@ -89,13 +89,15 @@ def _written(
     output = next(iter(found.checked.outputs))
     times = np.concatenate([found.segments[i].times for i in first])
     values = np.concatenate([found.predicted[i][:, 0] for i in first])
-    return overview.write_in_folder(
-        project.results_folder(options.report), PART, found.model,
-        lambda folder, root: page.write(found, folder, model, true, again, root),
-        title=f"Parameters: {', '.join(found.estimates)}", group=found.model, command=again,
-        status=RAN if found.passed else FAILED, line=sparkline(times, values), line_of=output,
-        line_text=f"Simulated {output}",
+    entry = Entry(
+        found.model, f"Parameters: {', '.join(found.estimates)}", found.model, pages.INDEX,
+        RAN if found.passed else FAILED, command=again, line=sparkline(times, values),
+        line_of=output, line_text=f"Simulated {output}",
     )  # fmt: skip
+    report = project.results_folder(options.report)
+    return overview.add(
+        report, PART, entry, lambda to, root: page.write(found, to, model, true, again, root)
+    )
 
 
 def _asked(options: argparse.Namespace) -> tuple[Path, "Request", dict[str, float]]:

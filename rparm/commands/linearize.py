@@ -17,8 +17,8 @@ from rparm.command_line import (
 )
 from rparm.errors import UserError
 from rparm.files import check_writable, from_here, written
-from rparm.report import overview
-from rparm.report.overview import RAN, crosses
+from rparm.report import overview, pages
+from rparm.report.overview import RAN, Entry, crosses
 
 PART = overview.LINEAR
 MOST_COLUMNS, MOST_ROWS = 6, 12  # of matrices in the terminal
@@ -103,18 +103,17 @@ def do_linearize(options: argparse.Namespace) -> Ended:
     for path in options.save:
         study.save(path, found, options.step)
         print(f"saved: {from_here(path)}")
-    report, again, poles = (
-        project.results_folder(options.report),
-        _command(options),
-        found.linear.poles,
-    )
+    report, again = project.results_folder(options.report), _command(options)
+    poles = found.linear.poles
     with written(report):
-        index = overview.write_in_folder(
-            report, PART, "_".join(filter(None, (found.path.stem, found.variant))),
-            lambda folder, root: page.write(folder, found, options.step, again, root),
-            title=f"{n} states, {m} inputs, {p} outputs", group=found.path.stem, status=RAN,
+        entry = Entry(
+            "_".join(filter(None, (found.path.stem, found.variant))),
+            f"{n} states, {m} inputs, {p} outputs", found.path.stem, pages.INDEX, RAN,
             line_text=f"{len(poles)} poles", shapes=crosses(poles), command=again,
         )  # fmt: skip
+        index = overview.add(
+            report, PART, entry, lambda to, root: page.write(to, found, options.step, again, root)
+        )
     document = study.document(found, options.step) | {"page": index.absolute()}
     verdict = f"linear: {n} states, {m} inputs, {p} outputs"
     return Ended(0, verdict, document, page=index)

@@ -102,7 +102,7 @@ def do_run(options: argparse.Namespace) -> Ended:
             print_measured(group[0])
         with written(options.report), Progress("report", len(groups), "pages") as progress:
             page = writer.write(groups, done.sweeps, done.studies, progress, done.failures)
-    print(*writer.differences, "", sep="\n")
+    result_tables.print_differences(writer.entries)
     for name, file in writer.files.items():
         print(f"{name}: {from_here(file)}")
     return _ended(done, (options.report / pages.INDEX).absolute(), page)

@@ -15,7 +15,7 @@ from rparm.project import PROGRAM
 from rparm.report import overlay, overview, system_page
 from rparm.report.overview import SYSTEM, Entry
 from rparm.report.system_page import Section
-from rparm.result_tables import VariantTable
+from rparm.result_tables import VariantTable, print_differences
 from rparm.systems import comparison, ecos, master
 from rparm.systems.comparison import Outcome, Reference
 from rparm.systems.opened import given_file, opened
@@ -179,7 +179,7 @@ def _run(chosen: Sequence[tuple[Section, Sequence[str]]], options: argparse.Name
                     figure = section.study.figure(section.ssp, outcome)
                     save_figure(figure, options.pictures / f"{name}.png")
             outcomes.append(outcome)
-        print()
+        print_differences(entries[-len(references) :])
     given = {"ssp": options.ssp, "step": options.step, "with": options.other}
     given["fmi"] = options.fmi if options.fmi != project.VERSIONS[0] else None
     more = retyped("system", [], given).partition(" system")[2]

@@ -8,11 +8,12 @@ import numpy as np
 
 from rparm.errors import UserError, placed
 from rparm.files import is_file, missing
-from rparm.report.run_data import ROUNDING, TIME, Curve, Plot
+from rparm.report.run_data import TIME, Curve, Plot, without_rounding
 from rparm.runs.comparison import SMALLEST_SCALE
 from rparm.runs.inputs import EARLY, Log, Logged, read_log
-from rparm.units import counted, exponents
+from rparm.units import counted, exponents, prefixed
 
+FILED = 5e-12  # of a variable's scale: less is rounding of files, which have twelve digits
 Others = Mapping[tuple[str, str], Log]  # by section and name of results
 
 
@@ -56,6 +57,9 @@ def lay(
         missed = "time of this run" if names else "variable that a plot of this run shows"
         raise UserError(f"--with: {log.path}: has no {missed}")
     columns = dict(zip(names, found.values.T, strict=True))
+    after = np.minimum(np.searchsorted(found.times, elapsed - EARLY), len(found.times) - 1)
+    both = np.flatnonzero(np.abs(found.times[after] - elapsed) <= EARLY)
+    is_thinned = 2 * len(both) >= min(len(found.times), len(inside))  # some rows of such a run
 
     def laid(curve: Curve) -> Curve:
         if curve.name not in columns:
@@ -63,15 +67,18 @@ def lay(
         signal = Logged(found.times, columns[curve.name], False, "")
         other = np.where(signal.covers(elapsed), signal.values(elapsed), np.nan)
         left = curve.values - other
-        rounding = ROUNDING * max(np.abs(curve.values).max(), SMALLEST_SCALE)
-        return replace(curve, other=other, difference=np.where(np.abs(left) < rounding, 0.0, left))
+        if is_thinned:  # elsewhere they differ by what is between the rows
+            left = np.interp(elapsed, elapsed[both], left[both]) + 0 * other
+        rounding = FILED * max(np.abs(curve.values).max(), SMALLEST_SCALE)
+        left = np.where(np.abs(left) < rounding, 0.0, left)
+        return replace(curve, other=without_rounding(other), difference=left)
 
-    after = np.minimum(np.searchsorted(found.times, inside - EARLY), len(found.times) - 1)
-    other = {"name": str(log.path), "between": bool((found.times[after] > inside + EARLY).any())}
+    other = {"name": str(log.path), "between": len(both) < len(inside)}
     plots = [replace(plot, curves=[*map(laid, plot.curves)]) for plot in plots]
     drawn = [(plot.unit, c) for plot in plots for c in plot.curves if c.difference is not None]
     sizes = [np.nanmax(np.abs(curve.difference)) for _, curve in drawn]
     scales = [max(np.abs(curve.values).max(), SMALLEST_SCALE) for _, curve in drawn]
     i = int(np.argmax(np.divide(sizes, scales)))
-    largest = f"{drawn[i][1].name} {exponents(f'{sizes[i]:.3g} {drawn[i][0]}'.strip())}"
+    unit, factor = prefixed(drawn[i][0], sizes[i])
+    largest = f"{drawn[i][1].name} {exponents(f'{factor * sizes[i]:.3g} {unit}'.strip())}"
     return plots, other | {"largest": f"largest difference {largest} from {log.path}"}

@@ -42,6 +42,7 @@ SECTIONS = {
     PROOFS: "proof",
     STUDIES: "accuracy study",
 }
+IN_FOLDERS = LINEAR, IDENTIFICATIONS  # sections whose pages have a folder each
 WIDTH, HEIGHT, MARGIN = 100.0, 60.0, 5.0  # of the view box
 SPACE = "\N{NO-BREAK SPACE}"  # before a unit
 THIN = 'vector-effect="non-scaling-stroke"'
@@ -129,20 +130,28 @@ def _whole(report: Path, command: str) -> str:
     return f"{command} --output {shlex.quote(str(project.from_root(report)))}"
 
 
-def write_in_folder(
-    report: Path, section: str, name: str, write: Callable[[Path, str], Path], **known: Any
-) -> Path:
-    """Write a page by `write(folder, root)`, and its entry; its path.
+def add(report: Path, section: str, entry: Entry, write: Callable[[Path, str], Path]) -> Path:
+    """Write a page by `write(folder, root)`, and its `entry`; its path.
 
-    Its folder in the section has its name, unless that has the page of another command.
+    A folder of its own has its name, unless that has the page of another command.
     """
-    taken = {file.parent.name: entry.command for file, entry in _found(report / section)}
-    whole = _whole(report, known["command"])
-    names = (name if i == 1 else f"{name}_{i}" for i in count(1))
-    name = next(each for each in names if taken.get(each, whole) == whole)
-    path = write(report / section / name, "../../")
-    record(report, section, [Entry(name=name, page=path.name, **known)], path.parent)
+    folder, root, name = report / section, "../", entry.name
+    if section in IN_FOLDERS:
+        taken = {file.parent.name: known.command for file, known in _found(folder)}
+        whole = _whole(report, entry.command)
+        names = (name if i == 1 else f"{name}_{i}" for i in count(1))
+        name = next(each for each in names if taken.get(each, whole) == whole)
+        folder, root = folder / name, "../../"
+    folder.mkdir(parents=True, exist_ok=True)
+    path = write(folder, root)
+    record(report, section, [replace(entry, name=name, page=path.name)], folder)
     return path
+
+
+def add_run(report: Path, section: str, name: str, page: RunPage, group: str) -> Path:
+    """Write a page of a run or a study, called `name`, and its entry; its path."""
+    entry = entry_of(name, page, group)
+    return add(report, section, entry, lambda to, _: pages.write_run(to / entry.page, page))
 
 
 def forget(report: Path, section: str, names: Collection[str] | None = None) -> None:

@@ -68,12 +68,11 @@ def write(
         failures=[str(wrong) for wrong in good.wrong] if good else [],
         again=again,
     )
-    file = report / PROOFS / f"{scenario.name}.html"
-    file.parent.mkdir(parents=True, exist_ok=True)
-    first = _largest(model, enclosure, errors)
-    charts.write_page(file, page, first, [_chart(enclosure, errors)], "Each state", "../")
-    overview.record(report, PROOFS, [overview.entry_of(scenario.name, page, model.name)])
-    return file
+    answers = page, _largest(model, enclosure, errors), [_chart(enclosure, errors)], "Each state"
+    entry = overview.entry_of(scenario.name, page, model.name)
+    return overview.add(
+        report, PROOFS, entry, lambda to, root: charts.write_page(to / entry.page, *answers, root)
+    )
 
 
 def _chart(enclosure: Enclosure, errors: Mapping[str, np.ndarray]) -> Chart:
@@ -109,17 +108,11 @@ def write_references(
         failures=[str(wrong) for good in found.values() for wrong in good.wrong],
         again=again,
     )
-    return _write(report, "references", page, "All models")
+    return overview.add_run(report, PROOFS, "references", page, "All models")
 
 
 def _status(references: Iterable[ProvenReference]) -> str:
     return PASSED if all(good.passed for good in references) else FAILED
-
-
-def _write(report: Path, name: str, page: RunPage, group: str) -> Path:
-    entry = overview.write_page(report / PROOFS, name, page, group)
-    overview.record(report, PROOFS, [entry])
-    return report / PROOFS / entry.page
 
 
 def _largest(model: Model, enclosure: Enclosure, errors: Mapping[str, np.ndarray]) -> Table:

@@ -24,7 +24,7 @@ from rparm.runs.inputs import Log
 from rparm.systems import comparison, ecos
 from rparm.systems.comparison import BOUND, Diagram, Measure, Outcome, Study, load_study
 from rparm.systems.structure import OpenedSystem
-from rparm.units import milliseconds, short, unit
+from rparm.units import exponents, milliseconds, seconds, short, unit
 
 MOST_ROWS = 350  # of a file of values, which has many columns
 DIGITS = 12  # there; errors have a bound of 1e-7
@@ -81,6 +81,11 @@ class Section:
             if v.causality in ("input", "output") and v.type in ("Real", "Integer", "Boolean")
         ]
         return list(dict.fromkeys([*comparison.kept(self.ssp), *moving]))
+
+    def said(self, variant: str) -> str:
+        """Return what the system says of a variant, or a user's of itself."""
+        system = self.ssp.system
+        return system.descriptions.get(variant, "" if self.folder else system.description)
 
     def page(self, variant: str) -> str:
         """Name the page of a variant, and its file of values."""
@@ -151,7 +156,8 @@ def write_variant(
         section.page(outcome.variant),
         page,
         section.title,
-        title=", ".join(f"{name} {value}" for name, value in _measures(section, outcome)),
+        title=section.said(outcome.variant),
+        difference=data.other["largest"] if data.other else "",
         **known,
     )
 
@@ -160,7 +166,8 @@ def estimate(outcome: Outcome) -> str:
     """Say how large the coupling error is, or why that is not known."""
     if not outcome.errors:
         return f"coupling error not estimated: {outcome.why}"
-    return f"coupling error about {outcome.error:.1e} ({outcome.worst}), by half the step"
+    size = exponents(f"{outcome.error:.2g}")
+    return f"coupling error about {size} ({outcome.worst}), by half the step"
 
 
 def write_failed(report: Path, section: Section, variant: str, error: UserError) -> Entry:
@@ -183,7 +190,7 @@ def write_failed(report: Path, section: Section, variant: str, error: UserError)
         **values,
         **_texts(section, variant),
     )
-    name, more = section.page(variant), {"title": "", "detail": str(error)}
+    name, more = section.page(variant), {"title": section.said(variant), "detail": str(error)}
     return overview.write_page(folder, name, page, section.title, **more)
 
 
@@ -265,7 +272,7 @@ def _facts(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
         ("steps", str(outcome.steps)),
         _error(outcome),
         *_measures(section, outcome),
-        ("wall time", f"{outcome.run.wall_time:.3f} s"),
+        ("wall time", seconds(outcome.run.wall_time)),
     ]
 
 
@@ -281,8 +288,7 @@ def _measures(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
 
 def _description(section: Section, variant: str) -> str:
     """Describe the variant, and how it is run."""
-    system = section.ssp.system
-    said = system.descriptions.get(variant, "" if section.folder else system.description)
+    system, said = section.ssp.system, section.said(variant)
     why_not = "" if section.folder else ecos.unsuited(section.ssp)
     by = f"rparm's own master ({why_not})" if why_not else "Ecos"
     how = f"Run by {by} with steps of {milliseconds(system.step)}."

@@ -47,7 +47,7 @@ class ReportWriter:
         """`options` are those of the command, for its pages; `others` what to draw over results."""
         self.folder, self.options, self._others = folder, options, others
         self.files: dict[str, Path] = {}  # pages of users' own files that were written, by name
-        self.differences: list[str] = []  # from other results, a text each
+        self.entries: list[Entry] = []  # of scenarios and files
 
     def begin(self) -> None:
         """Write what all pages share: fails now, not after all runs, if there is no room."""
@@ -88,7 +88,6 @@ class ReportWriter:
             if group:
                 over = self._others.get((section, scenario.name))
                 entry = scenario_page.write(folder, name, group, again, others, over)
-                self.differences += [f"{name}: {entry.difference}"] if over else []
             else:
                 entry = scenario_page.write_failed(folder, name, others[0], again)
             entries.append(entry if ours else replace(entry, source=str(path)))
@@ -98,9 +97,13 @@ class ReportWriter:
         whole = f"{project.PROGRAM} run{self.options}"
         swept = dict.fromkeys(sweep.scenario.name for sweep in sweeps)
         some = whole if studies else " ".join((whole, *swept))
+        self.entries = [*scenarios, *files]
         written = [write_sweeps(self.folder / STUDIES, sweeps, some)] if sweeps else []
         written += [write_convergence(self.folder / STUDIES, x, whole) for x in studies]
-        index = self._record(scenarios, files, written)
+        index = self.folder / pages.INDEX
+        for section, entries in ((SCENARIOS, scenarios), (STUDIES, written), (FILES, files)):
+            if entries:
+                overview.record(self.folder, section, entries)
         return index if scenarios or len(files) != 1 else self.folder / FILES / files[0].page
 
     def _free_name(self, file: Path) -> str:
@@ -108,18 +111,6 @@ class ReportWriter:
         sources = {entry.name: entry.source for entry in overview.read(self.folder, FILES)}
         names = chain([file.stem], (f"{file.stem} ({i})" for i in count(2)))
         return next(name for name in names if sources.get(name) in (None, str(file)))
-
-    def _record(
-        self, scenarios: Sequence[Entry], files: Sequence[Entry], studies: Sequence[Entry]
-    ) -> Path:
-        """Put the entries into the overview; files of earlier runs stay there."""
-        index = self.folder / "index.html"
-        if scenarios or not files:
-            index = overview.record(self.folder, SCENARIOS, scenarios)
-            index = overview.record(self.folder, STUDIES, studies)
-        if files:
-            index = overview.record(self.folder, FILES, files)
-        return index
 
 
 def write_sweeps(folder: Path, sweeps: Sequence[Sweep], again: str) -> Entry:

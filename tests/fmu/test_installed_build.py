@@ -171,6 +171,8 @@ def test_what_is_not_installed_is_named(
     monkeypatch.setattr(project, "find_spec", lambda name: None if name == "pydantic" else True)
     with pytest.raises(UserError, match=r'^pydantic: not installed, pip install "rparm\[build\]"'):
         rparm.build(model)
+    with pytest.raises(UserError, match=r"^--web: needs .* checkout .*: \./run\.sh playground, "):
+        project.runtimes(False, web=True)
 
 
 # ---- The programs that prove ---------------------------------------------------------------------

@@ -17,7 +17,7 @@ from tests.support.browser import Browser
 from tests.support.rparm_project import MISTAKES
 from tests.support.ssp_files import read_csv
 
-PREFIXES = {1e-9: " n", 1e-6: " µ", 1e-3: " m", 1.0: "", 1e3: " k"}
+PREFIXES = {1e-12: " p", 1e-9: " n", 1e-6: " µ", 1e-3: " m", 1.0: "", 1e3: " k"}
 
 
 @pytest.mark.parametrize(
@@ -153,8 +153,21 @@ def test_a_difference_has_all_digits(browser: Browser, report: Path, tmp_path: P
         "return [page.x, difference, units.difference.unit, page.notice.textContent]"
     )
     assert left == pytest.approx([-1e-9 * time for time in times], abs=2e-12)
-    assert unit == "nrad" and "interpolated" not in said and "q1 2 nrad" in said
+    assert unit == "nrad" and "interpolated" not in said and "q1 2\xa0nrad" in said
     assert browser.violations() == []
+
+
+def test_a_system_says_how_far_another_result_is(
+    report: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A shift of one signal is the whole difference: its file has a tenth of the steps."""
+    values = read_csv(report / f"system/{VARIANT}.csv")
+    values["plant.q1"] = values["plant.q1"] + 1e-3
+    file, rows = tmp_path / "shifted.csv", np.column_stack([*values.values()])
+    np.savetxt(file, rows, "%.17g", ",", header=",".join(values), comments="")
+    assert main(["system", VARIANT, "--report", str(tmp_path), "--with", str(file)]) == 0
+    said = f"{VARIANT}: largest difference plant.q1 1 mrad from {file}\n"
+    assert capsys.readouterr().out.count(said) == 1
 
 
 def test_files_of_no_use_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

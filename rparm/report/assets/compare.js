@@ -64,6 +64,10 @@ const Compare = (() => {
       throw new Refused('has no time of this run');
     }
     alone(data);
+    const known = new Set(times);
+    const inside = data.time.filter((time) => time >= times[0] && time <= times.at(-1));
+    const both = [...data.time.keys()].filter((i) => known.has(data.time[i]));
+    const isThinned = 2 * both.length >= Math.min(times.length, inside.length); // some rows of such a run
     for (const curve of curves) {
       const column = rows.map((row) => row[names.indexOf(curve.name)]);
       curve.other = resampled(times, column, data.time);
@@ -71,10 +75,12 @@ const Compare = (() => {
         const left = value - curve.other[i];
         return Math.abs(left) <= DIGITS * Math.abs(value) ? 0 : left;
       });
+      if (isThinned) { // elsewhere they differ by what is between the rows
+        const at = both.map((i) => data.time[i]), left = both.map((i) => curve.difference[i]);
+        curve.difference = resampled(at, left, data.time);
+      }
     }
-    const known = new Set(times);
-    const inside = data.time.filter((time) => time >= times[0] && time <= times.at(-1));
-    return { name, between: inside.some((time) => !known.has(time)) };
+    return { name, between: both.length < inside.length };
   }
 
   /** Take what is laid over the curves away. */
@@ -102,14 +108,15 @@ const Compare = (() => {
       for (const { name, difference } of plot.curves) {
         if (!difference) continue;
         const most = difference.reduce((size, x) => (Math.abs(x) > size ? Math.abs(x) : size), 0);
+        if (!most) continue;
         const { unit, factor } = scaled(plot.unit, [most]);
-        largest.set(name, `${name} ${shown(most / factor, 3)}${unit ? ` ${unit}` : ''}`);
+        largest.set(name, `${name} ${shown(most / factor, 3)}${unit ? `\u00a0${unit}` : ''}`);
       }
     }
     const between = other.between
       ? ' Its times differ: its values are interpolated linearly at the times of this run.' : '';
     return `Dashed: ${other.name}. Below the curves (\u0394): this run less that, at most `
-      + `${[...largest.values()].join(', ')}.${between}`;
+      + `${[...largest.values()].join(', ') || 0}.${between}`;
   }
 
   return { Refused, over, alone, label, described };

@@ -172,10 +172,10 @@ const Diagrams = (() => {
     };
   }
 
-  function indices({ rows }) {
+  function indices({ rows, legend }) {
     const from = rows.toReversed();
     const bars = (key, name, color) => ({
-      type: 'bar', orientation: 'h', name, marker: { color }, y: from.map(({ parameter }) => Charts.escaped(parameter)),
+      type: 'bar', orientation: 'h', name, showlegend: legend, marker: { color }, y: from.map(({ parameter }) => Charts.escaped(parameter)),
       x: from.map((row) => row[key]),
       error_x: { type: 'data', array: from.map((row) => row[`${key}_confidence`]), color: '--ink', thickness: 1 },
       hovertemplate: '%{y}: %{x:.3f} ± %{error_x.array:.3f}<extra></extra>',
@@ -228,7 +228,7 @@ const Diagrams = (() => {
 
   function bounds({ curves, x, y }) {
     const mode = ({ y: values }) => (values.filter(Number.isFinite).length > 1 ? 'lines' : 'lines+markers');
-    const traces = curves.map((curve, i) => ({ ...curve, mode: mode(curve), line: line(colour(i)), marker: { color: colour(i) } }));
+    const traces = curves.map((curve, i) => ({ ...curve, name: curve.name.replace(/(?<=\de)-(?=\d)/g, '\u2212'), mode: mode(curve), line: line(colour(i)), marker: { color: colour(i) } }));
     return { traces, layout: { xaxis: axis(x), yaxis: axis(y, { type: 'log' }) } };
   }
 

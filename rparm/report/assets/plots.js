@@ -44,7 +44,7 @@ const Plots = (() => {
     return minus(tiny ? rounded.toExponential() : String(rounded));
   }
 
-  const PREFIXES = {'-9': 'n', '-6': '\u00b5', '-3': 'm', 0: '', 3: 'k', 6: 'M', 9: 'G'};
+  const PREFIXES = {'-12': 'p', '-9': 'n', '-6': '\u00b5', '-3': 'm', 0: '', 3: 'k', 6: 'M', 9: 'G'};
   // a unit that begins with a symbol to the first power, which takes a prefix
   const PREFIXED = /^(m|s|rad|N|J|W|V|A|Hz|Pa|H)(?![\p{L}\u00b2\u00b3])/u;
 
@@ -55,7 +55,7 @@ const Plots = (() => {
       return { unit, factor: 1 };
     }
     const power = 3 * Math.floor((Math.log10(largest) + 1 + 1e-9) / 3);
-    const exponent = Math.max(-9, Math.min(9, power));
+    const exponent = Math.max(-12, Math.min(9, power));
     return { unit: PREFIXES[exponent] + unit, factor: Number(`1e${exponent}`) };
   }
 
