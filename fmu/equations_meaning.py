@@ -132,6 +132,7 @@ def _check_units(file: ModelFile) -> None:
     """Check that units fit, and find the units of [where]."""
     declared = [v for v in file.variables.values() if v.section != "where" or v.unit or v.display]
     units = {v.name: unit_of_exponents(v.exponents) for v in declared} | {"time": SECOND}
+    bare = [v.name for v in declared if v.is_real and not (v.unit or v.display)]
     units |= {key: unit_of_exponents(found) for key, found in file.table_units.items()}
     for state in file.of("states"):
         units[derivative_of(state.name)] = times(units[state.name], SECOND, -1)
@@ -140,7 +141,12 @@ def _check_units(file: ModelFile) -> None:
             expected = units.get(expression.target)
             if expression.is_rate:
                 expected = times(expected, SECOND, -1)
-            unit = unit_of(expression.tree, units, expected)
+            try:
+                unit = unit_of(expression.tree, units, expected)
+            except ExpressionError as error:
+                read = sorted(names(expression.tree).intersection(bare))
+                hint = f"; without a unit: {', '.join(read)}" if read else ""
+                raise ModelFileError(f"{error}{hint}") from None
         if expression.target:
             units.setdefault(expression.target, unit)
     for variable in file.of("where"):

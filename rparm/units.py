@@ -1,14 +1,13 @@
 """Values with units as users write them, and as messages, tables and pages show them.
 
 Users may write "90 deg", "300 mm" or "2kN". Known for a variable are its own unit, the display
-units that its FMU declares for it, and both with one factor exchanged: m, s and N take the prefixes
-m, c and k, rad takes m, and each factor its own display units. Conversions are exact and rounded
-once; degrees are converted as by `math.radians`.
+units that its FMU declares for it, and what `rparm.expressions.units` knows of the same dimension.
+Conversions are exact and rounded once; degrees are converted as by `math.radians`.
 """
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence, Sized
+from collections.abc import Mapping, Sequence, Sized
 from contextlib import suppress
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, Context
@@ -17,10 +16,14 @@ from typing import Any
 
 from rparm.errors import WrongValueError, did_you_mean
 from rparm.expressions import expression
+from rparm.expressions.units import measured
 from rparm.files import show
 
-PREFIXES = {"m": Fraction(1000), "c": Fraction(100), "k": Fraction(1, 1000)}
-PREFIXED = {"m": "mck", "s": "mck", "N": "mck", "rad": "m"}
+USUAL = {  # units that messages name
+    "m": "mm cm km", "s": "ms us min h", "rad": "deg mrad", "Hz": "mHz kHz", "kg": "g t",
+    "N": "mN kN", "N.m": "mN.m kN.m", "m/s": "mm/s km/h", "rad/s": "deg/s rpm",
+    "K": "degC mK", "degC": "K", "Pa": "kPa bar",
+}  # fmt: skip
 NONE = (None, "", "1")  # units of variables without one
 ANGLE = "rad"
 DEGREE = Fraction(180 / math.pi)  # degrees of a radian
@@ -29,8 +32,6 @@ LONGEST = 100  # characters of a value with its unit
 MOST_SHOWN = 20  # units in a message
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 QUANTITY = re.compile(rf"({NUMBER})[ \t]*([^\s\d.,+-].*|1/.*)?", re.ASCII)
-FACTOR = re.compile(r"([A-Za-z]+)(-?\d)?", re.ASCII)
-PRODUCT = re.compile(r"([^/()]+)(?:/(?:([^./()]+)|\(([^/()]+)\)))?")  # a.b, a/b or a/(b.c)
 TYPED = str.maketrans({"·": ".", "²": "2", "³": "3"})  # as pages write units
 PREFIXABLE = re.compile(r"(m|s|rad|N|J|W|V|A|Hz|Pa|H)(?!\w)")
 SMALLEST = 1e-99  # smaller numbers are shown as ~0
@@ -67,38 +68,21 @@ def display_unit(factor: object, offset: object) -> Unit:
 
 
 def units_of(name: str | None, displays: Displays) -> Units:
-    """Return all units in which users may give a value whose own unit is `name`; empty for none."""
+    """Return the units that messages name, for a value whose own unit is `name`; empty for none."""
     if name in NONE:
         return {}
     known = {name: Unit()} | dict(displays.get(name, {}))
-    for other, unit in _exchanged(name, displays):
-        known.setdefault(other, unit)
+    for other in USUAL.get(name, "").split():
+        known.setdefault(other, _measured(other, name))
     return known
 
 
-def _exchanged(name: str, displays: Displays) -> Iterator[tuple[str, Unit]]:
-    """Yield the units that differ from `name` in one factor."""
-    product = PRODUCT.fullmatch(name)
-    if not product:
-        return
-    for part in (1, 2, 3):
-        begin = product.start(part)
-        for factor in (product[part] or "").split("."):
-            found = FACTOR.fullmatch(factor)
-            if found:
-                power = int(found[2] or 1) * (1 if part == 1 else -1)
-                rest = name[begin + len(found[1]) :]
-                for other, unit in _alternatives(found[1], displays).items():
-                    yield f"{name[:begin]}{other}{rest}", Unit(unit.factor**power)
-            begin += len(factor) + 1
-
-
-def _alternatives(symbol: str, displays: Displays) -> dict[str, Unit]:
-    """Return the units that may replace a factor of a unit."""
-    found = {name: unit for name, unit in displays.get(symbol, {}).items() if not unit.offset}
-    for prefix in PREFIXED.get(symbol, ""):
-        found[f"{prefix}{symbol}"] = Unit(PREFIXES[prefix])
-    return found
+def _measured(name: str, own: str) -> Unit:
+    """Return a unit of what `own` measures, too; ValueError if it is none."""
+    other, of_own = measured(name), measured(own)
+    if other.exponents != of_own.exponents:
+        raise ValueError(f"{name} measures something else than {own}")
+    return Unit(of_own.factor / other.factor, (of_own.offset - other.offset) / other.factor)
 
 
 # units of other values in scenarios and campaigns than variables of models
@@ -145,7 +129,7 @@ def _parts(text: str, known: Units) -> tuple[str, str]:
 
 
 def _value(given: str, number: str, name: str, known: Units, is_difference: bool = False) -> float:
-    unit = known.get(name) or known.get(name.translate(TYPED)) if name else Unit()
+    unit = _unit(name, known) if name else Unit()
     if unit is None:
         guess = did_you_mean(name, known)
         raise WrongValueError(f"unknown unit {show(name)}{guess}{_known(known)}")
@@ -153,6 +137,16 @@ def _value(given: str, number: str, name: str, known: Units, is_difference: bool
         if math.isfinite(float(number)):
             return unit.value(number, is_difference)
     raise WrongValueError(f"expected a finite number, got {show(given)}")
+
+
+def _unit(name: str, known: Units) -> Unit | None:
+    name = name if name in known else name.translate(TYPED)
+    if name in known:
+        return known[name]
+    with suppress(ValueError):
+        unit = _measured(name, next(iter(known)))
+        return unit if not unit.offset else None
+    return None
 
 
 def _known(known: Units) -> str:

@@ -283,9 +283,10 @@ class Events:
         motion |= {u.leaf: graph.value("first", name=u.name) for u in inputs}
         given = {("state", x.name): f"given->state_errors[{i}]" for i, x in enumerate(states)}
         given["time", ""] = "given->time * fabs(t)"
-        for u in inputs:
+        for i, u in enumerate(inputs):
             value, rate = code.leaves["input", u.name], moving["first", u.name]
-            error = f"given->inputs * fabs({value}) + {given['time', '']} * fabs({rate})"
+            size = f"fmax(fabs({value}), given->largest[{i}])"
+            error = f"given->inputs * {size} + {given['time', '']} * fabs({rate})"
             given["input", u.name] = f"({error})"
         errors = Errors(code, given)
         for k, relation in enumerate(self.relations):

@@ -189,7 +189,7 @@ class Page:
             labels=self.labels,
             bars_of=bars,
             quantiles=quantiles,
-            lacking=_lacking,
+            lacking=lambda values: int((~np.isfinite(values)).sum()),
             measures=self.job.measures,
             no_value=NO_VALUE,
             scatter=charts.script(self.scatter(found)),
@@ -293,10 +293,6 @@ class Page:
 
 def _rounded(value: float) -> float | str:
     return float(f"{value:.6g}") if np.isfinite(value) else NOTHING
-
-
-def _lacking(values: np.ndarray) -> int:
-    return int((~np.isfinite(values)).sum())
 
 
 # ---- Charts -------------------------------------------------------------------------------------

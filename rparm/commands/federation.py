@@ -103,7 +103,10 @@ def do_federation(options: argparse.Namespace) -> Ended:
             times = {by: 1e6 * s / steps for by, s in seconds.items()}
             table.row(name, steps, difference, list(times.values()), passed)
             if options.output:
-                _write(options.output / f"{name}.csv", record)
+                path = options.output / f"{name}.csv"
+                with written(path):
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                    files.write_trajectory(path, record.times, record.names, record.values)
             row = {"name": name, "steps": steps, "difference": difference, "bound": BOUND}
             known = {by: us for by, us in times.items() if math.isfinite(us)}
             rows.append({**row, "microseconds_per_step": known, "passed": passed})
@@ -111,12 +114,6 @@ def do_federation(options: argparse.Namespace) -> Ended:
     keep = f"values: {from_here(options.output)}" if options.output else "--output DIR keeps values"
     verdict = f"{console.verdict_line(failed, names, 'variant')}; {keep}"
     return Ended(1 if failed else 0, verdict, {"variants": rows})
-
-
-def _write(path: Path, record: Record) -> None:
-    with written(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        files.write_trajectory(path, record.times, record.names, record.values)
 
 
 def _command(system: OpenedSystem, variant: str, component: str, address: str) -> str:

@@ -86,7 +86,8 @@ class Problem:
             index = self.parameters.names.index(DELAY)
             values, delay = np.delete(values, index), values[index]
         outputs = self.simulator.run(segment, np.append(values, x * self.scales))
-        return _late(segment.times, outputs, delay) if delay else outputs
+        seen = CubicSpline(segment.times, outputs, axis=0) if delay else None  # late by it
+        return outputs if seen is None else seen(segment.times - delay)
 
     def residuals(self, segment: Segment, z: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Return predicted minus measured in `noise`, (rows that count * outputs,), by rows."""
@@ -164,11 +165,6 @@ def _shortened(new: np.ndarray, old: np.ndarray) -> Iterator[np.ndarray]:
     for k in np.flatnonzero(new != old):
         yield np.where(np.arange(len(new)) == k, old, new)
     yield old
-
-
-def _late(times: np.ndarray, values: np.ndarray, delay: float) -> np.ndarray:
-    """Return values (rows, outputs) that are seen `delay` s late."""
-    return CubicSpline(times, values, axis=0)(times - delay)
 
 
 # ---- The fit -------------------------------------------------------------------------------------

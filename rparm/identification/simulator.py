@@ -14,7 +14,7 @@ from rparm.errors import UserError
 from rparm.fmi.compiled_loop import Part, Stepper
 from rparm.fmi.fmi_instance import Instance, Reals
 from rparm.fmi.fmu_file import Fmu
-from rparm.fmi.model import INITIAL, Model, Value
+from rparm.fmi.model import INITIAL, Value
 from rparm.identification.logs import Segment
 from rparm.identification.request import Parameters
 
@@ -181,12 +181,8 @@ def guess_start(
                 row[k] = smooth[1, outputs.index(of[name])]
             else:
                 row[k] = given.get(name, model.variables[name].start or 0.0)
-    return np.clip(found, *_limits(model, names))
-
-
-def _limits(model: Model, names: Sequence[str]) -> tuple[list[float], list[float]]:
     variables = [model.variables[name] for name in names]
-    return [v.least for v in variables], [v.greatest for v in variables]
+    return np.clip(found, [v.least for v in variables], [v.greatest for v in variables])
 
 
 def _polynomials(segment: Segment) -> np.ndarray:

@@ -190,29 +190,16 @@ def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> 
     logs = inputs.hashes  # without logs of measurements, which no run follows from
     measured = inputs.measured(content)
     return Scenario(
-        name=path.stem,
-        model=name_of(subject),
-        path=path.absolute(),
+        name=path.stem, model=name_of(subject), path=path.absolute(),
         title=reader.text(content["title"], "title"),
-        description=reader.text(content["description"], "description"),
-        parameters=parameters,
-        initial=initial,
-        start=start,
-        stop=stop,
-        steps=steps,
-        tolerance=tolerance,
-        times=times,
-        elapsed=elapsed,
-        signals=signals,
-        inputs=inputs.sampled(signals),
-        reference_every=min(every, MAX_STEPS),
-        defaults=model.start_values,
-        panels=reader.panels(content, model),
-        measured=measured,
-        logs=logs,
+        description=reader.text(content["description"], "description"), parameters=parameters,
+        initial=initial, start=start, stop=stop, steps=steps, tolerance=tolerance, times=times,
+        elapsed=elapsed, signals=signals, inputs=inputs.sampled(signals),
+        reference_every=min(every, MAX_STEPS), defaults=model.start_values,
+        panels=reader.panels(content, model), measured=measured, logs=logs,
         questions=(*reader.questions, *inputs.warnings),
         smallest_tolerance=model.smallest_tolerance(parameters),
-    )
+    )  # fmt: skip
 
 
 class _Reader(Reader):

@@ -90,8 +90,9 @@ def unsuited(ssp: "OpenedSystem") -> str:
         return "Ecos starts at 0 s or later"
     if odd:
         return f"there are connections of type {odd[0]}"
-    if any(ssp.models[c].variables[n].type == "Enumeration" for c, n in settings):
-        return "Ecos sets no Enumeration"
+    for c, name in settings:
+        if ssp.models[c].variables[name].type == "Enumeration":  # left out, with a warning in a log
+            return f"component {c!r}: {name!r} is an Enumeration, which Ecos does not set"
     return absent()
 
 
@@ -110,7 +111,8 @@ def run(
     system = ssp.system
     if variant not in system.parameters:
         raise UserError(f"{ssp.path}: has no parameter set {variant!r}")
-    _check_parameters(ssp, variant)
+    if why_not := unsuited(ssp):
+        raise UserError(f"{ssp.path}: {why_not}")
     statistics = said_at_end(ssp)
     with temporary_folder() as folder:
         plan = {
@@ -168,16 +170,6 @@ def _check_messages(
 def _to_read(ssp: "OpenedSystem", names: Sequence[str]) -> list[tuple[str, str]]:
     """Return the names of variables as Ecos has them, each after the name of its reader."""
     return [(READERS[ssp.variable(name).type], name.replace(".", "::", 1)) for name in names]
-
-
-def _check_parameters(ssp: "OpenedSystem", variant: str) -> None:
-    """Refuse what Ecos would leave out with a warning in its log only: Enumerations."""
-    for component, values in ssp.system.parameters[variant].items():
-        model = ssp.models[component]
-        for name in values:
-            if model.variables[name].type == "Enumeration":
-                where = f"{ssp.path}: parameter set {variant!r}: component {component!r}"
-                raise UserError(f"{where}: {name!r} is an Enumeration, which Ecos does not set")
 
 
 def _as_ecos_opens(ssp: "OpenedSystem", variant: str, folder: Path) -> Path:

@@ -100,16 +100,10 @@ class LoopReader(Reader):
         start, stop, step = self.times(content, step)
         parameters, descriptions = self.parameters(content)
         system = System(
-            name=name,
-            components=tuple(self.connected(component) for component in components),
-            connections=tuple(connections),
-            start=start,
-            stop=stop,
-            step=step,
-            parameters=parameters,
-            descriptions=descriptions,
-            description=description,
-        )
+            name=name, components=tuple(self.connected(component) for component in components),
+            connections=tuple(connections), start=start, stop=stop, step=step,
+            parameters=parameters, descriptions=descriptions, description=description,
+        )  # fmt: skip
         check(self.path, system, self.models)
         self.check_delays()
         system = self.with_inputs(system, self.moved)

@@ -515,15 +515,12 @@ def run_in_master(
         wall_time = time.perf_counter() - begin
         known = master.components.values()
         messages = [f"{c.name!r}: {text}" for c in known for text in c.instance.messages]
-        said = {name: _value_at_end(master, ssp, name) for name in said_at_end(ssp)}
+        said, row = {}, np.empty(1)
+        for name in said_at_end(ssp):
+            component, _, _ = name.partition(".")
+            _RowReader(ssp, master.components[component], [name]).read(row)
+            said[name] = float(row[0])
     return Run(tuple(names), times, rows, wall_time, tuple(dict.fromkeys(messages)), said)
-
-
-def _value_at_end(master: Master, ssp: OpenedSystem, name: str) -> float:
-    component = name.partition(".")[0]
-    row = np.empty(1)
-    _RowReader(ssp, master.components[component], [name]).read(row)
-    return float(row[0])
 
 
 class _RowReader:

@@ -14,6 +14,7 @@ enum status instance_enter_continuous_time(struct instance *instance) {
     if (status == STATUS_OK) {
         instance->state.phase = PHASE_CONTINUOUS_TIME;
         instance_forget_unhandled(instance);
+        instance_note_inputs(instance);
     }
     return status;
 }
@@ -26,6 +27,7 @@ void instance_enter_event_mode(struct instance *instance) {
 }
 
 bool instance_complete_step(struct instance *instance) {
+    instance_note_inputs(instance);
     return instance_has_missed_event(instance);
 }
 

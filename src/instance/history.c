@@ -66,7 +66,8 @@ enum status instance_indicators(double t, const double x[], double z[], void *in
 void instance_rounding(const double state_errors[], double errors[], void *instance_pointer) {
     const struct instance *instance = instance_pointer;
     instance->model->events->errors(instance->memory.restart_values, instance->state.restart_time.s,
-                                    state_errors, 2.0 * DBL_EPSILON, errors);
+                                    state_errors, instance->memory.largest_inputs,
+                                    2.0 * DBL_EPSILON, errors);
 }
 
 void instance_reach(const double x[], double reach[], void *instance_pointer) {
@@ -222,6 +223,7 @@ static inline void activate_values(struct instance *instance, struct clock_time 
         activate_bytes(instance, model->events->discrete_states);
     }
     instance->parameters_are_active = true;
+    instance_note_inputs(instance);
     activate(instance, model->inputs);
     activate(instance, model->states);
     const size_t input_count = count_of(model->inputs);

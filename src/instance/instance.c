@@ -144,7 +144,8 @@ static enum status setup(struct instance *instance) {
     const struct model *model = instance->model;
     const size_t values_size = aligned(model->values_size);
     const size_t input_count = count_of(model->inputs);
-    const size_t inputs_size = 3 * input_count * sizeof(struct polynomial);
+    const size_t inputs_size =
+        3 * input_count * sizeof(struct polynomial) + instance_noted_inputs(model) * sizeof(double);
     const size_t before_values = aligned(inputs_size + instance_event_size(model));
     struct instance_memory *memory = &instance->memory;
 
@@ -166,7 +167,8 @@ static enum status setup(struct instance *instance) {
     memory->next_inputs = (struct polynomial *)(void *)memory->block;
     memory->current_inputs = memory->next_inputs + input_count;
     memory->active_inputs = memory->current_inputs + input_count;
-    memory->unhandled = (bool *)(void *)(memory->active_inputs + input_count);
+    memory->largest_inputs = (double *)(void *)(memory->active_inputs + input_count);
+    memory->unhandled = (bool *)(void *)(memory->largest_inputs + instance_noted_inputs(model));
     memory->restart_values = memory->block + before_values;
     memory->values = memory->restart_values + values_size;
     locate_written(model, memory);

@@ -62,8 +62,10 @@ static enum status check_next_time(const struct instance *instance, double passe
 static enum status update(struct instance *instance, const bool *triggered) {
     const struct model_events *events = instance->model->events;
     write_tolerances(instance);
-    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        instance->du[i] = instance->memory.current_inputs[i].d[1];
+    const struct polynomial *inputs = instance->memory.current_inputs;
+    const size_t input_count = count_of(instance->model->inputs);
+    for (size_t i = 0; i < input_count; i++) {
+        instance->du[i] = inputs[i].d[1];
     }
     char reason[300];
     const char *text = NULL;
@@ -73,6 +75,8 @@ static enum status update(struct instance *instance, const bool *triggered) {
         .triggered = triggered,
         .is_timed = is_timed(instance, triggered),
         .du = instance->du,
+        .largest_inputs =
+            polynomials_move(inputs, input_count) ? instance->memory.largest_inputs : NULL,
         .du_is_known = !instance->is_integrated_outside,
         .tolerance = instance->event_tolerances,
         .max_events = instance->state.own.max_events,
@@ -198,6 +202,13 @@ bool instance_is_unchanged(const struct instance *instance) {
 
 /* ---- Events for an integrator outside ------------------------------------------------------- */
 
+void instance_note_inputs(struct instance *instance) {
+    const double *u = doubles_of(instance->memory.values, instance->model->inputs);
+    for (size_t i = 0; i < instance_noted_inputs(instance->model); i++) {
+        instance->memory.largest_inputs[i] = fmax(instance->memory.largest_inputs[i], fabs(u[i]));
+    }
+}
+
 /* Distance from its root at which integrators stop, relative to the size of the indicator. */
 static const double near_root = 1e-10;
 
@@ -226,7 +237,8 @@ static void write_bands(struct instance *instance, double bands[]) {
     if (events->errors != NULL) {
         double *errors = doubles_of(instance->first_derivatives, instance->model->states);
         write_location_errors(instance, errors);
-        events->errors(instance->memory.values, instance->state.time.s, errors, 1e-12, bands);
+        events->errors(instance->memory.values, instance->state.time.s, errors,
+                       instance->memory.largest_inputs, 1e-12, bands);
     }
     for (size_t i = 0; i < events->indicator_count; i++) {
         const struct indicator *indicator = &instance->indicators[i];

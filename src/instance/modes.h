@@ -36,6 +36,9 @@ NONNULL bool instance_is_unchanged(const struct instance *instance);
 
 /* ---- Events for an integrator outside ------------------------------------------------------- */
 
+/* Notes how large the inputs are now: importers round them by as much as their terms. */
+NONNULL void instance_note_inputs(struct instance *instance);
+
 /* Adds a small distance to the calculated indicators, so that none is 0 where a mode begins. */
 NONNULL void instance_add_bands(struct instance *instance);
 

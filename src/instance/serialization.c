@@ -300,6 +300,10 @@ static void transfer_state(struct codec *codec, const struct instance *instance,
     transfer_polynomials(
         codec, (struct polynomial *)(void *)(block + ((char *)memory->next_inputs - memory->block)),
         3 * input_count);
+    for (size_t i = 0; i < instance_noted_inputs(instance->model); i++) {
+        char *noted = block + ((char *)&memory->largest_inputs[i] - memory->block);
+        codec_real(codec, (double *)(void *)noted);
+    }
     if (instance->model->events != NULL) {
         transfer_event_point(codec, instance->model, state,
                              (bool *)(void *)(block + ((char *)memory->unhandled - memory->block)));

@@ -59,7 +59,8 @@ struct instance_memory {
     struct polynomial *next_inputs; /* inputs of the next step: last value set, and derivatives */
     struct polynomial *current_inputs; /* inputs at the current time */
     struct polynomial *active_inputs;  /* inputs since the last restart */
-    bool *unhandled;      /* causes of the unhandled event, like triggered of struct instance */
+    double *largest_inputs; /* largest magnitude of each so far; empty without `errors` */
+    bool *unhandled;        /* causes of the unhandled event, like triggered of struct instance */
     char *restart_values; /* value structure at the last restart, with which the integrator runs */
     char *values; /* value structure of the model, as set and read from outside, with the inputs at
                      the current time */
@@ -169,6 +170,11 @@ static inline double instance_next_time(const struct instance *instance) {
     const struct model_events *events = instance->model->events;
     return events != NULL && events->next_time != NULL ? events->next_time(instance->memory.values)
                                                        : INFINITY;
+}
+
+/* Returns the number of largest_inputs. */
+static inline size_t instance_noted_inputs(const struct model *model) {
+    return events_of(model).errors != NULL ? count_of(model->inputs) : 0;
 }
 
 /* Returns the bytes of the array triggered of struct instance. */

@@ -42,9 +42,10 @@ struct event {
     /* Per indicator, true if it falls to 0 here. NULL if there is no event: inputs or parameters
      * have changed, or the initialization ends. */
     const bool *triggered;
-    bool is_timed;    /* true at the time that next_time returned */
-    const double *du; /* derivative of each input by the time after the event */
-    bool du_is_known; /* false if inputs move outside: du is 0 then */
+    bool is_timed;                /* true at the time that next_time returned */
+    const double *du;             /* derivative of each input by the time after the event */
+    const double *largest_inputs; /* magnitudes so far; NULL if the inputs do not move */
+    bool du_is_known;             /* false if inputs move outside: du is 0 then */
     /* Tolerance of each state, in its unit: sum of its relative and absolute tolerance. */
     const double *tolerance;
     /* Where update writes the text of the expression that is not finite, if it fails for that. */
@@ -99,11 +100,12 @@ struct model_events {
                               double z[]);
 
     /* Writes a bound of each indicator's error, if the states have these errors (in their units),
-     * the time and the inputs the relative error `relative`, and all operations are rounded. Writes
-     * 0 where the error is not known, as near values that are not finite. NULL if errors follow
-     * from the limits that describe gives. */
-    void (*errors)(const void *values, double t, const double state_errors[], double relative,
-                   double errors[]);
+     * the time and the inputs the relative error `relative`, and all operations are rounded; an
+     * input's error is relative to its largest magnitude so far, largest_inputs, too. Writes 0
+     * where the error is not known, as near values that are not finite. NULL if errors follow from
+     * the limits that describe gives. */
+    void (*errors)(const void *values, double t, const double state_errors[],
+                   const double largest_inputs[], double relative, double errors[]);
 
     /* Writes how far each state may move from x within one internal step, INFINITY for any
      * distance: in a longer step the right-hand side could change and change back between the

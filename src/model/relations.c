@@ -17,9 +17,9 @@ struct call {
     void *values;
     int *is_begun, *holds, *active, *segments; /* parts of its modes */
     double t;                                  /* s */
-    double passed;    /* s: earlier time events, and those at this time, are past */
-    const double *du; /* derivative of each input by the time */
-    bool inputs_move;
+    double passed;                /* s: earlier time events, and those at this time, are past */
+    const double *du;             /* derivative of each input by the time */
+    const double *largest_inputs; /* as in struct event */
 };
 
 static const int *modes_in(const struct relations *model, const void *values) {
@@ -27,25 +27,23 @@ static const int *modes_in(const struct relations *model, const void *values) {
 }
 
 static struct call call_of(const struct relations *model, struct relations_room room, void *values,
-                           double t, const double du[]) {
+                           double t, const double du[], const double largest_inputs[]) {
     int *modes = (int *)(void *)((char *)values + model->modes.offset);
     int *holds = modes + 1;
     int *active = holds + model->relation_count;
-    bool inputs_move = false;
-    for (int i = 0; i < model->input_count; i++) {
-        inputs_move |= du[i] != 0.0;
-    }
     return (struct call){
-        model, room, values, modes,      holds, active, active + model->event_count + 1,
-        t,     t,    du,     inputs_move};
+        model, room, values, modes,         holds, active, active + model->event_count + 1,
+        t,     t,    du,     largest_inputs};
 }
 
 /* Compares all relations. state_errors: how far from its limit each state may have been located, in
  * its unit. */
 static void compare(const struct call *call, const double state_errors[],
                     struct compared compared[]) {
-    const double inputs = call->inputs_move ? time_error : 0.0; // inputs that do not move are exact
-    const struct given given = {state_errors, time_error, inputs, call->du};
+    const bool inputs_move = call->largest_inputs != NULL; // those that do not are exact
+    const double *largest = inputs_move ? call->largest_inputs : call->room.zeros;
+    const double inputs = inputs_move ? time_error : 0.0;
+    const struct given given = {state_errors, time_error, inputs, largest, call->du};
     call->model->compare(call->values, call->t, &given, compared);
 }
 
@@ -166,7 +164,7 @@ const void *relations_followed(const struct relations *model, struct relations_r
     if (!is_begun && model->start != NULL) {
         model->start(copy);
     }
-    const struct call call = call_of(model, room, copy, t, room.zeros);
+    const struct call call = call_of(model, room, copy, t, room.zeros, NULL);
     set_modes_from_values(&call, is_begun);
     return copy;
 }
@@ -438,7 +436,7 @@ static enum status start_samplers(const struct call *call, const struct event *e
 
 enum status relations_update(const struct relations *model, struct relations_room room,
                              void *values, const struct event *event) {
-    struct call call = call_of(model, room, values, event->t, event->du);
+    struct call call = call_of(model, room, values, event->t, event->du, event->largest_inputs);
     const double *x = (const double *)(const void *)((const char *)values + model->states);
     double *tolerance = room.tolerance;
     const int was_begun = *call.is_begun;
@@ -478,8 +476,9 @@ enum status relations_update(const struct relations *model, struct relations_roo
 }
 
 void relations_errors(const struct relations *model, struct relations_room room, const void *values,
-                      double t, const double state_errors[], double relative, double errors[]) {
-    const struct given given = {state_errors, relative, relative, room.zeros};
+                      double t, const double state_errors[], const double largest_inputs[],
+                      double relative, double errors[]) {
+    const struct given given = {state_errors, relative, relative, largest_inputs, room.zeros};
     model->compare(values, t, &given, room.compared);
     for (int k = 0; k < model->relation_count; k++) {
         if (!model->relation[k].is_timed) {

@@ -54,6 +54,7 @@ struct given {
     const double *state_errors; /* of each state, in its unit */
     double time;                /* relative error of the time */
     double inputs;              /* relative error of all inputs */
+    const double *largest;      /* of each input so far: its error is relative to it, too */
     const double *du;           /* derivative of each input by the time */
 };
 
@@ -66,8 +67,7 @@ struct relations {
     /* double[], discrete states of the model: with samplers first the start time, s, and the number
      * of ticks of each sampler; then its discrete variables */
     struct range discrete;
-    int relation_count, event_count, sampler_count, segment_count, count_count, state_count,
-        input_count;
+    int relation_count, event_count, sampler_count, segment_count, count_count, state_count;
     bool has_inputs; /* true if some relation depends on inputs and parameters only */
     const struct relation *relation;
     const struct segment *segment;
@@ -116,7 +116,8 @@ enum status relations_update(const struct relations *model, struct relations_roo
 
 /* errors of struct model_events. */
 void relations_errors(const struct relations *model, struct relations_room room, const void *values,
-                      double t, const double state_errors[], double relative, double errors[]);
+                      double t, const double state_errors[], const double largest_inputs[],
+                      double relative, double errors[]);
 
 /* Returns the last segment that begins at or below x, from the rising begins of all segments; the
  * first one if none does. */

@@ -145,10 +145,25 @@ h + ramp < ramp; h + time < time; ramp**2 < 0; 1 + ramp**2 < 1; rises < 3 * time
 @EACH_KIND
 def test_a_touch_is_no_event(unit: Callable, kind: str, when: str) -> None:
     """h = 3 (t - 0.5)**2 is 0 at 0.5 s, up to errors that decide what is below 0."""
-    inputs = {"f": Polynomial(-0.75 if "rises <" in when else 0.0, 0.0, 0.0)}
+    f = Polynomial(-0.75 if "rises <" in when else 0.0, 0.0, 0.0)
+    makes_no_event(unit(TEXTS["TOUCH"].format(when=when)), kind, f)
+
+
+@pytest.mark.parametrize(("a", "m"), [(0.7, 0.5), (1.3, 0.3), (0.7e-9, 0.5)])
+@EACH_KIND
+def test_an_input_may_touch_up_to_its_rounding(
+    unit: Callable, kind: str, a: float, m: float
+) -> None:
+    """As a sum, f = a (t - m)**2 falls up to 1e-16 a below 0; 1e-9 a below 0 it is an event."""
+    touching = unit(TEXTS["TOUCH"].format(when="f < 0"))
+    makes_no_event(touching, kind, Polynomial(a * m**2, -2 * a * m, 2 * a))
+    below = Polynomial(a * m**2 - 1e-9 * a, -2 * a * m, 2 * a)
+    assert run_of(touching, kind, 0.01, 100, {"f": below}).x[-1][-1] == 1.0
+
+
+def makes_no_event(touching: Unit, kind: str, f: Polynomial) -> None:
     for step, tolerance in ((1e-3, 1e-5), (1e-3, 1e-11), (0.01, 1e-8), (0.1, 1e-5), (0.125, 1e-8)):
-        count = round(1 / step)
-        run = run_of(unit(TEXTS["TOUCH"].format(when=when)), kind, step, count, inputs, tolerance)
+        run = run_of(touching, kind, step, round(1 / step), {"f": f}, tolerance)
         assert not run.failure
         assert run.x[-1][-1] == 0.0, (step, tolerance)
 

@@ -12,7 +12,7 @@ from rparm.errors import UserError, WrongValueError
 from rparm.fmi.model import Variable
 from rparm.runs import scenario
 from rparm.runs.inputs import Sines, Table
-from rparm.units import SECONDS, typed_quantity
+from rparm.units import HERTZ, SECONDS, typed_quantity, units_of
 from tests.support.rparm_project import FMUS, MISTAKES, NAMES, declared, load
 from tests.support.toy_model import DESCRIPTION, TOY, toy
 
@@ -57,7 +57,7 @@ def test_degrees_are_those_of_math_radians() -> None:
         ("q2", "mm", -3), ("q2", "cm", -2), ("q2", "km", 3), ("q2", "m", 0), ("f2", "kN", 3),
         ("f2", "mN", -3), ("tau1", "N.mm", -3), ("tau1", "N·mm", -3), ("tau1", "kN.m", 3),
         ("g", "mm/s2", -3), ("g", "cm/s²", -2), ("I1z", "kg.cm2", -4), ("dq2", "m/ms", 3),
-        ("stop_stiffness2", "N/mm", 3),
+        ("stop_stiffness2", "N/mm", 3), ("q2", "um", -6), ("g", "dm/cs2", 3), ("tau1", "W.ms", -3),
     ],
 )  # fmt: skip
 def test_prefixes_give_the_nearest_double(name: str, unit: str, power: int) -> None:
@@ -73,7 +73,7 @@ def test_declared_display_units_have_factor_and_offset() -> None:
     assert WARM["heat"].checked("25 degC") == 298.15
     assert WARM["rise"].checked("25 degC") == 25.0
     assert WARM["pressure"].checked("1.2bar") == 120000.0
-    assert list(WARM["heat"].units) == ["K", "degC"]
+    assert list(WARM["heat"].units) == ["K", "degC", "mK"]
     for declaration in ('factor="0"', 'factor="nan"', 'factor="1" offset="x"'):
         text = f'<Unit name="x"><DisplayUnit name="y" {declaration}/></Unit>'
         with pytest.raises(ValueError, match=r"factor|float"):
@@ -122,7 +122,10 @@ def test_a_boolean_has_no_unit() -> None:
 def test_the_command_line_needs_no_unit() -> None:
     assert typed_quantity("60", SECONDS) == typed_quantity(" 60000 ms", SECONDS) == 60.0
     assert typed_quantity("0.5", {}) == 0.5
-    for text in ("", "nan", "5 m", "1e999"):
+    assert typed_quantity("1.5 min", SECONDS) == typed_quantity("90000000us", SECONDS) == 90.0
+    assert typed_quantity("500 mHz", HERTZ) == typed_quantity("30 1/min", HERTZ) == 0.5
+    assert typed_quantity("25 degC", units_of("K", {})) == 298.15
+    for text in ("", "nan", "5 m", "1e999", "1 rad/s", "1 degC"):
         with pytest.raises(WrongValueError):
             typed_quantity(text, SECONDS)
 
@@ -155,7 +158,7 @@ def test_a_scenario_takes_units_wherever_it_takes_values(tmp_path: Path) -> None
     assert run.questions == ()
     for stop, force, message in (
         ('"1 m"', "1", r"\[time\] stop: unknown unit 'm', did you mean 'ms'\?"),
-        ("2", '"1 deg"', r"\[inputs.f2\] table\[1\]: unknown unit 'deg' \(known: N, mN, cN, kN\)"),
+        ("2", '"1 deg"', r"\[inputs.f2\] table\[1\]: unknown unit 'deg' \(known: N, mN, kN\)"),
     ):
         path.write_text(text.format(stop=stop, force=force), encoding="utf-8")
         with pytest.raises(UserError, match=message):
