@@ -28,6 +28,8 @@ FASTEST, SLOWEST = 1e-3, 1e2  # of the time scales of fastest and slowest pole: 
 RATIO = 1.04  # of a step to the next one that is tried
 BISECTIONS = 60
 MOST_STEPS = 50  # in a period of samplers
+MOST_TICKS = 2000  # in a step
+Way = tuple[str, str]  # order and inputs, as in `rparm.systems.master`
 Held = tuple[np.ndarray, np.ndarray, np.ndarray]
 Source = tuple[str, int]  # component, and place among all outputs
 STEPS = 500
@@ -50,7 +52,7 @@ class LargestStep:
 def largest_steps(
     parts: Mapping[str, Linear],
     connections: Sequence[Connection],
-    ways: Sequence[tuple[str, str]] = tuple((o, i) for o in ORDERS for i in INPUT_MODES),
+    ways: Sequence[Way] = tuple((o, i) for o in ORDERS for i in INPUT_MODES),
     law: Callable[[str, float], Linear] | None = None,
 ) -> list[LargestStep]:
     """Find the limit of each way to step `parts`, in their order; empty if there is no loop.
@@ -74,8 +76,10 @@ def largest_steps(
     count = 1 + math.ceil(math.log(SLOWEST / FASTEST * rates.max() / rates.min(), RATIO))
     tried = np.geomspace(FASTEST / rates.max(), SLOWEST / rates.min(), count)
     if every:
-        ratios = tried / (length := period(every))
-        whole = [*(1 / np.arange(MOST_STEPS, 1, -1.0)), *np.unique(np.round(ratios[ratios > 0.5]))]
+        ratios = np.round(tried / (length := period(every)))
+        most = MOST_TICKS / sum(length / tick.every for tick in every)
+        several = np.unique(ratios[(ratios > 1) & (ratios < most)])
+        whole = [*(1 / np.arange(MOST_STEPS, 0, -1.0)), *several]
         tried = length * np.array(whole)
 
     steps = cache(lambda step: by_steps(ticking, step)[1])
@@ -90,7 +94,7 @@ def largest_steps(
         found = found.select(part.inputs, part.outputs)
         return found.A, found.B, np.zeros_like(found.B)
 
-    def eigenvalues(step: float, way: tuple[str, str]) -> np.ndarray:
+    def eigenvalues(step: float, way: Way) -> np.ndarray:
         maps = (
             transition(loop.parts, loop.connections, step, *way, partial(held, k=k))
             for k in range(len(steps(step)))
@@ -101,10 +105,7 @@ def largest_steps(
 
 
 def _largest(
-    eigenvalues: Callable[[float], np.ndarray],
-    way: tuple[str, str],
-    tried: Sequence[float],
-    every: Sequence[Tick],
+    eigenvalues: Callable[[float], np.ndarray], way: Way, tried: list[float], every: list[Tick]
 ) -> LargestStep:
     def growth(step: float) -> float:
         return float(np.abs(eigenvalues(step)).max())
@@ -194,7 +195,7 @@ def _layout(
 class Limit:
     """The largest stable step of a way to step."""
 
-    way: tuple[str, str]  # order and inputs, as in `rparm.systems.master`
+    way: Way
     predicted: float  # s
     growths: tuple[float, float]  # in a step, measured WITHIN below and above it
 
@@ -224,7 +225,7 @@ class Resting:
         self._sequence = rest.sequence or subject.names
         self.ways = subject.ways
 
-    def predicted(self, way: tuple[str, str]) -> LargestStep:
+    def predicted(self, way: Way) -> LargestStep:
         """Predict the largest stable step of one of `ways`, from the linear models."""
         parts = self._subject.parts(self._rest.values)
         held = self._subject.held(parts)
@@ -232,7 +233,7 @@ class Resting:
         (found,) = largest_steps(parts, self._subject.connections, [way])
         return found
 
-    def growth(self, way: tuple[str, str], step: float) -> float:
+    def growth(self, way: Way, step: float) -> float:
         """Measure by how much a small deviation grows in a step, s, under the master."""
         rest, subject = self._rest, self._subject
         start = subject.at(rest.values).at
@@ -242,7 +243,7 @@ class Resting:
             master.initialize(0.0, None, subject.merged({**rest.values, **moved}))
             return growth(master, step, rest.signals)
 
-    def limit(self, way: tuple[str, str]) -> Limit:
+    def limit(self, way: Way) -> Limit:
         """Predict and measure the limit."""
         step = self.predicted(way).step
         below, above = (self.growth(way, step * (1 + x)) for x in (-WITHIN, WITHIN))

@@ -12,17 +12,8 @@ from rparm.errors import UnplacedError, UserError, WrongValueError, did_you_mean
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import PARAMETERS, Model, Value, Variable
-from rparm.linearization.sampling import (
-    Tick,
-    held_numbers,
-    hold,
-    instants,
-    law,
-    period,
-    samplers,
-    slowest,
-    ticks,
-)
+from rparm.linearization import sampling
+from rparm.linearization.sampling import Tick, held_numbers, hold, law, samplers, ticks
 from rparm.systems.python_component import PythonComponent, PythonInstance
 from rparm.units import typed_quantity
 
@@ -193,15 +184,14 @@ class Linear:
 
     def discretized(self) -> "Linear":
         """Return the model from period to period of its samplers; UnplacedError."""
-        n, length = len(self.states), period(self.ticks)
-        every = instants(self.ticks, length, slowest(self.ticks))
+        length, begin = sampling.period(self.ticks), sampling.slowest(self.ticks)
+        every = sampling.instants(self.ticks, length, begin)
         with np.errstate(over="ignore", invalid="ignore"):
             A, B, _ = hold(self.A, self.B, length, every)
         if not (np.isfinite(A).all() and np.isfinite(B).all()):
             raise UnplacedError("deviations overflow within a period of its samplers")
-        first = np.eye(n + len(self.inputs))
-        first[:n] = np.hstack(hold(self.A, self.B, 0.0, every[:1])[:2])
-        C, D = np.split(np.hstack([self.C, self.D]) @ first, [n], axis=1)
+        F, G, _ = hold(self.A, self.B, 0.0, every[:1])  # over the first ticks
+        C, D = self.C @ F, self.C @ G + self.D
         return replace(self, A=A, B=B, C=C, D=D, dt=length, between=self)
 
 

@@ -59,10 +59,9 @@ class Tick:
     def reduced(self, states: list[int], columns: list[int]) -> "Tick":
         """Return the tick of a model with some of the states, and columns of partials."""
         kept = [i for i, row in enumerate(self.rows) if row in states]
-        rows, changes = [states.index(self.rows[i]) for i in kept], list(self.changes.items())
         partials, late = (x[np.ix_(kept, columns)] for x in (self.partials, self.late))
-        known = dict(changes[i] for i in kept)
-        return replace(self, rows=rows, partials=partials, late=late, changes=known)
+        rows = [states.index(self.rows[i]) for i in kept]
+        return replace(self, rows=rows, partials=partials, late=late)
 
 
 Instant = tuple[float, list[Tick]]
@@ -132,8 +131,6 @@ def hold(
     rates, whole = np.zeros((n + 2 * m, n + 2 * m)), np.eye(n + 2 * m)
     rates[:n, :n], rates[:n, n : n + m] = A, B
     rates[n : n + m, n + m :] = np.eye(m)
-    if not n:
-        return whole[:0, :0], whole[:0, :m], whole[:0, m:]
     over: dict[str, np.ndarray] = {}  # by the time between two instants
     ends = [*(time for time, _ in instants), step]
     for begin, end, here in zip([0.0, *ends], ends, [*(x for _, x in instants), ()], strict=False):
@@ -160,8 +157,8 @@ def _exponential(matrix: np.ndarray) -> np.ndarray:
     return result
 
 
-def period(every: Sequence[Tick], *steps: float) -> float:
-    """Return the shortest time, s, in which samplers tick and steps fit a whole number of times.
+def period(every: Sequence[Tick], step: float = 0.0) -> float:
+    """Return the shortest time, s, in which samplers tick, and steps fit, a whole number of times.
 
     UnplacedError: there is no such time, or ticks change modes.
     """
@@ -171,21 +168,16 @@ def period(every: Sequence[Tick], *steps: float) -> float:
                 f"sampler {tick.name} changes {', '.join(tick.modes)} at this point, expected a "
                 "point at which samplers change no modes"
             )
-    times = [*(tick.every for tick in every), *steps]
-    longest = max(times)
-    ratios = [Fraction(longest / time).limit_denominator(MOST_TICKS) for time in times]
-    count = math.lcm(*(ratio.denominator for ratio in ratios))
-    is_same = [
-        math.isclose(r * t, longest, rel_tol=SAME) for r, t in zip(ratios, times, strict=True)
-    ]
-    if not all(is_same) or count * sum(ratios) > MOST_TICKS:
-        rates = ", ".join(
-            [f"{tick.name} every {tick.every:.6g} s" for tick in every]
-            + [f"a communication step of {step:.6g} s" for step in steps]
-        )
+    times = {tick.name: tick.every for tick in every} | ({"communication": step} if step else {})
+    longest = max(times.values())
+    ratios = [Fraction(longest / t).limit_denominator(MOST_TICKS) for t in times.values()]
+    found = longest * math.lcm(*(ratio.denominator for ratio in ratios))
+    counts = [found / time for time in times.values()]
+    if sum(counts) > MOST_TICKS or any(abs(n - round(n)) > SAME * n for n in counts):
+        rates = ", ".join(f"{name} every {time:.6g} s" for name, time in times.items())
         expected = f"expected a common period of at most {MOST_TICKS} ticks"
         raise UnplacedError(f"samples at several rates, {expected}: {rates}")
-    return count * longest
+    return found
 
 
 def slowest(every: Sequence[Tick]) -> float:
