@@ -27,7 +27,7 @@ from rparm.units import verdict
 FASTEST, SLOWEST = 1e-3, 1e2  # of the time scales of fastest and slowest pole: steps to try
 RATIO = 1.04  # of a step to the next one that is tried
 BISECTIONS = 60
-MOST_STEPS = 50  # in a period of samplers
+MOST_STEPS = 20  # in a period of samplers
 MOST_TICKS = 2000  # in a step
 Way = tuple[str, str]  # order and inputs, as in `rparm.systems.master`
 Held = tuple[np.ndarray, np.ndarray, np.ndarray]

@@ -19,7 +19,6 @@ from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.model import Model
 from rparm.systems.python_component import PythonInstance
 
-TERMS = 13  # of Taylor's series of an exponential
 SAME = 1e-12  # relative, of times that differ by rounding only
 MOST_TICKS = 10_000  # in a period
 UNDEFINED = sys.float_info.max  # in place of a new value that is not finite
@@ -127,6 +126,8 @@ def hold(
 
     Samplers tick at `instants` of the step.
     """
+    from scipy.linalg import expm
+
     n, m = B.shape
     rates, whole = np.zeros((n + 2 * m, n + 2 * m)), np.eye(n + 2 * m)
     rates[:n, :n], rates[:n, n : n + m] = A, B
@@ -135,26 +136,13 @@ def hold(
     ends = [*(time for time, _ in instants), step]
     for begin, end, here in zip([0.0, *ends], ends, [*(x for _, x in instants), ()], strict=False):
         if (gap := f"{end - begin:.10g}") not in over:
-            over[gap] = _exponential(rates * (end - begin))
+            over[gap] = expm(rates * (end - begin))
         whole = over[gap] @ whole
         before = whole[: n + m].copy()
         for tick in here:
             late = tick.late @ (before - whole[: n + m])
             whole[tick.rows] = tick.partials @ whole[: n + m] + late
     return whole[:n, :n], whole[:n, n : n + m], whole[:n, n + m :]
-
-
-def _exponential(matrix: np.ndarray) -> np.ndarray:
-    """Return exp of a matrix: Taylor's series of a part of it, squared; exact but for rounding."""
-    halvings = max(0, 4 + math.frexp(np.abs(matrix).sum(axis=1).max(initial=0.0))[1])
-    part = matrix / 2.0**halvings  # below 1/16: terms fall below rounding at once
-    result = term = np.eye(len(matrix))
-    for order in range(1, TERMS):
-        term = term @ part / order
-        result = result + term
-    for _ in range(halvings):
-        result = result @ result
-    return result
 
 
 def period(every: Sequence[Tick], step: float = 0.0) -> float:

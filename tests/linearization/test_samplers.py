@@ -119,29 +119,6 @@ def test_samplers_with_indexes_have_names_with_indexes(folder: Path) -> None:
     assert_close(found.C, first)
 
 
-def test_a_run_follows_the_linear_model_to_first_order(folder: Path) -> None:
-    """The difference falls as the square of the deviation, over 20 periods of two instants."""
-    fmu = made(folder, TEXTS["CRANE"])
-    found = rparm.linearize(fmu, at=dict.fromkeys(("phi", "w", "u", "e", "r"), 0.0))
-    trimmed = rparm.linearize(fmu, at={"r": 0.0}, trim=found.states)
-    assert trimmed.x == pytest.approx(np.zeros(4), abs=1e-9)
-    direction, differences = np.array([1.0, -0.7, 0.4, 0.8]), []
-    for size in (1e-3, 1e-5):
-        z, r, rows = size * direction, np.array([0.01 * size]), []
-        given = dict(zip(("p0", "w", "u", "e"), z.tolist(), strict=True))
-        run = rparm.simulate(
-            fmu, stop_time=4.0, step=0.2, inputs={"r": r[0]},
-            start_values={**given, "solver_method": "taylor"}, tolerance=1e-13,
-        )  # fmt: skip
-        for _ in range(21):
-            rows.append(found.C @ z + found.D @ r)
-            z = found.A @ z + found.B @ r
-        exact = np.column_stack([run[name] for name in found.outputs])
-        differences.append(np.abs(exact - rows).max() / size)
-    assert differences[0] < 1e-2
-    assert differences[1] / differences[0] == pytest.approx(1e-2, rel=0.05)
-
-
 def test_a_filter_is_discrete_without_continuous_states(folder: Path) -> None:
     found = rparm.linearize(made(folder, TEXTS["FILTER"]), at={"a": 0.25})
     whole = np.hstack([found.A, found.B])
