@@ -111,12 +111,12 @@ def notes(found: Study) -> list[str]:
         )
     elif linear.dt:
         every = {tick.name: tick.every for tick in linear.ticks}
-        names = _names(list(every))
+        why = f" by {_names(list(every))}"
         if min(every.values()) < linear.dt / 1.5:
             rates = [f"{name} ({milliseconds(time)})" for name, time in every.items()]
-            names = f"the common period of {_names(rates)}, which a tick of the slowest begins"
+            why = f", the common period of {_names(rates)}, which a tick of the slowest begins"
         texts.append(
-            f"Sampled every {milliseconds(linear.dt)} by {names}. States are those just before the "
+            f"Sampled every {milliseconds(linear.dt)}{why}. States are those just before the "
             "first tick of a period, outputs those just after it; inputs are held in between."
             + (" Connections act at once: not a communication step late." if found.variant else "")
         )

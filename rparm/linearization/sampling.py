@@ -156,13 +156,13 @@ def period(every: Sequence[Tick], step: float = 0.0) -> float:
                 f"sampler {tick.name} changes {', '.join(tick.modes)} at this point, expected a "
                 "point at which samplers change no modes"
             )
-    times = {tick.name: tick.every for tick in every} | ({"communication": step} if step else {})
-    longest = max(times.values())
-    ratios = [Fraction(longest / t).limit_denominator(MOST_TICKS) for t in times.values()]
+    times = [(tick.name, tick.every) for tick in every] + [("communication", step)] * (step > 0)
+    longest = max(time for _, time in times)
+    ratios = [Fraction(longest / time).limit_denominator(MOST_TICKS) for _, time in times]
     found = longest * math.lcm(*(ratio.denominator for ratio in ratios))
-    counts = [found / time for time in times.values()]
+    counts = [found / time for _, time in times]
     if sum(counts) > MOST_TICKS or any(abs(n - round(n)) > SAME * n for n in counts):
-        rates = ", ".join(f"{name} every {time:.6g} s" for name, time in times.items())
+        rates = ", ".join(f"{name} every {time:.6g} s" for name, time in times)
         expected = f"expected a common period of at most {MOST_TICKS} ticks"
         raise UnplacedError(f"samples at several rates, {expected}: {rates}")
     return found

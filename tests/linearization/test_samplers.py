@@ -196,7 +196,7 @@ def test_a_tick_sees_what_other_components_were_before(
 
 def test_the_largest_step_of_samplers_is_a_multiple_of_their_period(tmp_path: Path) -> None:
     """In Jacobi order u acts three steps after x: runs die out at this step, not at the next."""
-    file = loop(tmp_path)
+    file = loop(tmp_path, "2 * 0.1", "0.05")
     roots = [np.roots([1, -np.exp(-0.2 * k), 0, 1.5 * -np.expm1(-0.2 * k)]) for k in range(1, 30)]
     count = [np.abs(found).max() < 1 for found in roots].index(False)
     (limit,) = [x for x in study(Request(file)).largest if (x.order, x.inputs) == WAY]
