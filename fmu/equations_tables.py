@@ -111,7 +111,7 @@ def _numbers(values: object, key: str) -> Iterator[float]:
 
 def _columns(given: dict[str, Any], folder: Path) -> dict[str, list[float]]:
     """Read two columns of a CSV, which x and y name in its first line."""
-    path = folder / given["file"]
+    path, begin = folder / given["file"], 1  # line of a row
     names = {key: given.get(key) for key in ("x", "y")}
     for key, column in names.items():
         if not isinstance(column, str):
@@ -140,8 +140,14 @@ def _columns(given: dict[str, Any], folder: Path) -> dict[str, list[float]]:
                 for key, place in places.items() if row else ():
                     where = f"{key}: {path.name}: line {rows.line_num}"
                     found[key].append(_cell(row, place, where))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = getattr(error, "strerror", None) or "is no CSV in UTF-8"
+                begin = rows.line_num + 1
+    except csv.Error as error:
+        reason = str(error)
+        if "end of data" in reason or ("limit" in reason and rows.line_num > begin):
+            reason = "a quote opens that is not closed"
+        raise ValueError(f"file: {path.name}: line {begin}: {reason}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "is no text in UTF-8"
         raise ValueError(f"file: {path.name}: {reason}") from None
     return found
 

@@ -10,13 +10,13 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache, partial, reduce
 from pathlib import Path
 
 import numpy as np
 
 from rparm.linearization.linear import Linear
-from rparm.linearization.sampling import hold
+from rparm.linearization.sampling import Tick, by_steps, hold, period
 from rparm.linearization.system import SystemSubject, connected, looped
 from rparm.systems import ssp
 from rparm.systems.comparison import Rest
@@ -27,6 +27,9 @@ from rparm.units import verdict
 FASTEST, SLOWEST = 1e-3, 1e2  # of the time scales of fastest and slowest pole: steps to try
 RATIO = 1.04  # of a step to the next one that is tried
 BISECTIONS = 60
+MOST_STEPS = 20  # in a period of samplers
+MOST_TICKS = 2000  # in a step
+Way = tuple[str, str]  # order and inputs, as in `rparm.systems.master`
 Held = tuple[np.ndarray, np.ndarray, np.ndarray]
 Source = tuple[str, int]  # component, and place among all outputs
 STEPS = 500
@@ -49,45 +52,60 @@ class LargestStep:
 def largest_steps(
     parts: Mapping[str, Linear],
     connections: Sequence[Connection],
-    ways: Sequence[tuple[str, str]] = tuple((o, i) for o in ORDERS for i in INPUT_MODES),
+    ways: Sequence[Way] = tuple((o, i) for o in ORDERS for i in INPUT_MODES),
     law: Callable[[str, float], Linear] | None = None,
 ) -> list[LargestStep]:
     """Find the limit of each way to step `parts`, in their order; empty if there is no loop.
 
-    `law` gives the model of a sampled part, which is called once a step, at another step.
+    `law` gives the model of a part in Python, which is called once a step, at another step. With
+    samplers only steps are tried that divide their common period, or are multiples of it.
     """
     loop = looped(parts, connections)
     if not loop.parts:
         return []
-    laws = [part.dt for part in loop.parts.values() if part.dt]
-    if laws:
+    ticking = {name: part.ticks for name, part in loop.parts.items()}
+    every = [tick for own in ticking.values() for tick in own]
+    times = [part.dt for part in loop.parts.values() if part.dt] + [tick.every for tick in every]
+    if times:
         own = [part.poles for part in loop.parts.values() if not part.dt]
-        poles = np.concatenate([*own, 1 / np.array(laws)])
+        poles = np.concatenate([*own, 1 / np.array(times)])
     else:
         poles = connected(loop.parts, loop.connections).poles
     rates = np.abs(poles[poles != 0])
     rates = rates if len(rates) else np.ones(1)
     count = 1 + math.ceil(math.log(SLOWEST / FASTEST * rates.max() / rates.min(), RATIO))
     tried = np.geomspace(FASTEST / rates.max(), SLOWEST / rates.min(), count)
+    if every:
+        ratios = np.round(tried / (length := period(every)))
+        most = MOST_TICKS / sum(length / tick.every for tick in every)
+        several = np.unique(ratios[(ratios > 1) & (ratios < most)])
+        whole = [*(1 / np.arange(MOST_STEPS, 0, -1.0)), *several]
+        tried = length * np.array(whole)
+
+    steps = cache(lambda step: by_steps(ticking, step)[1])
 
     @cache
-    def held(name: str, step: float) -> Held:
+    def held(name: str, step: float, k: int) -> Held:
         part = loop.parts[name]
         if not part.dt or law is None:
-            return hold(part.A, part.B, step)
+            return hold(part.A, part.B, step, steps(step)[k][name])
         found = law(name, step)
         found = found.without(set(found.states).difference(part.states))
         found = found.select(part.inputs, part.outputs)
         return found.A, found.B, np.zeros_like(found.B)
 
-    def eigenvalues(step: float, way: tuple[str, str]) -> np.ndarray:
-        return np.linalg.eigvals(transition(loop.parts, loop.connections, step, *way, held))
+    def eigenvalues(step: float, way: Way) -> np.ndarray:
+        maps = (
+            transition(loop.parts, loop.connections, step, *way, partial(held, k=k))
+            for k in range(len(steps(step)))
+        )
+        return np.linalg.eigvals(reduce(lambda before, one: one @ before, maps))
 
-    return [_largest(partial(eigenvalues, way=way), way, tried.tolist()) for way in ways]
+    return [_largest(partial(eigenvalues, way=way), way, tried.tolist(), every) for way in ways]
 
 
 def _largest(
-    eigenvalues: Callable[[float], np.ndarray], way: tuple[str, str], tried: Sequence[float]
+    eigenvalues: Callable[[float], np.ndarray], way: Way, tried: list[float], every: list[Tick]
 ) -> LargestStep:
     def growth(step: float) -> float:
         return float(np.abs(eigenvalues(step)).max())
@@ -101,12 +119,12 @@ def _largest(
         return LargestStep(*way, math.inf, math.nan)
     if low == 0.0:
         return LargestStep(*way, 0.0, math.nan)
-    for _ in range(BISECTIONS):
+    for _ in range(0 if every else BISECTIONS):
         middle = (low + high) / 2
         low, high = (middle, high) if growth(middle) < 1.0 else (low, middle)
     found = eigenvalues(low)
     angle = abs(np.angle(found[np.abs(found).argmax()]))
-    return LargestStep(*way, low, float(angle / (2 * math.pi * low)))
+    return LargestStep(*way, low, float(angle / (2 * math.pi * period(every, low))))
 
 
 def transition(
@@ -177,7 +195,7 @@ def _layout(
 class Limit:
     """The largest stable step of a way to step."""
 
-    way: tuple[str, str]  # order and inputs, as in `rparm.systems.master`
+    way: Way
     predicted: float  # s
     growths: tuple[float, float]  # in a step, measured WITHIN below and above it
 
@@ -207,7 +225,7 @@ class Resting:
         self._sequence = rest.sequence or subject.names
         self.ways = subject.ways
 
-    def predicted(self, way: tuple[str, str]) -> LargestStep:
+    def predicted(self, way: Way) -> LargestStep:
         """Predict the largest stable step of one of `ways`, from the linear models."""
         parts = self._subject.parts(self._rest.values)
         held = self._subject.held(parts)
@@ -215,7 +233,7 @@ class Resting:
         (found,) = largest_steps(parts, self._subject.connections, [way])
         return found
 
-    def growth(self, way: tuple[str, str], step: float) -> float:
+    def growth(self, way: Way, step: float) -> float:
         """Measure by how much a small deviation grows in a step, s, under the master."""
         rest, subject = self._rest, self._subject
         start = subject.at(rest.values).at
@@ -225,7 +243,7 @@ class Resting:
             master.initialize(0.0, None, subject.merged({**rest.values, **moved}))
             return growth(master, step, rest.signals)
 
-    def limit(self, way: tuple[str, str]) -> Limit:
+    def limit(self, way: Way) -> Limit:
         """Predict and measure the limit."""
         step = self.predicted(way).step
         below, above = (self.growth(way, step * (1 + x)) for x in (-WITHIN, WITHIN))

@@ -12,7 +12,8 @@ from rparm.errors import UnplacedError, UserError, WrongValueError, did_you_mean
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import PARAMETERS, Model, Value, Variable
-from rparm.linearization.sampling import Tick, held_numbers, hold, law, period, samplers, ticks
+from rparm.linearization import sampling
+from rparm.linearization.sampling import Tick, held_numbers, hold, law, samplers, ticks
 from rparm.systems.python_component import PythonComponent, PythonInstance
 from rparm.units import typed_quantity
 
@@ -157,7 +158,13 @@ class Linear:
             D=self.D[np.ix_(rows, columns)],
             u=self.u[columns],
             y=self.y[rows],
+            ticks=self._ticks(range(len(self.states)), columns),
         )
+
+    def _ticks(self, states: Sequence[int], inputs: Sequence[int]) -> tuple[Tick, ...]:
+        """Return the ticks as they are with some states and inputs."""
+        columns = [*states, *(len(self.states) + i for i in inputs)]
+        return tuple(tick.reduced(list(states), columns) for tick in self.ticks)
 
     def without(self, states: Iterable[str]) -> "Linear":
         """Leave states out that stand still; their names join `held`."""
@@ -171,19 +178,21 @@ class Linear:
             C=self.C[:, kept],
             x=self.x[kept],
             rates=self.rates[kept],
+            ticks=self._ticks(kept, range(len(self.inputs))),
             held=(*self.held, *(name for name in self.states if name in held)),
         )
 
     def discretized(self) -> "Linear":
-        """Return the model from period to period of its samplers, of one rate; UnplacedError."""
-        n = len(self.states)
+        """Return the model from period to period of its samplers; UnplacedError."""
+        length, begin = sampling.period(self.ticks), sampling.slowest(self.ticks)
+        every = sampling.instants(self.ticks, length, begin)
         with np.errstate(over="ignore", invalid="ignore"):
-            whole, first = period(self.A, self.B, self.ticks)
-        if not np.isfinite(whole).all():
+            A, B, _ = hold(self.A, self.B, length, every)
+        if not (np.isfinite(A).all() and np.isfinite(B).all()):
             raise UnplacedError("deviations overflow within a period of its samplers")
-        A, B = np.split(whole[:n], [n], axis=1)
-        C, D = np.split(np.hstack([self.C, self.D]) @ first, [n], axis=1)
-        return replace(self, A=A, B=B, C=C, D=D, dt=self.ticks[0].every, between=self)
+        F, G, _ = hold(self.A, self.B, 0.0, every[:1])  # over the first ticks
+        C, D = self.C @ F, self.C @ G + self.D
+        return replace(self, A=A, B=B, C=C, D=D, dt=length, between=self)
 
 
 def _places(known: Sequence[str], wanted: Sequence[str] | None, option: str) -> list[int]:
@@ -433,7 +442,7 @@ class FmuSubject(ExitStack):
     def finished(self, found: Linear) -> Linear:
         """Return the model of a point without states that are held, sampled if it has samplers.
 
-        UserError if its samplers have several rates, or if it is sampled and does not say how.
+        UserError if it is sampled and does not say how.
         """
         model = self.fmu.model
         with placed(str(self.fmu.path)):

@@ -102,14 +102,21 @@ def notes(found: Study) -> list[str]:
     """Say what has been left out, in a sentence each."""
     linear, texts = found.linear, []
     if found.python:
+        steps = "the communication step"
+        if linear.dt > 1.5 * found.step:
+            steps = f"the common period of steps of {milliseconds(found.step)} and samplers"
         texts.append(
-            f"Sampled every {milliseconds(linear.dt)}, the communication step, because of Python: "
+            f"Sampled every {milliseconds(linear.dt)}, {steps}, because of Python: "
             f"{_names(found.python)}. States are those at its begin; inputs are held over it."
         )
     elif linear.dt:
-        names = _names(list(dict.fromkeys(tick.name for tick in linear.ticks)))
+        every = {tick.name: tick.every for tick in linear.ticks}
+        why = f" by {_names(list(every))}"
+        if min(every.values()) < linear.dt / 1.5:
+            rates = [f"{name} ({milliseconds(time)})" for name, time in every.items()]
+            why = f", the common period of {_names(rates)}, which a tick of the slowest begins"
         texts.append(
-            f"Sampled every {milliseconds(linear.dt)} by {names}. States are those just before the "
+            f"Sampled every {milliseconds(linear.dt)}{why}. States are those just before the "
             "first tick of a period, outputs those just after it; inputs are held in between."
             + (" Connections act at once: not a communication step late." if found.variant else "")
         )

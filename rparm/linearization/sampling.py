@@ -8,8 +8,9 @@ differentiated by differences of its step over its inputs and the numbers that i
 import math
 import re
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
 
 import numpy as np
 
@@ -18,8 +19,8 @@ from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.model import Model
 from rparm.systems.python_component import PythonInstance
 
-TERMS = 13  # of Taylor's series of an exponential
 SAME = 1e-12  # relative, of times that differ by rounding only
+MOST_TICKS = 10_000  # in a period
 UNDEFINED = sys.float_info.max  # in place of a new value that is not finite
 # description of a local variable, as fmu/equations writes it
 ABOUT = re.compile(r"Sampler (\d+), ([^:]+): (?:(period|offset)|(new value|change|count) of (.+))")
@@ -53,6 +54,16 @@ class Tick:
     late: np.ndarray  # the part of it that other ticks of the instant do not change
     changes: dict[str, float]  # new value less the present one, by state
     modes: list[str]  # others that it changes here
+
+    def reduced(self, states: list[int], columns: list[int]) -> "Tick":
+        """Return the tick of a model with some of the states, and columns of partials."""
+        kept = [i for i, row in enumerate(self.rows) if row in states]
+        partials, late = (x[np.ix_(kept, columns)] for x in (self.partials, self.late))
+        rows = [states.index(self.rows[i]) for i in kept]
+        return replace(self, rows=rows, partials=partials, late=late)
+
+
+Instant = tuple[float, list[Tick]]
 
 
 # ---- Samplers of an FMU --------------------------------------------------------------------------
@@ -108,78 +119,99 @@ def ticks(
 
 
 # ---- From sample to sample -----------------------------------------------------------------------
-def hold(A: np.ndarray, B: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return F, G, S, shapes (n, n), (n, m), (n, m), of x(h) = F x + G u + S u', u at the begin."""
+def hold(
+    A: np.ndarray, B: np.ndarray, step: float, instants: Sequence[Instant] = ()
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return F, G, S, shapes (n, n), (n, m), (n, m), of x(h) = F x + G u + S u', u at the begin.
+
+    Samplers tick at `instants` of the step.
+    """
+    from scipy.linalg import expm
+
     n, m = B.shape
-    if not n:
-        return np.zeros((0, 0)), np.zeros((0, m)), np.zeros((0, m))
-    whole = np.zeros((n + 2 * m, n + 2 * m))
-    whole[:n, :n], whole[:n, n : n + m] = A, B
-    whole[n : n + m, n + m :] = np.eye(m)
-    found = _exponential(whole * step)
-    return found[:n, :n], found[:n, n : n + m], found[:n, n + m :]
+    rates, whole = np.zeros((n + 2 * m, n + 2 * m)), np.eye(n + 2 * m)
+    rates[:n, :n], rates[:n, n : n + m] = A, B
+    rates[n : n + m, n + m :] = np.eye(m)
+    over: dict[str, np.ndarray] = {}  # by the time between two instants
+    ends = [*(time for time, _ in instants), step]
+    for begin, end, here in zip([0.0, *ends], ends, [*(x for _, x in instants), ()], strict=False):
+        if (gap := f"{end - begin:.10g}") not in over:
+            over[gap] = expm(rates * (end - begin))
+        whole = over[gap] @ whole
+        before = whole[: n + m].copy()
+        for tick in here:
+            late = tick.late @ (before - whole[: n + m])
+            whole[tick.rows] = tick.partials @ whole[: n + m] + late
+    return whole[:n, :n], whole[:n, n : n + m], whole[:n, n + m :]
 
 
-def _exponential(matrix: np.ndarray) -> np.ndarray:
-    """Return exp of a matrix: Taylor's series of a part of it, squared; exact but for rounding."""
-    halvings = max(0, 4 + math.frexp(np.abs(matrix).sum(axis=1).max(initial=0.0))[1])
-    part = matrix / 2.0**halvings  # below 1/16: terms fall below rounding at once
-    result = term = np.eye(len(matrix))
-    for order in range(1, TERMS):
-        term = term @ part / order
-        result = result + term
-    for _ in range(halvings):
-        result = result @ result
-    return result
+def period(every: Sequence[Tick], step: float = 0.0) -> float:
+    """Return the shortest time, s, in which samplers tick, and steps fit, a whole number of times.
 
-
-def _check(every: Sequence[Tick]) -> None:
-    """Refuse ticks of several rates, and those that change modes."""
+    UnplacedError: there is no such time, or ticks change modes.
+    """
     for tick in every:
         if tick.modes:
             raise UnplacedError(
                 f"sampler {tick.name} changes {', '.join(tick.modes)} at this point, expected a "
                 "point at which samplers change no modes"
             )
-    if not all(math.isclose(tick.every, every[0].every, rel_tol=SAME) for tick in every):
-        rates = ", ".join(f"{tick.name} every {tick.every:.6g} s" for tick in every)
-        raise UnplacedError(f"samples at several rates, expected one for a linear model: {rates}")
+    times = [(tick.name, tick.every) for tick in every] + [("communication", step)] * (step > 0)
+    longest = max(time for _, time in times)
+    ratios = [Fraction(longest / time).limit_denominator(MOST_TICKS) for _, time in times]
+    found = longest * math.lcm(*(ratio.denominator for ratio in ratios))
+    counts = [found / time for _, time in times]
+    if sum(counts) > MOST_TICKS or any(abs(n - round(n)) > SAME * n for n in counts):
+        rates = ", ".join(f"{name} every {time:.6g} s" for name, time in times)
+        expected = f"expected a common period of at most {MOST_TICKS} ticks"
+        raise UnplacedError(f"samples at several rates, {expected}: {rates}")
+    return found
 
 
-def period(A: np.ndarray, B: np.ndarray, every: Sequence[Tick]) -> tuple[np.ndarray, np.ndarray]:
-    """Return what moves states and inputs, (n + m, n + m), over a period, and over its first ticks.
+def slowest(every: Sequence[Tick]) -> float:
+    """Return the first time, s, of a tick of a sampler of the slowest rate."""
+    least = max(tick.every for tick in every) * (1 - SAME)
+    return min(_first(tick, 0.0) for tick in every if tick.every >= least)
 
-    A period begins just before the tick with the smallest offset, and ends before the next one of
-    this sampler; inputs are held all the time. UnplacedError: rates differ, or modes change.
+
+def instants(every: Sequence[Tick], length: float, begin: float) -> list[Instant]:
+    """Return when samplers tick in `length` s from `begin`, s after it, ticks in order."""
+    times = [
+        (_first(tick, begin) + k * tick.every, i)
+        for i, tick in enumerate(every)
+        for k in range(round(length / tick.every))
+    ]
+    rounding = SAME * (length + max((tick.offset for tick in every), default=0.0))
+    found: list[tuple[float, list[int]]] = []
+    for time, i in sorted(times):
+        if not found or time - found[-1][0] > rounding:
+            found.append((time, []))
+        found[-1][1].append(i)
+    return [(time, [every[i] for i in sorted(here)]) for time, here in found]
+
+
+def by_steps(
+    every: Mapping[str, Sequence[Tick]], step: float
+) -> tuple[float, list[dict[str, list[Instant]]]]:
+    """Return the period, s, of parts with these ticks and of steps, and the instants of each step.
+
+    It begins just after the ticks of an instant: ticks at the end of a step belong to it.
     """
-    _check(every)
-    n, m = B.shape
-    whole, first = np.eye(n + m), None
-    instants = _instants(every)
-    ends = [time for time, _ in instants[1:]] + [instants[0][0] + every[0].every]
-    for (time, here), end in zip(instants, ends, strict=True):
-        before = whole.copy()
-        for tick in here:
-            whole[tick.rows] = tick.partials @ whole + tick.late @ (before - whole)
-        first = whole.copy() if first is None else first
-        transition, forced, _ = hold(A, B, end - time)
-        whole[:n] = np.hstack([transition, forced]) @ whole
-    return whole, first
+    ticking = [replace(tick, name=f"{name}.{tick.name}") for name in every for tick in every[name]]
+    length = period(ticking, step)
+    steps = [{name: list[Instant]() for name in every} for _ in range(round(length / step))]
+    for name, own in every.items():
+        found = [(time or length, here) for time, here in instants(own, length, 0.0)]
+        for time, here in sorted(found, key=lambda instant: instant[0]):
+            k = math.ceil(time / step - SAME * len(steps)) - 1
+            steps[k][name].append((time - k * step, here))
+    return length, steps
 
 
-def _instants(every: Sequence[Tick]) -> list[tuple[float, list[Tick]]]:
-    """Return the times of a period at which samplers tick, s, with the ticks in their order."""
-    found: list[tuple[float, list[Tick]]] = []
-    for tick in every:
-        time = math.fmod(tick.offset, tick.every)
-        rounding = SAME * (tick.every + tick.offset)
-        time = 0.0 if tick.every - time <= rounding else time
-        same = [here for other, here in found if abs(other - time) <= rounding]
-        if same:
-            same[0].append(tick)
-        else:
-            found.append((time, [tick]))
-    return sorted(found, key=lambda instant: instant[0])
+def _first(tick: Tick, begin: float) -> float:
+    """Return the first time of a tick after `begin`, s, or 0 there."""
+    time = (tick.offset - begin) % tick.every
+    return 0.0 if tick.every - time <= SAME * (tick.every + tick.offset) else time
 
 
 # ---- Components in Python ------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from rparm.linearization import linear
 from rparm.linearization.largest_step import LargestStep, largest_steps
 from rparm.linearization.linear import FmuSubject, Linear
 from rparm.linearization.margins import Margins, margins, open_loop
-from rparm.linearization.system import SystemSubject, connected, sampled
+from rparm.linearization.system import SystemSubject
 from rparm.linearization.trim import Trimmed, trim
 from rparm.project import VERSIONS
 from rparm.systems.opened import SUFFIXES
@@ -63,6 +63,7 @@ class Study:
     loop: Linear | None = None  # L where the system is broken
     margins: Margins | None = None  # of `loop`
     python: Sequence[str] = ()  # components in Python, which sample the system
+    step: float = 0.0  # s, of a system
 
 
 def study(request: Request) -> Study:
@@ -96,22 +97,16 @@ def of_system(opened: OpenedSystem, request: Request) -> Study:
         subject = stack.enter_context(made)
         trimmed = _point(subject, request)
         parts = subject.parts(trimmed.values)
-        held, all_parts = subject.held(parts), parts
+        held = subject.held(parts)
         parts = {name: part.without(held[name]) for name, part in parts.items()}
-        if ticks := any(part.ticks for part in parts.values()):
-            whole = subject.joined(all_parts, held)
-        elif subject.python:
-            feeding = [c.start for c in subject.connections]
-            whole = sampled(parts, subject.kept, opened.system.step, feeding)
-        else:
-            whole = connected(parts, subject.kept)
+        whole = subject.joined(parts)
         found = _chosen(whole, trimmed, request)
         units = _units(subject, found)
-        limits: dict[str, Any] = {"python": tuple(subject.python)}
+        limits: dict[str, Any] = {"python": tuple(subject.python), "step": opened.system.step}
         if subject.cut is not None:
             loop = open_loop(whole.select([request.cut], [subject.cut.start]))
             limits |= {"loop": loop, "margins": margins(loop)}
-        elif not ticks:
+        else:
             steps = largest_steps(parts, subject.connections, subject.ways, subject.law)
             limits |= {"largest": steps}
         return Study(path, found, units, request.free, variant, **limits)

@@ -12,7 +12,7 @@ from rparm.files import UnreadableError
 from rparm.fmi.fmu_file import MODEL_EXCHANGE, Fmu
 from rparm.fmi.model import Value, Variable
 from rparm.linearization import linear
-from rparm.linearization.sampling import Tick, hold, samplers
+from rparm.linearization.sampling import Tick, by_steps, hold, samplers
 from rparm.systems import master
 from rparm.systems.master import ConnectedInstance, Master
 from rparm.systems.python_component import PythonComponent, PythonInstance
@@ -93,9 +93,6 @@ class SystemSubject(ExitStack):
                     found[name] = linear.linear_model(instance)
                     self._refuse_sampled(component, found[name], given)
                     continue
-                if self.python:
-                    wrong = f"{name!r} has samplers, and {self.python[0]!r} is in Python"
-                    raise UserError(f"{self.ssp.path}: {wrong}: expected one of both")
                 found[name], _ = self._exchanged(component, given)
         return found
 
@@ -121,15 +118,19 @@ class SystemSubject(ExitStack):
         instance, inputs = self._laws[name]
         return linear.law_model(instance, self.time, step, inputs)
 
-    def joined(
-        self, parts: Mapping[str, linear.Linear], held: Mapping[str, list[str]]
-    ) -> linear.Linear:
-        """Join parts of which some tick, as a discrete model, without held states."""
+    def joined(self, parts: Mapping[str, linear.Linear]) -> linear.Linear:
+        """Join parts, without the connection that is cut: as a discrete model if some are sampled.
+
+        UserError if what is cut is not seen once a period.
+        """
+        if not self.python and not any(part.ticks for part in parts.values()):
+            return connected(parts, self.kept)
+        step, feeding = self.ssp.system.step, [c.start for c in self.connections]
         with placed(self.ssp.path):
             found, whole = (
-                connected(parts, connections)
-                .discretized()
-                .without(f"{name}.{x}" for name in held for x in held[name])
+                sampled(parts, connections, step, feeding)
+                if self.python
+                else connected(parts, connections).discretized()
                 for connections in (self.kept, self.connections)
             )
         if self.cut is not None:
@@ -289,28 +290,37 @@ def sampled(
 ) -> linear.Linear:
     """Join linear models as a master steps them in Jacobi order, every `step` s, inputs held.
 
-    Outputs that follow inputs at once and are `feeding` others are states, too: they are read
-    before the next inputs are set. Inputs are as in `connected`.
+    It is from period to period of samplers and steps, just after their ticks. Outputs that follow
+    inputs at once and are `feeding` others are states, too: they are read before the next inputs
+    are set. Inputs are as in `connected`.
     """
     inputs = [f"{name}.{u}" for name, part in parts.items() for u in part.inputs]
     outputs = [f"{name}.{y}" for name, part in parts.items() for y in part.outputs]
-    blocks = []
-    for part in parts.values():
-        A, B, C, D = _clear(part)
-        blocks.append((*((A, B) if part.dt else hold(A, B, step)[:2]), C, D))
-    A, B, C, D = map(_diagonal, zip(*blocks, strict=True))
+    clear = {name: _clear(part) for name, part in parts.items()}
+    C, D = (_diagonal([blocks[i] for blocks in clear.values()]) for i in (2, 3))
     late = D.any(axis=1) & np.isin(outputs, list(feeding))  # outputs that are states
-    n, k = len(A), int(late.sum())
+    n, k, m = C.shape[1], int(late.sum()), len(inputs)
     y = np.zeros((len(outputs), n + k))  # of all states
     y[~late, :n], y[late, n:] = C[~late], np.eye(k)
     u = _feeding(inputs, outputs, connections) @ y
     at_once = np.where(late[:, None], 0.0, D)
-    x = np.hstack([A, np.zeros((n, k))]) + B @ u
-    whole, terms = np.vstack([x, C[late] @ x + D[late] @ u]), np.abs(np.vstack([x, C[late] @ x]))
+    length, steps = by_steps({name: part.ticks for name, part in parts.items()}, step)
+    over = np.eye(n + k + m)
+    for here in steps:
+        one = [
+            clear[name][:2] if part.dt else hold(*clear[name][:2], step, here[name])[:2]
+            for name, part in parts.items()
+        ]
+        A, B = map(_diagonal, zip(*one, strict=True))
+        x = np.hstack([A, np.zeros((n, k))]) + B @ u
+        whole = np.vstack([x, C[late] @ x + D[late] @ u])
+        terms = np.abs(np.vstack([x, C[late] @ x]))
+        forced = np.vstack([B, C[late] @ B + D[late]])
+        over[: n + k] = np.hstack([linear.cleared(whole, terms), forced]) @ over
     joined = _joined(parts)
     return linear.Linear(
-        A=linear.cleared(whole, terms),
-        B=np.vstack([B, C[late] @ B + D[late]]),
+        A=over[: n + k, : n + k],
+        B=over[: n + k, n + k :],
         C=y + at_once @ u,
         D=at_once,
         **joined
@@ -319,7 +329,7 @@ def sampled(
             "x": np.append(joined["x"], joined["y"][late]),
             "rates": np.append(joined["rates"], np.zeros(k)),
         },
-        dt=step,
+        dt=length,
     )
 
 
@@ -404,6 +414,9 @@ def looped(parts: Mapping[str, linear.Linear], connections: Iterable[Connection]
     arrows = np.zeros((len(nodes), len(nodes)), bool)
     for name, part in parts.items():
         A, B, C, D = _clear(part)
+        for tick in part.ticks:
+            A[tick.rows] += np.abs(tick.partials[:, : len(A)])
+            B[tick.rows] += np.abs(tick.partials[:, len(A) :])
         for cause, effect, matrix in (
             ("states", "states", A), ("inputs", "states", B),
             ("states", "outputs", C), ("inputs", "outputs", D),
@@ -431,5 +444,6 @@ def looped(parts: Mapping[str, linear.Linear], connections: Iterable[Connection]
         }
         if chosen["outputs"]:
             others = [state for state in part.states if state not in chosen["states"]]
-            reduced[name] = part.without(others).select(chosen["inputs"], chosen["outputs"])
+            found = part.without(others).select(chosen["inputs"], chosen["outputs"])
+            reduced[name] = replace(found, ticks=tuple(t for t in found.ticks if t.rows))
     return Looped(reduced, [c for c, _ in on_loop])

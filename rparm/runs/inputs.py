@@ -266,7 +266,8 @@ class Log:
                     yield begin, rows.line_num, row
                 begin = rows.line_num + 1
         except csv.Error as error:
-            raise self._wrong(str(error), rows.line_num) from None
+            is_open = ": a quote opens that is not closed" if begin < rows.line_num else ""
+            raise self._wrong(f"{error}{is_open}", begin) from None
 
     def _no_number(self, row: Sequence[str], columns: Sequence[int], line: int) -> UserError:
         """Return the error for the first value in `columns` of a row that is no finite number."""

@@ -154,6 +154,8 @@ def test_a_mistake_in_a_table_is_one_line(name: str, tmp_path: Path) -> None:
     (tmp_path / "g.csv").write_text("a,d\n1,2\n2,inf\n")
     (tmp_path / "i.csv").write_text("a,d\n1,2,\n2,3,5\n")
     (tmp_path / "h.csv").write_bytes(b"a,d\n\xff\xfe\n")
+    for file, rows in (("j", 5), ("k", 99_999)):  # so many below the quote
+        (tmp_path / f"{file}.csv").write_text('a,d\n1,2\n2,"3\n' + "4,5\n" * rows)
     mistake = MISTAKES["tables"][name]
     with pytest.raises(ModelFileError) as refused:
         read_text(tmp_path, mistake["text"])

@@ -12,11 +12,16 @@ import rparm
 from rparm import __main__ as cli
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import CO_SIMULATION
+from rparm.linearization.largest_step import growth
 from rparm.linearization.responses import frequency_response
 from rparm.linearization.study import Request, study
+from rparm.linearization.system import SystemSubject
+from rparm.systems.master import Master
+from rparm.systems.opened import opened as open_system
 from tests.equations.examples import FOLDER, MODELS, axis, example, made
 
 TEXTS = MODELS["samplers"] | MODELS["sampled"]
+WAY = ("jacobi", "held")
 TEXTS |= {n.upper(): (FOLDER / f"{n}.toml").read_text(encoding="utf-8") for n in ("axis", "pwm")}
 
 
@@ -82,6 +87,28 @@ def test_samplers_with_offsets_compose_in_the_order_of_time(
     assert changes["never"] == {"u": 0.0} and changes["second"] == {"e": pytest.approx(0.1)}
 
 
+@pytest.mark.parametrize("offset", [0, 23, 103, 140])
+def test_the_period_of_several_rates_begins_with_the_slowest(folder: Path, offset: int) -> None:
+    """Of 1, 4 and 10 ms it is 20 ms; at one instant samplers run in the order of the file."""
+    w, begin = 0.3, offset % 100  # 0.1 ms
+    at = {"offset": offset * 1e-4, "w": w}
+    found = rparm.linearize(made(folder, TEXTS["CASCADE"]), at=at)
+    assert found.states == ("i", "w", "u", "e", "ref", "seen")
+    assert found.dt == pytest.approx(0.02)
+    whole, rates, seen = np.eye(7), np.zeros((7, 7)), []  # of states and r
+    rates[:2] = [[-300, -50, 300, 0, 0, 0, 0], [40, -3 * w**2, 0, 0, 0, 0, 0]]
+    sensor, speed, current = np.eye(7), np.eye(7), np.eye(7)
+    sensor[5], speed[4] = np.eye(7)[1], [0, -0.2, 0, 0, 0, -3, 3]
+    current[2:4] = [[-2, 0, 0, 1, 2, 0, 0], [-0.1, 0, 0, 1, 0.1, 0, 0]]
+    for time in range(begin, begin + 200):
+        for law, every, first in (sensor, 40, 0), (speed, 100, begin), (current, 10, 0):
+            whole = law @ whole if (time - first) % every == 0 else whole
+        seen = [*seen, whole]
+        whole = expm(1e-4 * rates) @ whole
+    assert_close(np.hstack([found.A, found.B]), whole[:6])
+    assert_close(np.hstack([found.C, found.D]), seen[0][:6])
+
+
 def test_samplers_with_indexes_have_names_with_indexes(folder: Path) -> None:
     found = rparm.linearize(made(folder, TEXTS["TWO"]))
     assert found.states == ("x[1]", "x[2]", "u[1]", "u[2]") and found.outputs == found.states
@@ -90,29 +117,6 @@ def test_samplers_with_indexes_have_names_with_indexes(folder: Path) -> None:
     rates = np.vstack([np.eye(2, 4, 2) - np.eye(2, 4), np.zeros((2, 4))])
     assert_close(found.A, expm(0.08 * rates) @ second @ expm(0.02 * rates) @ first)
     assert_close(found.C, first)
-
-
-def test_a_run_follows_the_linear_model_to_first_order(folder: Path) -> None:
-    """The difference falls as the square of the deviation, over 20 periods of two instants."""
-    fmu = made(folder, TEXTS["CRANE"])
-    found = rparm.linearize(fmu, at=dict.fromkeys(("phi", "w", "u", "e", "r"), 0.0))
-    trimmed = rparm.linearize(fmu, at={"r": 0.0}, trim=found.states)
-    assert trimmed.x == pytest.approx(np.zeros(4), abs=1e-9)
-    direction, differences = np.array([1.0, -0.7, 0.4, 0.8]), []
-    for size in (1e-3, 1e-5):
-        z, r, rows = size * direction, np.array([0.01 * size]), []
-        given = dict(zip(("p0", "w", "u", "e"), z.tolist(), strict=True))
-        run = rparm.simulate(
-            fmu, stop_time=4.0, step=0.2, inputs={"r": r[0]},
-            start_values={**given, "solver_method": "taylor"}, tolerance=1e-13,
-        )  # fmt: skip
-        for _ in range(21):
-            rows.append(found.C @ z + found.D @ r)
-            z = found.A @ z + found.B @ r
-        exact = np.column_stack([run[name] for name in found.outputs])
-        differences.append(np.abs(exact - rows).max() / size)
-    assert differences[0] < 1e-2
-    assert differences[1] / differences[0] == pytest.approx(1e-2, rel=0.05)
 
 
 def test_a_filter_is_discrete_without_continuous_states(folder: Path) -> None:
@@ -133,9 +137,7 @@ def test_a_state_that_no_tick_moves_is_held(folder: Path) -> None:
     assert_close(np.diag(found.A), np.array([0.5, np.exp(-0.5), 0.0]))
 
 
-RATES = "fast every 0.1 s, slow every 0.3 s, late every 0.1 s"
 REFUSED = {
-    "several rates": ("COUNTERS", {}, f"Counters.fmu: samples at several rates, .* {RATES}$"),
     "modes": ("PWM", {}, "sampler end changes on at this point, expected a point at which"),
     "a time that inputs decide": ("CHOPPER", {}, r"Chopper: event end \(time >= off\): when it"),
     "a part of a period": (
@@ -170,20 +172,44 @@ def test_what_has_no_discrete_model_says_what_to_do(folder: Path) -> None:
         study(Request(made(folder, TEXTS["DEADBEAT"]), kind=CO_SIMULATION))
 
 
-@pytest.mark.parametrize(("old", "new", "cut", "message"), MODELS["loop"]["cases"])
-def test_a_tick_sees_what_other_components_were_before(
-    tmp_path: Path, old: str, new: str, cut: str, message: str
-) -> None:
-    """u = -1.5 x of a sample earlier."""
+def loop(folder: Path, old: str = "", new: str = "") -> Path:
     for name, text in MODELS["loop"]["files"].items():
-        (tmp_path / name).write_text(text.replace(old, new), encoding="utf-8")
-    request = Request(tmp_path / "loop.toml", cut=cut)
-    if message:
-        with pytest.raises(UserError, match=message):
+        (folder / name).write_text(text.replace(old, new), encoding="utf-8")
+    return folder / "loop.toml"
+
+
+@pytest.mark.parametrize(("old", "new", "cut", "expected"), MODELS["loop"]["cases"])
+def test_a_tick_sees_what_other_components_were_before(
+    tmp_path: Path, old: str, new: str, cut: str, expected: str | float
+) -> None:
+    """u = -1.5 x of 0.2 s, and of a delay earlier; the sensor in Python is late by 0.1 s."""
+    request = Request(loop(tmp_path, old, new), cut=cut)
+    if isinstance(expected, str):
+        with pytest.raises(UserError, match=expected):
             study(request)
     else:
-        a, poles = np.exp(-0.2), study(request).linear.poles
-        np.testing.assert_allclose(np.poly(poles), [1, -a, 1.5 * (1 - a), 0], atol=1e-12)
+        found, (a, b) = study(request).linear, np.exp([-0.2, expected - 0.2])
+        characteristic = [1, -a + 1.5 * (1 - b), 1.5 * (b - a), 0]
+        np.testing.assert_allclose(np.poly(found.poles), characteristic, atol=1e-12)
+        assert found.dt == 0.2
+
+
+def test_the_largest_step_of_samplers_is_a_multiple_of_their_period(tmp_path: Path) -> None:
+    """In Jacobi order u acts three steps after x: runs die out at this step, not at the next."""
+    file = loop(tmp_path, "2 * 0.1", "0.05")
+    roots = [np.roots([1, -np.exp(-0.2 * k), 0, 1.5 * -np.expm1(-0.2 * k)]) for k in range(1, 30)]
+    count = [np.abs(found).max() < 1 for found in roots].index(False)
+    (limit,) = [x for x in study(Request(file)).largest if (x.order, x.inputs) == WAY]
+    assert limit.step == pytest.approx(0.2 * count)
+    for step in (limit.step, limit.step + 0.2):
+        with (
+            open_system(file) as system,
+            SystemSubject(system, "default") as subject,
+            Master(subject.fmus, subject.connections, *WAY) as master,
+        ):
+            master.initialize(0.0, None, subject.merged({"plant.x": 1e-3}))
+            measured = growth(master, step, ["plant.x"])
+        assert measured == pytest.approx(np.abs(roots[round(step / 0.2) - 1]).max(), rel=1e-3)
 
 
 @pytest.mark.parametrize("version", ["", "fmi3"])

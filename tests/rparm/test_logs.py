@@ -151,6 +151,11 @@ WRONG = [
         for mistake in MISTAKES["log"]
     ),
     ('time,force\n1,"' + "x" * 200_000, "", "log.csv, line 2: field larger than field limit"),
+    (
+        'time,force\n1,2\n2,"3\n' + "4,5\n" * 99_999,
+        "",
+        "line 3: field larger than field limit (131072): a quote opens that is not closed",
+    ),
     (b"time,force\n1,\xb0\n", "", "log.csv: not UTF-8 text, at byte 13"),
     (LOG.encode("utf-16"), "", "log.csv: not UTF-8 text, at byte 0"),
     ("time,force\n1,\0\n", "", "line 2: column 'force': expected a number"),
