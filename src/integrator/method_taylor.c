@@ -138,6 +138,7 @@ static enum status expand(struct taylor *taylor, double t, double length, bool i
     while (time_scale >= DBL_MIN) {
         const double longest =
             is_long ? longest_step_in_scales(taylor->series.problem, t, time_scale) : 0.0;
+        taylor->series.long_order = taylor->is_searched && t == 0.0 ? (taylor->series.largest_order / 2) | 1 : taylor->series.largest_order;
         const enum status status = taylor_series_expand(&taylor->series, t, time_scale, x, longest);
         if (status != STATUS_OK || !isnan(taylor->series.step)) {
             // the next step need not begin from the whole length again

@@ -17,6 +17,7 @@ static inline bool taylor_series_has_few_rows(const struct ode *ode) {
 
 struct taylor_series {
     struct problem *problem;
+    int long_order;
     int largest_order;
     int order;
     int expected_order; /* order to which a step that lands is expanded at first; the result does
