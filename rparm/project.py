@@ -363,7 +363,7 @@ def commit() -> str:
         "*",
     ]
     with suppress(OSError):
-        return subprocess.run(command, capture_output=True, text=True).stdout.strip()
+        return subprocess.run(command, capture_output=True, encoding="utf-8").stdout.strip()
     return ""
 
 

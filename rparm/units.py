@@ -179,7 +179,7 @@ def short(number: float, digits: int | None = None) -> str:
 
 def exponents(text: str) -> str:
     """Write 1e-8 for 1e-08, and 1e6 for 1e+06."""
-    return re.sub(r"(?<=\d)e\+?(-?)0*(?=\d)", r"e\1", text)
+    return re.sub(r"(?<=\d)e(?:\+|(-))0*(?=\d)", r"e\1", text)
 
 
 def rounded_up(value: float, digits: int) -> str:
@@ -214,7 +214,7 @@ def ordinal(number: int) -> str:
 
 def minus(text: object) -> str:
     """Replace the hyphens before digits by minus signs, as plots have them."""
-    return re.sub(r"(?<![\w.-])-(?=\d)|(?<=\de)-(?=\d)", "\N{MINUS SIGN}", str(text))
+    return re.sub(r"(?<![\w.-])-(?=\d)|(?<=\de)-(?=\d)", "\N{MINUS SIGN}", exponents(str(text)))
 
 
 def unit(text: str | None) -> str:

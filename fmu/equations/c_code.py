@@ -122,7 +122,7 @@ class Code:
         """Return the C expression of a value, without operators."""
         if self.outer and not root.moves:
             return self.outer.of(root)
-        for value in in_order([root], self.known):
+        for value in () if root in self.known else in_order([root], self.known):
             self.known[value] = self._expression(value)
         return self.known[root]
 

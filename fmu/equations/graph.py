@@ -55,6 +55,7 @@ FALLIBLE = ("/", "sqrt", "log", "asin", "acos", "pow", "exp", "sinh", "cosh")
 UNDEFINED = ("/", "sqrt", "log", "asin", "acos", "pow")  # some are not a number
 GROWING = ("exp", "sinh", "cosh")  # results overflow
 STEEP = ("sqrt", "log", "asin", "acos", "pow", "atan2")  # slopes may be infinite or undefined
+NOTED = frozenset((*FALLIBLE, *STEEP))
 RULES = {function: [parse(rule) for rule in rules] for function, rules in DERIVATIVES.items()}
 
 
@@ -68,11 +69,7 @@ class Value:
     number: float
     leaves: frozenset[tuple[str, str]]  # operation and name of all leaves that it follows from
     functions: frozenset[str]  # of FALLIBLE and STEEP, those that it follows from
-
-    @property
-    def moves(self) -> bool:
-        """Whether it may change while parameters and modes stay."""
-        return any(op in MOVING for op, _ in self.leaves)
+    moves: bool  # it may change while parameters and modes stay
 
 
 @dataclass(frozen=True)
@@ -141,11 +138,11 @@ class Graph:
         """The operation as it is."""
         key = (op, tuple(map(id, arguments)), name, number.hex())
         if key not in self.known:
-            own = [(op, name)] if op in LEAVES else []
-            leaves = frozenset(own).union(*(argument.leaves for argument in arguments))
-            used = {op}.intersection((*FALLIBLE, *STEEP))
-            functions = frozenset(used).union(*(argument.functions for argument in arguments))
-            self.known[key] = Value(op, arguments, name, number, leaves, functions)
+            own, used = {(op, name)} if op in LEAVES else (), NOTED & {op}
+            leaves = frozenset(own).union(*[argument.leaves for argument in arguments])
+            functions = used.union(*[argument.functions for argument in arguments])
+            moves = op in MOVING or any([argument.moves for argument in arguments])
+            self.known[key] = Value(op, arguments, name, number, leaves, functions, moves)
         return self.known[key]
 
     def number(self, number: float) -> Value:

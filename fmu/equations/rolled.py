@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain, islice
+from operator import attrgetter, sub
 
 SHORTEST = 400  # lines of a function that gains by loops
 FEWEST_TURNS = 4
@@ -18,10 +20,11 @@ MOST_TRIED = 40  # lengths of a turn
 STRING = r'"(?:\\.|[^"\\])*"'
 STATE = r"(?<=state_indicator\()"
 NUMBER = re.compile(rf"{STRING}|\b([nvzc])(\d+)\b|\[(\d+)|{STATE}(\d+)")  # strings have none
-LITERAL = re.compile(r"(?<![\w.])(?:\d+\.\d+(?:e[-+]?\d+)?|\d+e[-+]?\d+)(?![\w.])")
+LITERAL = re.compile(r"\d(?<![\w.]\d)\d*(?:\.\d+(?:e[-+]?\d+)?|e[-+]?\d+)(?![\w.])")
 RARE, FEWEST_LITERALS = 16, 20  # occurrences of a number, and such numbers, for a table of them
 TABLE = "numbers"
-DEFINITION = re.compile(r"const (double|int) ([nvzc])(\d+) = ")
+NUMBERS = attrgetter("numbers")
+DEFINITION = re.compile(r"const (double|int) ([nvzc])\d+ = ")
 
 
 @dataclass(frozen=True)
@@ -30,19 +33,6 @@ class Line:
 
     form: str
     numbers: tuple[int, ...]
-
-    @classmethod
-    def of(cls, text: str) -> Line:
-        """Take a statement apart."""
-        numbers: list[int] = []
-
-        def hole(number: re.Match[str]) -> str:
-            if not number.lastindex:
-                return number[0]
-            numbers.append(int(number[number.lastindex]))
-            return f"{number[1] or '[' * bool(number[3])}#"
-
-        return cls(NUMBER.sub(hole, text), tuple(numbers))
 
     def text(self, terms: Sequence[str], depth: int) -> Iterator[str]:
         """Yield the lines of C; terms: added to the numbers."""
@@ -60,6 +50,36 @@ class Line:
         yield re.sub(rf"{STRING}|(?:\b[nvzc]|\[|{STATE})#", number, self.form)
 
 
+class Statement:
+    """A statement, taken apart at its numbers once."""
+
+    def __init__(self, text: str) -> None:
+        found = [number for number in NUMBER.finditer(text) if number.lastindex]
+        begins = [number.start(number.lastindex) for number in found]
+        ends = [0, *(number.end() for number in found)]
+        self.pieces = [text[end:begin] for end, begin in zip(ends, [*begins, None], strict=True)]
+        self.names = [number[0] if number[1] else "" for number in found]  # of constants
+        numbers = tuple([int(number[number.lastindex]) for number in found])
+        self.line = Line("#".join(self.pieces), numbers)
+        definition = DEFINITION.match(text)
+        self.defined = self.names[0] if definition else ""
+        self.array = f"{definition[2]}_{definition[1]}s" if definition else ""
+
+    def with_arrays(self, kept: Mapping[str, tuple[str, int]]) -> Line:
+        """Return its line, where elements of arrays replace constants."""
+        if kept.keys().isdisjoint(self.names):
+            return self.line
+        pieces, numbers = [*self.pieces], [*self.line.numbers]
+        for i, name in enumerate(self.names):
+            if name in kept:
+                array, numbers[i] = kept[name]
+                pieces[i] = f"{pieces[i][:-1]}{array}["
+                pieces[i + 1] = f"]{pieces[i + 1]}"
+        if self.defined in kept:
+            pieces[0] = pieces[0].removeprefix("const ").partition(" ")[2]
+        return Line("#".join(pieces), tuple(numbers))
+
+
 @dataclass(frozen=True)
 class Loop:
     """Turns of lines, with the numbers of the first turn."""
@@ -73,8 +93,7 @@ class Loop:
     def __post_init__(self) -> None:
         shape = (tuple(line.form for line in self.lines), self.turns, self.steps)
         object.__setattr__(self, "form", shape)
-        numbers = tuple(number for line in self.lines for number in line.numbers)
-        object.__setattr__(self, "numbers", numbers)
+        object.__setattr__(self, "numbers", (*chain(*map(NUMBERS, self.lines)),))
 
     def text(self, terms: Sequence[str], depth: int = 0) -> Iterator[str]:
         """Yield the lines of C."""
@@ -104,20 +123,18 @@ def rolled(*sections: list[str]) -> list[list[str]]:
     table: list[str] = []  # numbers that are other ones in each turn
     if len(rare) >= FEWEST_LITERALS:
         sections = tuple([_with_table(line, rare, table) for line in s] for s in sections)
-    constants = [DEFINITION.match(line) for section in sections for line in section]
-    arrays = {f"{c[2]}{c[3]}": f"{c[2]}_{c[1]}s" for c in constants if c}  # in their order
-    kept: dict[str, str] = {}  # elements of arrays, by constant
+    statements = [[Statement(line) for line in section] for section in sections]
+    arrays = {s.defined: s.array for section in statements for s in section if s.defined}
+    kept: dict[str, tuple[str, int]] = {}  # elements of arrays, by constant
     sizes: Counter[str] = Counter()
     while True:
-        texts = [[_with_arrays(line, kept) for line in section] for section in sections]
-        found = [_loops([Line.of(text) for text in section]) for section in texts]
-        new = _read_by_others(texts, found)
+        found = [_loops([s.with_arrays(kept) for s in section]) for section in statements]
+        new = _read_by_others(statements, kept, found)
         if not new:
             break
         sizes.clear()
-        names = [name for name in arrays if name in new or name in kept]
-        for name in names:
-            kept[name] = f"{arrays[name]}[{sizes[arrays[name]]}]"
+        for name in [name for name in arrays if name in new or name in kept]:
+            kept[name] = arrays[name], sizes[arrays[name]]
             sizes[arrays[name]] += 1
     lines = [
         _split(text for item in items for text in item.text([""] * len(item.numbers), 0))
@@ -142,13 +159,6 @@ def _with_table(line: str, rare: set[str], table: list[str]) -> str:
         return f"{TABLE}[{len(table) - 1}]"
 
     return LITERAL.sub(moved, line)
-
-
-def _with_arrays(line: str, kept: dict[str, str]) -> str:
-    definition = DEFINITION.match(line)
-    if definition and f"{definition[2]}{definition[3]}" in kept:
-        line = line.removeprefix(f"const {definition[1]} ")
-    return NUMBER.sub(lambda number: kept.get(number[0], number[0]), line) if kept else line
 
 
 def _loops(items: list[Line | Loop]) -> list[Line | Loop]:
@@ -183,50 +193,62 @@ def _loop_at(
     other = following[begin]
     for _ in range(MOST_TRIED):
         length = other - begin
-        if other + length > len(items):
+        if begin + FEWEST_TURNS * length > len(items):
             break
-        turns, steps = 1, _steps(items, forms, begin, other, length)
-        while steps is not None and (
-            _steps(items, forms, begin + (turns - 1) * length, begin + turns * length, length)
-            == steps
-        ):
-            turns += 1
-        if turns >= FEWEST_TURNS:
+        steps = _steps(items, forms, begin, length)
+        if steps is not None:
+            turns, turn = FEWEST_TURNS, forms[begin:other]
+            for b in range(begin + turns * length, len(items), length):
+                if (
+                    forms[b : b + length] != turn
+                    or _rise(items, b - length, length, length) != steps
+                ):
+                    break
+                turns += 1
             return Loop(tuple(items[begin:other]), turns, steps), turns * length
         other = following[other]
     return None, 1
 
 
 def _steps(
-    items: list[Line | Loop], forms: list[int], a: int, b: int, length: int
+    items: list[Line | Loop], forms: list[int], a: int, length: int
 ) -> tuple[int, ...] | None:
-    """Return by how much numbers rise from turn a to turn b; None if these are no turns."""
-    if forms[a : a + length] != forms[b : b + length]:
+    """Return by how much numbers rise from turn to turn; None if these are not enough turns."""
+    if forms[a : a + FEWEST_TURNS * length : length].count(forms[a]) < FEWEST_TURNS:
         return None
-    found: list[int] = []
-    for i in range(length):
-        pairs = zip(items[b + i].numbers, items[a + i].numbers, strict=True)
-        found += [later - earlier for later, earlier in pairs]
-    return tuple(found) if min(found, default=0) >= 0 else None
+    begins, steps = range(a, a + (FEWEST_TURNS - 1) * length, length), ()
+    for count in (1, length):  # most differ in the first line
+        if any(forms[b : b + count] != forms[b + length : b + length + count] for b in begins):
+            return None
+        steps, *others = [_rise(items, b, count, length) for b in begins]
+        if min(steps, default=0) < 0 or any(other != steps for other in others):
+            return None
+    return steps
 
 
-def _read_by_others(texts: list[list[str]], found: list[list[Line | Loop]]) -> set[str]:
+def _rise(items: list[Line | Loop], a: int, count: int, distance: int) -> tuple[int, ...]:
+    """Return by how much the numbers of `count` items rise over a distance."""
+    pairs = (map(NUMBERS, items[b : b + count]) for b in (a + distance, a))
+    return tuple(map(sub, *map(chain.from_iterable, pairs)))
+
+
+def _read_by_others(
+    statements: list[list[Statement]], kept: Container[str], found: list[list[Line | Loop]]
+) -> set[str]:
     """Return the constants that are read where their names do not mean them."""
     where: dict[str, tuple[int, ...]] = {}  # turns in which a constant is defined
     others: set[str] = set()
-    count = iter(range(sum(map(len, texts)) + 1))
-    for section, items in zip(texts, found, strict=True):
-        places = [place for item in items for place in _places(item, (), (), count)]
-        for text, (turns, steps) in zip(section, places, strict=True):
-            is_definition = DEFINITION.match(text) is not None
-            numbers = (number for number in NUMBER.finditer(text) if number.lastindex)
-            for i, number in enumerate(numbers):
-                if is_definition and i == 0:
-                    where[number[0]] = turns
-                elif number[1]:
-                    own = where[number[0]]
+    count = iter(range(sum(map(len, statements)) + 1))
+    for section, items in zip(statements, found, strict=True):
+        places = (place for item in items for place in _places(item, (), (), count))
+        for statement, (turns, steps) in zip(section, places, strict=True):
+            for i, name in enumerate(statement.names):
+                if i == 0 and statement.defined:
+                    where[name] = turns
+                elif name and name not in kept:
+                    own = where[name]
                     if own != turns[: len(own)] or any(step[i] for step in steps[len(own) :]):
-                        others.add(number[0])
+                        others.add(name)
     return others
 
 
@@ -240,10 +262,11 @@ def _places(
     if isinstance(item, Line):
         yield turns, steps
         return
-    for _ in range(item.turns):
-        turn, used = next(count), 0
-        for line in item.lines:
-            end = used + len(line.numbers)
-            own = (*(step[used:end] for step in steps), item.steps[used:end])
+    inside, used = [], 0
+    for line in item.lines:
+        end = used + len(line.numbers)
+        inside.append((line, (*(step[used:end] for step in steps), item.steps[used:end])))
+        used = end
+    for turn in islice(count, item.turns):
+        for line, own in inside:
             yield from _places(line, (*turns, turn), own, count)
-            used = end

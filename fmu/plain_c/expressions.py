@@ -25,7 +25,7 @@ from plain_c.memory import (
     is_real,
     is_whole,
 )
-from plain_c.text import CTextError, Program, refused
+from plain_c.text import CTextError, Program, refused, walk
 from plain_c.values import RELATION, Known
 from rparm.expressions.expression import RELATIONS, in_order
 
@@ -71,6 +71,9 @@ class Expressions(Memory):
 
     def size(self, node: c_ast.Node) -> int:
         """Evaluate a whole number that is known: length of an array, value of an enumerator."""
+        for name in (each.name for each in walk(node) if isinstance(each, c_ast.ID)):
+            if name not in self.program.enumerators and name not in self.program.constants:
+                raise refused(node, f"{name} has no value here: write a number or an enumerator")
         kind, value = self.value(node, self.globals, State())
         if not is_whole(kind) or not isinstance(value, int):
             raise refused(node, "a whole number is expected that is known here")

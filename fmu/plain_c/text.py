@@ -257,8 +257,14 @@ def walk(node: c_ast.Node) -> Iterator[c_ast.Node]:
 
 def check_function(function: c_ast.FuncDef) -> None:
     """Refuse a function with something that is no part of the equations' C."""
+    declared = [node for node in walk(function) if isinstance(node, c_ast.Decl)]
+    values = [node for node in declared if isinstance(node.type, c_ast.TypeDecl)]
+    fixed = {node.name for node in values if "const" in node.quals}
+    fixed -= {node.name for node in values if "const" not in node.quals}
     for node in walk(function):
         match node:
+            case c_ast.Assignment(lvalue=c_ast.ID(name=name)) if name in fixed:
+                raise refused(node, f"{name} is const: leave that out, or give another variable")
             case c_ast.IdentifierType():
                 for name in NO_TYPES.keys() & set(node.names):
                     raise refused(node, NO_TYPES[name])

@@ -1,6 +1,6 @@
 """What the report animates of the machine: plant, efforts of the drives, payload, wall."""
 
-from rparm.models.rp_manipulator.animation import EFFORTS, JOINTS, acting, joints
+from rparm.models.rp_manipulator.animation import EFFORTS, JOINTS, acting, drawn, joints
 from rparm.models.rp_plant.animation import FORCES, geometry, plant_columns
 
 from rparm.report.motion import Animation, Recorded
@@ -18,4 +18,4 @@ def animation(recorded: Recorded) -> Animation:
     attached = trajectory.get("payload_attached")  # campaigns record Reals only
     columns["payload_attached"] = None if attached is None else attached.astype(bool)
     arm = geometry(plant.values) | {"wall": {name: wall.values[name] for name in WALL}}
-    return Animation(columns, {name: trajectory[f"{name}_ref"] for name in JOINTS}, arm)
+    return drawn(columns, {name: trajectory[f"{name}_ref"] for name in JOINTS}, arm)

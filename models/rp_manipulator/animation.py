@@ -16,7 +16,21 @@ VISIBLE = 1e-3  # rad, m: a ghost that is nearer to the arm would be hidden behi
 def animation(recorded: Recorded) -> Animation:
     """The arm with its efforts, and the reference where it is seen to be another motion."""
     columns = joints(recorded) | {name: acting(recorded, name) for name in EFFORTS}
-    return Animation(columns, ghost(recorded), geometry(recorded.values))
+    return drawn(columns, ghost(recorded), geometry(recorded.values))
+
+
+def drawn(
+    columns: dict[str, np.ndarray | None],
+    reference: dict[str, np.ndarray] | None,
+    arm: dict[str, Any],
+) -> Animation:
+    """Add where the links end to what is drawn."""
+    q1, q2 = (columns[name] for name in JOINTS)
+    along = np.exp(1j * q1)
+    across, tip = 1j * arm["a"] * along, (arm["l1"] + q2) * along
+    elbow = arm["l1"] * along
+    links = np.array([0 * tip, elbow, elbow + across, tip + across])
+    return Animation(columns, reference, arm, np.array([links.real, links.imag]))
 
 
 def joints(recorded: Recorded) -> dict[str, np.ndarray | None]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from rparm.models.rp_manipulator.animation import EFFORTS, acting, ghost, joints
+from rparm.models.rp_manipulator.animation import EFFORTS, acting, drawn, ghost, joints
 from rparm.models.rp_manipulator.animation import geometry as arm_geometry
 
 from rparm.fmi.model import Value
@@ -19,7 +19,7 @@ def animation(recorded: Recorded) -> Animation:
     """The plant, driven by its inputs."""
     columns = joints(recorded) | plant_columns(recorded)
     columns |= {name: acting(recorded, name) for name in (*EFFORTS, *FORCES)}
-    return Animation(columns, ghost(recorded), geometry(recorded.values))
+    return drawn(columns, ghost(recorded), geometry(recorded.values))
 
 
 def plant_columns(recorded: Recorded) -> dict[str, np.ndarray | None]:

@@ -127,7 +127,7 @@ ALWAYS_INLINE double series_exponential(const struct series_motion *m, int i, in
     return e[k];
 }
 
-/* Returns order k of plant_friction. Above order 0 the law is that of the forces Fb - Fc and 0. */
+/* Returns order k of plant_friction. Above order 0 the law has Fb - Fc and 0 for Fb and Fc. */
 ALWAYS_INLINE double series_friction(const struct series_motion *m, int i, int k,
                                      double row[][SERIES_LENGTH]) {
     if (!plant_slides(m->modes.joint[i])) {

@@ -260,7 +260,7 @@ class Page:
             [run, *(_rounded(self.table[name][run]) for name in names), self.command(run)]
             for run in worst(self.table[column])
         ]
-        return pages.Table(f"Largest {column}", head, rows)
+        return pages.Table(f"Runs with the largest {column}", head, rows)
 
     def failures_table(self) -> pages.Table:
         head = ["runs", "the first", "its reason", "run it again"]

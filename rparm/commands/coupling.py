@@ -7,14 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rparm import console, project
-from rparm.command_line import (
-    Ended,
-    add_report,
-    add_step,
-    add_system,
-    file_or_name,
-    retyped,
-)
+from rparm.command_line import Ended, add_report, add_step, add_system, file_or_name, retyped
 from rparm.console import Progress
 from rparm.errors import UserError
 from rparm.files import check_writable, from_folder, written

@@ -83,7 +83,8 @@ def do_run(options: argparse.Namespace) -> Ended:
         with written(options.report):
             writer.begin()
             if chosen:
-                writer.forget({scenario.name for scenario in chosen} if options.names else None)
+                some = {scenario.name for scenario in chosen} if options.names else None
+                writer.forget(some, studies=options.tolerance is None)
         done = Done(chosen, own)
         if options.tolerance is not None:
             done.runs = _runs(runs, chosen, bool(twins), done.failures, options.tolerance)
@@ -101,7 +102,7 @@ def do_run(options: argparse.Namespace) -> Ended:
             print_measured(group[0])
         with written(options.report), Progress("report", len(groups), "pages") as progress:
             page = writer.write(groups, done.sweeps, done.studies, progress, done.failures)
-    print()
+    print(*writer.differences, "", sep="\n")
     for name, file in writer.files.items():
         print(f"{name}: {from_here(file)}")
     return _ended(done, (options.report / pages.INDEX).absolute(), page)

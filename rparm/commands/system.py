@@ -7,15 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rparm import console, project
-from rparm.command_line import (
-    Ended,
-    add_flag,
-    add_other,
-    add_report,
-    add_step,
-    add_system,
-    retyped,
-)
+from rparm.command_line import Ended, add_flag, add_other, add_report, add_step, add_system, retyped
 from rparm.console import Progress
 from rparm.errors import UserError, did_you_mean, together
 from rparm.files import check_writable, written

@@ -51,7 +51,7 @@ def write(
         again=again,
     )
     known, parameters = found.known, _parameters(found, true)
-    drawn = [correlations_chart(known, found.covariances.scatter)] if known else []
+    drawn = [correlations_chart(known, found.covariances.scatter)] if len(known) > 1 else []
     drawn.append(autocorrelations_chart(found.whiteness))
     if not root:
         pages.write_assets(folder)
@@ -72,7 +72,7 @@ def _data(found: Identification, model: Model) -> RunData:
     residuals, plots = [], []
     for k, name in enumerate(found.checked.outputs):
         text = unit(model.variables[name].unit)
-        both = [Curve("measured", measured[:, k]), Curve("simulated", predicted[:, k])]
+        both = [Curve("measured", measured[:, k], points=True), Curve("simulated", predicted[:, k])]
         plots.append(Plot(name, text, both))
         left = Curve("residual", predicted[:, k] - measured[:, k])
         residuals.append(Plot(f"residuals of {name}", text, [left]))
@@ -94,7 +94,7 @@ def _validation(found: Identification, model: Model, times: np.ndarray) -> list[
         simulated = np.interp(times, own, second.predicted[:, k], right=np.nan)
         measured = np.interp(times, own[there], second.measured[there, k], right=np.nan)
         text = unit(model.variables[name].unit)
-        curves = [Curve("measured", measured), Curve("simulated", simulated)]
+        curves = [Curve("measured", measured, points=True), Curve("simulated", simulated)]
         note = "The second log, in one go from its start."
         plots.append(Plot(f"validation: {name}", text, curves, note=note))
     return plots
@@ -181,7 +181,7 @@ def correlations(covariance: np.ndarray) -> np.ndarray:
 
 # ---- Charts -------------------------------------------------------------------------------------
 def autocorrelations_chart(tests: Mapping[str, Whiteness]) -> Chart:
-    """Draw them as bars, and the lines between which 95 % of those of noise are."""
+    """Draw them as bars, and lines between which noise stays in 95 % of cases."""
     bound = max((test.bound for test in tests.values()), default=0.0)
     rows = [{"name": name, "values": test.correlations} for name, test in tests.items()]
     title = "Autocorrelation of the residuals: 95 % of noise is between the lines"

@@ -192,9 +192,8 @@ def poles_table(found: Study) -> pages.Table:
     """Return poles, conjugate pairs in one row."""
     linear = found.linear
     cells = [*map(_pole_cells, linear.poles, linear.rates_of(linear.poles))]
-    head = ["real part (1/s)", "imaginary (rad/s)", "frequency (Hz)", "damping", "1/real (s)"]
-    if linear.dt:
-        head = ["real part", "imaginary", "frequency (Hz)", "damping", "time constant (s)"]
+    first = ["real part", "imaginary"] if linear.dt else ["real part (1/s)", "imaginary (rad/s)"]
+    head = [*first, "frequency (Hz)", "damping", "time constant (s)"]
     title = "Poles" if found.loop is None else "Poles of the broken loop"
     return pages.Table(title, head, _rows_of(linear, cells))
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from rparm import project
 from rparm.fmi.model import Value
+from rparm.report.run_data import LINKS
 from rparm.runs.comparison import Run
 from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import Result
@@ -46,6 +47,7 @@ class Animation:
     columns: Mapping[str, np.ndarray | None]  # (rows,), or None: not there
     reference: Mapping[str, np.ndarray] | None  # (rows,): the motion that is drawn as a ghost
     arm: Mapping[str, Any]  # lengths in m, limits, surroundings
+    links: np.ndarray  # (2, points, rows): x and y of the ends of the links in frame 0, m
 
 
 def of_run(run: Run, rows: Rows = EVERY) -> dict | None:
@@ -98,6 +100,7 @@ def of_recorded(folder: str, recorded: Recorded, rows: Rows = EVERY) -> dict[str
         **{name: taken(values) for name, values in animation.columns.items()},
         "reference": reference and {name: taken(values) for name, values in reference.items()},
         "arm": dict(animation.arm),
+        LINKS: animation.links[..., rows].tolist(),
     }
 
 

@@ -11,7 +11,7 @@ from rparm.files import is_file, missing
 from rparm.report.run_data import ROUNDING, TIME, Curve, Plot
 from rparm.runs.comparison import SMALLEST_SCALE
 from rparm.runs.inputs import EARLY, Log, Logged, read_log
-from rparm.units import counted
+from rparm.units import counted, exponents
 
 Others = Mapping[tuple[str, str], Log]  # by section and name of results
 
@@ -68,4 +68,10 @@ def lay(
 
     after = np.minimum(np.searchsorted(found.times, inside - EARLY), len(found.times) - 1)
     other = {"name": str(log.path), "between": bool((found.times[after] > inside + EARLY).any())}
-    return [replace(plot, curves=[*map(laid, plot.curves)]) for plot in plots], other
+    plots = [replace(plot, curves=[*map(laid, plot.curves)]) for plot in plots]
+    drawn = [(plot.unit, c) for plot in plots for c in plot.curves if c.difference is not None]
+    sizes = [np.nanmax(np.abs(curve.difference)) for _, curve in drawn]
+    scales = [max(np.abs(curve.values).max(), SMALLEST_SCALE) for _, curve in drawn]
+    i = int(np.argmax(np.divide(sizes, scales)))
+    largest = f"{drawn[i][1].name} {exponents(f'{sizes[i]:.3g} {drawn[i][0]}'.strip())}"
+    return plots, other | {"largest": f"largest difference {largest} from {log.path}"}

@@ -20,7 +20,7 @@ from rparm import project
 from rparm.files import write_text
 from rparm.report import pages
 from rparm.report.pages import RunPage
-from rparm.report.run_data import Plot
+from rparm.report.run_data import LINKS, Plot
 from rparm.units import number
 
 ENTRY = ".entry.json"
@@ -63,6 +63,7 @@ class Entry:
     error: float | None = None  # the worst one; None if it is NaN or unknown
     bound: float | None = None
     detail: str = ""  # which output is worst, or why the run failed
+    difference: str = ""  # largest one from another result
     line: str = ""  # path of the sparkline
     line_text: str = ""  # its description
     line_of: str = ""  # the variable of the sparkline
@@ -92,17 +93,18 @@ def entry_of(name: str, page: RunPage, group: str, **more: Any) -> Entry:
     known = {"name": name, "title": page.title, "group": group, "status": page.status}
     known |= {"page": f"{name}.html", "command": page.again}
     if page.data is not None:
-        plot, x = page.data.plots[0], page.data.x
-        curve = plot.curves[0]
-        values = curve.values
+        moving = (p for p in page.data.plots if p.log or len({*p.curves[0].values}) > 1)
+        plot, x = next(moving, page.data.plots[0]), np.abs(page.data.x - page.data.x[:1])
+        curve, values = plot.curves[0], plot.curves[0].values
         if plot.log:
             values = np.log10(np.where(values > 0, values, np.nan))
         elif np.abs(values[np.isfinite(values)]).max(initial=0.0) < NOTHING:
             values = np.zeros(len(x))
-        known |= {"line": sparkline(x, values), "shapes": poses(page.data.motion or {})}
+        shapes = poses(np.array(page.data.motion[LINKS])) if page.data.motion else []
+        known |= {"line": sparkline(x, values), "shapes": shapes}
         known["line_text"] = "Motion of the arm; " * bool(known["shapes"]) + plot.text
-        scale = sparkline_scale(x, plot, page.data.axis.unit)
-        known |= {"line_of": curve.name, "line_scale": scale}
+        known["line_scale"] = sparkline_scale(page.data.x, plot, page.data.axis.unit)
+        known["line_of"] = curve.name
     return Entry(**known | more)
 
 
@@ -144,9 +146,10 @@ def write_in_folder(
 
 
 def forget(report: Path, section: str, names: Collection[str] | None = None) -> None:
-    """Remove entries of a section, all or some; and the start page if nothing is left in it."""
+    """Remove pages of a section, all or some; and the start page if nothing is left in it."""
     for name in [entry.name for entry in read(report, section)] if names is None else names:
-        (report / section / f"{name}{ENTRY}").unlink(missing_ok=True)
+        for suffix in (ENTRY, ".html"):
+            (report / section / f"{name}{suffix}").unlink(missing_ok=True)
     if _all(report):
         write(report)
     else:
@@ -209,18 +212,13 @@ def _write(report: Path, found: Mapping[str, Entry]) -> None:
 
 
 # ---- Thumbnails ----------------------------------------------------------------------------------
-def poses(moving: Mapping[str, Any]) -> list[list[str]]:
-    """Draw the path of an arm's end effector, and poses from the first to the last."""
-    arm, q1, q2 = moving.get("arm"), *(np.array(moving.get(x) or ()) for x in ("q1", "q2"))
-    there = np.isfinite(q1) & np.isfinite(q2)
-    if arm is None or not there.any():
+def poses(links: np.ndarray) -> list[list[str]]:
+    """Draw the path of the end effector, and poses from the first to the last."""
+    if not (there := np.isfinite(links).all(axis=(0, 1))).any():
         return []
-    along = np.exp(1j * q1[there])  # a point x + i y in frame 0
-    across = 1j * arm["a"] * along
-    tip = (arm["l1"] + q2[there]) * along + across
-    joints = _placed(np.array([0 * tip, arm["l1"] * along, arm["l1"] * along + across, tip]))
-    shown = np.unique(np.linspace(0, len(tip) - 1, POSES).astype(int))
-    kept = np.unique(np.linspace(0, len(tip) - 1, DOTS).astype(int))
+    joints = _placed(links[0][:, there] + 1j * links[1][:, there])
+    last = joints.shape[1] - 1
+    shown, kept = (np.unique(np.linspace(0, last, n).astype(int)) for n in (POSES, DOTS))
     drawn = [_path(joints[:, i].real, joints[:, i].imag) for i in shown]
     trace = _path(joints[-1, kept].real, joints[-1, kept].imag)
     return [["trace", trace], *(["ghost", path] for path in drawn[:-1]), ["arm", drawn[-1]]]
@@ -251,7 +249,8 @@ def sparkline_scale(x: np.ndarray, plot: Plot, unit: str) -> str:
         values = np.zeros(1)
     low, high = (number(float(f"{value:.3g}")) for value in (values.min(), values.max()))
     between = low if low == high else f"{low} to {high}"
-    parts = (f"{between} {plot.unit}".strip(), f"{x[-1] - x[0]:.3g} {unit}")
+    span = f"{x[-1] - x[0]:.3g}" if unit == "s" else f"{x[0]:.3g} to {x[-1]:.3g}"
+    parts = (f"{between} {plot.unit}".strip(), f"{span} {unit}")
     return ", ".join(SPACE.join(part.rsplit(" ", 1)) for part in parts)
 
 

@@ -13,6 +13,7 @@ from rparm.runs.comparison import SMALLEST_SCALE
 MOST_ROWS = 800  # of a page, so that a report stays small
 FEWEST_PACKED = 8  # numbers; shorter lists stay as they are
 TIME = "time"  # keeps all digits
+LINKS = "links"  # of the motion: for pictures; pages draw by its other values
 ROUNDING = 1e-12  # of a variable's scale: less is rounding of its computation
 SEEN = 1e-6  # of a column's range: extremes that stand out by less are not seen
 
@@ -105,13 +106,14 @@ class RunData:
     def json(self) -> str:
         """Write text for a script element: no text in it ends the element."""
         packer = _Packer()
+        moving = self.motion and {k: x for k, x in self.motion.items() if k != LINKS}
         content = {
             "name": self.name,
             "title": self.title,
             "axis": vars(self.axis),
             TIME: packer.packed(self.x, TIME),
             "plots": [_plot(plot, packer) for plot in self.plots],
-            "motion": packer.packed(self.motion),
+            "motion": packer.packed(moving),
             "other": self.other,
             "arrays": packer.arrays,
         }

@@ -73,6 +73,7 @@ def write(
         error=first.error if np.isfinite(first.error) else None,
         bound=first.bound if first.compared else None,
         detail=f"worst output: {first.worst}",
+        difference=over["largest"] if over else "",
     )
 
 

@@ -137,11 +137,7 @@ def write_variant(
         status=RAN if outcome.is_estimate else PASSED if outcome.passed else FAILED,
         facts=_facts(section, outcome),
         data=data,
-        tables=[
-            *_parameters(ssp, outcome.variant),
-            *_solvers(ssp, run),
-            *_errors(ssp, outcome),
-        ],
+        tables=[*_parameters(ssp, outcome.variant), *_solvers(ssp, run), *_errors(ssp, outcome)],
         notes=[
             *(f"{m.name.capitalize()}: {m.meaning}." for m in section.measures),
             "These numbers are of all steps, also of those that the file leaves out.",

@@ -47,15 +47,17 @@ class ReportWriter:
         """`options` are those of the command, for its pages; `others` what to draw over results."""
         self.folder, self.options, self._others = folder, options, others
         self.files: dict[str, Path] = {}  # pages of users' own files that were written, by name
+        self.differences: list[str] = []  # from other results, a text each
 
     def begin(self) -> None:
         """Write what all pages share: fails now, not after all runs, if there is no room."""
         pages.write_assets(self.folder)
 
-    def forget(self, names: Collection[str] | None = None) -> None:
-        """Take what an earlier run found of all scenarios, or of some, out of the overview."""
+    def forget(self, names: Collection[str] | None, studies: bool) -> None:
+        """Remove what an earlier run found of all scenarios, or of some, and of their studies."""
         overview.forget(self.folder, SCENARIOS, names)
-        overview.forget(self.folder, STUDIES, None if names is None else [ACCURACY])
+        if studies:
+            overview.forget(self.folder, STUDIES, None if names is None else [ACCURACY])
 
     @staticmethod
     def grouped(runs: Sequence[Run]) -> dict[Path, list[Run]]:
@@ -86,6 +88,7 @@ class ReportWriter:
             if group:
                 over = self._others.get((section, scenario.name))
                 entry = scenario_page.write(folder, name, group, again, others, over)
+                self.differences += [f"{name}: {entry.difference}"] if over else []
             else:
                 entry = scenario_page.write_failed(folder, name, others[0], again)
             entries.append(entry if ours else replace(entry, source=str(path)))

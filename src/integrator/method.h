@@ -13,7 +13,9 @@
  * in s since the restart. */
 struct problem {
     struct message_sink sink;
-    double *failed_x; /* the state at failed_at; here, where a step reads nothing */
+    /* here, where a step reads nothing */
+    double *failed_x; /* the state at failed_at */
+    void *observer_context;
     struct ode ode;
     struct integrator_settings settings;
     double origin;     /* time of the simulation at the restart, s: for messages only */
@@ -24,7 +26,6 @@ struct problem {
     double failed_at; /* last time at which the right-hand side failed; -INFINITY if it never did */
     int64_t evaluation_count;      /* calls of the right-hand side, or series begun */
     integrator_observer *observer; /* NULL if there is none */
-    void *observer_context;
     struct location location;
 };
 

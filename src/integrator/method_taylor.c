@@ -209,12 +209,16 @@ static double length_to_expand(const struct taylor *taylor, double now, double t
 static enum status take_step(struct taylor *taylor, double now, double t, bool is_long, double x[],
                              double *end, struct method_work *work) {
     struct taylor_series *series = &taylor->series;
+    const size_t n = series->problem->ode.state_count;
     const double length = length_to_expand(taylor, now, t, is_long);
     enum status status = expand(taylor, now, length, is_long, x, work);
     double step = series->step;
     if (status == STATUS_OK) {
         step = step_within_reach(taylor, x, step);
         status = fit_step(taylor, is_long, &step, work);
+    }
+    if (status == STATUS_NOT_FINITE && !problem_are_finite(series->problem->failed_x, n)) {
+        return problem_fail(series->problem, now, x); // no state that a user can look for
     }
     if (status != STATUS_OK) {
         return status;
@@ -228,7 +232,7 @@ static enum status take_step(struct taylor *taylor, double now, double t, bool i
     if (*end > t) {
         taylor_series_evaluate(series, (t - now) / series->time_scale, x, NULL);
     } else {
-        memcpy(x, taylor->end_x, series->problem->ode.state_count * sizeof(double));
+        memcpy(x, taylor->end_x, n * sizeof(double));
     }
     taylor->last_length = *end - now;
     work->steps++;

@@ -156,7 +156,7 @@ def test_what_moves_is_an_input_of_the_system(folder: Path, console: Console) ->
 
 
 def test_strangers_write_what_ecos_does_not_read(slide: Path, tmp_path: Path) -> None:
-    """No prefix, and parameter sets within the structure; Ecos gets a copy of its kind."""
+    """No prefix, and sets within the structure, all of which apply; Ecos gets a copy of its own."""
     with zipfile.ZipFile(slide) as archive:
         sets = {name: archive.read(name) for name in archive.namelist() if name.endswith(".ssv")}
 
@@ -171,7 +171,7 @@ def test_strangers_write_what_ecos_does_not_read(slide: Path, tmp_path: Path) ->
         return content.replace(b"xmlns:ssd=", b"xmlns=").replace(b"ssd:", b"")
 
     with ssp.unpacked(edited(slide, tmp_path / "x.ssp", {ssp.STRUCTURE: other})) as found:
-        values = ecos.run(found, "light", ["arm.q2"]).values[:, 0]
+        values = ecos.run(found, ssp.ALONE, ["arm.q2"]).values[:, 0]
     assert np.abs(values - exact(1.0)).max() < 1e-8
 
 

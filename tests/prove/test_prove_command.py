@@ -22,7 +22,7 @@ from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.runs import comparison
 from rparm.runs import scenario as scenarios
-from rparm.units import rounded_up
+from rparm.units import minus, rounded_up
 from tests.support.rparm_project import MISTAKES
 
 PROVER = proof.provers()["rp_manipulator"]
@@ -357,7 +357,7 @@ def test_the_page_of_a_proof(own: Path, tmp_path: Path, capsys: pytest.CaptureFi
     assert "The proof assumes the equations of motion" in page
     for name, error in found["methods"]["taylor"].items():
         assert f"proven error of {name}" in page
-        assert f"{rounded_up(error['error'], 2)} at {error['at']:.4g} s" in page
+        assert minus(f"{rounded_up(error['error'], 2)} at {error['at']:.4g} s") in page
     main(["prove", str(own), "--within", "1mrad", "--method", "erk", "--output", str(tmp_path)])
     page = (tmp_path / "proofs" / "own.html").read_text()
     assert "--within</span>" in page and "1mrad" in page

@@ -258,8 +258,8 @@ def test_what_is_forgotten_is_no_longer_shown(tmp_path: Path) -> None:
     forget(tmp_path, "system")
     page = index.read_text(encoding="utf-8")
     assert 'href="scenarios/a.html"' in page and 'href="system/' not in page
-    record(tmp_path, "system", [ENTRY])
-    (tmp_path / "system/a.html").unlink()  # by the user
-    assert 'href="system/' not in write(tmp_path).read_text(encoding="utf-8")
+    assert not (tmp_path / "system/a.html").exists()
+    (tmp_path / "scenarios/a.html").unlink()  # by the user
+    assert 'href="scenarios/' not in write(tmp_path).read_text(encoding="utf-8")
     forget(tmp_path, "scenarios")
     assert not index.exists()

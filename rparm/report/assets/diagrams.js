@@ -78,6 +78,15 @@ const Diagrams = (() => {
         traces.push({ ...piece(mark, place, [angle, angle - mark.lag]), yaxis: 'y2' });
       }
     }
+    // a resonance without damping must not press all else flat
+    const gains = curves.flatMap(({ gain }) => gain.filter(Number.isFinite));
+    const [from, to] = ends.map(Math.log10);
+    const coarse = Array.from({ length: 101 }, (_, i) => 10 ** (from + (i * (to - from)) / 100));
+    const usual = curves.flatMap(({ hertz, gain }) => coarse
+      .filter((at) => at >= hertz[0] && at <= hertz.at(-1)).map((at) => interpolated(hertz, gain, at)))
+      .filter(Number.isFinite);
+    const low = Math.max(Math.min(...gains) - 5, Math.min(...usual) - 20);
+    const high = Math.min(Math.max(...gains) + 5, Math.max(...usual) + 20);
     const angles = curves.flatMap(({ phase }) => phase.filter(Number.isFinite));
     const turns = Math.max(...angles) - Math.min(...angles);
     const scale = turns < 720 ? { dtick: turns < 270 ? 45 : 90, nticks: 0 } : {};
@@ -85,7 +94,7 @@ const Diagrams = (() => {
       traces,
       layout: {
         xaxis: axis('frequency (Hz)', { type: 'log', anchor: 'y2', range: ends.map(Math.log10), dtick: 1, nticks: 0 }),
-        ...stacked([axis('gain (dB)'), axis('phase (degrees)', scale)]),
+        ...stacked([axis('gain (dB)', { range: [low, high] }), axis('phase (degrees)', scale)]),
         shapes: [...(half ? [across(half)] : []), ...[...crossings, ...marks.filter(isGain).map(({ hertz }) => hertz)].map((x) => across(x, '--ink'))],
       },
     };
@@ -218,7 +227,8 @@ const Diagrams = (() => {
   }
 
   function bounds({ curves, x, y }) {
-    const traces = curves.map((curve, i) => ({ ...curve, mode: 'lines', line: line(colour(i)) }));
+    const mode = ({ y: values }) => (values.filter(Number.isFinite).length > 1 ? 'lines' : 'lines+markers');
+    const traces = curves.map((curve, i) => ({ ...curve, mode: mode(curve), line: line(colour(i)), marker: { color: colour(i) } }));
     return { traces, layout: { xaxis: axis(x), yaxis: axis(y, { type: 'log' }) } };
   }
 

@@ -304,20 +304,21 @@ const Plots = (() => {
   class Readout {
     constructor(list, plots, other) {
       this.values = [];
-      const seen = new Set();
+      const seen = new Map(); // values by names: of a variable once, of runs that share a name each
+      const all = plots.flatMap(({ plot }) => plot.curves.map(({ name }) => name));
+      const isShared = (name) => all.indexOf(name) !== all.lastIndexOf(name);
       list.replaceChildren();
       for (const { plot, palette, units } of plots) {
         const names = plot.curves.map(({ name }) => name);
-        if (names.length > 1 && names.join(', ') !== plot.title) {
-          const title = document.createElement('li');
-          title.className = 'group';
-          title.textContent = plot.title;
-          list.append(title);
-        }
+        const title = document.createElement('li');
+        title.className = 'group';
+        title.textContent = plot.title;
+        if ((names.length > 1 || isShared(names[0])) && names.join(', ') !== plot.title) list.append(title);
         plot.curves.forEach((curve, i) => {
           const name = curve.points && curve.name === 'measured' ? `${plot.title} measured` : curve.name;
-          if (seen.has(name)) return;
-          seen.add(name);
+          const known = seen.get(name) ?? [];
+          if (known.some((values) => values.every((value, row) => Object.is(value, curve.values[row])))) return;
+          seen.set(name, [...known, curve.values]);
           const add = (text, values, { unit, factor }, style) => {
             const item = document.createElement('li');
             const label = document.createElement('span');
@@ -337,6 +338,7 @@ const Plots = (() => {
           add(other, curve.other, units.own);
           add('difference', curve.difference, units.difference);
         });
+        if (list.lastChild === title) title.remove();
       }
     }
 
