@@ -428,7 +428,7 @@ void location_lead_from_restart(struct location *location) {
 static const double representation = 1e-12;
 
 /* Returns the first fall of an indicator of the model whose polynomial is given. */
-static double first_of_model(struct location *location, size_t i, double latest) {
+static double first_of_model(struct location *location, size_t i) {
     const struct step_polynomial *step = &location->step;
     const struct roots_polynomial p = {step->indicator_row[i], step->degree, -1.0};
     double size = 0.0;
@@ -437,7 +437,7 @@ static double first_of_model(struct location *location, size_t i, double latest)
     }
     return first_fall(location, i, &p,
                       &(struct fall){.error = representation * size,
-                                     .latest = latest,
+                                     .latest = INFINITY,
                                      .is_restart = step->begin == 0.0});
 }
 
@@ -497,6 +497,9 @@ static double largest(const double samples[], int count) {
     return scale;
 }
 
+/* Errors of a polynomial, as far as they are known, by which it is surely above 0. */
+static const double far_above = 16.0;
+
 /* Searches one indicator in a piece. Returns false if the piece needs more points. */
 static bool search_piece(struct location *location, const struct piece *piece, size_t i,
                          bool is_last_try) {
@@ -507,8 +510,7 @@ static bool search_piece(struct location *location, const struct piece *piece, s
     const bool is_exact = error <= noise;
     const int degree = piece->count - 1;
     if (!is_exact && !is_last_try) {
-        // far enough above 0
-        c[0] -= 16.0 * error;
+        c[0] -= far_above * error;
         const bool is_above = roots_is_above(&(struct roots_polynomial){c, degree, -1.0});
         location->is_armed[i] |= is_above;
         return is_above;
@@ -522,17 +524,18 @@ static bool search_piece(struct location *location, const struct piece *piece, s
     return true;
 }
 
-/* Shortest piece of a step: a step is divided in two until polynomials represent all indicators. */
+/* Shortest piece of a search, in its whole length: it is divided in two until polynomials represent
+ * all indicators. */
 static const double shortest_piece = 0x1p-10;
 
 /* Searches the indicators from number `from` on. */
 static enum status search_model_in(struct location *location, double begin, double length,
-                                   size_t from) {
+                                   double whole, size_t from) {
     struct piece piece;
     enum status status = begin_piece(location, begin, length, &piece);
     size_t i = from;
     while (status == STATUS_OK && i < location->ode->indicator_count) {
-        const bool is_last_try = piece.count == CHEBYSHEV_LENGTH && length <= shortest_piece;
+        const bool is_last_try = piece.count == CHEBYSHEV_LENGTH && length <= shortest_piece * whole;
         const bool is_wanted = location->indicators[i].kind == INDICATOR_OF_MODEL &&
                                !location->has_row[i] && location->first[i] > begin;
         if (!is_wanted || search_piece(location, &piece, i, is_last_try)) {
@@ -540,9 +543,9 @@ static enum status search_model_in(struct location *location, double begin, doub
         } else if (piece.count < CHEBYSHEV_LENGTH) {
             status = sample_between(location, &piece);
         } else {
-            status = search_model_in(location, begin, 0.5 * length, i);
+            status = search_model_in(location, begin, 0.5 * length, whole, i);
             if (status == STATUS_OK) {
-                status = search_model_in(location, begin + 0.5 * length, 0.5 * length, i);
+                status = search_model_in(location, begin + 0.5 * length, 0.5 * length, whole, i);
             }
             break;
         }
@@ -552,8 +555,9 @@ static enum status search_model_in(struct location *location, double begin, doub
 
 /* ---- Steps ---------------------------------------------------------------------------------- */
 
-/* True if the last terms are small and the sum has the value z at the end of the step. */
-static bool is_converged(const double c[], int degree, double z, double relative_tolerance) {
+/* True if the polynomial will do for an indicator that is z at the end: its error, its last terms
+ * and what the sum misses, is small, or it is above 0 by far more: then it becomes lower. */
+static bool represents(double c[], int degree, double z, double relative_tolerance) {
     double sum = 0.0;
     double size = 0.0;
     for (int k = degree; k >= 0; k--) {
@@ -561,28 +565,61 @@ static bool is_converged(const double c[], int degree, double z, double relative
         size += fabs(c[k]);
     }
     const double last = degree > 0 ? fabs(c[degree - 1]) + fabs(c[degree]) : 0.0;
-    return isfinite(size) && last + fabs(sum - z) <= relative_tolerance * size;
+    const double error = last + fabs(sum - z);
+    if (!isfinite(size) || error <= relative_tolerance * size) {
+        return isfinite(size);
+    }
+    c[0] -= far_above * error;
+    return roots_is_above(&(struct roots_polynomial){c, degree, -1.0});
 }
 
-void location_check_rows(struct location *location, const double x[], double relative_tolerance) {
+/* Cuts the rows of the model's indicators at s, the end of the search. Drops those that do not
+ * represent their indicators up to the tolerance: the series may end before an indicator of fast
+ * motion has converged. True if one is left to be interpolated. */
+static bool check_rows(struct location *location, double s) {
     const struct step_polynomial *step = &location->step;
-    bool has_any = false;
-    for (size_t k = 0; k < location->used_count; k++) {
-        has_any |= location->has_row[location->used[k]];
-    }
-    if (!has_any || evaluate(location, step->end, x) != STATUS_OK) {
-        return;
-    }
+    bool is_known = false;
+    bool is_evaluated = false;
+    bool needs_more = false;
     for (size_t k = 0; k < location->used_count; k++) {
         const size_t i = location->used[k];
+        if (location->indicators[i].kind != INDICATOR_OF_MODEL) {
+            continue;
+        }
+        if (location->has_row[i] && !is_evaluated) {
+            is_evaluated = true;
+            location_write_states(location, s, location->x);
+            const double t = step->begin + s * (step->end - step->begin);
+            is_known = evaluate(location, t, location->x) == STATUS_OK;
+        }
+        double power = s;
+        for (int j = 1; location->has_row[i] && s < 1.0 && j <= step->degree; j++) {
+            step->indicator_row[i][j] *= power;
+            power *= s;
+        }
         location->has_row[i] =
             location->has_row[i] &&
-            is_converged(step->indicator_row[i], step->degree, location->z[i], relative_tolerance);
+            (!is_known || represents(step->indicator_row[i], step->degree, location->z[i],
+                                     location->settings->relative_tolerance));
+        needs_more |= !location->has_row[i];
     }
+    return needs_more;
 }
 
 /* Part of a step within which roots of several indicators are one event. */
 static const double same_time = 4.0 * 0x1p-52;
+
+/* Searches the indicators of the model up to s. */
+static enum status search_model(struct location *location, double s) {
+    const bool needs_more = check_rows(location, s);
+    for (size_t k = 0; k < location->used_count; k++) {
+        const size_t i = location->used[k];
+        if (location->has_row[i]) {
+            location->first[i] = s * first_of_model(location, i);
+        }
+    }
+    return needs_more ? search_model_in(location, 0.0, s, s, 0) : STATUS_OK;
+}
 
 enum status location_search(struct location *location) {
     const struct step_polynomial *step = &location->step;
@@ -590,18 +627,15 @@ enum status location_search(struct location *location) {
     double s = INFINITY; // first event so far: no later one is located
     for (size_t k = 0; k < location->used_count; k++) {
         const size_t i = location->used[k];
-        const struct indicator *indicator = &location->indicators[i];
         location->first[i] = INFINITY;
-        if (indicator->kind == INDICATOR_OF_STATE) {
+        if (location->indicators[i].kind == INDICATOR_OF_STATE) {
             location->first[i] = first_of_state(location, i, s + same_time);
-        } else if (location->has_row[i]) {
-            location->first[i] = first_of_model(location, i, s + same_time);
         }
         s = location->first[i] < s ? location->first[i] : s;
-        needs_model |= indicator->kind == INDICATOR_OF_MODEL && !location->has_row[i];
+        needs_model |= location->indicators[i].kind == INDICATOR_OF_MODEL;
     }
     if (needs_model) {
-        const enum status status = search_model_in(location, 0.0, 1.0, 0);
+        const enum status status = search_model(location, s + same_time < 1.0 ? s + same_time : 1.0);
         if (status != STATUS_OK) {
             return status;
         }

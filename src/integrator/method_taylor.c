@@ -24,6 +24,11 @@ static const double most_scales = 1000.0;
 static const double shrinking = 0x1p-20;
 static const double growing = 16.0;
 
+#ifndef O2
+#define O2 4
+#define O1(x) ((x/2)|1)
+#define CAP most_scales
+#endif
 struct taylor {
     struct taylor_series series;
     bool is_searched;     /* true if events are searched since the restart */
@@ -79,6 +84,11 @@ static enum status restart(void *memory, const double x[]) {
     taylor->passed = -INFINITY;
     taylor->is_searched = location_is_active(&taylor->series.problem->location);
     taylor->last_length = taylor->series.problem->first_step;
+    taylor->series.long_order = taylor->series.largest_order;
+    if (taylor->is_searched && taylor->series.problem->is_after_event) {
+        // most of a long step would be lost to the next event
+        taylor->series.long_order = O1(taylor->series.largest_order);
+    }
     return STATUS_OK;
 }
 
@@ -125,7 +135,9 @@ static double longest_step(const struct problem *problem, double t) {
 
 static double longest_step_in_scales(const struct problem *problem, double t, double time_scale) {
     const double longest = longest_step(problem, t) / time_scale;
-    const double most = location_is_active(&problem->location) ? growing : most_scales;
+    // before an event the last step may have been much shorter
+    const bool grows = location_is_active(&problem->location) && !(problem->is_after_event && t == 0.0);
+    const double most = grows ? growing : CAP;
     return longest < most ? longest : most;
 }
 
@@ -138,7 +150,6 @@ static enum status expand(struct taylor *taylor, double t, double length, bool i
     while (time_scale >= DBL_MIN) {
         const double longest =
             is_long ? longest_step_in_scales(taylor->series.problem, t, time_scale) : 0.0;
-        taylor->series.long_order = taylor->is_searched && t == 0.0 ? (taylor->series.largest_order / 2) | 1 : taylor->series.largest_order;
         const enum status status = taylor_series_expand(&taylor->series, t, time_scale, x, longest);
         if (status != STATUS_OK || !isnan(taylor->series.step)) {
             // the next step need not begin from the whole length again
@@ -223,7 +234,12 @@ static enum status take_step(struct taylor *taylor, double now, double t, bool i
     if (status != STATUS_OK) {
         return status;
     }
-    series->expected_order = is_long ? series->expected_order : series->order;
+    if (is_long) {
+        const int next = series->long_order + O2;
+        series->long_order = next < series->largest_order ? next : series->largest_order;
+    } else {
+        series->expected_order = series->order;
+    }
     const bool lands = step == 1.0 && series->time_scale == t - now;
     *end = lands ? t : now + step * series->time_scale;
     if (!(*end > now)) {
@@ -273,7 +289,6 @@ static enum status search(struct taylor *taylor, double end) {
             copy_row(taylor, series->row[row_of_indicator[i]], length, step->indicator_row[i]);
         }
     }
-    location_check_rows(location, taylor->end_x, series->problem->settings.relative_tolerance);
     return location_search(location);
 }
 
