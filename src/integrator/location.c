@@ -535,7 +535,8 @@ static enum status search_model_in(struct location *location, double begin, doub
     enum status status = begin_piece(location, begin, length, &piece);
     size_t i = from;
     while (status == STATUS_OK && i < location->ode->indicator_count) {
-        const bool is_last_try = piece.count == CHEBYSHEV_LENGTH && length <= shortest_piece * whole;
+        const bool is_last_try =
+            piece.count == CHEBYSHEV_LENGTH && length <= shortest_piece * whole;
         const bool is_wanted = location->indicators[i].kind == INDICATOR_OF_MODEL &&
                                !location->has_row[i] && location->first[i] > begin;
         if (!is_wanted || search_piece(location, &piece, i, is_last_try)) {
@@ -635,7 +636,8 @@ enum status location_search(struct location *location) {
         needs_model |= location->indicators[i].kind == INDICATOR_OF_MODEL;
     }
     if (needs_model) {
-        const enum status status = search_model(location, s + same_time < 1.0 ? s + same_time : 1.0);
+        const enum status status =
+            search_model(location, s + same_time < 1.0 ? s + same_time : 1.0);
         if (status != STATUS_OK) {
             return status;
         }

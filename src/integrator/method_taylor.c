@@ -6,7 +6,8 @@
  * end the polynomial must fit the equations.
  *
  * If a restart continues the same solution, its first step has the largest order and is as long as
- * this allows. The requested times in it are values of one polynomial. */
+ * this allows. The requested times in it are values of one polynomial. After an event another one
+ * may be near: then the first step has half the order. */
 #include "method.h"
 #include "taylor_series.h"
 #include "workspace.h"
@@ -24,11 +25,6 @@ static const double most_scales = 1000.0;
 static const double shrinking = 0x1p-20;
 static const double growing = 16.0;
 
-#ifndef O2
-#define O2 4
-#define O1(x) ((x/2)|1)
-#define CAP most_scales
-#endif
 struct taylor {
     struct taylor_series series;
     bool is_searched;     /* true if events are searched since the restart */
@@ -87,7 +83,7 @@ static enum status restart(void *memory, const double x[]) {
     taylor->series.long_order = taylor->series.largest_order;
     if (taylor->is_searched && taylor->series.problem->is_after_event) {
         // most of a long step would be lost to the next event
-        taylor->series.long_order = O1(taylor->series.largest_order);
+        taylor->series.long_order = taylor->series.largest_order / 2 | 1;
     }
     return STATUS_OK;
 }
@@ -136,8 +132,9 @@ static double longest_step(const struct problem *problem, double t) {
 static double longest_step_in_scales(const struct problem *problem, double t, double time_scale) {
     const double longest = longest_step(problem, t) / time_scale;
     // before an event the last step may have been much shorter
-    const bool grows = location_is_active(&problem->location) && !(problem->is_after_event && t == 0.0);
-    const double most = grows ? growing : CAP;
+    const bool grows =
+        location_is_active(&problem->location) && !(problem->is_after_event && t == 0.0);
+    const double most = grows ? growing : most_scales;
     return longest < most ? longest : most;
 }
 
@@ -234,12 +231,8 @@ static enum status take_step(struct taylor *taylor, double now, double t, bool i
     if (status != STATUS_OK) {
         return status;
     }
-    if (is_long) {
-        const int next = series->long_order + O2;
-        series->long_order = next < series->largest_order ? next : series->largest_order;
-    } else {
-        series->expected_order = series->order;
-    }
+    series->expected_order = is_long ? series->expected_order : series->order;
+    series->long_order = series->largest_order;
     const bool lands = step == 1.0 && series->time_scale == t - now;
     *end = lands ? t : now + step * series->time_scale;
     if (!(*end > now)) {
