@@ -47,8 +47,7 @@ static bool place_on_stops(struct rp_plant_values *values, const struct triggere
 }
 
 /* True if a joint on a stop leaves it and comes back from no more than the tolerance of q: at v^2 /
- * (2 |q''|), where q'' points into the stop. Then its energy is no more than the force into the
- * stop does over this way. */
+ * (2 |q''|), where q'' points into the stop. */
 static bool hardly_leaves(const struct rp_plant_values *values, const struct event *event,
                           int joint, int side) {
     const double dq = values->dq[joint];

@@ -497,8 +497,7 @@ static double largest(const double samples[], int count) {
     return scale;
 }
 
-/* Errors of a polynomial, as far as they are known, by which it is surely above 0. */
-static const double far_above = 16.0;
+static const double far_above = 16.0; // errors of a polynomial by which it is surely above 0
 
 /* Searches one indicator in a piece. Returns false if the piece needs more points. */
 static bool search_piece(struct location *location, const struct piece *piece, size_t i,
@@ -524,8 +523,7 @@ static bool search_piece(struct location *location, const struct piece *piece, s
     return true;
 }
 
-/* Shortest piece of a search, in its whole length: it is divided in two until polynomials represent
- * all indicators. */
+/* Shortest part of a search: it is divided in two until polynomials represent all indicators. */
 static const double shortest_piece = 0x1p-10;
 
 /* Searches the indicators from number `from` on. */
@@ -574,49 +572,37 @@ static bool represents(double c[], int degree, double z, double relative_toleran
     return roots_is_above(&(struct roots_polynomial){c, degree, -1.0});
 }
 
-/* Cuts the rows of the model's indicators at s, the end of the search. Drops those that do not
- * represent their indicators up to the tolerance: the series may end before an indicator of fast
- * motion has converged. True if one is left to be interpolated. */
-static bool check_rows(struct location *location, double s) {
+/* Part of a step within which roots of several indicators are one event. */
+static const double same_time = 4.0 * 0x1p-52;
+
+/* Searches the indicators of the model up to s. Rows that do not represent their indicators there
+ * are not used: the series may end before an indicator of fast motion has converged. */
+static enum status search_model(struct location *location, double s) {
     const struct step_polynomial *step = &location->step;
     bool is_known = false;
     bool is_evaluated = false;
     bool needs_more = false;
     for (size_t k = 0; k < location->used_count; k++) {
         const size_t i = location->used[k];
-        if (location->indicators[i].kind != INDICATOR_OF_MODEL) {
-            continue;
-        }
+        double *row = step->indicator_row[i];
         if (location->has_row[i] && !is_evaluated) {
             is_evaluated = true;
             location_write_states(location, s, location->x);
-            const double t = step->begin + s * (step->end - step->begin);
-            is_known = evaluate(location, t, location->x) == STATUS_OK;
+            is_known = evaluate(location, step->begin + s * (step->end - step->begin),
+                                location->x) == STATUS_OK;
         }
         double power = s;
         for (int j = 1; location->has_row[i] && s < 1.0 && j <= step->degree; j++) {
-            step->indicator_row[i][j] *= power;
+            row[j] *= power;
             power *= s;
         }
-        location->has_row[i] =
-            location->has_row[i] &&
-            (!is_known || represents(step->indicator_row[i], step->degree, location->z[i],
-                                     location->settings->relative_tolerance));
-        needs_more |= !location->has_row[i];
-    }
-    return needs_more;
-}
-
-/* Part of a step within which roots of several indicators are one event. */
-static const double same_time = 4.0 * 0x1p-52;
-
-/* Searches the indicators of the model up to s. */
-static enum status search_model(struct location *location, double s) {
-    const bool needs_more = check_rows(location, s);
-    for (size_t k = 0; k < location->used_count; k++) {
-        const size_t i = location->used[k];
+        location->has_row[i] = location->has_row[i] &&
+                               (!is_known || represents(row, step->degree, location->z[i],
+                                                        location->settings->relative_tolerance));
         if (location->has_row[i]) {
             location->first[i] = s * first_of_model(location, i);
+        } else {
+            needs_more |= location->indicators[i].kind == INDICATOR_OF_MODEL;
         }
     }
     return needs_more ? search_model_in(location, 0.0, s, s, 0) : STATUS_OK;

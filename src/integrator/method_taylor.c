@@ -80,11 +80,9 @@ static enum status restart(void *memory, const double x[]) {
     taylor->passed = -INFINITY;
     taylor->is_searched = location_is_active(&taylor->series.problem->location);
     taylor->last_length = taylor->series.problem->first_step;
-    taylor->series.long_order = taylor->series.largest_order;
-    if (taylor->is_searched && taylor->series.problem->is_after_event) {
-        // most of a long step would be lost to the next event
-        taylor->series.long_order = taylor->series.largest_order / 2 | 1;
-    }
+    const int largest = taylor->series.largest_order;
+    const bool is_event_near = taylor->is_searched && taylor->series.problem->is_after_event;
+    taylor->series.long_order = is_event_near ? largest / 2 | 1 : largest;
     return STATUS_OK;
 }
 
@@ -131,10 +129,8 @@ static double longest_step(const struct problem *problem, double t) {
 
 static double longest_step_in_scales(const struct problem *problem, double t, double time_scale) {
     const double longest = longest_step(problem, t) / time_scale;
-    // before an event the last step may have been much shorter
-    const bool grows =
-        location_is_active(&problem->location) && !(problem->is_after_event && t == 0.0);
-    const double most = grows ? growing : most_scales;
+    const bool is_free = problem->is_after_event && t == 0.0; // whatever the last length was
+    const double most = location_is_active(&problem->location) && !is_free ? growing : most_scales;
     return longest < most ? longest : most;
 }
 

@@ -49,7 +49,6 @@ void taylor_series_configure(struct taylor_series *series) {
         left *= e * e;
     }
     series->largest_order = order + 1 - order % 2;
-    series->long_order = series->largest_order;
     series->expected_order = LEAST_ORDER;
 }
 
