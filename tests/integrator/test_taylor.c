@@ -221,14 +221,6 @@ static void test_no_tolerance_takes_more_orders_than_a_row_has(void) {
     TEST_ASSERT_EQUAL_INT(SERIES_LENGTH - 1, statistics().last_order);
 }
 
-static void test_rest_stays_rest(void) {
-    double x[2];
-    create(square_rhs, square_series, 0.0);
-    restart(0.0, 3.0, INFINITY, true);
-    advance(1.0, x);
-    TEST_ASSERT_TRUE(x[0] == 0.0 && x[1] == 3.0);
-}
-
 /* ---- Extremes ------------------------------------------------------------------------------- */
 
 static void test_a_pole_is_not_passed(void) {

@@ -86,15 +86,6 @@ def test_exact_state_does_not_depend_on_the_precision(problem: Problem) -> None:
     assert largest == pytest.approx(problem.largest, rel=1e-12)
 
 
-def test_motion_is_bounded_and_not_chaotic(problem: Problem) -> None:
-    """A change of the start by 1e-6 does not grow: the motion does not amplify errors of steps."""
-    assert max(problem.largest.values()) < 10
-    initial = problem.scenario.initial
-    for name in problem.exact:
-        changed = replace(problem.scenario, initial=initial | {name: initial[name] + 1e-6})
-        assert problem.final_error(final_state(changed)[0]) < 5e-5
-
-
 def test_derivatives_of_the_inputs_are_exact() -> None:
     t = sp.Symbol("t")
     sines = Sines(0.3, ((2.0, 0.4, 0.1), (-0.7, 1.3, -2.0)))
@@ -191,12 +182,6 @@ def test_error_of_the_integration_by_itself(
 
 
 # ---- Fit and verdict ---------------------------------------------------------------------------
-
-
-def test_slopes_of_powers_are_their_exponents(problem: Problem) -> None:
-    found = made_up(problem, 1.0, 2.0, 3.0, 4.0, floor=0.0)
-    assert found.slopes[:3] == pytest.approx((1, 2, 3), abs=1e-12)
-    assert found.passed and found.violations == []
 
 
 def test_errors_near_that_of_the_integration_do_not_count(problem: Problem) -> None:
