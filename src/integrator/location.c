@@ -321,10 +321,8 @@ double fall_first(const struct roots_polynomial *p, const struct fall *fall) {
     if (rises) {
         return fall_behind(p, 0.0);
     }
-    if (roots_is_above(p)) {
-        return INFINITY;
-    }
-    return p->c[0] > 0.0 ? fall_or_end(p, fall) : roots_search_first(p);
+    const double s = roots_first(p);
+    return s > 0.0 && s <= 1.0 ? fall_or_end(p, fall) : s;
 }
 
 /* Returns fall_first of indicator i; given: the fields of struct fall that do not follow from
@@ -428,7 +426,7 @@ void location_lead_from_restart(struct location *location) {
 static const double representation = 1e-12;
 
 /* Returns the first fall of an indicator of the model whose polynomial is given. */
-static double first_of_model(struct location *location, size_t i) {
+static double first_of_model(struct location *location, size_t i, double latest) {
     const struct step_polynomial *step = &location->step;
     const struct roots_polynomial p = {step->indicator_row[i], step->degree, -1.0};
     double size = 0.0;
@@ -437,7 +435,7 @@ static double first_of_model(struct location *location, size_t i) {
     }
     return first_fall(location, i, &p,
                       &(struct fall){.error = representation * size,
-                                     .latest = INFINITY,
+                                     .latest = latest,
                                      .is_restart = step->begin == 0.0});
 }
 
@@ -497,8 +495,6 @@ static double largest(const double samples[], int count) {
     return scale;
 }
 
-static const double far_above = 16.0; // errors of a polynomial by which it is surely above 0
-
 /* Searches one indicator in a piece. Returns false if the piece needs more points. */
 static bool search_piece(struct location *location, const struct piece *piece, size_t i,
                          bool is_last_try) {
@@ -509,7 +505,8 @@ static bool search_piece(struct location *location, const struct piece *piece, s
     const bool is_exact = error <= noise;
     const int degree = piece->count - 1;
     if (!is_exact && !is_last_try) {
-        c[0] -= far_above * error;
+        // far enough above 0
+        c[0] -= 16.0 * error;
         const bool is_above = roots_is_above(&(struct roots_polynomial){c, degree, -1.0});
         location->is_armed[i] |= is_above;
         return is_above;
@@ -523,18 +520,17 @@ static bool search_piece(struct location *location, const struct piece *piece, s
     return true;
 }
 
-/* Shortest part of a search: it is divided in two until polynomials represent all indicators. */
+/* Shortest piece of a step: a step is divided in two until polynomials represent all indicators. */
 static const double shortest_piece = 0x1p-10;
 
 /* Searches the indicators from number `from` on. */
 static enum status search_model_in(struct location *location, double begin, double length,
-                                   double whole, size_t from) {
+                                   size_t from) {
     struct piece piece;
     enum status status = begin_piece(location, begin, length, &piece);
     size_t i = from;
     while (status == STATUS_OK && i < location->ode->indicator_count) {
-        const bool is_last_try =
-            piece.count == CHEBYSHEV_LENGTH && length <= shortest_piece * whole;
+        const bool is_last_try = piece.count == CHEBYSHEV_LENGTH && length <= shortest_piece;
         const bool is_wanted = location->indicators[i].kind == INDICATOR_OF_MODEL &&
                                !location->has_row[i] && location->first[i] > begin;
         if (!is_wanted || search_piece(location, &piece, i, is_last_try)) {
@@ -542,9 +538,9 @@ static enum status search_model_in(struct location *location, double begin, doub
         } else if (piece.count < CHEBYSHEV_LENGTH) {
             status = sample_between(location, &piece);
         } else {
-            status = search_model_in(location, begin, 0.5 * length, whole, i);
+            status = search_model_in(location, begin, 0.5 * length, i);
             if (status == STATUS_OK) {
-                status = search_model_in(location, begin + 0.5 * length, 0.5 * length, whole, i);
+                status = search_model_in(location, begin + 0.5 * length, 0.5 * length, i);
             }
             break;
         }
@@ -554,9 +550,8 @@ static enum status search_model_in(struct location *location, double begin, doub
 
 /* ---- Steps ---------------------------------------------------------------------------------- */
 
-/* True if the polynomial will do for an indicator that is z at the end: its error, its last terms
- * and what the sum misses, is small, or it is above 0 by far more: then it becomes lower. */
-static bool represents(double c[], int degree, double z, double relative_tolerance) {
+/* True if the last terms are small and the sum has the value z at the end of the step. */
+static bool is_converged(const double c[], int degree, double z, double relative_tolerance) {
     double sum = 0.0;
     double size = 0.0;
     for (int k = degree; k >= 0; k--) {
@@ -564,49 +559,28 @@ static bool represents(double c[], int degree, double z, double relative_toleran
         size += fabs(c[k]);
     }
     const double last = degree > 0 ? fabs(c[degree - 1]) + fabs(c[degree]) : 0.0;
-    const double error = last + fabs(sum - z);
-    if (!isfinite(size) || error <= relative_tolerance * size) {
-        return isfinite(size);
+    return isfinite(size) && last + fabs(sum - z) <= relative_tolerance * size;
+}
+
+void location_check_rows(struct location *location, const double x[], double relative_tolerance) {
+    const struct step_polynomial *step = &location->step;
+    bool has_any = false;
+    for (size_t k = 0; k < location->used_count; k++) {
+        has_any |= location->has_row[location->used[k]];
     }
-    c[0] -= far_above * error;
-    return roots_is_above(&(struct roots_polynomial){c, degree, -1.0});
+    if (!has_any || evaluate(location, step->end, x) != STATUS_OK) {
+        return;
+    }
+    for (size_t k = 0; k < location->used_count; k++) {
+        const size_t i = location->used[k];
+        location->has_row[i] =
+            location->has_row[i] &&
+            is_converged(step->indicator_row[i], step->degree, location->z[i], relative_tolerance);
+    }
 }
 
 /* Part of a step within which roots of several indicators are one event. */
 static const double same_time = 4.0 * 0x1p-52;
-
-/* Searches the indicators of the model up to s. Rows that do not represent their indicators there
- * are not used: the series may end before an indicator of fast motion has converged. */
-static enum status search_model(struct location *location, double s) {
-    const struct step_polynomial *step = &location->step;
-    bool is_known = false;
-    bool is_evaluated = false;
-    bool needs_more = false;
-    for (size_t k = 0; k < location->used_count; k++) {
-        const size_t i = location->used[k];
-        double *row = step->indicator_row[i];
-        if (location->has_row[i] && !is_evaluated) {
-            is_evaluated = true;
-            location_write_states(location, s, location->x);
-            is_known = evaluate(location, step->begin + s * (step->end - step->begin),
-                                location->x) == STATUS_OK;
-        }
-        double power = s;
-        for (int j = 1; location->has_row[i] && s < 1.0 && j <= step->degree; j++) {
-            row[j] *= power;
-            power *= s;
-        }
-        location->has_row[i] = location->has_row[i] &&
-                               (!is_known || represents(row, step->degree, location->z[i],
-                                                        location->settings->relative_tolerance));
-        if (location->has_row[i]) {
-            location->first[i] = s * first_of_model(location, i);
-        } else {
-            needs_more |= location->indicators[i].kind == INDICATOR_OF_MODEL;
-        }
-    }
-    return needs_more ? search_model_in(location, 0.0, s, s, 0) : STATUS_OK;
-}
 
 enum status location_search(struct location *location) {
     const struct step_polynomial *step = &location->step;
@@ -614,16 +588,18 @@ enum status location_search(struct location *location) {
     double s = INFINITY; // first event so far: no later one is located
     for (size_t k = 0; k < location->used_count; k++) {
         const size_t i = location->used[k];
+        const struct indicator *indicator = &location->indicators[i];
         location->first[i] = INFINITY;
-        if (location->indicators[i].kind == INDICATOR_OF_STATE) {
+        if (indicator->kind == INDICATOR_OF_STATE) {
             location->first[i] = first_of_state(location, i, s + same_time);
+        } else if (location->has_row[i]) {
+            location->first[i] = first_of_model(location, i, s + same_time);
         }
         s = location->first[i] < s ? location->first[i] : s;
-        needs_model |= location->indicators[i].kind == INDICATOR_OF_MODEL;
+        needs_model |= indicator->kind == INDICATOR_OF_MODEL && !location->has_row[i];
     }
     if (needs_model) {
-        const enum status status =
-            search_model(location, s + same_time < 1.0 ? s + same_time : 1.0);
+        const enum status status = search_model_in(location, 0.0, 1.0, 0);
         if (status != STATUS_OK) {
             return status;
         }

@@ -65,6 +65,12 @@ static inline bool location_is_active(const struct location *location) {
     return location->indicators != NULL;
 }
 
+/* Drops the rows of location->step that do not represent their indicators up to the relative
+ * tolerance: the series may end before an indicator of fast motion has converged. x: the states at
+ * the end of the step. */
+NONNULL void location_check_rows(struct location *location, const double x[],
+                                 double relative_tolerance);
+
 /* Searches location->step. If it has an event, writes its time and the indicators that have
  * triggered. */
 MUST_CHECK NONNULL enum status location_search(struct location *location);

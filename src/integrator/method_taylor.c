@@ -6,8 +6,7 @@
  * end the polynomial must fit the equations.
  *
  * If a restart continues the same solution, its first step has the largest order and is as long as
- * this allows. The requested times in it are values of one polynomial. After an event another one
- * may be near: then the first step has half the order. */
+ * this allows. The requested times in it are values of one polynomial. */
 #include "method.h"
 #include "taylor_series.h"
 #include "workspace.h"
@@ -80,9 +79,6 @@ static enum status restart(void *memory, const double x[]) {
     taylor->passed = -INFINITY;
     taylor->is_searched = location_is_active(&taylor->series.problem->location);
     taylor->last_length = taylor->series.problem->first_step;
-    const int largest = taylor->series.largest_order;
-    const bool is_event_near = taylor->is_searched && taylor->series.problem->is_after_event;
-    taylor->series.long_order = is_event_near ? largest / 2 | 1 : largest;
     return STATUS_OK;
 }
 
@@ -129,8 +125,7 @@ static double longest_step(const struct problem *problem, double t) {
 
 static double longest_step_in_scales(const struct problem *problem, double t, double time_scale) {
     const double longest = longest_step(problem, t) / time_scale;
-    const bool is_free = problem->is_after_event && t == 0.0; // whatever the last length was
-    const double most = location_is_active(&problem->location) && !is_free ? growing : most_scales;
+    const double most = location_is_active(&problem->location) ? growing : most_scales;
     return longest < most ? longest : most;
 }
 
@@ -228,7 +223,6 @@ static enum status take_step(struct taylor *taylor, double now, double t, bool i
         return status;
     }
     series->expected_order = is_long ? series->expected_order : series->order;
-    series->long_order = series->largest_order;
     const bool lands = step == 1.0 && series->time_scale == t - now;
     *end = lands ? t : now + step * series->time_scale;
     if (!(*end > now)) {
@@ -278,6 +272,7 @@ static enum status search(struct taylor *taylor, double end) {
             copy_row(taylor, series->row[row_of_indicator[i]], length, step->indicator_row[i]);
         }
     }
+    location_check_rows(location, taylor->end_x, series->problem->settings.relative_tolerance);
     return location_search(location);
 }
 

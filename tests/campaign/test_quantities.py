@@ -84,14 +84,14 @@ def test_a_system_takes_units_too(tmp_path: Path) -> None:
 
 
 def test_an_angle_beyond_a_turn_is_asked_about(tmp_path: Path, console: Console) -> None:
-    changes = [("[-2.0, 0.2]", "[90, 0.2]"), ("[1.0, 3.0]", '["1 g", 2.0]')]
+    changes = [("[-2.0, 0.2]", "[90, 0.2]"), ("[1.0, 3.0]", '["1 lb", 2.0]')]
     path = write(tmp_path, changes=changes)
     code, _, err = console("campaign", path, "--fmu", FMUS["rp_manipulator"])
     asked, error = err.splitlines(keepends=True)
     assert code == 2
     assert asked.endswith("[parameters.q1]: 90 rad is 14.3 turns, is that meant? In degrees it is "
                           '"90 deg".\n')  # fmt: skip
-    assert "[parameters.m2] uniform: unknown unit 'g'" in error
+    assert "[parameters.m2] uniform: unknown unit 'lb'" in error
     assert_one_line(error)
 
 

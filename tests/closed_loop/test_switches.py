@@ -8,7 +8,7 @@ import pytest
 
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
-from rparm.systems.master import Master
+from rparm.systems.master import Master, Snapshot
 from rparm.systems.structure import Connection
 from tests.support.paths import ROOT
 
@@ -90,6 +90,17 @@ def test_a_release_is_passed_on_too(fmus: dict[str, Fmu]) -> None:
         force = rows[:, master.names.index("controller.tau1")]
     jumps = np.flatnonzero(np.abs(np.diff(force)) > 3.0) + 1
     np.testing.assert_array_equal(jumps * H, [GRASP, 2 * GRASP])
+
+
+def test_going_back_over_a_switch_repeats_bit_for_bit(fmus: dict[str, Fmu]) -> None:
+    with wired(fmus) as master:
+        master.initialize(0.0, None, parameters(GRASP))
+        master.run(np.arange(5) * H)
+        with Snapshot(master) as snapshot:
+            snapshot.take()
+            first = master.run(np.arange(4, 17) * H)
+            snapshot.restore()
+            np.testing.assert_array_equal(master.run(np.arange(4, 17) * H), first)
 
 
 def test_a_boolean_feeds_a_boolean_only(fmus: dict[str, Fmu]) -> None:
