@@ -425,7 +425,27 @@ void location_lead_from_restart(struct location *location) {
 /* Largest error of a polynomial that represents an indicator, relative to the values' scale. */
 static const double representation = 1e-12;
 
-/* Returns the first fall of an indicator of the model whose polynomial is given. */
+/* Returns the root s of the polynomial p, corrected to a root of its indicator. error: of p where
+ * the correction is not worth an evaluation. */
+static double corrected(struct location *location, size_t i, const struct roots_polynomial *p,
+                        double error, double s) {
+    const struct step_polynomial *step = &location->step;
+    for (int tries = 0; tries < 3; tries++) {
+        const double t = step->begin + s * (step->end - step->begin);
+        location_write_states(location, s, location->x);
+        const bool is_known = evaluate(location, t, location->x) == STATUS_OK;
+        const double next = s - location->z[i] / horner(p->c, p->degree, s).slope;
+        const bool is_small = fabs(next - s) < 0x1p-10;
+        if (!is_known || !is_small || next <= 0.0 || fabs(location->z[i]) <= error) {
+            break;
+        }
+        s = fmin(next, 1.0);
+    }
+    return s;
+}
+
+/* Returns the first fall of an indicator of the model whose polynomial is given: it is as exact as
+ * the steps are. */
 static double first_of_model(struct location *location, size_t i, double latest) {
     const struct step_polynomial *step = &location->step;
     const struct roots_polynomial p = {step->indicator_row[i], step->degree, -1.0};
@@ -433,10 +453,11 @@ static double first_of_model(struct location *location, size_t i, double latest)
     for (int k = 0; k <= step->degree; k++) {
         size += fabs(p.c[k]);
     }
-    return first_fall(location, i, &p,
-                      &(struct fall){.error = representation * size,
-                                     .latest = latest,
-                                     .is_restart = step->begin == 0.0});
+    const double error = representation * size;
+    const double s = first_fall(
+        location, i, &p,
+        &(struct fall){.error = error, .latest = latest, .is_restart = step->begin == 0.0});
+    return s < 1.0 ? corrected(location, i, &p, error, s) : s;
 }
 
 /* Writes all indicators at s of the whole step to column k of samples. */

@@ -173,6 +173,10 @@ static const double *discrete_in(const struct relations *model, const void *valu
     return (const double *)(const void *)((const char *)values + model->discrete.offset);
 }
 
+static const double *states_in(const struct relations *model, const void *values) {
+    return (const double *)(const void *)((const char *)values + model->states);
+}
+
 static double *discrete_of(const struct call *call) {
     return (double *)(void *)((char *)call->values + call->model->discrete.offset);
 }
@@ -301,6 +305,15 @@ static enum status assign(const struct call *call, int number, const struct even
     return refused != NULL ? refuse(call, event, refused) : check_counts(call, event);
 }
 
+/* Gives states that have jumped the error of the few roundings of what was assigned: otherwise a
+ * state that is put onto its limit, a last digit beyond, would meet it again at once. */
+static void allow_rounding(const struct call *call) {
+    const double *x = states_in(call->model, call->values);
+    for (int i = 0; i < call->model->state_count; i++) {
+        call->room.tolerance[i] = fmax(call->room.tolerance[i], 8.0 * DBL_EPSILON * fabs(x[i]));
+    }
+}
+
 /* Performs an event or a sampler, and updates all modes. */
 static enum status perform(const struct call *call, int number, const struct event *event) {
     const struct relations *model = call->model;
@@ -309,6 +322,7 @@ static enum status perform(const struct call *call, int number, const struct eve
     if (status != STATUS_OK) {
         return status;
     }
+    allow_rounding(call);
     update_timed_modes(call);
     update_modes_until_stable(call, false);
     switch_fallen(call);
@@ -437,7 +451,7 @@ static enum status start_samplers(const struct call *call, const struct event *e
 enum status relations_update(const struct relations *model, struct relations_room room,
                              void *values, const struct event *event) {
     struct call call = call_of(model, room, values, event->t, event->du, event->largest_inputs);
-    const double *x = (const double *)(const void *)((const char *)values + model->states);
+    const double *x = states_in(model, values);
     double *tolerance = room.tolerance;
     const int was_begun = *call.is_begun;
     if (!was_begun) {

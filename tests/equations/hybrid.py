@@ -33,6 +33,7 @@ TOLERANCES = (1e-5, 1e-7, 1e-10)
 FACTOR = {"cvode_bdf": 100.0}
 OTHERS = 10.0
 ROUNDING = 1e-9  # likewise, whatever the tolerance
+OF_OFFSET = 2e-10  # likewise of each impact, if the condition has an offset of a million units
 OF_MASTER = 1e-6  # what the master of Model Exchange adds
 LARGEST_ERROR = 2e-3  # where more is possible, nothing is compared
 
@@ -154,6 +155,7 @@ def failures(
             error = (
                 FACTOR.get(method, OTHERS) * float(tolerance)
                 + ROUNDING
+                + OF_OFFSET * (model.form == "offset") * len(model.motion.impacts)
                 + OF_MASTER * (kind == "model_exchange")
             )
             judge = Judge(model, error)
