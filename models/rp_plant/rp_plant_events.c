@@ -59,7 +59,7 @@ static bool hardly_leaves(const struct rp_plant_values *values, const struct eve
     (void)rp_plant_find_rest(&values->parameters, values->q, values->dq, &modes, &decision.rest);
     rp_plant_decide(&values->parameters, values->q, values->dq, &values->inputs, &modes, &decision);
     const double into = -side * decision.outcome.ddq[joint];
-    return into > 0.0 && dq * dq <= 2.0 * into * event->tolerance[joint];
+    return into > 0.0 && dq * dq <= 2.0 * into * fmax(event->rest, 1.0) * event->tolerance[joint];
 }
 
 static bool moves_into_stop(const struct rp_plant_values *values, const int side[2]) {

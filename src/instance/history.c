@@ -171,6 +171,7 @@ static struct integrator_start start_of(struct instance *instance) {
         .horizon = state->horizon,
         .first_step = state->restart_step,
         .continues = state->restart_continues,
+        .is_after_event = state->restart_after_event,
         .indicators = instance->model->events != NULL ? describe_indicators(instance) : NULL};
 }
 
@@ -256,6 +257,7 @@ static enum status restart(struct instance *instance, struct clock_time end,
     state->steps_before_restart = state->statistics.steps;
     state->restart_step = state->next_step;
     state->restart_continues = continuation != CONTINUE_AFTER_CHANGE;
+    state->restart_after_event = is_event;
     const struct integrator_start start = start_of(instance);
     return integrator_restart(instance->integrator,
                               doubles_of(memory->restart_values, instance->model->states), &start);

@@ -42,6 +42,9 @@ static void write_tolerances(struct instance *instance) {
     }
 }
 
+/* Bouncing ends below this part of the requested tolerance, with every method. */
+static const double rest_fraction = 0.1;
+
 /* True if triggered, as in struct instance, says that a time event has come. */
 static bool is_timed(const struct instance *instance, const bool *triggered) {
     return triggered != NULL && triggered[instance->model->events->indicator_count];
@@ -79,6 +82,8 @@ static enum status update(struct instance *instance, const bool *triggered) {
             polynomials_move(inputs, input_count) ? instance->memory.largest_inputs : NULL,
         .du_is_known = !instance->is_integrated_outside,
         .tolerance = instance->event_tolerances,
+        .rest = rest_fraction * instance_requested_tolerance(instance, &instance->state) /
+                instance->state.own.effective_relative_tolerance,
         .max_events = instance->state.own.max_events,
         .text = &text,
         .reason = reason,

@@ -294,6 +294,7 @@ static void transfer_state(struct codec *codec, const struct instance *instance,
     codec_real(codec, &state->restart_step);
     codec_real(codec, &state->next_step);
     codec_bool(codec, "restart_continues", &state->restart_continues);
+    codec_bool(codec, "restart_after_event", &state->restart_after_event);
     transfer_structure(codec, instance, block + (memory->values - memory->block));
     transfer_structure(codec, instance, block + (memory->restart_values - memory->block));
     // the three arrays of inputs lie side by side

@@ -57,14 +57,19 @@ static void write_absolute_tolerances(const struct instance *instance, double ab
 }
 
 /* The parameter takes precedence over the experiment, and this over the default. */
+double instance_requested_tolerance(const struct instance *instance,
+                                    const struct instance_state *state) {
+    if (state->own.relative_tolerance > 0.0) {
+        return state->own.relative_tolerance;
+    }
+    return state->experiment.tolerance_defined
+               ? fmin(state->experiment.tolerance, INSTANCE_COARSEST_EXPERIMENT_TOLERANCE)
+               : instance->description->default_tolerance;
+}
+
 double instance_tolerance(const struct instance *instance, const struct instance_state *state) {
     const enum integrator_method method = (enum integrator_method)state->own.solver_method;
-    double tolerance = instance->description->default_tolerance;
-    if (state->own.relative_tolerance > 0.0) {
-        tolerance = state->own.relative_tolerance;
-    } else if (state->experiment.tolerance_defined) {
-        tolerance = fmin(state->experiment.tolerance, INSTANCE_COARSEST_EXPERIMENT_TOLERANCE);
-    }
+    const double tolerance = instance_requested_tolerance(instance, state);
     return fmin(fmax(integrator_tolerance_fraction(method) * tolerance, INSTANCE_FINEST_TOLERANCE),
                 INSTANCE_COARSEST_TOLERANCE);
 }

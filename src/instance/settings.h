@@ -15,7 +15,9 @@ instance_check_experiment(const struct instance *instance,
 /* Returns STATUS_OK if the parameters are consistent; otherwise a message says why not. */
 MUST_CHECK NONNULL enum status instance_check_parameters(struct instance *instance);
 
-/* Returns the relative tolerance at which the integrator runs, by the settings in state. */
+/* Return the requested relative tolerance, and the one of the integrator, by settings in state. */
+NONNULL double instance_requested_tolerance(const struct instance *instance,
+                                            const struct instance_state *state);
 NONNULL double instance_tolerance(const struct instance *instance,
                                   const struct instance_state *state);
 

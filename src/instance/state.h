@@ -48,7 +48,8 @@ struct instance_state {
     int64_t steps_before_restart; /* internal steps before the restart */
     double restart_step; /* first internal step of the last restart, s; 0 if the method found it */
     double next_step;    /* first internal step of a restart now, s; 0 if the method finds it */
-    bool restart_continues; /* true if the last restart continued the solution before it */
+    bool restart_continues;   /* true if the last restart continued the solution before it */
+    bool restart_after_event; /* true if it did so after an event */
 
     enum event_point event_point;
     struct clock_time cut_end; /* end of the step without that event */

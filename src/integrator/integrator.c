@@ -146,6 +146,7 @@ enum status integrator_restart(struct integrator *integrator, const double x[],
     problem->horizon = start->horizon;
     problem->first_step = start->first_step;
     problem->continues = start->continues;
+    problem->is_after_event = start->is_after_event;
     problem->reached = 0.0;
     problem->failed_at = -INFINITY;
     memcpy(integrator->reached_x, x, problem->ode.state_count * sizeof(double));

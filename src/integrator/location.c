@@ -321,8 +321,10 @@ double fall_first(const struct roots_polynomial *p, const struct fall *fall) {
     if (rises) {
         return fall_behind(p, 0.0);
     }
-    const double s = roots_first(p);
-    return s > 0.0 && s <= 1.0 ? fall_or_end(p, fall) : s;
+    if (roots_is_above(p)) {
+        return INFINITY;
+    }
+    return p->c[0] > 0.0 ? fall_or_end(p, fall) : roots_search_first(p);
 }
 
 /* Returns fall_first of indicator i; given: the fields of struct fall that do not follow from
@@ -516,6 +518,8 @@ static double largest(const double samples[], int count) {
     return scale;
 }
 
+static const double far_above = 16.0; // errors of a polynomial by which it is surely above 0
+
 /* Searches one indicator in a piece. Returns false if the piece needs more points. */
 static bool search_piece(struct location *location, const struct piece *piece, size_t i,
                          bool is_last_try) {
@@ -526,8 +530,7 @@ static bool search_piece(struct location *location, const struct piece *piece, s
     const bool is_exact = error <= noise;
     const int degree = piece->count - 1;
     if (!is_exact && !is_last_try) {
-        // far enough above 0
-        c[0] -= 16.0 * error;
+        c[0] -= far_above * error;
         const bool is_above = roots_is_above(&(struct roots_polynomial){c, degree, -1.0});
         location->is_armed[i] |= is_above;
         return is_above;
@@ -571,8 +574,10 @@ static enum status search_model_in(struct location *location, double begin, doub
 
 /* ---- Steps ---------------------------------------------------------------------------------- */
 
-/* True if the last terms are small and the sum has the value z at the end of the step. */
-static bool is_converged(const double c[], int degree, double z, double relative_tolerance) {
+/* True if the polynomial will do for an indicator that is z at the end of the step: its error, by
+ * its last terms and what the sum misses, is small, or it stays above 0 by far more. Then it
+ * becomes lower. */
+static bool represents(double c[], int degree, double z, double relative_tolerance) {
     double sum = 0.0;
     double size = 0.0;
     for (int k = degree; k >= 0; k--) {
@@ -580,7 +585,12 @@ static bool is_converged(const double c[], int degree, double z, double relative
         size += fabs(c[k]);
     }
     const double last = degree > 0 ? fabs(c[degree - 1]) + fabs(c[degree]) : 0.0;
-    return isfinite(size) && last + fabs(sum - z) <= relative_tolerance * size;
+    const double error = last + fabs(sum - z);
+    if (!isfinite(size) || error <= relative_tolerance * size) {
+        return isfinite(size);
+    }
+    c[0] -= far_above * error;
+    return roots_is_above(&(struct roots_polynomial){c, degree, -1.0});
 }
 
 void location_check_rows(struct location *location, const double x[], double relative_tolerance) {
@@ -596,7 +606,7 @@ void location_check_rows(struct location *location, const double x[], double rel
         const size_t i = location->used[k];
         location->has_row[i] =
             location->has_row[i] &&
-            is_converged(step->indicator_row[i], step->degree, location->z[i], relative_tolerance);
+            represents(step->indicator_row[i], step->degree, location->z[i], relative_tolerance);
     }
 }
 
@@ -620,7 +630,7 @@ enum status location_search(struct location *location) {
         needs_model |= indicator->kind == INDICATOR_OF_MODEL && !location->has_row[i];
     }
     if (needs_model) {
-        const enum status status = search_model_in(location, 0.0, 1.0, 0);
+        const enum status status = search_model_in(location, 0.0, fmin(s + same_time, 1.0), 0);
         if (status != STATUS_OK) {
             return status;
         }

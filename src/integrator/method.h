@@ -21,8 +21,8 @@ struct problem {
     double origin;     /* time of the simulation at the restart, s: for messages only */
     double horizon;    /* time beyond which the right-hand side is not evaluated */
     double first_step; /* length of the first internal step, s; 0 if the method finds one */
-    bool continues;    /* as in struct integrator_start */
-    double reached;    /* end of the last advance; 0 after a restart */
+    bool continues, is_after_event; /* as in struct integrator_start */
+    double reached;                 /* end of the last advance; 0 after a restart */
     double failed_at; /* last time at which the right-hand side failed; -INFINITY if it never did */
     int64_t evaluation_count;      /* calls of the right-hand side, or series begun */
     integrator_observer *observer; /* NULL if there is none */

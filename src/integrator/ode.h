@@ -99,6 +99,7 @@ struct integrator_start {
         first_step; /* result of integrator_next_step for a solution like this one; 0 if unknown */
     bool continues; /* true if the solution is the one that was integrated up to here: further
                        advances are likely */
+    bool is_after_event; /* true if it continues after an event: the next one may be near */
     const struct indicator *indicators; /* indicators of the ode until the next restart; they must
                                            stay. NULL to search no events */
 };

@@ -134,7 +134,7 @@ static enum status find_order(struct taylor_series *series) {
 enum status taylor_series_expand(struct taylor_series *series, double t, double time_scale,
                                  const double x[], double longest) {
     const bool is_long = longest > 0.0;
-    const int last = is_long ? series->largest_order : series->expected_order;
+    const int last = is_long ? series->long_order : series->expected_order;
     const enum status status = begin(series, t, time_scale, x, last);
     if (status != STATUS_OK || !is_long) {
         return status != STATUS_OK ? status : find_order(series);

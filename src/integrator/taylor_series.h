@@ -18,6 +18,7 @@ static inline bool taylor_series_has_few_rows(const struct ode *ode) {
 struct taylor_series {
     struct problem *problem;
     int largest_order;
+    int long_order; /* order of the next step that is as long as its order allows */
     int order;
     int expected_order; /* order to which a step that lands is expanded at first; the result does
                            not depend on it */

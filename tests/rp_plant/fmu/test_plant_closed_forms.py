@@ -15,6 +15,7 @@ from rparm.fmi.fmu_file import Fmu
 from tests.rp_plant.fmu.plant_runs import (
     COMPLIANT,
     FIRM,
+    RIGID,
     each_method,
     each_step,
     events,
@@ -78,6 +79,23 @@ def test_held_against_efforts_that_change(plant: Fmu, method: str) -> None:
         assert states.view.tolist() == [*start.values(), 0.0, 0.0]
         assert last_event(instance) == (0, 0.0)
         assert instance.integer("solver_restarts") == 0
+
+
+# ---- Rigid stops -----------------------------------------------------------------------------
+
+
+@each_method
+def test_bouncing_ends_at_a_tenth_of_the_requested_tolerance(plant: Fmu, method: str) -> None:
+    """The slide falls on its stop. Each bounce has a quarter of the height of the one before."""
+    g, height, e, tolerance = 9.81, 0.3, 0.5, 1e-8
+    bounces = math.ceil(math.log(0.1 * tolerance * (0.2 + 0.01) / height) / math.log(e * e))
+    fall = math.sqrt(2 * height / g)
+    end = fall * (1 + 2 * sum(e**n for n in range(1, bounces)))
+    start = {"stops2": RIGID, "lower2": -0.2, "restitution2": e}
+    start |= {"a": 0.0, "q1": math.pi / 2, "q2": height - 0.2, "coulomb_friction1": FIRM}
+    with started(plant, method, tolerance, **start) as instance:
+        assert events(instance, 1.0, 1.0) == [(bounces, near(end, 100 * tolerance))]
+        assert read(instance, "q2", "dq2") == [-0.2, 0.0]
 
 
 # ---- Compliant stops -------------------------------------------------------------------------
