@@ -18,7 +18,7 @@ from tests.equations.compiled import BUILD, building, declaration, lock, read_te
 from tests.equations.hybrid_models import Polynomial
 
 METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3, "taylor": 4}
-MASTER_STEP = 2e-3  # s, of Model Exchange
+MASTER_STEP = 1e-3  # s, of Model Exchange
 MOST_EVENTS = 300
 
 
