@@ -7,7 +7,7 @@
  *
  * If a restart continues the same solution, its first step has the largest order and is as long as
  * this allows. The requested times in it are values of one polynomial. After an event another one
- * may be near: then the first step has half the order. */
+ * may be near: then the first step has half the order at most. */
 #include "method.h"
 #include "taylor_series.h"
 #include "workspace.h"
@@ -80,9 +80,7 @@ static enum status restart(void *memory, const double x[]) {
     taylor->passed = -INFINITY;
     taylor->is_searched = location_is_active(&taylor->series.problem->location);
     taylor->last_length = taylor->series.problem->first_step;
-    const int largest = taylor->series.largest_order;
-    const bool is_event_near = taylor->is_searched && taylor->series.problem->is_after_event;
-    taylor->series.long_order = is_event_near ? largest / 2 | 1 : largest;
+    taylor->series.is_event_near = taylor->is_searched && taylor->series.problem->is_after_event;
     return STATUS_OK;
 }
 
@@ -227,7 +225,7 @@ static enum status take_step(struct taylor *taylor, double now, double t, bool i
         return status;
     }
     series->expected_order = is_long ? series->expected_order : series->order;
-    series->long_order = series->largest_order;
+    series->is_event_near = false;
     const bool lands = step == 1.0 && series->time_scale == t - now;
     *end = lands ? t : now + step * series->time_scale;
     if (!(*end > now)) {

@@ -134,13 +134,23 @@ static enum status find_order(struct taylor_series *series) {
 enum status taylor_series_expand(struct taylor_series *series, double t, double time_scale,
                                  const double x[], double longest) {
     const bool is_long = longest > 0.0;
-    const int last = is_long ? series->long_order : series->expected_order;
-    const enum status status = begin(series, t, time_scale, x, last);
+    const int least = series->is_event_near ? LEAST_ORDER + 2 : series->largest_order;
+    int last = is_long ? least : series->expected_order;
+    enum status status = begin(series, t, time_scale, x, last);
     if (status != STATUS_OK || !is_long) {
         return status != STATUS_OK ? status : find_order(series);
     }
     double size[SERIES_LENGTH];
     write_sizes(series, last - 1, last, size);
+    // the next event may be as near as the last one: most of a longer step would be lost to it
+    while (last < series->largest_order / 2 && size[last - 1] + size[last] > 1.0) {
+        last += 2;
+        status = taylor_series_add_orders(series, last);
+        if (status != STATUS_OK) {
+            return status;
+        }
+        write_sizes(series, last - 1, last, size);
+    }
     series->step = step_of_last_terms(size + last - 1, last, longest);
     return STATUS_OK;
 }

@@ -18,7 +18,7 @@ static inline bool taylor_series_has_few_rows(const struct ode *ode) {
 struct taylor_series {
     struct problem *problem;
     int largest_order;
-    int long_order; /* order of the next step that is as long as its order allows */
+    bool is_event_near; /* true if the next long step begins at an event */
     int order;
     int expected_order; /* order to which a step that lands is expanded at first; the result does
                            not depend on it */
@@ -41,7 +41,8 @@ NONNULL void taylor_series_destroy(struct taylor_series *series);
 NONNULL void taylor_series_configure(struct taylor_series *series);
 
 /* Expands the solution about the state x at the time t, and writes `step`. If longest > 0, the step
- * is as long as the largest order allows, and at most this long. If it is 0, orders are added until
+ * is as long as the largest order allows, and at most this long; if an event is near, half the
+ * order at most, or what suffices one time scale ahead. If longest is 0, orders are added until
  * the terms one time scale ahead are within the tolerance; the step is 1, or less if the largest
  * order is not enough. */
 MUST_CHECK NONNULL enum status taylor_series_expand(struct taylor_series *series, double t,
