@@ -125,6 +125,7 @@ enum status location_restart(struct location *location, const struct indicator *
                              const double x[]) {
     location->indicators = indicators;
     location->time = INFINITY;
+    location->calm = 0.0;
     if (indicators == NULL) {
         return STATUS_OK;
     }
@@ -520,6 +521,44 @@ static double largest(const double samples[], int count) {
 
 static const double far_above = 16.0; // errors of a polynomial by which it is surely above 0
 
+/* True if the indicators that are searched at these points stay above 0, because they vary by far
+ * less than they are above it. */
+static bool are_calm(struct location *location, int count) {
+    for (size_t k = 0; k < location->used_count; k++) {
+        const size_t i = location->used[k];
+        double lowest = location->samples[i][0];
+        double highest = lowest;
+        for (int j = 1; j < count; j++) {
+            lowest = fmin(lowest, location->samples[i][j]);
+            highest = larger(location->samples[i][j], highest);
+        }
+        const bool is_wanted =
+            location->indicators[i].kind == INDICATOR_OF_MODEL && !location->has_row[i];
+        const double noise = location->is_armed[i] ? 0.0 : location->noise[i];
+        if (is_wanted && !(lowest > larger(noise, 0.5 * far_above * (highest - lowest)))) {
+            return false;
+        }
+        location->is_armed[i] |= is_wanted;
+    }
+    return true;
+}
+
+/* True if indicators that were calm in the last step are so in this one, which is not much longer:
+ * three points are enough to see them begin to move. */
+static bool stay_calm(struct location *location) {
+    const double length = location->step.end - location->step.begin;
+    if (length > 2.0 * location->calm) {
+        return false;
+    }
+    for (int k = 0; k < 3; k++) {
+        if (sample(location, 0.5 * k, k) != STATUS_OK) {
+            return false;
+        }
+    }
+    location->calm = are_calm(location, 3) ? length : 0.0;
+    return location->calm > 0.0;
+}
+
 /* Searches one indicator in a piece. Returns false if the piece needs more points. */
 static bool search_piece(struct location *location, const struct piece *piece, size_t i,
                          bool is_last_try) {
@@ -552,6 +591,10 @@ static enum status search_model_in(struct location *location, double begin, doub
                                    size_t from) {
     struct piece piece;
     enum status status = begin_piece(location, begin, length, &piece);
+    if (status == STATUS_OK && length == 1.0 && are_calm(location, piece.count)) {
+        location->calm = location->step.end - location->step.begin;
+        return STATUS_OK;
+    }
     size_t i = from;
     while (status == STATUS_OK && i < location->ode->indicator_count) {
         const bool is_last_try = piece.count == CHEBYSHEV_LENGTH && length <= shortest_piece;
@@ -629,7 +672,7 @@ enum status location_search(struct location *location) {
         s = location->first[i] < s ? location->first[i] : s;
         needs_model |= indicator->kind == INDICATOR_OF_MODEL && !location->has_row[i];
     }
-    if (needs_model) {
+    if (needs_model && !stay_calm(location)) {
         const enum status status = search_model_in(location, 0.0, fmin(s + same_time, 1.0), 0);
         if (status != STATUS_OK) {
             return status;

@@ -37,15 +37,17 @@ struct location {
     double *noise; /* by indicator: how far from 0 it may be, with either sign, without having risen
                       since the restart */
     double *touch; /* by indicator, as in struct fall */
-    double *rounding;                    /* by indicator, at the restart; 0 if not known */
-    bool *triggered;                     /* by indicator: true if it is at 0 at `time` */
-    struct step_polynomial step;         /* last internal step; methods write it */
-    double (*rows)[SERIES_LENGTH];       /* room for the rows of the states */
-    double *x;                           /* states at one point */
-    double *dx;                          /* room for states at another point */
-    double *restart_x;                   /* states at the restart */
-    double *z;                           /* indicators at one point */
-    double *first;                       /* by indicator: s of its first root in the step */
+    double *rounding;              /* by indicator, at the restart; 0 if not known */
+    bool *triggered;               /* by indicator: true if it is at 0 at `time` */
+    struct step_polynomial step;   /* last internal step; methods write it */
+    double (*rows)[SERIES_LENGTH]; /* room for the rows of the states */
+    double *x;                     /* states at one point */
+    double *dx;                    /* room for states at another point */
+    double *restart_x;             /* states at the restart */
+    double *z;                     /* indicators at one point */
+    double calm;   /* length of the last step if the interpolated indicators hardly moved in it, s;
+                      else 0 */
+    double *first; /* by indicator: s of its first root in the step */
     double (*samples)[CHEBYSHEV_LENGTH]; /* by indicator */
 };
 
