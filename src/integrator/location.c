@@ -521,7 +521,7 @@ static double largest(const double samples[], int count) {
 
 static const double far_above = 16.0; // errors of a polynomial by which it is surely above 0
 
-/* True if the indicators that are searched at these points stay above 0, because they vary by far
+/* True if the indicators of the whole step, at these points, stay above 0 because they vary by far
  * less than they are above it. */
 static bool are_calm(struct location *location, int count) {
     for (size_t k = 0; k < location->used_count; k++) {
@@ -540,23 +540,23 @@ static bool are_calm(struct location *location, int count) {
         }
         location->is_armed[i] |= is_wanted;
     }
+    for (size_t i = 0; i < location->ode->indicator_count; i++) {
+        location->samples[i][0] = location->samples[i][count - 1]; // the next step begins there
+    }
+    location->calm = location->step.end - location->step.begin;
+    location->calm_end = location->step.end;
     return true;
 }
 
 /* True if indicators that were calm in the last step are so in this one, which is not much longer:
- * three points are enough to see them begin to move. */
+ * its begin, middle and end are enough to see them begin to move. */
 static bool stay_calm(struct location *location) {
-    const double length = location->step.end - location->step.begin;
-    if (length > 2.0 * location->calm) {
-        return false;
-    }
-    for (int k = 0; k < 3; k++) {
-        if (sample(location, 0.5 * k, k) != STATUS_OK) {
-            return false;
-        }
-    }
-    location->calm = are_calm(location, 3) ? length : 0.0;
-    return location->calm > 0.0;
+    const struct step_polynomial *step = &location->step;
+    const double before = location->calm;
+    location->calm = 0.0;
+    return step->end - step->begin <= 2.0 * before && step->begin == location->calm_end &&
+           sample(location, 0.5, 1) == STATUS_OK && sample(location, 1.0, 2) == STATUS_OK &&
+           are_calm(location, 3);
 }
 
 /* Searches one indicator in a piece. Returns false if the piece needs more points. */
@@ -591,9 +591,8 @@ static enum status search_model_in(struct location *location, double begin, doub
                                    size_t from) {
     struct piece piece;
     enum status status = begin_piece(location, begin, length, &piece);
-    if (status == STATUS_OK && length == 1.0 && are_calm(location, piece.count)) {
-        location->calm = location->step.end - location->step.begin;
-        return STATUS_OK;
+    if (status != STATUS_OK || (length == 1.0 && are_calm(location, piece.count))) {
+        return status;
     }
     size_t i = from;
     while (status == STATUS_OK && i < location->ode->indicator_count) {

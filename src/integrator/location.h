@@ -45,9 +45,10 @@ struct location {
     double *dx;                    /* room for states at another point */
     double *restart_x;             /* states at the restart */
     double *z;                     /* indicators at one point */
-    double calm;   /* length of the last step if the interpolated indicators hardly moved in it, s;
-                      else 0 */
-    double *first; /* by indicator: s of its first root in the step */
+    double calm;     /* length of the last step if interpolated indicators hardly moved in it, s;
+                        otherwise 0 */
+    double calm_end; /* its end: samples[][0] are the indicators there */
+    double *first;   /* by indicator: s of its first root in the step */
     double (*samples)[CHEBYSHEV_LENGTH]; /* by indicator */
 };
 
