@@ -334,7 +334,6 @@ enum status instance_exit_initialization(struct instance *instance) {
 
 void instance_integrate_outside(struct instance *instance) {
     instance->is_integrated_outside = true;
-    instance->band_factor = 1.0;
 }
 
 void instance_allow_setting_states(struct instance *instance) {

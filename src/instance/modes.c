@@ -24,20 +24,8 @@ static void write_location_errors(const struct instance *instance, double errors
     }
 }
 
-/* After an event an indicator that rises again from its band is above 0 at once, so that importers
- * see no second event: the bands are this much wider there, and as before after this time, s. */
-static const double widening = 63.0;
-static const double widening_time = 1e-3;
-
-/* Returns the factor of the bands now. */
-static double widened(const struct instance *instance) {
-    const double since =
-        (instance->state.time.s - instance->state.own.last_event_time) / widening_time;
-    return 1.0 + widening / (1.0 + since * since);
-}
-
 /* Writes the error of each state at an event: the integrator's tolerance or, outside, twice the
- * error of the location, since indicators fall to 0 beyond their roots by a band. */
+ * error of the location, since indicators fall to 0 beyond their roots. */
 static void write_tolerances(struct instance *instance) {
     const struct range states = instance->model->states;
     const double *x = doubles_of(instance->memory.values, states);
@@ -50,9 +38,7 @@ static void write_tolerances(struct instance *instance) {
     for (size_t i = 0; i < count_of(states); i++) {
         const double allowed = instance->absolute_tolerances[i] +
                                instance->state.own.effective_relative_tolerance * fabs(x[i]);
-        tolerances[i] = is_located_outside
-                            ? fmax(allowed, 2.0 * instance->band_factor * tolerances[i])
-                            : allowed;
+        tolerances[i] = is_located_outside ? fmax(allowed, 2.0 * tolerances[i]) : allowed;
     }
 }
 
@@ -237,6 +223,11 @@ static double size_of(const struct instance *instance, const struct indicator *i
            fabs(indicator->offset);
 }
 
+/* After an event an indicator that rises again from its band is above 0 at once, so that importers
+ * see no second event: the bands are this much wider there, and as before after this time, s. */
+static const double widening = 63.0;
+static const double widening_time = 1e-3;
+
 /* Writes the band that is added to each indicator: it falls to 0 only this far beyond its root. A
  * mode may begin at the root, and integrators miss falls that begin at 0. For an indicator of a
  * state the band is far above the rounding of its two parts, the state's nominal value and the
@@ -245,7 +236,8 @@ static double size_of(const struct instance *instance, const struct indicator *i
  * kinds of indicators, too. */
 static void write_bands(struct instance *instance, double bands[]) {
     const struct model_events *events = instance->model->events;
-    const double factor = events->errors != NULL ? widened(instance) : 1.0;
+    const double since =
+        (instance->state.time.s - instance->state.own.last_event_time) / widening_time;
     events->describe(instance->memory.values, instance->indicators);
     if (events->errors != NULL) {
         double *errors = doubles_of(instance->first_derivatives, instance->model->states);
@@ -263,7 +255,7 @@ static void write_bands(struct instance *instance, double bands[]) {
         } else if (events->errors == NULL) {
             bands[i] = 2.0 * near_root + 1e-9 * fabs(indicator->offset);
         }
-        bands[i] *= factor;
+        bands[i] *= events->errors != NULL ? 1.0 + widening / (1.0 + since * since) : 1.0;
     }
 }
 
@@ -462,7 +454,6 @@ enum status instance_update_at_point(struct instance *instance, bool *states_cha
         return STATUS_OK;
     }
     bool *triggered = instance->triggered;
-    instance->band_factor = widened(instance);
     memcpy(triggered, instance->memory.unhandled, instance_event_size(instance->model));
     const double now = instance->state.time.s;
     triggered[events->indicator_count] =
@@ -483,7 +474,6 @@ enum status instance_update_at_point(struct instance *instance, bool *states_cha
     if (status == STATUS_OK) {
         status = instance_update_modes(instance, is_any ? triggered : NULL);
     }
-    instance->band_factor = 1.0;
     *states_changed = memcmp(before, instance->memory.values + states.offset, states.size) != 0;
     return status == STATUS_OK && is_any ? refuse_unseen_events(instance, triggered) : status;
 }

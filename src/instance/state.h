@@ -113,7 +113,6 @@ struct instance {
     double *absolute_tolerances; /* one per state, as the integrator has them; NULL if the model has
                                     no events */
     double *event_tolerances;    /* one per state, at its value at the last event */
-    double band_factor; /* of the bands of indicators at the event that is being handled, or 1 */
     struct indicator *indicators; /* one per indicator, since the last restart */
     double *du;                   /* derivative of each input by the time */
     double *z;                    /* three per indicator */
