@@ -78,8 +78,9 @@ static enum status update(struct instance *instance, const bool *triggered) {
         .triggered = triggered,
         .is_timed = is_timed(instance, triggered),
         .du = instance->du,
-        .largest_inputs =
-            polynomials_move(inputs, input_count) ? instance->memory.largest_inputs : NULL,
+        .largest_inputs = events->errors != NULL && polynomials_move(inputs, input_count)
+                              ? instance->memory.largest_inputs
+                              : NULL,
         .du_is_known = !instance->is_integrated_outside,
         .tolerance = instance->event_tolerances,
         .rest = rest_fraction * instance_requested_tolerance(instance, &instance->state) /
