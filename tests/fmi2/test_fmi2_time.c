@@ -166,25 +166,6 @@ static void test_a_step_that_ends_where_the_instance_is_is_refused(void) {
     }
 }
 
-static void test_masters_may_add_up_or_multiply(void) {
-    static const double lengths[] = {1e-3, 1.0 / 60.0, 0.1};
-    for (size_t i = 0; i < FMU_COUNT(lengths); i++) {
-        const double h = lengths[i];
-        const fmi2Component adding = fmu_initialized(&messages, 0.0);
-        const fmi2Component multiplying = fmu_initialized(&messages, 0.0);
-        double t = 0.0;
-        for (int step = 0; step < 5000; step++) {
-            ASSERT_OK(fmu.DoStep(adding, t, h, fmi2True));
-            ASSERT_OK(fmu.DoStep(multiplying, step * h, h, fmi2True));
-            t += h;
-        }
-        TEST_ASSERT_TRUE(t == fmu_get(adding, RP_MANIPULATOR_time));
-        TEST_ASSERT_TRUE(4999 * h + h == fmu_get(multiplying, RP_MANIPULATOR_time));
-        fmu_free(adding);
-        fmu_free(multiplying);
-    }
-}
-
 static fmi2Component initialized_until(double start, double stop) {
     const fmi2Component c = fmu_instantiate(&messages, false);
     ASSERT_OK(fmu.SetupExperiment(c, fmi2False, 0, start, fmi2True, stop));

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rparm.models.machine.experiment import STEPS_PER_SECOND, STOP
+from rparm.models.machine.experiment import STEPS_PER_SECOND
 
 from tests.support.rparm_project import Console
 from tests.support.ssp_files import read_csv
@@ -66,60 +66,6 @@ def test_integral_action_against_friction_hunts() -> None:
         friction = np.abs(columns[f"plant.friction{joint}"])
         assert (friction[moves] <= 1.2).all()
         assert friction.max() == pytest.approx(1.2, rel=0.01)
-
-
-def test_the_wall_pushes_and_never_pulls() -> None:
-    columns = run("wall_contact")
-    force, depth = columns["environment.wall_force"], columns["environment.penetration"]
-    assert (force >= 0).all() and (force[depth == 0] == 0).all()
-    wanted = 0.02 - columns["trajectory.ee_y_ref"]
-    assert wanted.max() == pytest.approx(0.02, rel=1e-3)
-    assert 0 < depth.max() < 0.15 * wanted.max()
-    speed = -columns["plant.ee_vy"]
-    law = np.where(depth > 0, np.maximum(2e4 * depth + 60.0 * speed, 0.0), 0.0)
-    np.testing.assert_allclose(force, law, rtol=1e-12, atol=1e-9)
-    # one contact, after which the tip is back on its path
-    touches = force > 0
-    assert 0.2 < np.mean(touches) * STOP < 0.6
-    assert distance(columns)[-1] < 1e-3
-    # the reading is that after inputs are set: the wrench follows the motion of the same point
-    np.testing.assert_array_equal(columns["environment.ee_fy"], force)
-
-
-def test_drives_and_encoders_are_what_their_pages_say() -> None:
-    columns = run("wall_contact")
-    for joint, effort, gear in ((1, "tau1", 100.0), (2, "f2", 200.0 * np.pi)):
-        current = columns[f"actuator.current{joint}"]
-        np.testing.assert_allclose(columns[f"actuator.{effort}"], 0.05 * gear * current, rtol=1e-13)
-        resolution = (5.992112452678286e-06, 1.25e-6)[joint - 1]
-        counted = columns[f"sensor.counts{joint}"] * resolution
-        np.testing.assert_allclose(columns[f"sensor.q{joint}_measured"], counted, rtol=1e-15)
-        # a sample is that of the point before its step: less than two steps old
-        late = np.abs(counted - columns[f"plant.q{joint}"])
-        fastest = np.abs(columns[f"plant.dq{joint}"]).max()
-        assert late.max() <= 2e-3 * fastest + resolution
-
-
-def test_noise_and_latency_are_those_of_the_sensor() -> None:
-    """Two ticks late, with the noise that was asked for and that of rounding to counts."""
-    columns, quiet = run("noisy_sensor"), run("pick_and_place")
-    for joint, deviation, resolution in ((1, 1.2e-5, 5.992112452678286e-06), (2, 2.5e-6, 1.25e-6)):
-        counted = columns[f"sensor.counts{joint}"] * resolution
-        position = columns[f"plant.q{joint}"]
-        # a tick takes what the step began with, and shows the sample of two ticks before
-        noise = counted[4:] - position[1:-3]
-        wanted = np.hypot(deviation, resolution / np.sqrt(12))
-        assert np.std(noise) == pytest.approx(wanted, rel=0.05)
-        assert abs(np.mean(noise)) < 4 * wanted / np.sqrt(len(noise))
-        for other in (position[2:-2], position[:-4]):  # moving, it is seen that they are two
-            assert np.std(counted[4:] - other) > (2.0 if joint == 1 else 1.0) * np.std(noise)
-        # efforts shake by it, above all through the velocity
-        effort = "actuator.tau1" if joint == 1 else "actuator.f2"
-        shaking, calm = (np.std(np.diff(c[effort])) for c in (columns, quiet))
-        assert shaking > 2 * calm
-    # later feedback, a larger error; still far below that of a payload that is not known
-    assert distance(quiet).max() < distance(columns).max()
-    assert distance(columns).max() < 0.1 * distance(run("pick_and_place_untold")).max()
 
 
 def test_the_command_runs_it(tmp_path: Path, console: Console) -> None:

@@ -1,4 +1,4 @@
-"""RPActuator.fmu: values of the equations, refusals, a run with the arm, worth of its scenarios.
+"""RPActuator.fmu: values of the equations, worth of its scenarios.
 
 The closed forms are in test_rp_actuator.c.
 """
@@ -6,8 +6,6 @@ The closed forms are in test_rp_actuator.c.
 import random
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -91,44 +89,6 @@ def test_values_are_those_of_the_equations(loaded: LoadedFmu, limit: str) -> Non
         values = expected(point, limit)
         with in_initialization_mode(loaded, point) as instance:
             assert instance.get(*values) == pytest.approx([*values.values()], rel=1e-12)
-
-
-# ---- What is refused -----------------------------------------------------------------------------
-
-
-# ---- With the arm --------------------------------------------------------------------------------
-
-
-def run_up(drives: LoadedFmu, arm: LoadedFmu, stop: float, step: float) -> tuple[float, float]:
-    """Current in A and velocity in m/s of joint 2 at `stop`, coupled every `step` (both in s)."""
-    with Instance(drives) as drive, Instance(arm) as load:
-        drive.initialize(f2_cmd=1e6, current_max2=1e3, voltage_max2=24.0, time_constant2=0.01)
-        load.initialize(m2=20.0, g=0.0, a=0.0)
-        for i in range(round(stop / step)):
-            effort, velocity = drive.get("f2"), load.get("dq2")
-            load.set(f2=effort[0])
-            drive.set(dq2=velocity[0])
-            drive.step(i * step, step)
-            load.step(i * step, step)
-        return drive.get("current2")[0], load.get("dq2")[0]
-
-
-def test_a_run_up_on_full_voltage_is_that_of_a_dc_motor(
-    fmu: Path, loaded: LoadedFmu, tmp_path: Path
-) -> None:
-    """T I' = (U - n k v) / R - I and m v' = n k I are linear; the coupling errs in order 1."""
-    arm = LoadedFmu(fmu, tmp_path)
-    nk, resistance, voltage, mass, time_constant = 0.05 * 200 * np.pi, 0.5, 24.0, 20.0, 0.01
-    rates = np.array([[-1 / time_constant, -nk / (resistance * time_constant)], [nk / mass, 0]])
-    end = np.array([0.0, voltage / nk])  # no current, no-load speed
-    values, vectors = np.linalg.eig(rates)
-    stop = 0.032
-    decayed = np.exp(stop * values) * np.linalg.solve(vectors, -end)
-    exact = end + (vectors @ decayed).real
-    errors = [np.abs((run_up(loaded, arm, stop, h) - exact) / exact) for h in (4e-4, 2e-4, 1e-4)]
-    assert (errors[2] < 0.01).all(), errors
-    for coarse, fine in pairwise(errors):
-        assert coarse / fine == pytest.approx([2.0, 2.0], abs=0.1), errors
 
 
 # ---- References ----------------------------------------------------------------------------------

@@ -126,17 +126,6 @@ def test_inputs_count_at_samples_only(sampled: Callable[..., Instance]) -> None:
     assert seen == [x for pair in zip(efforts, errors, strict=True) for x in pair]
 
 
-def test_it_tends_to_the_continuous_form(sampled: Callable[..., Instance]) -> None:
-    """Euler's error falls with the period, in proportion to it."""
-    values = {"integral1": 150.0, "q1_ref": -0.1875}
-    at_end = {period: sampled(period, **values) for period in (0.0, 2e-4, 1e-4)}
-    for instance in at_end.values():
-        instance.step(0.0, 0.3)
-    exact, coarse, fine = (instance.get("integral1")[0] for instance in at_end.values())
-    assert abs(fine - exact) < 0.05
-    assert (coarse - exact) / (fine - exact) == pytest.approx(2.0, abs=0.1)
-
-
 def test_output_derivatives_are_those_of_held_efforts(sampled: Callable[..., Instance]) -> None:
     instance = sampled(0.25)
     instance.set_input_derivatives(q1=(0.5, 0.25))

@@ -2,7 +2,6 @@
 tick, against an independent sensor in fractions."""
 
 import random
-import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
@@ -11,14 +10,12 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi1 import FMICallException
 from rparm.models.rp_sensor.references.make_references import Encoder
 
 from rparm.errors import UserError
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
-from tests.support import instances
-from tests.support.instances import DISCARD, LoadedFmu, instantiated, status_of
+from tests.support.instances import instantiated
 from tests.support.paths import ROOT
 from tests.support.rparm_project import declared, fmi3_fmu, load, names_of
 
@@ -179,29 +176,6 @@ def test_a_tick_at_a_communication_point_belongs_to_the_step_before(sensor: Fmu)
         assert seen == [i * i for i in range(1, 9)]
 
 
-def refusal_of_step(instance: Instance, length: float) -> str:
-    """The last message of a step from 0 s that is discarded."""
-    with pytest.raises(FMICallException):
-        instance.do_step(0.0, length)
-    return instance.messages[-1]
-
-
-def test_a_huge_step_with_short_ticks_ends_soon(sensor: Fmu) -> None:
-    with started(sensor, sample_time=1e-6) as instance:
-        message = refusal_of_step(instance, 1e6)
-    time = float(re.search(r"ended at t = (\S+): a time event is due there", message)[1])
-    assert time == pytest.approx(0.100001, rel=1e-12)
-    assert message.endswith("max_internal_steps = 100000")
-
-
-def test_ticks_allowed_in_a_step(sensor: Fmu) -> None:
-    with started(sensor, sample_time=1e-3, max_internal_steps=100) as instance:
-        instance.do_step(0.0, 0.1)
-    with started(sensor, sample_time=1e-3, max_internal_steps=99) as instance:
-        message = refusal_of_step(instance, 0.1)
-    assert message.endswith("one more than max_internal_steps = 99")
-
-
 SCENARIOS = names_of(MODEL.name)
 
 # ---- What is refused ---------------------------------------------------------------------------
@@ -223,23 +197,6 @@ def test_a_start_that_swallows_the_sample_time(sensor: Fmu) -> None:
         pass
     with pytest.raises(UserError), started(sensor, start=-1e300, sample_time=1.0):
         pass
-
-
-def test_positions_that_overflow_within_a_step(fmu: Path, tmp_path: Path) -> None:
-    """The step is discarded; from a saved state the instance continues."""
-    with instances.Instance(
-        LoadedFmu(fmu.with_name("RPSensor.fmu"), tmp_path), logging_on=True
-    ) as instance:
-        instance.initialize()
-        instance.step(0.0, 0.01)
-        state = instance.fmi.getFMUstate()
-        instance.set(q1=1e308)
-        instance.set_input_derivatives(q1=[1.7e308])
-        assert status_of(instance.step, 0.01, 10.0) == DISCARD
-        assert "t = 0." in instance.messages[-1].text
-        instance.fmi.setFMUstate(state)
-        instance.fmi.freeFMUstate(state)
-        instance.step(0.01, 10.0)
 
 
 # ---- FMI 3.0's event mode ----------------------------------------------------------------------

@@ -1,6 +1,5 @@
 /* The reference motions as the instance sees them: the payload, what is refused.
- * test_trajectory.py has grasp and release. Derivatives by parameters are compared with 40
- * digits in test_trajectory.py. */
+ * test_trajectory.py has grasp and release. */
 #include "last_text.h"
 #include "model_test.h"
 #include "rp_trajectory_example.h"
@@ -8,8 +7,6 @@
 
 #include <math.h>
 #include <unity.h>
-
-static const double pi = 3.14159265358979323846;
 
 static const int motions[] = {RP_TRAJECTORY_POINT_TO_POINT, RP_TRAJECTORY_LINE,
                               RP_TRAJECTORY_CIRCLE};
@@ -90,16 +87,6 @@ static void test_a_path_at_the_smallest_distance_is_refused(void) {
     assert_accepted();
 }
 
-/* The text gives the nearest point of the path and its distance. */
-static void test_a_path_stays_beyond_the_smallest_distance(void) {
-    v.parameters.motion = RP_TRAJECTORY_LINE;
-    v.parameters.ee_from[0] = 0.5;
-    v.parameters.ee_from[1] = v.parameters.ee_to[1] = -0.0625;
-    v.parameters.ee_to[0] = -0.5;
-    assert_refused("the path to (0, -0.0625) m is refused: there it is 0.0625 m from the axis of "
-                   "joint 1, and it must stay beyond the smallest reachable distance |a| = 0.1 m");
-}
-
 /* Zero is written without a sign, whatever the direction of the line. */
 static void test_a_coordinate_of_zero_has_no_sign(void) {
     v.parameters.motion = RP_TRAJECTORY_LINE;
@@ -123,24 +110,6 @@ static void test_a_circle_about_the_axis_is_everywhere_as_near(void) {
                    "joint 1, and it must stay beyond the smallest reachable distance |a| = 0.1 m");
     v.parameters.radius = 0.125;
     assert_accepted();
-}
-
-/* A quarter of a circle that stays off the axis, with the start or the end nearest to it. */
-static void test_the_nearest_point_of_an_arc_may_be_an_end(void) {
-    v.parameters.center[0] = 0.25;
-    v.parameters.center[1] = 0.0;
-    v.parameters.radius = 0.25;
-    v.parameters.ramp_time = 0.25;
-    v.parameters.turns = 0.25;
-    for (int direction = -1; direction <= 1; direction += 2) {
-        // from the top to the right, and back
-        v.parameters.frequency = 0.5 * direction;
-        v.parameters.start_angle = direction < 0 ? 0.5 * pi : 0.0;
-        v.parameters.a = 0.5;
-        assert_refused(
-            "the path to (0.25, 0.25) m is refused: there it is 0.353553 m from the axis of joint "
-            "1, and it must stay beyond the smallest reachable distance |a| = 0.5 m");
-    }
 }
 
 static void test_a_release_before_the_grasp_is_refused(void) {

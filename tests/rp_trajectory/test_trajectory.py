@@ -1,4 +1,4 @@
-"""RPTrajectory.fmu: exact motions and derivatives, refused parameters, a unit without states."""
+"""RPTrajectory.fmu: exact motions and derivatives, grasp and release."""
 
 import ctypes
 from collections.abc import Iterator
@@ -8,12 +8,11 @@ import mpmath as mp
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Model
 from rparm.models.rp_trajectory.references import make_references
 
-from tests.support.instances import ERROR, Instance, LoadedFmu, instantiated, set_value, status_of
+from tests.support.instances import Instance, LoadedFmu
 from tests.support.paths import ROOT
-from tests.support.rparm_project import FMUS, declared, fmi3_fmu, load, names_of
+from tests.support.rparm_project import declared, load, names_of
 
 UNIT = "RPTrajectory"
 
@@ -169,23 +168,13 @@ def test_the_motion_does_not_depend_on_when_it_starts(loaded: LoadedFmu, start: 
             assert first.get(*OUTPUTS) == second.get(*OUTPUTS)
 
 
-# ---- what is refused ---------------------------------------------------------------------------
-
-
-def test_an_arc_that_leaves_out_the_nearest_point_is_accepted(loaded: LoadedFmu) -> None:
-    near = {"x_center": 0.3, "y_center": 0.0, "radius": 0.35, "start_angle": -1.5, "turns": 0.45}
-    with running(loaded, near | {"frequency": 0.4}) as instance:
-        instance.step(0.0, 1.0)
-    with pytest.raises(FMICallException), running(loaded, near | {"frequency": -0.4}):
-        pass
-
-
 # ---- a unit without states and inputs ----------------------------------------------------------
 
 
-def test_only_the_start_is_settable(loaded: LoadedFmu) -> None:
+@pytest.mark.parametrize("name", ["radius", "grasp_time"])
+def test_parameters_are_fixed(loaded: LoadedFmu, name: str) -> None:
     with running(loaded, {}) as instance, pytest.raises(FMICallException):
-        instance.set(radius=0.05)
+        instance.set(**{name: 0.05})
 
 
 # ---- references --------------------------------------------------------------------------------
@@ -232,50 +221,3 @@ def test_initialization_knows_it(loaded: LoadedFmu, start: float, expected: bool
         assert is_attached(instance) == expected
         instance.fmi.exitInitializationMode()
         assert is_attached(instance) == expected
-
-
-def test_grasp_and_release_are_time_events_in_model_exchange(loaded: LoadedFmu) -> None:
-    with Instance(loaded, kind=FMU2Model) as instance:
-        instance.initialize(**GRASPED)
-        for due, before in ((GRASP, False), (RELEASE, True)):
-            *_, is_defined, next_time = instance.fmi.newDiscreteStates()
-            assert is_defined and next_time == due
-            instance.fmi.enterContinuousTimeMode()
-            instance.fmi.setTime(due)
-            assert is_attached(instance) == before
-            instance.fmi.enterEventMode()
-        *_, is_defined, _ = instance.fmi.newDiscreteStates()
-        assert not is_defined and not is_attached(instance)
-
-
-def test_steps_end_at_grasp_and_release_in_event_mode() -> None:
-    path = fmi3_fmu(FMUS["rp_trajectory"])
-    options = {"event_mode_used": True, "early_return_allowed": True}
-    with instantiated(path, "CoSimulation", **options) as (unit, description):
-        variables = {v.name: v for v in description.modelVariables}
-
-        def attached() -> bool:
-            return bool(unit.getBoolean([variables["payload_attached"].valueReference])[0])
-
-        for name, value in GRASPED.items():
-            set_value(unit, variables[name], value)
-        unit.enterInitializationMode()
-        unit.exitInitializationMode()
-        t = 0.0
-        for due, after in ((GRASP, True), (RELEASE, False)):
-            *_, is_defined, next_time = unit.updateDiscreteStates()
-            assert is_defined and next_time == due
-            unit.enterStepMode()
-            event, _, early, t = unit.doStep(t, 1.0)
-            assert event and early and t == due
-            assert attached() != after
-            unit.enterEventMode()
-            *_, is_defined, _ = unit.updateDiscreteStates()
-            assert attached() == after
-        assert not is_defined
-
-
-def test_times_are_fixed(loaded: LoadedFmu) -> None:
-    with Instance(loaded) as instance:
-        instance.initialize(**GRASPED)
-        assert status_of(lambda: instance.set(grasp_time=0.1)) == ERROR

@@ -47,15 +47,6 @@ def test_free_motion_keeps_its_energy(fmi: int) -> None:
     assert [table[name][0] for name in start] == list(start.values())
 
 
-def test_without_gravity_a_force_on_the_slide_at_rest_moves_it_as_newton_says(arm: Path) -> None:
-    """With a = 0 and q1 at rest, m2 ddq2 = f2: a parabola."""
-    values = {"g": 0.0, "a": 0.0, "m2": 2.0}
-    table = rparm.simulate(arm, **RUN, start_values=values, inputs={"f2": 3.0})
-    expected = 0.5 * 1.5 * table["time"] ** 2
-    assert table["q2"] == pytest.approx(expected, abs=1e-9)
-    assert np.abs(table["q1"]).max() < 1e-12
-
-
 def test_a_run_has_the_bits_of_the_scenario(arm: Path) -> None:
     with Fmu(arm) as opened:
         loaded = scenarios.load(project.scenario_file("sine_efforts"), opened.model)

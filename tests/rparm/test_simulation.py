@@ -12,7 +12,6 @@ from rparm import files
 from rparm.console import Progress
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
-from rparm.runs import scenario as scenarios
 from rparm.runs import simulation
 from tests.support.rparm_project import LONG, MISTAKES, SHORT, edit, fmi3_fmu, load, repacked
 from tests.support.ssp_files import edited
@@ -157,16 +156,3 @@ def test_fmu_with_a_binary_that_is_cut_off(fmu: Path, tmp_path: Path, kept: int)
     with pytest.raises(UserError, match=refused), Fmu(path) as other:
         simulation.simulate(other, load(SHORT))
     assert Path.cwd() == here
-
-
-def test_fmu_without_a_variable_of_the_scenario(project: Path, fmu: Path, tmp_path: Path) -> None:
-    def change(xml: str) -> str:
-        return xml.replace('name="l1"', 'name="length1"')
-
-    path = project / f"models/rp_manipulator/scenarios/{SHORT}.toml"
-    reason = rf"{SHORT}\.toml: \[parameters\]: the model has no variable 'l1', .*known: .*length1"
-    with (
-        Fmu(repacked(fmu, tmp_path / "old.fmu", change)) as other,
-        pytest.raises(UserError, match=reason),
-    ):
-        scenarios.load(path, other.model)
