@@ -321,8 +321,7 @@ double fall_first(const struct roots_polynomial *p, const struct fall *fall) {
     if (rises) {
         return fall_behind(p, 0.0);
     }
-    const double s = roots_first(p);
-    return s > 0.0 && s <= 1.0 ? fall_or_end(p, fall) : s;
+    return roots_is_above(p) ? INFINITY : p->c[0] > 0.0 ? fall_or_end(p, fall) : roots_first(p);
 }
 
 /* Returns fall_first of indicator i; given: the fields of struct fall that do not follow from
