@@ -14,6 +14,13 @@
 static const ARKODE_ERKTableID table = ARKODE_DORMAND_PRINCE_7_4_5;
 static const int order = 5;
 
+/* ERKStep's control of the length of steps, which steps made here share. */
+static const double safety = 0.99;
+static const double bias = 1.2;
+static double gains[] = {0.8, 0.31, 0.0};
+
+enum { MOST_STAGES = 7 };
+
 /* Largest numbers of steps in the search for the time of an event. */
 enum { MOST_CORRECTIONS = 20, MOST_DIVISIONS = 40 };
 
@@ -47,12 +54,12 @@ struct erk {
 
 /* ---- Observation ---------------------------------------------------------------------------- */
 
-/* Searches the step that has ended at t with the state x. If it has no event, the next step begins
- * there. */
-static enum status search(struct erk *erk, double t, const double x[]) {
+/* Searches the step that has ended at t with the state x; has_dx: erk->dx is the right-hand side
+ * there. If the step has no event, the next one begins there. */
+static enum status search(struct erk *erk, double t, const double x[], bool has_dx) {
     struct problem *problem = erk->base.problem;
     const size_t n = problem->ode.state_count;
-    enum status status = problem_rhs(problem, t, x, erk->dx);
+    enum status status = has_dx ? STATUS_OK : problem_rhs(problem, t, x, erk->dx);
     if (status != STATUS_OK) {
         return status;
     }
@@ -92,7 +99,7 @@ static int observe(sunrealtype t, N_Vector x, void *user_data) {
     }
     erk->watched = t;
     if (location_is_active(&problem->location)) {
-        erk->search_status = search(erk, t, small_vector_data(x));
+        erk->search_status = search(erk, t, small_vector_data(x), false);
         erk->is_cut_short = erk->search_status != STATUS_OK || problem->location.time <= erk->end;
     }
     if (!erk->is_cut_short && problem->observer != NULL && t < erk->end) {
@@ -146,6 +153,9 @@ static bool create_solver(struct erk *erk) {
            ERKStepSetUserData(erk->solver, base) == ARK_SUCCESS &&
            ERKStepSetTableNum(erk->solver, table) == ARK_SUCCESS &&
            ERKStepGetCurrentButcherTable(erk->solver, &erk->coefficients) == ARK_SUCCESS &&
+           ERKStepSetAdaptivityMethod(erk->solver, ARK_ADAPT_PI, 0, 0, gains) == ARK_SUCCESS &&
+           ERKStepSetSafetyFactor(erk->solver, safety) == ARK_SUCCESS &&
+           ERKStepSetErrorBias(erk->solver, bias) == ARK_SUCCESS &&
            // steps end at the requested points: no polynomial is needed, which saves an evaluation
            // each
            ERKStepSetInterpolantType(erk->solver, ARK_INTERP_LAGRANGE) == ARK_SUCCESS &&
@@ -229,6 +239,87 @@ static void add_work(const struct erk *erk, struct method_work *work) {
     }
 }
 
+/* Steps from the begin of the running internal step to the time t, by the sums of ERKStep. The last
+ * stage begins with the state at the end: writes it to x and the right-hand side there to erk->dx.
+ * Returns the length of the step, s; NaN if the right-hand side cannot be evaluated. */
+static double step_to(struct erk *erk, double t, double x[]) {
+    const struct ARKodeButcherTableMem *of = erk->coefficients;
+    const size_t n = erk->base.problem->ode.state_count;
+    double length = t - erk->step_begin;
+    if (erk->step_begin + length > t) {
+        length *= 1.0 - 4.0 * DBL_EPSILON;
+    }
+    for (int k = 1; k < of->stages; k++) {
+        double factors[MOST_STAGES];
+        for (int j = 0; j < k; j++) {
+            factors[j] = length * of->A[k][j];
+        }
+        for (size_t i = 0; i < n; i++) {
+            double way = 0.0;
+            for (int j = 0; j < k; j++) {
+                way += factors[j] * erk->step_dx[(size_t)j * n + i];
+            }
+            x[i] = way + erk->step_x[i];
+        }
+        if (problem_rhs(erk->base.problem, erk->step_begin + of->c[k] * length, x,
+                        erk->step_dx + (size_t)k * n) != STATUS_OK) {
+            return NAN;
+        }
+    }
+    return length;
+}
+
+/* Writes the norm of the error that the embedded method estimates for step_to, in tolerances.
+ * Returns the length of a step behind it, s. */
+static double longer_step(const struct erk *erk, double length, double *norm) {
+    const struct ARKodeButcherTableMem *of = erk->coefficients;
+    const struct integrator_settings *settings = &erk->base.problem->settings;
+    const size_t n = erk->base.problem->ode.state_count;
+    double sum = 0.0;
+    for (size_t i = 0; i < n; i++) {
+        double error = 0.0;
+        for (int j = 0; j < of->stages; j++) {
+            error += length * (of->b[j] - of->d[j]) * erk->step_dx[(size_t)j * n + i];
+        }
+        error /=
+            settings->relative_tolerance * fabs(erk->step_x[i]) + settings->absolute_tolerances[i];
+        sum += error * error;
+    }
+    *norm = sqrt(sum / (double)n);
+    // as ERKStep, where the step is accurate
+    const double growth = safety * pow(fmax(bias * *norm, 1e-10), -gains[0] / (order - 1));
+    const double next = growth > 1.5 ? growth * length : length;
+    const double longest = settings->max_step;
+    return longest > 0.0 && next > longest ? longest : next;
+}
+
+/* Makes an advance that continues the motion in one step, with the results of ERKStep but without
+ * its start, a half of the work. Returns false if ERKStep is to advance: the step is no surely
+ * accurate one. */
+static bool leap(struct erk *erk, double t, double x[], struct method_work *work) {
+    const struct problem *problem = erk->base.problem;
+    const double longest = problem->settings.max_step;
+    const double way = t - erk->step_begin;
+    if (!problem->continues || !(way <= erk->next_step) || (longest > 0.0 && way > longest)) {
+        return false;
+    }
+    double norm;
+    const double length = step_to(erk, t, x);
+    const double next = longer_step(erk, length, &norm);
+    if (!(norm <= 0.5)) {
+        return false;
+    }
+    erk->next_step = next;
+    erk->watched = t;
+    erk->search_status = search(erk, t, x, erk->step_begin + length == t);
+    erk->is_cut_short = erk->search_status != STATUS_OK || problem->location.time <= t;
+    work->steps++;
+    work->last_step = length;
+    work->last_order = order;
+    work->internal = t;
+    return true;
+}
+
 /* Advances step by step after ERKStep has failed: it gives up at the first right-hand side that
  * cannot be evaluated, and then reports the time of that evaluation instead of its last state's.
  * Here ever shorter steps are tried. x: the last valid state. */
@@ -271,29 +362,6 @@ static int advance_carefully(struct erk *erk, double begin, double end, int64_t 
     return flag;
 }
 
-/* Steps from the begin of the step that contains the event to the time t, by the stages of the
- * table: the last one begins with the state at the end. Writes it to x and the right-hand side
- * there to erk->dx. */
-static int step_to(struct erk *erk, double t, double x[]) {
-    const struct ARKodeButcherTableMem *table_of = erk->coefficients;
-    const size_t n = erk->base.problem->ode.state_count;
-    const double length = t - erk->step_begin;
-    for (int k = 1; k < table_of->stages; k++) {
-        for (size_t i = 0; i < n; i++) {
-            double slope = 0.0;
-            for (int j = 0; j < k; j++) {
-                slope += table_of->A[k][j] * erk->step_dx[(size_t)j * n + i];
-            }
-            x[i] = erk->step_x[i] + length * slope;
-        }
-        const double at = table_of->c[k] < 1.0 ? erk->step_begin + table_of->c[k] * length : t;
-        if (problem_rhs(erk->base.problem, at, x, erk->step_dx + (size_t)k * n) != STATUS_OK) {
-            return ARK_RHSFUNC_FAIL;
-        }
-    }
-    return ARK_SUCCESS;
-}
-
 /* Steps onto the event. The polynomial of the search is less accurate than the step: Newton's
  * method leads from its root to the root of the steps that end there. The indicator may be 0 at the
  * begin of the step, too: a correction that leads out of the part with the fall divides this part
@@ -305,11 +373,14 @@ static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
     const double slack = 0x1p-30 * (high - low); // far more than rounding
     bool is_below = false;                       // true if the indicator is below 0 at `high`
     double t = location->time;
+    double norm;
     int flag = ARK_SUCCESS;
     int corrections = 0;
     int divisions = 0;
     while (flag >= 0 && corrections < MOST_CORRECTIONS && divisions < MOST_DIVISIONS) {
-        flag = step_to(erk, t, x);
+        const double length = step_to(erk, t, x);
+        flag = isfinite(length) ? ARK_SUCCESS : ARK_RHSFUNC_FAIL;
+        erk->next_step = longer_step(erk, length, &norm);
         double z = 0.0;
         double correction = 0.0;
         if (flag < 0 || !location_correction(location, t, x, erk->dx, &z, &correction)) {
@@ -325,8 +396,9 @@ static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
         if (next > high && !is_below) {
             next = high;
         }
-        if (fabs(next - t) <= fmax(negligible * (t - erk->step_begin),
-                                   2.0 * DBL_EPSILON * erk->watched)) {
+        if (fabs(next - t) <=
+            fmax(negligible * (t - erk->step_begin), 2.0 * DBL_EPSILON * erk->watched)) {
+            next = fmin(fmax(next, erk->step_begin), erk->watched);
             for (size_t i = 0; i < erk->base.problem->ode.state_count; i++) {
                 x[i] += (next - t) * erk->dx[i];
             }
@@ -346,17 +418,16 @@ static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
     return flag;
 }
 
-static int integrate(struct erk *erk, double t, int64_t max_steps, const double begin_x[],
-                     double *stopped_at, double x[], struct method_work *work) {
+/* Integrates with ERKStep. flag: of begin_watching. */
+static int evolve(struct erk *erk, int flag, double t, int64_t max_steps, const double begin_x[],
+                  double *stopped_at, double x[], struct method_work *work) {
     // parts of equal length leave no sliver at the end
     const double begin = erk->base.problem->reached;
     const double length = t - begin;
     const double first_step = erk->next_step > 0.0 ? length / ceil(length / erk->next_step) : 0.0;
     sundials_set_state(&erk->base, begin_x);
-    int flag = start(erk, begin, t, first_step);
-    if (flag == ARK_SUCCESS) {
-        flag = begin_watching(erk, t, begin_x, x);
-    }
+    const int started = start(erk, begin, t, first_step);
+    flag = started == ARK_SUCCESS ? flag : started;
     if (flag == ARK_SUCCESS) {
         flag = ERKStepSetMaxNumSteps(erk->solver, sundials_steps(max_steps));
     }
@@ -367,19 +438,27 @@ static int integrate(struct erk *erk, double t, int64_t max_steps, const double 
     if (is_given_up) {
         add_work(erk, work);
         flag = advance_carefully(erk, begin, t, max_steps, begin_x, stopped_at, x, work);
-    }
-    add_work(erk, work);
-    if (erk->is_cut_short) {
-        work->internal = erk->watched;
-        work->is_cut_short = true;
-        *stopped_at = erk->watched;
-        return erk->base.problem->location.time <= t ? step_onto_event(erk, stopped_at, x)
-                                                     : ARK_SUCCESS;
-    }
-    if (!is_given_up) {
+    } else if (!erk->is_cut_short) {
         sundials_get_state(&erk->base, x);
     }
-    return flag;
+    add_work(erk, work);
+    return ERKStepGetCurrentStep(erk->solver, &erk->next_step) < 0 ? ARK_MEM_NULL : flag;
+}
+
+static int integrate(struct erk *erk, double t, int64_t max_steps, const double begin_x[],
+                     double *stopped_at, double x[], struct method_work *work) {
+    int flag = begin_watching(erk, t, begin_x, x);
+    if (flag != ARK_SUCCESS || !leap(erk, t, x, work)) {
+        flag = evolve(erk, flag, t, max_steps, begin_x, stopped_at, x, work);
+    }
+    if (!erk->is_cut_short) {
+        return flag;
+    }
+    work->internal = erk->watched;
+    work->is_cut_short = true;
+    *stopped_at = erk->watched;
+    return erk->base.problem->location.time <= t ? step_onto_event(erk, stopped_at, x)
+                                                 : ARK_SUCCESS;
 }
 
 static enum status advance(void *memory, double t, int64_t max_steps, const double begin_x[],
@@ -394,8 +473,7 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
         return sundials_status(problem, ARK_TOO_CLOSE);
     }
     const int flag = integrate(erk, t, max_steps, begin_x, stopped_at, x, work);
-    if (flag < 0 || ERKStepGetCurrentStep(erk->solver, &erk->next_step) < 0 ||
-        !isfinite(erk->next_step)) {
+    if (flag < 0 || !isfinite(erk->next_step)) {
         erk->next_step = 0.0;
     }
     return erk->search_status != STATUS_OK ? erk->search_status : sundials_status(problem, flag);
