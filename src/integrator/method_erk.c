@@ -14,13 +14,6 @@
 static const ARKODE_ERKTableID table = ARKODE_DORMAND_PRINCE_7_4_5;
 static const int order = 5;
 
-/* ERKStep's control of the length of steps, which steps made here share. */
-static const double safety = 0.99;
-static const double bias = 1.2;
-static double gains[] = {0.8, 0.31, 0.0};
-
-enum { MOST_STAGES = 7 };
-
 /* Largest numbers of steps in the search for the time of an event. */
 enum { MOST_CORRECTIONS = 20, MOST_DIVISIONS = 40 };
 
@@ -54,18 +47,14 @@ struct erk {
 
 /* ---- Observation ---------------------------------------------------------------------------- */
 
-/* Searches the step that has ended at t with the state x; has_dx: erk->dx is the right-hand side
- * there. If the step has no event, the next one begins there. */
-static enum status search(struct erk *erk, double t, const double x[], bool has_dx) {
+/* Searches the step that has ended at t with the state x and the right-hand side erk->dx. If it has
+ * no event, the next step begins there. */
+static enum status search(struct erk *erk, double t, const double x[]) {
     struct problem *problem = erk->base.problem;
     const size_t n = problem->ode.state_count;
-    enum status status = has_dx ? STATUS_OK : problem_rhs(problem, t, x, erk->dx);
-    if (status != STATUS_OK) {
-        return status;
-    }
     location_write_cubic(&problem->location, erk->step_begin, erk->step_x, erk->step_dx, t, x,
                          erk->dx);
-    status = location_search(&problem->location);
+    const enum status status = location_search(&problem->location);
     if (problem->location.time == INFINITY) {
         erk->step_begin = t;
         memcpy(erk->step_x, x, n * sizeof(double));
@@ -99,7 +88,10 @@ static int observe(sunrealtype t, N_Vector x, void *user_data) {
     }
     erk->watched = t;
     if (location_is_active(&problem->location)) {
-        erk->search_status = search(erk, t, small_vector_data(x), false);
+        erk->search_status = problem_rhs(erk->base.problem, t, small_vector_data(x), erk->dx);
+        if (erk->search_status == STATUS_OK) {
+            erk->search_status = search(erk, t, small_vector_data(x));
+        }
         erk->is_cut_short = erk->search_status != STATUS_OK || problem->location.time <= erk->end;
     }
     if (!erk->is_cut_short && problem->observer != NULL && t < erk->end) {
@@ -153,9 +145,6 @@ static bool create_solver(struct erk *erk) {
            ERKStepSetUserData(erk->solver, base) == ARK_SUCCESS &&
            ERKStepSetTableNum(erk->solver, table) == ARK_SUCCESS &&
            ERKStepGetCurrentButcherTable(erk->solver, &erk->coefficients) == ARK_SUCCESS &&
-           ERKStepSetAdaptivityMethod(erk->solver, ARK_ADAPT_PI, 0, 0, gains) == ARK_SUCCESS &&
-           ERKStepSetSafetyFactor(erk->solver, safety) == ARK_SUCCESS &&
-           ERKStepSetErrorBias(erk->solver, bias) == ARK_SUCCESS &&
            // steps end at the requested points: no polynomial is needed, which saves an evaluation
            // each
            ERKStepSetInterpolantType(erk->solver, ARK_INTERP_LAGRANGE) == ARK_SUCCESS &&
@@ -239,39 +228,34 @@ static void add_work(const struct erk *erk, struct method_work *work) {
     }
 }
 
-/* Steps from the begin of the running internal step to the time t, by the sums of ERKStep. The last
- * stage begins with the state at the end: writes it to x and the right-hand side there to erk->dx.
- * Returns the length of the step, s; NaN if the right-hand side cannot be evaluated. */
-static double step_to(struct erk *erk, double t, double x[]) {
+/* Steps from the begin of the running internal step to the time t. The last stage begins with the
+ * state there: writes it to x and the right-hand side to erk->dx. Returns false if that cannot be
+ * evaluated. */
+static bool step_to(struct erk *erk, double t, double x[]) {
     const struct ARKodeButcherTableMem *of = erk->coefficients;
     const size_t n = erk->base.problem->ode.state_count;
-    double length = t - erk->step_begin;
-    if (erk->step_begin + length > t) {
-        length *= 1.0 - 4.0 * DBL_EPSILON;
-    }
-    for (int k = 1; k < of->stages; k++) {
-        double factors[MOST_STAGES];
-        for (int j = 0; j < k; j++) {
-            factors[j] = length * of->A[k][j];
-        }
+    const double length = t - erk->step_begin;
+    bool is_evaluated = true;
+    for (int k = 1; is_evaluated && k < of->stages; k++) {
+        const double *coefficients = of->A[k];
         for (size_t i = 0; i < n; i++) {
-            double way = 0.0;
+            const double *stage_dx = erk->step_dx + i;
+            double slope = 0.0;
             for (int j = 0; j < k; j++) {
-                way += factors[j] * erk->step_dx[(size_t)j * n + i];
+                slope += coefficients[j] * *stage_dx;
+                stage_dx += n;
             }
-            x[i] = way + erk->step_x[i];
+            x[i] = erk->step_x[i] + length * slope;
         }
-        if (problem_rhs(erk->base.problem, erk->step_begin + of->c[k] * length, x,
-                        erk->step_dx + (size_t)k * n) != STATUS_OK) {
-            return NAN;
-        }
+        const double stage_t = of->c[k] < 1.0 ? erk->step_begin + of->c[k] * length : t;
+        double *dx = erk->step_dx + (size_t)k * n;
+        is_evaluated = problem_rhs(erk->base.problem, stage_t, x, dx) == STATUS_OK;
     }
-    return length;
+    return is_evaluated;
 }
 
-/* Writes the norm of the error that the embedded method estimates for step_to, in tolerances.
- * Returns the length of a step behind it, s. */
-static double longer_step(const struct erk *erk, double length, double *norm) {
+/* True if the embedded method estimates an error of step_to within the tolerances. */
+static bool is_accurate(const struct erk *erk, double length) {
     const struct ARKodeButcherTableMem *of = erk->coefficients;
     const struct integrator_settings *settings = &erk->base.problem->settings;
     const size_t n = erk->base.problem->ode.state_count;
@@ -279,44 +263,29 @@ static double longer_step(const struct erk *erk, double length, double *norm) {
     for (size_t i = 0; i < n; i++) {
         double error = 0.0;
         for (int j = 0; j < of->stages; j++) {
-            error += length * (of->b[j] - of->d[j]) * erk->step_dx[(size_t)j * n + i];
+            error += (of->b[j] - of->d[j]) * erk->step_dx[(size_t)j * n + i];
         }
-        error /=
-            settings->relative_tolerance * fabs(erk->step_x[i]) + settings->absolute_tolerances[i];
+        error *= length / (settings->relative_tolerance * fabs(erk->step_x[i]) +
+                           settings->absolute_tolerances[i]);
         sum += error * error;
     }
-    *norm = sqrt(sum / (double)n);
-    // as ERKStep, where the step is accurate
-    const double growth = safety * pow(fmax(bias * *norm, 1e-10), -gains[0] / (order - 1));
-    const double next = growth > 1.5 ? growth * length : length;
-    const double longest = settings->max_step;
-    return longest > 0.0 && next > longest ? longest : next;
+    return sum <= (double)n;
 }
 
-/* Makes an advance that continues the motion in one step, with the results of ERKStep but without
- * its start, a half of the work. Returns false if ERKStep is to advance: the step is no surely
- * accurate one. */
+/* Makes the advance after an event in one step, without the start of ERKStep, a half of the work.
+ * Returns false if ERKStep is to advance. */
 static bool leap(struct erk *erk, double t, double x[], struct method_work *work) {
     const struct problem *problem = erk->base.problem;
-    const double longest = problem->settings.max_step;
-    const double way = t - erk->step_begin;
-    if (!problem->continues || !(way <= erk->next_step) || (longest > 0.0 && way > longest)) {
+    const double length = t - erk->step_begin;
+    if (!problem->continues || !(length <= erk->next_step) || !step_to(erk, t, x) ||
+        !is_accurate(erk, length)) {
         return false;
     }
-    double norm;
-    const double length = step_to(erk, t, x);
-    const double next = longer_step(erk, length, &norm);
-    if (!(norm <= 0.5)) {
-        return false;
-    }
-    erk->next_step = next;
     erk->watched = t;
-    erk->search_status = search(erk, t, x, erk->step_begin + length == t);
+    erk->search_status = search(erk, t, x);
     erk->is_cut_short = erk->search_status != STATUS_OK || problem->location.time <= t;
-    work->steps++;
-    work->last_step = length;
-    work->last_order = order;
-    work->internal = t;
+    *work =
+        (struct method_work){.steps = 1, .last_step = length, .last_order = order, .internal = t};
     return true;
 }
 
@@ -373,14 +342,11 @@ static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
     const double slack = 0x1p-30 * (high - low); // far more than rounding
     bool is_below = false;                       // true if the indicator is below 0 at `high`
     double t = location->time;
-    double norm;
     int flag = ARK_SUCCESS;
     int corrections = 0;
     int divisions = 0;
     while (flag >= 0 && corrections < MOST_CORRECTIONS && divisions < MOST_DIVISIONS) {
-        const double length = step_to(erk, t, x);
-        flag = isfinite(length) ? ARK_SUCCESS : ARK_RHSFUNC_FAIL;
-        erk->next_step = longer_step(erk, length, &norm);
+        flag = step_to(erk, t, x) ? ARK_SUCCESS : ARK_RHSFUNC_FAIL;
         double z = 0.0;
         double correction = 0.0;
         if (flag < 0 || !location_correction(location, t, x, erk->dx, &z, &correction)) {
@@ -442,7 +408,11 @@ static int evolve(struct erk *erk, int flag, double t, int64_t max_steps, const 
         sundials_get_state(&erk->base, x);
     }
     add_work(erk, work);
-    return ERKStepGetCurrentStep(erk->solver, &erk->next_step) < 0 ? ARK_MEM_NULL : flag;
+    // an event says nothing about the length of steps
+    const double before = erk->is_cut_short ? erk->next_step : 0.0;
+    (void)ERKStepGetCurrentStep(erk->solver, &erk->next_step);
+    erk->next_step = erk->next_step < before ? before : erk->next_step;
+    return flag;
 }
 
 static int integrate(struct erk *erk, double t, int64_t max_steps, const double begin_x[],
