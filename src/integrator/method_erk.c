@@ -251,31 +251,28 @@ static bool step_to(struct erk *erk, double t, double x[]) {
     return is_evaluated;
 }
 
-/* True if the embedded method estimates an error of step_to within a tenth of the tolerances. */
-static bool is_accurate(const struct erk *erk, double length) {
+/* Makes the advance after an event in one step, without the start of ERKStep, a half of the work.
+ * Returns false if ERKStep is to advance: the step is long, or its error above a tenth of the
+ * tolerances. */
+static bool leap(struct erk *erk, double t, double x[], struct method_work *work) {
     const struct ARKodeButcherTableMem *of = erk->coefficients;
-    const struct integrator_settings *settings = &erk->base.problem->settings;
-    const size_t n = erk->base.problem->ode.state_count;
+    const struct problem *problem = erk->base.problem;
+    const size_t n = problem->ode.state_count;
+    const double length = t - erk->step_begin;
+    if (!problem->continues || !(length <= erk->next_step) || !step_to(erk, t, x)) {
+        return false;
+    }
     double sum = 0.0;
     for (size_t i = 0; i < n; i++) {
         double error = 0.0;
         for (int j = 0; j < of->stages; j++) {
             error += (of->b[j] - of->d[j]) * erk->step_dx[(size_t)j * n + i];
         }
-        error *= length / (settings->relative_tolerance * fabs(erk->step_x[i]) +
-                           settings->absolute_tolerances[i]);
+        error *= length / (problem->settings.relative_tolerance * fabs(erk->step_x[i]) +
+                           problem->settings.absolute_tolerances[i]);
         sum += error * error;
     }
-    return sum <= 0.01 * (double)n;
-}
-
-/* Makes the advance after an event in one step, without the start of ERKStep, a half of the work.
- * Returns false if ERKStep is to advance. */
-static bool leap(struct erk *erk, double t, double x[], struct method_work *work) {
-    const struct problem *problem = erk->base.problem;
-    const double length = t - erk->step_begin;
-    if (!problem->continues || !(length <= erk->next_step) || !step_to(erk, t, x) ||
-        !is_accurate(erk, length)) {
+    if (!(sum <= 0.01 * (double)n)) {
         return false;
     }
     erk->watched = t;
@@ -382,8 +379,8 @@ static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
 }
 
 /* Integrates with ERKStep. flag: of begin_watching. */
-static int evolve(struct erk *erk, int flag, double t, int64_t max_steps, const double begin_x[],
-                  double *stopped_at, double x[], struct method_work *work) {
+static int integrate(struct erk *erk, int flag, double t, int64_t max_steps, const double begin_x[],
+                     double *stopped_at, double x[], struct method_work *work) {
     // parts of equal length leave no sliver at the end
     const double begin = erk->base.problem->reached;
     const double length = t - begin;
@@ -412,22 +409,6 @@ static int evolve(struct erk *erk, int flag, double t, int64_t max_steps, const 
     return flag;
 }
 
-static int integrate(struct erk *erk, double t, int64_t max_steps, const double begin_x[],
-                     double *stopped_at, double x[], struct method_work *work) {
-    int flag = begin_watching(erk, t, begin_x, x);
-    if (flag != ARK_SUCCESS || !leap(erk, t, x, work)) {
-        flag = evolve(erk, flag, t, max_steps, begin_x, stopped_at, x, work);
-    }
-    if (!erk->is_cut_short) {
-        return flag;
-    }
-    work->internal = erk->watched;
-    work->is_cut_short = true;
-    *stopped_at = erk->watched;
-    return erk->base.problem->location.time <= t ? step_onto_event(erk, stopped_at, x)
-                                                 : ARK_SUCCESS;
-}
-
 static enum status advance(void *memory, double t, int64_t max_steps, const double begin_x[],
                            double *stopped_at, double x[], struct method_work *work) {
     struct erk *erk = memory;
@@ -439,7 +420,15 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
         sundials_get_state(&erk->base, x);
         return sundials_status(problem, ARK_TOO_CLOSE);
     }
-    const int flag = integrate(erk, t, max_steps, begin_x, stopped_at, x, work);
+    int flag = begin_watching(erk, t, begin_x, x);
+    if (flag != ARK_SUCCESS || !leap(erk, t, x, work)) {
+        flag = integrate(erk, flag, t, max_steps, begin_x, stopped_at, x, work);
+    }
+    if (erk->is_cut_short) {
+        work->is_cut_short = true;
+        *stopped_at = erk->watched;
+        flag = problem->location.time <= t ? step_onto_event(erk, stopped_at, x) : ARK_SUCCESS;
+    }
     if (flag < 0 || !isfinite(erk->next_step)) {
         erk->next_step = 0.0;
     }
