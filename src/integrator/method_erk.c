@@ -17,6 +17,9 @@ static const int order = 5;
 /* Largest numbers of steps in the search for the time of an event. */
 enum { MOST_CORRECTIONS = 20, MOST_DIVISIONS = 40 };
 
+/* Part of a step over which a state changes as its derivative, up to rounding. */
+static const double negligible = 0x1p-24;
+
 /* Shortest advance, s. ARKODE multiplies lengths of steps with each other, and with a length that
  * it keeps over a restart. If that underflows, its result would depend on the step before. */
 static const double shortest_advance = 1e-100;
@@ -36,25 +39,22 @@ struct erk {
     /* begin of the running internal step, if events are searched */
     double step_begin; /* s since the restart; NaN if they are not */
     double *step_x;    /* the state there */
-    double *step_dx;   /* the right-hand side there */
-    double *dx;        /* the right-hand side at the end */
+    double *step_dx;   /* the right-hand side there, the first of the stages, one after the other */
+    double *dx;        /* the right-hand side at the end, the last of the stages */
     enum status search_status;
+    ARKodeButcherTable coefficients; /* of the table, in ERKStep's memory */
 };
 
 /* ---- Observation ---------------------------------------------------------------------------- */
 
-/* Searches the step that has ended at t with the state x. If it has no event, the next step begins
- * there. */
+/* Searches the step that has ended at t with the state x and the right-hand side erk->dx. If it has
+ * no event, the next step begins there. */
 static enum status search(struct erk *erk, double t, const double x[]) {
     struct problem *problem = erk->base.problem;
     const size_t n = problem->ode.state_count;
-    enum status status = problem_rhs(problem, t, x, erk->dx);
-    if (status != STATUS_OK) {
-        return status;
-    }
     location_write_cubic(&problem->location, erk->step_begin, erk->step_x, erk->step_dx, t, x,
                          erk->dx);
-    status = location_search(&problem->location);
+    const enum status status = location_search(&problem->location);
     if (problem->location.time == INFINITY) {
         erk->step_begin = t;
         memcpy(erk->step_x, x, n * sizeof(double));
@@ -64,10 +64,13 @@ static enum status search(struct erk *erk, double t, const double x[]) {
 }
 
 /* Evaluates the right-hand side if events are searched: at the begin of an internal step the search
- * has evaluated it already. */
+ * has evaluated it already, and behind the last step nothing needs it. */
 static int searched_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data) {
     const struct erk *erk = user_data;
     const size_t size = erk->base.problem->ode.state_count * sizeof(double);
+    if (erk->is_cut_short) {
+        return 0;
+    }
     if (t == erk->step_begin && memcmp(small_vector_data(x), erk->step_x, size) == 0) {
         memcpy(small_vector_data(dx), erk->step_dx, size);
         return 0;
@@ -85,7 +88,10 @@ static int observe(sunrealtype t, N_Vector x, void *user_data) {
     }
     erk->watched = t;
     if (location_is_active(&problem->location)) {
-        erk->search_status = search(erk, t, small_vector_data(x));
+        erk->search_status = problem_rhs(erk->base.problem, t, small_vector_data(x), erk->dx);
+        if (erk->search_status == STATUS_OK) {
+            erk->search_status = search(erk, t, small_vector_data(x));
+        }
         erk->is_cut_short = erk->search_status != STATUS_OK || problem->location.time <= erk->end;
     }
     if (!erk->is_cut_short && problem->observer != NULL && t < erk->end) {
@@ -93,8 +99,9 @@ static int observe(sunrealtype t, N_Vector x, void *user_data) {
     }
     if (erk->is_cut_short) {
         memcpy(erk->cut_x, small_vector_data(x), problem->ode.state_count * sizeof(double));
+        return ERKStepSetStopTime(erk->solver, t);
     }
-    return erk->is_cut_short ? 1 : 0;
+    return 0;
 }
 
 /* Prepares observe for an advance from the state begin_x to the time end, which writes the state to
@@ -119,15 +126,6 @@ static int begin_watching(struct erk *erk, double end, const double begin_x[], d
     return ERKStepSetPostprocessStepFn(erk->solver, is_watched ? observe : NULL);
 }
 
-/* Sends a text of ERKStep, unless the observer has ended the advance: that is no failure. */
-static void report_text(int error_code, const char *module, const char *function, char *text,
-                        void *erk_pointer) {
-    const struct erk *erk = erk_pointer;
-    if (!erk->is_cut_short) {
-        sundials_text(error_code, module, function, text, erk_pointer);
-    }
-}
-
 /* ---- Life ----------------------------------------------------------------------------------- */
 
 static void destroy(void *memory) {
@@ -143,9 +141,10 @@ static bool create_solver(struct erk *erk) {
     struct sundials *base = &erk->base;
     erk->solver = ERKStepCreate(sundials_rhs, 0.0, base->x, base->context);
     return erk->solver != NULL &&
-           ERKStepSetErrHandlerFn(erk->solver, report_text, base) == ARK_SUCCESS &&
+           ERKStepSetErrHandlerFn(erk->solver, sundials_text, base) == ARK_SUCCESS &&
            ERKStepSetUserData(erk->solver, base) == ARK_SUCCESS &&
            ERKStepSetTableNum(erk->solver, table) == ARK_SUCCESS &&
+           ERKStepGetCurrentButcherTable(erk->solver, &erk->coefficients) == ARK_SUCCESS &&
            // steps end at the requested points: no polynomial is needed, which saves an evaluation
            // each
            ERKStepSetInterpolantType(erk->solver, ARK_INTERP_LAGRANGE) == ARK_SUCCESS &&
@@ -162,15 +161,17 @@ static enum status create(struct problem *problem, void **memory) {
         return STATUS_OUT_OF_MEMORY;
     }
     const size_t n = problem->ode.state_count;
-    erk->step_x = workspace_calloc(3 * n, sizeof *erk->step_x);
-    const bool is_created = erk->step_x != NULL && create_solver(erk);
+    const bool has_solver = create_solver(erk);
+    const size_t stages = has_solver ? (size_t)erk->coefficients->stages : 0;
+    erk->step_x = workspace_calloc((1 + stages) * n, sizeof *erk->step_x);
+    const bool is_created = has_solver && erk->step_x != NULL;
     const enum status status = is_created ? sundials_warm_up(erk) : STATUS_OUT_OF_MEMORY;
     if (status != STATUS_OK) {
         destroy(erk);
         return status;
     }
     erk->step_dx = erk->step_x + n;
-    erk->dx = erk->step_dx + n;
+    erk->dx = erk->step_x + stages * n;
     *memory = erk;
     return STATUS_OK;
 }
@@ -201,9 +202,10 @@ static enum status restart(void *memory, const double x[]) {
 /* Starts ERKStep from the state in base.x at the time begin; first_step: s, 0 if ARKODE finds one.
  */
 static int start(struct erk *erk, double begin, double end, double first_step) {
-    const bool is_searched = location_is_active(&erk->base.problem->location);
+    const struct problem *problem = erk->base.problem;
+    const bool is_watched = location_is_active(&problem->location) || problem->observer != NULL;
     int flag =
-        ERKStepReInit(erk->solver, is_searched ? searched_rhs : sundials_rhs, begin, erk->base.x);
+        ERKStepReInit(erk->solver, is_watched ? searched_rhs : sundials_rhs, begin, erk->base.x);
     if (flag == ARK_SUCCESS) {
         flag = ERKStepSetInitStep(erk->solver, first_step);
     }
@@ -226,6 +228,61 @@ static void add_work(const struct erk *erk, struct method_work *work) {
     }
 }
 
+/* Steps from the begin of the running internal step to the time t. The last stage begins with the
+ * state there: writes it to x and the right-hand side to erk->dx. Returns false if that cannot be
+ * evaluated. */
+static bool step_to(struct erk *erk, double t, double x[]) {
+    const struct ARKodeButcherTableMem *of = erk->coefficients;
+    const size_t n = erk->base.problem->ode.state_count;
+    const double length = t - erk->step_begin;
+    bool is_evaluated = true;
+    for (int k = 1; is_evaluated && k < of->stages; k++) {
+        for (size_t i = 0; i < n; i++) {
+            double slope = 0.0;
+            for (int j = 0; j < k; j++) {
+                slope += of->A[k][j] * erk->step_dx[(size_t)j * n + i];
+            }
+            x[i] = erk->step_x[i] + length * slope;
+        }
+        const double stage_t = of->c[k] < 1.0 ? erk->step_begin + of->c[k] * length : t;
+        double *dx = erk->step_dx + (size_t)k * n;
+        is_evaluated = problem_rhs(erk->base.problem, stage_t, x, dx) == STATUS_OK;
+    }
+    return is_evaluated;
+}
+
+/* Makes the advance after an event in one step, without the start of ERKStep, a half of the work.
+ * Returns false if ERKStep is to advance: the step is long, or its error above a tenth of the
+ * tolerances. */
+static bool leap(struct erk *erk, double t, double x[], struct method_work *work) {
+    const struct ARKodeButcherTableMem *of = erk->coefficients;
+    const struct problem *problem = erk->base.problem;
+    const size_t n = problem->ode.state_count;
+    const double length = t - erk->step_begin;
+    if (!problem->continues || !(length <= erk->next_step) || !step_to(erk, t, x)) {
+        return false;
+    }
+    double sum = 0.0;
+    for (size_t i = 0; i < n; i++) {
+        double error = 0.0;
+        for (int j = 0; j < of->stages; j++) {
+            error += (of->b[j] - of->d[j]) * erk->step_dx[(size_t)j * n + i];
+        }
+        error *= length / (problem->settings.relative_tolerance * fabs(erk->step_x[i]) +
+                           problem->settings.absolute_tolerances[i]);
+        sum += error * error;
+    }
+    if (!(sum <= 0.01 * (double)n)) {
+        return false;
+    }
+    erk->watched = t;
+    erk->search_status = search(erk, t, x);
+    erk->is_cut_short = erk->search_status != STATUS_OK || problem->location.time <= t;
+    *work =
+        (struct method_work){.steps = 1, .last_step = length, .last_order = order, .internal = t};
+    return true;
+}
+
 /* Advances step by step after ERKStep has failed: it gives up at the first right-hand side that
  * cannot be evaluated, and then reports the time of that evaluation instead of its last state's.
  * Here ever shorter steps are tried. x: the last valid state. */
@@ -246,14 +303,14 @@ static int advance_carefully(struct erk *erk, double begin, double end, int64_t 
             break;
         }
         flag = ERKStepEvolve(erk->solver, end, erk->base.x, stopped_at, ARK_ONE_STEP);
+        if (erk->is_cut_short) {
+            break;
+        }
         if (flag >= 0) {
             good = *stopped_at;
             sundials_get_state(&erk->base, x);
             (void)ERKStepGetCurrentStep(erk->solver, &step);
             continue;
-        }
-        if (erk->is_cut_short) {
-            break;
         }
         step = 0.5 * fmin(step, end - good);
         if (problem->failed_at < good || !(step > 16.0 * DBL_EPSILON * fmax(good, end))) {
@@ -268,36 +325,6 @@ static int advance_carefully(struct erk *erk, double begin, double end, int64_t 
     return flag;
 }
 
-/* True if the step is too short for ARKODE, which refuses steps that change the time by hardly more
- * than its rounding. */
-static bool is_too_close(double begin, double end) {
-    return end - begin <= 8.0 * DBL_EPSILON * end;
-}
-
-/* Steps from the begin of the step that contains the event to the time t. Writes the state to x and
- * the right-hand side to erk->dx. */
-static int step_to(struct erk *erk, double t, double x[]) {
-    struct problem *problem = erk->base.problem;
-    double reached;
-    const double length = t - erk->step_begin;
-    sundials_set_state(&erk->base, erk->step_x);
-    if (length < shortest_advance) { // all terms but the first are rounding
-        for (size_t i = 0; i < problem->ode.state_count; i++) {
-            small_vector_data(erk->base.x)[i] += length * erk->step_dx[i];
-        }
-    } else if (!is_too_close(erk->step_begin, t)) {
-        int flag = start(erk, erk->step_begin, t, length);
-        if (flag == ARK_SUCCESS) {
-            flag = ERKStepEvolve(erk->solver, t, erk->base.x, &reached, ARK_NORMAL);
-        }
-        if (flag < 0) {
-            return flag;
-        }
-    }
-    sundials_get_state(&erk->base, x);
-    return problem_rhs(problem, t, x, erk->dx) == STATUS_OK ? ARK_SUCCESS : ARK_RHSFUNC_FAIL;
-}
-
 /* Steps onto the event. The polynomial of the search is less accurate than the step: Newton's
  * method leads from its root to the root of the steps that end there. The indicator may be 0 at the
  * begin of the step, too: a correction that leads out of the part with the fall divides this part
@@ -309,11 +336,11 @@ static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
     const double slack = 0x1p-30 * (high - low); // far more than rounding
     bool is_below = false;                       // true if the indicator is below 0 at `high`
     double t = location->time;
-    int flag = ERKStepSetPostprocessStepFn(erk->solver, NULL);
+    int flag = ARK_SUCCESS;
     int corrections = 0;
     int divisions = 0;
     while (flag >= 0 && corrections < MOST_CORRECTIONS && divisions < MOST_DIVISIONS) {
-        flag = step_to(erk, t, x);
+        flag = step_to(erk, t, x) ? ARK_SUCCESS : ARK_RHSFUNC_FAIL;
         double z = 0.0;
         double correction = 0.0;
         if (flag < 0 || !location_correction(location, t, x, erk->dx, &z, &correction)) {
@@ -329,7 +356,13 @@ static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
         if (next > high && !is_below) {
             next = high;
         }
-        if (fabs(next - t) <= 2.0 * DBL_EPSILON * erk->watched) {
+        if (fabs(next - t) <=
+            fmax(negligible * (t - erk->step_begin), 2.0 * DBL_EPSILON * erk->watched)) {
+            next = fmin(fmax(next, erk->step_begin), erk->watched);
+            for (size_t i = 0; i < erk->base.problem->ode.state_count; i++) {
+                x[i] += (next - t) * erk->dx[i];
+            }
+            t = next;
             break;
         }
         if (next > low - slack && next <= high + slack) {
@@ -345,17 +378,16 @@ static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
     return flag;
 }
 
-static int integrate(struct erk *erk, double t, int64_t max_steps, const double begin_x[],
+/* Integrates with ERKStep. flag: of begin_watching. */
+static int integrate(struct erk *erk, int flag, double t, int64_t max_steps, const double begin_x[],
                      double *stopped_at, double x[], struct method_work *work) {
     // parts of equal length leave no sliver at the end
     const double begin = erk->base.problem->reached;
     const double length = t - begin;
     const double first_step = erk->next_step > 0.0 ? length / ceil(length / erk->next_step) : 0.0;
     sundials_set_state(&erk->base, begin_x);
-    int flag = start(erk, begin, t, first_step);
-    if (flag == ARK_SUCCESS) {
-        flag = begin_watching(erk, t, begin_x, x);
-    }
+    const int started = start(erk, begin, t, first_step);
+    flag = started == ARK_SUCCESS ? flag : started;
     if (flag == ARK_SUCCESS) {
         flag = ERKStepSetMaxNumSteps(erk->solver, sundials_steps(max_steps));
     }
@@ -366,19 +398,14 @@ static int integrate(struct erk *erk, double t, int64_t max_steps, const double 
     if (is_given_up) {
         add_work(erk, work);
         flag = advance_carefully(erk, begin, t, max_steps, begin_x, stopped_at, x, work);
-    }
-    add_work(erk, work);
-    if (erk->is_cut_short) {
-        work->steps++; // ERKStep does not count the step after which it was ended
-        work->internal = erk->watched;
-        work->is_cut_short = true;
-        *stopped_at = erk->watched;
-        return erk->base.problem->location.time <= t ? step_onto_event(erk, stopped_at, x)
-                                                     : ARK_SUCCESS;
-    }
-    if (!is_given_up) {
+    } else if (!erk->is_cut_short) {
         sundials_get_state(&erk->base, x);
     }
+    add_work(erk, work);
+    // an event says nothing about the length of steps
+    const double before = erk->is_cut_short ? erk->next_step : 0.0;
+    (void)ERKStepGetCurrentStep(erk->solver, &erk->next_step);
+    erk->next_step = erk->next_step < before ? before : erk->next_step;
     return flag;
 }
 
@@ -393,9 +420,16 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
         sundials_get_state(&erk->base, x);
         return sundials_status(problem, ARK_TOO_CLOSE);
     }
-    const int flag = integrate(erk, t, max_steps, begin_x, stopped_at, x, work);
-    if (flag < 0 || ERKStepGetCurrentStep(erk->solver, &erk->next_step) < 0 ||
-        !isfinite(erk->next_step)) {
+    int flag = begin_watching(erk, t, begin_x, x);
+    if (flag != ARK_SUCCESS || !leap(erk, t, x, work)) {
+        flag = integrate(erk, flag, t, max_steps, begin_x, stopped_at, x, work);
+    }
+    if (erk->is_cut_short) {
+        work->is_cut_short = true;
+        *stopped_at = erk->watched;
+        flag = problem->location.time <= t ? step_onto_event(erk, stopped_at, x) : ARK_SUCCESS;
+    }
+    if (flag < 0 || !isfinite(erk->next_step)) {
         erk->next_step = 0.0;
     }
     return erk->search_status != STATUS_OK ? erk->search_status : sundials_status(problem, flag);
