@@ -110,7 +110,7 @@ class Series:
         if terms:
             found["terms"] = ["for (int i = 1; i < k; i++) {", *indented(found["terms"]), "}"]
         if terms and not self.is_wide:  # two at once: half the additions wait for each other
-            both = [re.sub(r"= (.*);", _with_next, line) for line in found["terms"][1:-1]]
+            both = [re.sub(r"\+= (.*);$", _with_next, line) for line in found["terms"][1:-1]]
             last = ["if (k % 2 == 0) {", "    const int i = k - 1;", *found["terms"][1:]]
             found["terms"] = ["for (int i = 1; i + 1 < k; i += 2) {", *both, "}", *last]
         return found
@@ -303,7 +303,7 @@ def _with_next(term: re.Match[str]) -> str:
     """The sum of a term and of the next one."""
     following = term[1].replace("i * ", "(i + 1) * ").replace("[i]", "[i + 1]")
     following = following.replace("[i - 1]", "[i]")
-    return f"= {term[1]} + {following.replace('k - i]', 'k - i - 1]')};"
+    return f"+= {term[1]} + {following.replace('k - i]', 'k - i - 1]')};"
 
 
 def forms(values: Iterable[Value]) -> dict[Value, tuple[int, int]]:
