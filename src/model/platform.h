@@ -24,6 +24,7 @@
 #endif
 
 #define ALWAYS_INLINE static inline __attribute__((always_inline))
+/* Stands in front of a function whose code is to be small rather than fast. */
 #define SELDOM_CALLED __attribute__((cold))
 
 /* Stands in front of a loop in which no iteration depends on another. */
