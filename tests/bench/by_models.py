@@ -1,23 +1,17 @@
 """Models in equations, a step of their FMUs: next to heyoka, and a chain as a band."""
 
-import sys
 from collections.abc import Callable
-from functools import cache
-from operator import add, mul, neg, sub, truediv
 from pathlib import Path
 from statistics import median
 from time import thread_time
 
-import heyoka as hy
 import numpy as np
+from by_heyoka import compiled
+from equations.model_file import read
+
+from tests.equations.examples import FOLDER, METHODS, initializing, made
 
 HERE = Path(__file__).resolve().parent
-sys.path += [str(HERE.parents[1]), str(HERE.parents[1] / "fmu")]
-from equations.model_file import read  # noqa: E402
-
-from rparm.expressions.expression import in_order  # noqa: E402
-from tests.equations.examples import FOLDER, METHODS, initializing, made  # noqa: E402
-
 COLUMN = "one step of 2 s, free motion, error <= 1e-8"
 # a state that follows all others: its row of the Jacobian is full
 FULL = '\nall = { derivative = "(k - 40) * sum(i = 1..n, v[i])" }\n[where]'
@@ -31,52 +25,34 @@ MODELS = {
     "Hodgkin-Huxley": ((HERE / "neuron.toml").read_text(), 50.0, 1e-9),
 }
 PAIRS = {"Pleiades": HERE / "pairs.toml"}  # the same equations, as they suit heyoka
-OPERATIONS = {"+": add, "-": sub, "*": mul, "/": truediv, "negative": neg, "pow": pow}
-OPERATIONS |= {"sin": hy.sin, "cos": hy.cos, "exp": hy.exp}
 Run = Callable[..., tuple[float, np.ndarray]]  # by tolerance: processor time, s; states
 
 
-def by_fmu(fmu_file: Path, method: str, step: float) -> tuple[Run, np.ndarray]:
+def by_fmu(fmu_file: Path, method: str, step: float) -> tuple[Run, tuple]:
     """Return what makes the step by an FMU beside its equations, and the start."""
     instance = initializing(fmu_file)
     references, fmu = instance.loaded.references, instance.fmi
     states = [references[x.name] for x in read(fmu_file.with_suffix(".toml")).of("states")]
+    start = tuple(fmu.getReal(states))
 
-    def run(tolerance: float, end: float = step) -> tuple[float, np.ndarray]:
+    def run(tolerance: float) -> tuple[float, np.ndarray]:
         fmu.reset()
         fmu.setInteger([references["solver_method"]], [METHODS[method]])
         fmu.setupExperiment(tolerance=tolerance)
         fmu.enterInitializationMode()
         fmu.exitInitializationMode()
         begin = thread_time()
-        if end > 0.0:
-            fmu.doStep(0.0, end)
+        fmu.doStep(0.0, step)
         return thread_time() - begin, np.array(fmu.getReal(states))
 
-    return run, run(1e-6, 0.0)[1]
+    return run, start
 
 
-def by_heyoka(file: Path, step: float, start: np.ndarray) -> Run:
-    """Return what makes the step by heyoka, from the graph of the equations."""
-    model = read(file)
-    states = model.of("states")
-    found = {x.leaf: x.start or 0.0 for x in model.of("parameters", "inputs")}
-    found |= {x.leaf: hy.expression(f"x{i}") for i, x in enumerate(states)}
-    for value in in_order([x.value for x in states], found):
-        given = [found[argument] for argument in value.arguments]
-        if value.op == "number":
-            found[value] = value.number
-        else:
-            is_square = value.op == "*" and given[0] is given[1]
-            found[value] = given[0] ** 2.0 if is_square else OPERATIONS[value.op](*given)
-    equations = [(found[x.leaf], found[x.value]) for x in states]
-
-    @cache
-    def compiled(tolerance: float, real: type) -> hy.taylor_adaptive:
-        return hy.taylor_adaptive(equations, start.astype(real), tol=real(tolerance), fp_type=real)
+def by_heyoka(file: Path, step: float, start: tuple) -> Run:
+    """Return what makes the step by heyoka."""
 
     def run(tolerance: float, real: type = float) -> tuple[float, np.ndarray]:
-        taylor = compiled(tolerance, real)
+        taylor = compiled(file, start, tolerance, real)
         taylor.time, taylor.state[:] = real(0.0), start
         begin = thread_time()
         taylor.propagate_until(real(step))
