@@ -18,7 +18,7 @@ from equations.model_file import read  # noqa: E402
 from rparm.expressions.expression import in_order  # noqa: E402
 
 OPERATIONS = {"+": add, "-": sub, "*": mul, "/": truediv, "negative": neg, "pow": pow}
-OPERATIONS |= {"sin": hy.sin, "cos": hy.cos, "exp": hy.exp}
+OPERATIONS |= {"number": float, "sin": hy.sin, "cos": hy.cos, "exp": hy.exp}
 ARM = ROOT / "tests/equations/arm.toml"
 START = (0.3, 0.2, 0.0, 0.0)  # q1, q2, dq1, dq2
 STATES = ("q1", "q2", "dq1", "dq2")
@@ -67,12 +67,9 @@ def equations_of(file: Path) -> list[tuple[hy.expression, hy.expression]]:
     found |= {x.leaf: hy.par[i] for i, x in enumerate(model.of("inputs"))}
     found |= {x.leaf: hy.expression(f"x{i}") for i, x in enumerate(model.of("states"))}
     for value in in_order([x.value for x in model.of("states")], found):
-        given = [found[argument] for argument in value.arguments]
-        if value.op == "number":
-            found[value] = value.number
-        else:
-            is_square = value.op == "*" and given[0] is given[1]
-            found[value] = given[0] ** 2.0 if is_square else OPERATIONS[value.op](*given)
+        given = [found[argument] for argument in value.arguments] or [value.number]
+        is_square = value.op == "*" and given[0] is given[1]
+        found[value] = given[0] ** 2.0 if is_square else OPERATIONS[value.op](*given)
     return [(found[x.leaf], found[x.value]) for x in model.of("states")]
 
 
