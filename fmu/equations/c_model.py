@@ -29,6 +29,7 @@ static enum status extend(const struct series_origin *origin, int first, int las
                             : extend_orders(origin, first, last, row);
 }
 """
+LONG = 1000  # statements for derivatives in small code: compilers need less time
 FOLLOWED = "relations_followed(&relations, ROOM, values, t, &copy)"
 
 
@@ -222,7 +223,7 @@ def _domains(
     }
 
 
-def _calculated(file: ModelFile, events: Events) -> dict[str, list[str]]:
+def _calculated(file: ModelFile, events: Events) -> dict[str, Any]:
     """Calculated fields and their derivatives along a curve."""
     graph = file.graph
     fields = {file.fields.rate(state.name): state.value for state in file.of("states")}
@@ -245,7 +246,9 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, list[str]]:
     start_seconds = graph.derivatives(start_firsts, seeds)
     outputs = Code(leaves(file)).assign({f"to->{n}": v for n, v in fields.items()}).lines
     first, second = rolled(curve.lines[:split], curve.lines[split:])
+    is_long = len(first) + len(second) >= LONG
     return {
+        "storage_of_propagate": "SELDOM_CALLED static" if is_long else "static",
         "started": _at_start(file, "d", dict(zip(started, start_firsts, strict=True))),
         "started_twice": _at_start(file, "dd", dict(zip(started, start_seconds, strict=True))),
         "outputs": rolled(outputs)[0],

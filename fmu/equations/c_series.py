@@ -39,6 +39,7 @@ class Series:
         roots = [*rates.values(), *followed]
         self.is_wide = sum(value.moves for value in in_order(roots)) >= WIDE
         roots = scaled(graph, roots, self.is_wide)
+        self.rates = dict(zip(rates, roots, strict=False))
         values = [value for value in with_partials(graph, roots) if value.moves]
         self.sums: dict[str, str] = {}  # by term i
         factors = {factor for value in values for factor in self._read(value)}
@@ -46,8 +47,8 @@ class Series:
         self.order = {value: i for i, value in enumerate([*rates, *needed])}  # in products
         self.rows = self.order
         self.columns: dict[Value, int] = {}
+        self.forms = forms([*rates, *values])
         if self.is_wide:
-            self.forms = forms([*rates, *values])
             needed.sort(key=self.forms.__getitem__)
             public = [*rates, *(v for v in needed if v in roots[len(rates) :])]
             self.rows = {value: i for i, value in enumerate(public)}
@@ -88,24 +89,30 @@ class Series:
             width = len(self.columns)
             own = f"double(*const at)[{width}] = (double(*)[{width}])(void *)row[{len(self.rows)}];"
             self.still.lines.insert(0, own)
+        if any("over_k" in line for line in self.later.lines):
+            self.integrals.insert(0, "const double over_k = 1.0 / k;")
         terms = [f"{name} += {term};" for term, name in self.sums.items()]
         parts = {
             "still": self.still.lines,
             "first": self.first.lines,
             "start": self.start.lines,
-            "integrals": self.integrals,
             "sums": [f"double {name} = 0.0;" for name in self.sums.values()],
             "terms": terms,
+            "integrals": self.integrals,
             "later": self.later.lines,
         }
         if self.is_wide or sum(map(len, parts.values())) >= SHORTEST:
             for part in ("sums", "terms", "later"):
                 parts[part] = [re.sub(r"\bs(\d+)\b", r"s[\1]", line) for line in parts[part]]
-            parts["sums"] = [line.removeprefix("double ") for line in parts["sums"]]
-            parts["integrals"] = [f"double s[{len(self.sums) or 1}];", *parts["integrals"]]
+            own = [line.removeprefix("double ") for line in parts["sums"]]
+            parts["sums"] = [f"double s[{len(self.sums) or 1}];", *own]
         found = dict(zip(parts, rolled(*parts.values()), strict=True))
         if terms:
             found["terms"] = ["for (int i = 1; i < k; i++) {", *indented(found["terms"]), "}"]
+        if terms and not self.is_wide:  # two at once: half the additions wait for each other
+            both = [re.sub(r"\+= (.*);$", _with_next, line) for line in found["terms"][1:-1]]
+            last = ["if (k % 2 == 0) {", "    const int i = k - 1;", *found["terms"][1:]]
+            found["terms"] = ["for (int i = 1; i + 1 < k; i += 2) {", *both, "}", *last]
         return found
 
     def _sort_sums(self) -> None:
@@ -164,25 +171,42 @@ class Series:
     def _varying(self, value: Value) -> tuple[Value, Value]:
         """A factor that does not move, and what it is the factor of in all orders above 0."""
         graph, factor = self.graph, self.graph.number(1.0)
-        while value.op in ("negative", "+", "-", "*"):
+        while value.op in ("negative", "+", "-", "*", "/"):
             a, b = value.arguments[0], value.arguments[-1]
-            if value.op != "negative" and a.moves and b.moves:
+            if value.op != "negative" and b.moves and (a.moves or value.op == "/"):
                 break
             if value.op == "negative" or (value.op == "-" and b.moves):
                 factor = graph.negative(factor)
-            if value.op == "*":
-                factor = graph.simple("*", factor, b if a.moves else a)
+            if value.op in ("*", "/"):
+                still = self._over(b) if value.op == "/" else b if a.moves else a
+                factor = graph.simple("*", factor, still)
             value = a if a.moves else b
         return factor, value
+
+    def _over(self, value: Value) -> Value:
+        """1 over it: a division for a step, not for each order, where others wait for it."""
+        return self.graph.simple("/", self.graph.number(1.0), value)
+
+    def _change(self, x: Value, g: Value) -> str:
+        """The sum of i x_i g_(k-i) over i = 1 .. k - 1, over k; that of a state by its rate."""
+        f, moving = self._varying(x)
+        rate = self.rates.get(moving)
+        if rate is None or not rate.moves:
+            return f"over_k * {self._sum(x, g, 'i * ')}"
+        return f"h * {self._scaled_sum(self._row(rate, 'i - 1'), f, g)}"
 
     def _sum(self, x: Value, y: Value, weight: str = "") -> str:
         """The sum of x_i y_(k-i) over i = 1 .. k - 1, with a weight of each term."""
         (f, x), (g, y) = self._varying(x), self._varying(y)
         x, y = (x, y) if weight else sorted((x, y), key=self.order.__getitem__)
-        term = f"{weight}{self._row(x, 'i')} * {self._row(y, 'k - i')}"
+        return self._scaled_sum(f"{weight}{self._row(x, 'i')}", times(self.graph, f, g), y)
+
+    def _scaled_sum(self, x: str, factor: Value, y: Value) -> str:
+        g, y = self._varying(y)
+        term = f"{x} * {self._row(y, 'k - i')}"
         name = self.sums.setdefault(term, f"s{len(self.sums)}")
-        factor = self.still.of(times(self.graph, f, g))
-        return name if factor == "1.0" else f"{factor} * {name}"
+        scale = self.still.of(times(self.graph, factor, g))
+        return name if scale == "1.0" else f"{scale} * {name}"
 
     def _at(self, value: Value) -> str:
         """Coefficient k > 0."""
@@ -219,9 +243,9 @@ class Series:
         for x, g, sign in pairs:
             relative = "+" if sign == pairs[0][2] else "-"
             if g.moves:
-                found += f" {relative} {self._sum(x, g, 'i * ')}"
-            found += f" {relative} k * {self._at(x)} * {self.start.of(g)}"
-        found = f"{pairs[0][2]}({found.removeprefix(' + ')}) / k"
+                found += f" {relative} {self._change(x, g)}"
+            found += f" {relative} {self._at(x)} * {self.start.of(g)}"
+        found = f"{pairs[0][2]}({found.removeprefix(' + ')})"
         if value.op not in (*STEEP, *GROWING):
             return found
         are_finite = reduce(
@@ -258,14 +282,28 @@ class Series:
                 return self._at(a)
             case "+" | "-" if not a.moves:
                 return self._at(b) if value.op == "+" else f"-{self._at(b)}"
-            case "*" if a.moves and b.moves:
-                ends = f"{self.start.of(a)} * {self._at(b)} + {self._at(a)} * {self.start.of(b)}"
-                return f"{self._sum(a, b)} + ({ends})"
+            case "*" if a is b:
+                twice = self.start.of(self.graph.value("*", self.graph.number(2.0), a))
+                return f"{self._sum(a, a)} + {twice} * {self._at(a)}"
+            case "*" if a.moves and b.moves:  # last what is known last
+                a, b = sorted((a, b), key=lambda x: self.forms[x][0])
+                ends = f"{self._at(a)} * {self.start.of(b)} + {self.start.of(a)} * {self._at(b)}"
+                return f"{self._sum(a, b)} + {ends}"
             case "/" if b.moves:
                 end = f"{self._at(b)} * {self.start.of(value)}"
-                return f"({self._at(a)} - {self._sum(b, value)} - {end}) / {self.start.of(b)}"
+                over = self.start.of(self._over(b))
+                return f"({self._at(a)} - {self._sum(b, value)} - {end}) * {over}"
+            case "/":
+                return f"{self._at(a)} * {self.still.of(self._over(b))}"
         given = [self._at(x) if x.moves else self.still.of(x) for x in value.arguments]
         return formula(value.op, *given)
+
+
+def _with_next(term: re.Match[str]) -> str:
+    """The sum of a term and of the next one."""
+    following = term[1].replace("i * ", "(i + 1) * ").replace("[i]", "[i + 1]")
+    following = following.replace("[i - 1]", "[i]")
+    return f"+= {term[1]} + {following.replace('k - i]', 'k - i - 1]')};"
 
 
 def forms(values: Iterable[Value]) -> dict[Value, tuple[int, int]]:

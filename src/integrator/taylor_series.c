@@ -76,15 +76,14 @@ enum status taylor_series_add_orders(struct taylor_series *series, int last) {
                           series->row);
 }
 
-/* Writes the sums of the terms of the orders first to last, one time scale ahead, in tolerances of
- * the states. */
-static void write_sizes(const struct taylor_series *series, int first, int last, double size[]) {
-    memset(size + first, 0, (size_t)(last - first + 1) * sizeof *size);
-    for (size_t i = 0; i < series->problem->ode.state_count; i++) {
-        for (int k = first; k <= last; k++) {
-            size[k] += fabs(series->row[i][k]) * series->weight[i];
-        }
+/* Returns the sum of the terms of order k, one time scale ahead, in tolerances of the states; or a
+ * part of it above the bound. */
+static double size_of(const struct taylor_series *series, int k, double bound) {
+    double size = 0.0;
+    for (size_t i = 0; i < series->problem->ode.state_count && !(size > bound); i++) {
+        size += fabs(series->row[i][k]) * series->weight[i];
     }
+    return size;
 }
 
 /* Returns a number near log2 x, for x >= 0. */
@@ -96,7 +95,8 @@ static int exponent_of(double x) {
 
 /* Returns the step at whose end the terms of the orders last - 1 and last, which have these sizes
  * one time scale ahead, are within the tolerance; bound at most, NaN if a size is not finite. */
-static double step_of_last_terms(const double size[2], int last, double bound) {
+static double step_of_last_terms(const struct taylor_series *series, int last, double bound) {
+    const double size[] = {size_of(series, last - 1, INFINITY), size_of(series, last, INFINITY)};
     if (!isfinite(size[0] + size[1])) {
         return NAN;
     }
@@ -111,21 +111,19 @@ static double step_of_last_terms(const double size[2], int last, double bound) {
  * of even order the errors of a swing cancel, and cease to cancel at a smaller tolerance if some
  * steps have one order more. */
 static enum status find_order(struct taylor_series *series) {
-    double size[SERIES_LENGTH];
-    write_sizes(series, LEAST_ORDER - 1, series->order, size);
     for (int order = LEAST_ORDER;; order += 2) {
         if (order > series->order) {
             const enum status status = taylor_series_add_orders(series, order);
             if (status != STATUS_OK) {
                 return status;
             }
-            write_sizes(series, order - 1, order, size);
         }
         // the terms are within the tolerance and become smaller
-        const bool is_enough = size[order - 1] <= 1.0 && size[order] <= size[order - 1];
+        const double size = size_of(series, order - 1, 1.0);
+        const bool is_enough = size <= 1.0 && size_of(series, order, size) <= size;
         if (is_enough || order == series->largest_order) {
             series->order = order;
-            series->step = is_enough ? 1.0 : step_of_last_terms(size + order - 1, order, 1.0);
+            series->step = is_enough ? 1.0 : step_of_last_terms(series, order, 1.0);
             return STATUS_OK;
         }
     }
@@ -140,18 +138,16 @@ enum status taylor_series_expand(struct taylor_series *series, double t, double 
     if (status != STATUS_OK || !is_long) {
         return status != STATUS_OK ? status : find_order(series);
     }
-    double size[SERIES_LENGTH];
-    write_sizes(series, last - 1, last, size);
     // the next event may be as near as the last one: most of a longer step would be lost to it
-    while (last < series->largest_order / 2 && size[last - 1] + size[last] > 1.0) {
+    while (last < series->largest_order / 2 &&
+           size_of(series, last - 1, 1.0) + size_of(series, last, 1.0) > 1.0) {
         last += 2;
         status = taylor_series_add_orders(series, last);
         if (status != STATUS_OK) {
             return status;
         }
-        write_sizes(series, last - 1, last, size);
     }
-    series->step = step_of_last_terms(size + last - 1, last, longest);
+    series->step = step_of_last_terms(series, last, longest);
     return STATUS_OK;
 }
 

@@ -24,6 +24,8 @@
 #endif
 
 #define ALWAYS_INLINE static inline __attribute__((always_inline))
+/* Stands in front of a function whose code is to be small rather than fast. */
+#define SELDOM_CALLED __attribute__((cold))
 
 /* Stands in front of a loop in which no iteration depends on another. */
 #if defined(__clang__)
@@ -69,6 +71,7 @@ static inline _Bool processor_has_avx2(void) {
 #define NONNULL_ARGUMENTS(...)
 #define PRINTF_FORMAT(format_, first)
 #define ALWAYS_INLINE static inline
+#define SELDOM_CALLED
 #define INDEPENDENT_ITERATIONS
 #define HIDE_SYMBOLS
 #if defined(_MSC_VER)

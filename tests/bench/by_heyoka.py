@@ -1,16 +1,25 @@
 """The problem of problem.c in heyoka: timed runs, and errors against an exact run."""
 
+import sys
 from dataclasses import dataclass
 from functools import cache, cached_property
+from operator import add, mul, neg, sub, truediv
+from pathlib import Path
 from statistics import median
 from time import thread_time
 
 import heyoka as hy
 import numpy as np
 
-PARAMETERS = {
-    "m1": 2.0, "m2": 1.0, "I1z": 0.1, "I2z": 0.05, "l1": 0.5, "lc1": 0.25, "a": 0.1, "g": 9.81
-}  # fmt: skip
+ROOT = Path(__file__).resolve().parents[2]
+sys.path += [str(ROOT), str(ROOT / "fmu")]
+from equations.model_file import read  # noqa: E402
+
+from rparm.expressions.expression import in_order  # noqa: E402
+
+OPERATIONS = {"+": add, "-": sub, "*": mul, "/": truediv, "negative": neg, "pow": pow}
+OPERATIONS |= {"number": float, "sin": hy.sin, "cos": hy.cos, "exp": hy.exp}
+ARM = ROOT / "tests/equations/arm.toml"
 START = (0.3, 0.2, 0.0, 0.0)  # q1, q2, dq1, dq2
 STATES = ("q1", "q2", "dq1", "dq2")
 
@@ -36,7 +45,7 @@ class Work:
     @cached_property
     def reference(self) -> np.ndarray:
         """States at the end of each step, shape (steps, 4), in extended precision."""
-        taylor = compiled(np.finfo(np.longdouble).eps, np.longdouble)
+        taylor = compiled(ARM, START, np.finfo(np.longdouble).eps, np.longdouble)
         states = np.empty((self.steps, 4), np.longdouble)
         taylor.time, taylor.state[:] = np.longdouble(0.0), START
         for i, u in enumerate(self.inputs):
@@ -51,30 +60,29 @@ class Work:
         return float((np.abs(states - self.reference).max(axis=0) / largest).max())
 
 
+def equations_of(file: Path) -> list[tuple[hy.expression, hy.expression]]:
+    """States and their rates, from the graph of a file with equations; inputs are parameters."""
+    model = read(file)
+    found = {x.leaf: x.start for x in model.of("parameters")}
+    found |= {x.leaf: hy.par[i] for i, x in enumerate(model.of("inputs"))}
+    found |= {x.leaf: hy.expression(f"x{i}") for i, x in enumerate(model.of("states"))}
+    for value in in_order([x.value for x in model.of("states")], found):
+        given = [found[argument] for argument in value.arguments] or [value.number]
+        is_square = value.op == "*" and given[0] is given[1]
+        found[value] = given[0] ** 2.0 if is_square else OPERATIONS[value.op](*given)
+    return [(found[x.leaf], found[x.value]) for x in model.of("states")]
+
+
 @cache
-def compiled(tolerance: float, real: type = float) -> hy.taylor_adaptive:
-    """Compile equations (14) and (15) of the notes; the parameters are the inputs."""
-    m1, m2, I1z, I2z, l1, lc1, a, g = PARAMETERS.values()
-    q1, q2, dq1, dq2 = hy.make_vars(*STATES)
-    tau1, f2 = hy.par[0], hy.par[1]
-    length = l1 + q2
-    inertia = m1 * lc1 * lc1 + I1z + I2z + m2 * length * length
-    c, s = hy.cos(q1), hy.sin(q1)
-    torque = tau1 - 2.0 * m2 * length * dq1 * dq2 - g * (m1 * lc1 * c + m2 * (length * c - a * s))
-    force = f2 + m2 * length * dq1 * dq1 - m2 * g * s
-    ddq1 = (torque + a * force) / inertia
-    return hy.taylor_adaptive(
-        [(q1, dq1), (q2, dq2), (dq1, ddq1), (dq2, force / m2 + a * ddq1)],
-        np.array(START, real),
-        pars=np.zeros(2, real),
-        tol=real(tolerance),
-        fp_type=real,
-    )
+def compiled(file: Path, start: tuple, tolerance: float, real: type = float) -> hy.taylor_adaptive:
+    """Compile the equations of a file."""
+    begin, tol = np.array(start, real), real(tolerance)
+    return hy.taylor_adaptive(equations_of(file), begin, tol=tol, fp_type=real)
 
 
 def run_heyoka(work: Work, tolerance: float) -> Run:
     """Make all steps: set the parameters, propagate_until, read the state. Setup is not timed."""
-    taylor = compiled(tolerance)
+    taylor = compiled(ARM, START, tolerance)
     taylor.time = 0.0
     taylor.state[:] = START
     pars, state, propagate, size = taylor.pars, taylor.state, taylor.propagate_until, work.step

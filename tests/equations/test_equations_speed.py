@@ -14,6 +14,7 @@ from tests.support.missing import missing
 from tests.support.paths import FMI_HEADERS, ROOT
 
 MOST = {"cvode_bdf": 1.03, "erk": 1.03, "taylor": 1.10}
+HARNESS = ROOT / "tests" / "fmi_harness"
 SOURCE = Path(__file__).with_name("steps.c")
 NAMES = ["solver_method", "q1", "q2", "dq1", "dq2", "tau1", "f2"]
 
@@ -24,7 +25,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if shutil.which("valgrind") is None:
         missing("valgrind: ./setup.sh --platforms")
     folder = tmp_path_factory.mktemp("speed")
-    command = ["cc", f"-I{FMI_HEADERS}", SOURCE, "-o", folder / "steps", "-ldl", "-lm"]
+    folders = FMI_HEADERS, HARNESS, ROOT / "fmu/fmi2", ROOT / "fmu/fmi3"
+    command = ["cc", *(f"-I{path}" for path in folders), SOURCE, HARNESS / "fmu_library.c"]
+    command += ["-o", folder / "steps", "-ldl", "-lm"]
     subprocess.run(command, check=True)
     build(copy(ROOT / "tests" / "equations" / "arm.toml", folder), folder)
     return folder
