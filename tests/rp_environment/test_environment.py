@@ -171,6 +171,38 @@ def test_the_tip_is_where_the_plant_has_its_payload(loaded: LoadedFmu, path: Pat
             assert instance.get("penetration")[0] == pytest.approx(2.0 - height, abs=1e-12)
 
 
+def test_power_of_the_wrench_is_what_the_plant_receives(loaded: LoadedFmu, path: Path) -> None:
+    """The rate of the arm's energy under the wrench is that of the force at the tip."""
+    plant = LoadedFmu(path.with_name("RPPlant.fmu"), loaded.folder / "driven")
+    rate = ["ddq1", "ddq2"]
+    for seed in range(5):
+        source = random.Random(seed)
+        state = {n: source.uniform(-1.0, 1.0) for n in ("q1", "q2", "dq1", "dq2")}
+        with Instance(plant) as arm:
+            arm.initialize(**state)
+            motion = dict(zip(INPUTS, arm.get(*INPUTS), strict=True))
+            tip = {"tip_x": source.uniform(-0.2, 0.2), "tip_z": source.uniform(-0.2, 0.2)}
+            wall_at = {"angle": source.uniform(-3.0, 3.0), "position": 3.0, "damping": 40.0}
+            with running(loaded, motion | tip | wall_at) as instance:
+                before = np.array(arm.get(*rate))
+                force = instance.get(*OUTPUTS)
+                arm.set(ee_fx=force[0], ee_fy=force[1], ee_mz=force[2])
+                added = np.array(arm.get(*rate)) - before
+                d11, d12, d22 = arm.get("D11", "D12", "D22")
+                # the depth after a short time in both directions
+                depths = []
+                for dt in (-1e-6, 1e-6):
+                    instance.set(
+                        ee_x=motion["ee_x"] + dt * motion["ee_vx"],
+                        ee_y=motion["ee_y"] + dt * motion["ee_vy"],
+                        ee_angle=motion["ee_angle"] + dt * motion["ee_rate"],
+                    )
+                    depths.append(instance.get("penetration")[0])
+        power = np.array([state["dq1"], state["dq2"]]) @ [[d11, d12], [d12, d22]] @ added
+        speed = -(depths[1] - depths[0]) / 2e-6
+        assert power == pytest.approx(force[4] * speed, abs=1e-8 * force[4])
+
+
 # ---- As a unit -----------------------------------------------------------------------------------
 
 
