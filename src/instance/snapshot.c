@@ -102,7 +102,16 @@ enum status instance_restore(struct instance *instance, const struct instance_sn
     return resume(instance);
 }
 
-/* Copies the parts that a step writes. If inputs are held, it writes neither the next inputs nor
+/* Copies the part of the state that a step writes. What it writes before follows from that part, or
+ * is copied here. */
+static inline void copy_state(struct instance_state *to, const struct instance_state *from) {
+    enum { BEGIN = offsetof(struct instance_state, time) };
+    memcpy((char *)to + BEGIN, (const char *)from + BEGIN, sizeof *to - BEGIN);
+    to->own.event_count = from->own.event_count;
+    to->own.last_event_time = from->own.last_event_time;
+}
+
+/* Copies the parts of the memory that a step writes. If inputs are held, it writes neither the next inputs nor
  * the current ones. */
 static void copy_written(const struct instance_memory *memory, bool inputs_are_held, char *to,
                          const char *from) {
@@ -114,7 +123,7 @@ static void copy_written(const struct instance_memory *memory, bool inputs_are_h
 }
 
 void instance_keep(struct instance *instance, struct instance_snapshot *snapshot) {
-    snapshot->state = instance->state;
+    copy_state(&snapshot->state, &instance->state);
     snapshot->history_is_lost = instance->history_is_lost;
     snapshot->inputs_are_held = instance->inputs_are_held;
     copy_written(&instance->memory, snapshot->inputs_are_held, (char *)snapshot->memory,
@@ -122,7 +131,10 @@ void instance_keep(struct instance *instance, struct instance_snapshot *snapshot
 }
 
 enum status instance_undo(struct instance *instance, const struct instance_snapshot *snapshot) {
-    instance->state = snapshot->state;
+    struct instance_state *state = &instance->state;
+    copy_state(state, &snapshot->state);
+    state->own.time = state->time.s;
+    instance_write_statistics(&state->statistics, &state->own);
     copy_written(&instance->memory, snapshot->inputs_are_held, instance->memory.block,
                  (const char *)snapshot->memory);
     if (snapshot->inputs_are_held) {
