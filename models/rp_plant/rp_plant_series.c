@@ -25,6 +25,7 @@
 #include "rp_series.h"
 
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -171,13 +172,12 @@ ALWAYS_INLINE double series_effort(const struct series_motion *m, int i, int k,
 /* ---- Constants ------------------------------------------------------------------------------ */
 
 static bool has_wrench(const struct series_origin *origin) {
-    double size = 0.0;
-    for (int i = FX; i <= MZ; i++) {
-        for (int k = 0; k < SERIES_INPUT_LENGTH; k++) {
-            size += fabs(origin->inputs[i][k]); // one branch for all
-        }
+    uint64_t bits[3 * SERIES_INPUT_LENGTH], any = 0;
+    memcpy(bits, origin->inputs[FX], sizeof bits);
+    for (size_t i = 0; i < sizeof bits / sizeof bits[0]; i++) {
+        any |= bits[i]; // one branch for all
     }
-    return size != 0.0;
+    return any << 1 != 0; // without the signs of zeros
 }
 
 static bool is_stuck(const struct series_motion *m, int joint) {

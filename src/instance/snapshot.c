@@ -41,35 +41,25 @@ static struct instance_snapshot *new_snapshot(struct instance *instance) {
     }
     created->newer = NULL;
     created->older = instance->newest;
-    if (instance->newest != NULL) {
-        instance->newest->newer = created;
-    } else {
-        instance->oldest = created;
-    }
+    *(instance->newest != NULL ? &instance->newest->newer : &instance->oldest) = created;
     instance->newest = created;
     return created;
-}
-
-static void copy_from(const struct instance *instance, unsigned tag,
-                      struct instance_snapshot *snapshot) {
-    snapshot->tag = tag;
-    snapshot->state = instance->state;
-    memcpy(snapshot->memory, instance->memory.block, instance->memory.size);
 }
 
 enum status instance_save(struct instance *instance, unsigned tag,
                           struct instance_snapshot **snapshot) {
     if (*snapshot == NULL) {
-        struct instance_snapshot *created = new_snapshot(instance);
-        if (created == NULL) {
+        *snapshot = new_snapshot(instance);
+        if (*snapshot == NULL) {
             return STATUS_OUT_OF_MEMORY;
         }
-        *snapshot = created;
     } else if (instance_check_own(instance, *snapshot) != STATUS_OK) {
         return STATUS_INVALID_ARGUMENT;
     }
     instance_update_next_step(instance);
-    copy_from(instance, tag, *snapshot);
+    (*snapshot)->tag = tag;
+    (*snapshot)->state = instance->state;
+    memcpy((*snapshot)->memory, instance->memory.block, instance->memory.size);
     return STATUS_OK;
 }
 
@@ -84,10 +74,9 @@ static enum status resume(struct instance *instance) {
     if (!instance_has_integrator(instance)) {
         return STATUS_OK;
     }
-    enum status status = STATUS_OK;
-    if (instance_is_configured_otherwise(instance)) {
-        status = instance_configure_integrator(instance);
-    }
+    const enum status status = instance_is_configured_otherwise(instance)
+                                   ? instance_configure_integrator(instance)
+                                   : STATUS_OK;
     integrator_set_statistics(instance->integrator, &instance->state.statistics);
     return status;
 }
@@ -102,8 +91,16 @@ enum status instance_restore(struct instance *instance, const struct instance_sn
     return resume(instance);
 }
 
-/* Copies the parts that a step writes. If inputs are held, it writes neither the next inputs nor
- * the current ones. */
+/* Copies the part of the state that a step writes, but values that follow from it. */
+static inline void copy_state(struct instance_state *to, const struct instance_state *from) {
+    enum { BEGIN = offsetof(struct instance_state, time) };
+    memcpy((char *)to + BEGIN, (const char *)from + BEGIN, sizeof *to - BEGIN);
+    to->own.event_count = from->own.event_count;
+    to->own.last_event_time = from->own.last_event_time;
+}
+
+/* Copies the parts of the memory that a step writes. If inputs are held, it writes neither the next
+ * inputs nor the current ones. */
 static void copy_written(const struct instance_memory *memory, bool inputs_are_held, char *to,
                          const char *from) {
     const struct range restart = memory->written_at_restart;
@@ -114,7 +111,7 @@ static void copy_written(const struct instance_memory *memory, bool inputs_are_h
 }
 
 void instance_keep(struct instance *instance, struct instance_snapshot *snapshot) {
-    snapshot->state = instance->state;
+    copy_state(&snapshot->state, &instance->state);
     snapshot->history_is_lost = instance->history_is_lost;
     snapshot->inputs_are_held = instance->inputs_are_held;
     copy_written(&instance->memory, snapshot->inputs_are_held, (char *)snapshot->memory,
@@ -122,7 +119,10 @@ void instance_keep(struct instance *instance, struct instance_snapshot *snapshot
 }
 
 enum status instance_undo(struct instance *instance, const struct instance_snapshot *snapshot) {
-    instance->state = snapshot->state;
+    struct instance_state *state = &instance->state;
+    copy_state(state, &snapshot->state);
+    state->own.time = state->time.s;
+    instance_write_statistics(&state->statistics, &state->own);
     copy_written(&instance->memory, snapshot->inputs_are_held, instance->memory.block,
                  (const char *)snapshot->memory);
     if (snapshot->inputs_are_held) {
