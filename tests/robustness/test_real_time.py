@@ -20,7 +20,7 @@ LIBRARY = BUILD / "fmu" / "RPPlant" / "RPPlant.so"
 METHODS = {"cvode_adams": 1, "taylor": 4}
 # Largest work of a step over the median of those without events, by events in the step: the first
 # for a step without any, the second more for each event.
-BOUNDS = {"cvode_adams": (15, 4), "taylor": (8, 9)}
+BOUNDS = {"cvode_adams": (12, 4), "taylor": (8, 7)}
 
 
 @dataclass
