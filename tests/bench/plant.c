@@ -156,7 +156,7 @@ static const struct work {
     {"Stribeck friction",
      stribeck_friction,
      NULL,
-     {[CVODE_ADAMS] = 1.6, [CVODE_BDF] = 1.7, [ERK] = 1.7, [TAYLOR] = 1.7}},
+     {[CVODE_ADAMS] = 1.6, [CVODE_BDF] = 1.7, [ERK] = 1.6, [TAYLOR] = 1.6}},
     {"held by friction",
      held,
      NULL,
