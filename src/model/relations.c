@@ -305,12 +305,16 @@ static enum status assign(const struct call *call, int number, const struct even
     return refused != NULL ? refuse(call, event, refused) : check_counts(call, event);
 }
 
-/* Gives states that have jumped the error of the few roundings of what was assigned: otherwise a
- * state that is put onto its limit, a last digit beyond, would meet it again at once. */
-static void allow_rounding(const struct call *call) {
+/* Sets the tolerance of states that have jumped: 0, or the few roundings of what was assigned.
+ * Without those a state that is put onto its limit, a last digit beyond, would meet it again. */
+static void allow_rounding(const struct call *call, bool is_allowed) {
     const double *x = states_in(call->model, call->values);
+    double *tolerance = call->room.tolerance;
     for (int i = 0; i < call->model->state_count; i++) {
-        call->room.tolerance[i] = fmax(call->room.tolerance[i], 8.0 * DBL_EPSILON * fabs(x[i]));
+        const double rounding = 8.0 * DBL_EPSILON * fabs(x[i]);
+        if (tolerance[i] <= rounding) { // others are larger
+            tolerance[i] = is_allowed ? rounding : 0.0;
+        }
     }
 }
 
@@ -322,10 +326,11 @@ static enum status perform(const struct call *call, int number, const struct eve
     if (status != STATUS_OK) {
         return status;
     }
-    allow_rounding(call);
     update_timed_modes(call);
     update_modes_until_stable(call, false);
+    allow_rounding(call, true);
     switch_fallen(call);
+    allow_rounding(call, false);
     update_modes_until_stable(call, false);
     memset(call->room.turned, 0, (size_t)model->relation_count * sizeof *call->room.turned);
     return STATUS_OK;
