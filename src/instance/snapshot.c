@@ -91,7 +91,7 @@ enum status instance_restore(struct instance *instance, const struct instance_sn
     return resume(instance);
 }
 
-/* Copies the part of the state that a step writes, but values that follow from it. */
+/* Copies the part of the state that a step writes, except values that follow from it. */
 static inline void copy_state(struct instance_state *to, const struct instance_state *from) {
     enum { BEGIN = offsetof(struct instance_state, time) };
     memcpy((char *)to + BEGIN, (const char *)from + BEGIN, sizeof *to - BEGIN);

@@ -32,8 +32,8 @@ struct instance_state {
     bool experiment_defined;
     struct instance_experiment experiment;
     struct instance_values own;
-    struct clock_time time;
-    double drift; /* sum of clock_step_drift over all steps, s */
+    struct clock_time time; /* a step writes all fields from here on, and few before */
+    double drift;           /* sum of clock_step_drift over all steps, s */
 
     /* The integrator's history, from which it continues while nothing changes. A replay needs only
      * the restart and the first and the last advance since then (integrator_advance). Only

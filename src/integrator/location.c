@@ -258,6 +258,9 @@ void location_lead_from_restart(struct location *location) {
 /* Largest error of a polynomial that represents an indicator, relative to the values' scale. */
 static const double representation = 1e-12;
 
+/* Largest correction of a root at once. */
+static const double largest_correction = 0x1p-10;
+
 /* Returns the root s of the polynomial p, corrected to a root of its indicator. error: of p where
  * the correction is not worth an evaluation. */
 static double corrected(struct location *location, size_t i, const struct roots_polynomial *p,
@@ -268,7 +271,7 @@ static double corrected(struct location *location, size_t i, const struct roots_
         location_write_states(location, s, location->x);
         const bool is_known = evaluate(location, t, location->x) == STATUS_OK;
         const double next = s - location->z[i] / horner(p->c, p->degree, s).slope;
-        const bool is_small = fabs(next - s) < 0x1p-10;
+        const bool is_small = fabs(next - s) < largest_correction;
         if (!is_known || !is_small || next <= 0.0 || fabs(location->z[i]) <= error) {
             break;
         }
@@ -356,16 +359,20 @@ static const double far_above = 16.0; // errors of a polynomial by which it is s
 static bool are_calm(struct location *location, int count) {
     for (size_t k = 0; k < location->used_count; k++) {
         const size_t i = location->used[k];
-        double lowest = location->samples[i][0];
-        double highest = lowest;
-        for (int j = 1; j < count; j++) {
-            lowest = fmin(lowest, location->samples[i][j]);
-            highest = larger(location->samples[i][j], highest);
+        double lowest = INFINITY;
+        double highest = -INFINITY;
+        bool is_known = true;
+        for (int j = 0; j < count; j++) {
+            const double z = location->samples[i][j];
+            lowest = z < lowest ? z : lowest;
+            highest = larger(z, highest);
+            is_known &= isfinite(z) != 0;
         }
         const bool is_wanted =
             location->indicators[i].kind == INDICATOR_OF_MODEL && !location->has_row[i];
         const double noise = location->is_armed[i] ? 0.0 : location->noise[i];
-        if (is_wanted && !(lowest > larger(noise, 0.5 * far_above * (highest - lowest)))) {
+        const bool is_above = lowest > larger(noise, 0.5 * far_above * (highest - lowest));
+        if (is_wanted && !(is_known && is_above)) {
             return false;
         }
         location->is_armed[i] |= is_wanted;
@@ -379,14 +386,18 @@ static bool are_calm(struct location *location, int count) {
 }
 
 /* True if indicators that were calm in the last step are so in this one, which is not much longer:
- * its begin, middle and end are enough to see them begin to move. */
+ * its begin, its end and two points between are enough to see them begin to move. The points are
+ * not symmetric, so that no swing is the same at all of them. */
 static bool stay_calm(struct location *location) {
+    static const double points[] = {0.0, 0.375, 0.8125, 1.0};
     const struct step_polynomial *step = &location->step;
-    const double before = location->calm;
+    bool is_calm =
+        step->end - step->begin <= 2.0 * location->calm && step->begin == location->calm_end;
     location->calm = 0.0;
-    return step->end - step->begin <= 2.0 * before && step->begin == location->calm_end &&
-           sample(location, 0.5, 1) == STATUS_OK && sample(location, 1.0, 2) == STATUS_OK &&
-           are_calm(location, 3);
+    for (int k = 1; is_calm && k < 4; k++) {
+        is_calm = sample(location, points[k], k) == STATUS_OK;
+    }
+    return is_calm && are_calm(location, 4);
 }
 
 /* Searches one indicator in a piece. Returns false if the piece needs more points. */
@@ -447,9 +458,9 @@ static enum status search_model_in(struct location *location, double begin, doub
 /* ---- Steps ---------------------------------------------------------------------------------- */
 
 /* True if the polynomial will do for an indicator that is z at the end of the step: its error, by
- * its last terms and what the sum misses, is small, or it stays above 0 by far more. Then it
- * becomes lower. */
-static bool represents(double c[], int degree, double z, double relative_tolerance) {
+ * its last terms and what the sum misses, is small, or it stays above 0 by far more. In that case
+ * c[0] is lowered, so that later proofs hold. */
+static bool make_represent(double c[], int degree, double z, double relative_tolerance) {
     double sum = 0.0;
     double size = 0.0;
     for (int k = degree; k >= 0; k--) {
@@ -477,8 +488,8 @@ void location_check_rows(struct location *location, const double x[], double rel
     for (size_t k = 0; k < location->used_count; k++) {
         const size_t i = location->used[k];
         location->has_row[i] =
-            location->has_row[i] &&
-            represents(step->indicator_row[i], step->degree, location->z[i], relative_tolerance);
+            location->has_row[i] && make_represent(step->indicator_row[i], step->degree,
+                                                   location->z[i], relative_tolerance);
     }
 }
 
@@ -496,7 +507,7 @@ enum status location_search(struct location *location) {
         if (indicator->kind == INDICATOR_OF_STATE) {
             location->first[i] = first_of_state(location, i, s + same_time);
         } else if (location->has_row[i]) {
-            location->first[i] = first_of_model(location, i, s + same_time);
+            location->first[i] = first_of_model(location, i, s + largest_correction);
         }
         s = location->first[i] < s ? location->first[i] : s;
         needs_model |= indicator->kind == INDICATOR_OF_MODEL && !location->has_row[i];

@@ -39,7 +39,7 @@ struct erk {
     /* begin of the running internal step, if events are searched */
     double step_begin; /* s since the restart; NaN if they are not */
     double *step_x;    /* the state there */
-    double *step_dx;   /* the right-hand side there, the first of the stages, one after the other */
+    double *step_dx;   /* right-hand sides of all stages, one after the other; the first is there */
     double *dx;        /* the right-hand side at the end, the last of the stages */
     enum status search_status;
     ARKodeButcherTable coefficients; /* of the table, in ERKStep's memory */
@@ -63,9 +63,9 @@ static enum status search(struct erk *erk, double t, const double x[]) {
     return status;
 }
 
-/* Evaluates the right-hand side if events are searched: at the begin of an internal step the search
- * has evaluated it already, and behind the last step nothing needs it. */
-static int searched_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data) {
+/* Evaluates the right-hand side of an advance that is watched: at the begin of an internal step the
+ * search has evaluated it already, and behind the last step nothing needs it. */
+static int watched_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data) {
     const struct erk *erk = user_data;
     const size_t size = erk->base.problem->ode.state_count * sizeof(double);
     if (erk->is_cut_short) {
@@ -205,7 +205,7 @@ static int start(struct erk *erk, double begin, double end, double first_step) {
     const struct problem *problem = erk->base.problem;
     const bool is_watched = location_is_active(&problem->location) || problem->observer != NULL;
     int flag =
-        ERKStepReInit(erk->solver, is_watched ? searched_rhs : sundials_rhs, begin, erk->base.x);
+        ERKStepReInit(erk->solver, is_watched ? watched_rhs : sundials_rhs, begin, erk->base.x);
     if (flag == ARK_SUCCESS) {
         flag = ERKStepSetInitStep(erk->solver, first_step);
     }
@@ -259,7 +259,9 @@ static bool leap(struct erk *erk, double t, double x[], struct method_work *work
     const struct problem *problem = erk->base.problem;
     const size_t n = problem->ode.state_count;
     const double length = t - erk->step_begin;
-    if (!problem->continues || !(length <= erk->next_step) || !step_to(erk, t, x)) {
+    const double max_step = problem->settings.max_step;
+    const bool is_short = length <= erk->next_step && !(max_step > 0.0 && length > max_step);
+    if (!problem->continues || !is_short || !step_to(erk, t, x)) {
         return false;
     }
     double sum = 0.0;

@@ -7,7 +7,7 @@
  *
  * If a restart continues the same solution, its first step has the largest order and is as long as
  * this allows. The requested times in it are values of one polynomial. After an event another one
- * may be near: then the first step has half the order at most. */
+ * may be near: then the first step has about half the order at most. */
 #include "method.h"
 #include "taylor_series.h"
 #include "workspace.h"
@@ -87,7 +87,7 @@ static enum status restart(void *memory, const double x[]) {
 /* ---- Check ---------------------------------------------------------------------------------- */
 
 /* Makes the polynomial fit the equations at the end of the step, *step time scales long: adds
- * orders, or halves *step, which counts as a failed step. is_long: the largest order is in use.
+ * orders, or halves *step, which counts as a failed step. is_long: orders are not added.
  * Writes end_x and end_dx. */
 static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
                             struct method_work *work) {
@@ -132,8 +132,8 @@ static double longest_step_in_scales(const struct problem *problem, double t, do
 }
 
 /* Expands the solution about the state x at the time t (s since the restart). The time scale is
- * `length` (s), or shorter if terms overflow. is_long: for a step as long as the largest order
- * allows; otherwise for a step of one time scale at most. */
+ * `length` (s), or shorter if terms overflow. is_long: for a step as long as its orders
+ * allow; otherwise for a step of one time scale at most. */
 static enum status expand(struct taylor *taylor, double t, double length, bool is_long,
                           const double x[], struct method_work *work) {
     double time_scale = taylor->longest_scale < length ? taylor->longest_scale : length;

@@ -41,10 +41,10 @@ NONNULL void taylor_series_destroy(struct taylor_series *series);
 NONNULL void taylor_series_configure(struct taylor_series *series);
 
 /* Expands the solution about the state x at the time t, and writes `step`. If longest > 0, the step
- * is as long as the largest order allows, and at most this long; if an event is near, half the
- * order at most, or what suffices one time scale ahead. If longest is 0, orders are added until
- * the terms one time scale ahead are within the tolerance; the step is 1, or less if the largest
- * order is not enough. */
+ * is as long as the largest order allows, and at most this long; if an event is near, only
+ * as many orders as suffice one time scale ahead, and about half the largest at most. If longest is
+ * 0, orders are added until the terms one time scale ahead are within the tolerance; the step is 1,
+ * or less if the largest order is not enough. */
 MUST_CHECK NONNULL enum status taylor_series_expand(struct taylor_series *series, double t,
                                                     double time_scale, const double x[],
                                                     double longest);

@@ -48,7 +48,7 @@ struct event {
     bool du_is_known;             /* false if inputs move outside: du is 0 then */
     /* Tolerance of each state, in its unit: sum of its relative and absolute tolerance. */
     const double *tolerance;
-    double rest; /* motion within so many of these, or one, may end at a limit */
+    double rest; /* motion within max(rest, 1) of these may end at a limit */
     /* Where update writes the text of the expression that is not finite, if it fails for that. */
     const char **text;
     int max_events; /* largest number of events that follow each other at one instant */

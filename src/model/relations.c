@@ -305,7 +305,7 @@ static enum status assign(const struct call *call, int number, const struct even
     return refused != NULL ? refuse(call, event, refused) : check_counts(call, event);
 }
 
-/* Sets the tolerance of states that have jumped: 0, or the few roundings of what was assigned.
+/* Sets the tolerance of states that have jumped: 0, or a few roundings of what was assigned.
  * Without those a state that is put onto its limit, a last digit beyond, would meet it again. */
 static void allow_rounding(const struct call *call, bool is_allowed) {
     const double *x = states_in(call->model, call->values);

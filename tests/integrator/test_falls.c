@@ -95,12 +95,13 @@ static void test_a_dip_within_the_touch_is_no_fall(void) {
 static const double below = -1e-6;
 static const size_t row_of_indicator[1] = {0};
 static double rate;
-static bool is_curved; // true if the indicator is sin x - 0.01, false if it is x
+static enum { LINE, SINE, SWING } shape;
+static const double pi = 3.141592653589793;
 static struct integrator *integrator;
 
 void setUp(void) {
     integrator = NULL;
-    is_curved = false;
+    shape = LINE;
 }
 
 void tearDown(void) {
@@ -127,8 +128,13 @@ static enum status series(double t, double time_scale, int first, int last,
     return STATUS_OK;
 }
 
+/* Period: half of 0.05 s. */
+static double swing(double t) {
+    return 0.5 + 0.6 * cos(80.0 * pi * (t - 0.5));
+}
+
 static enum status indicators(double t, const double x[], double z[], void *context) {
-    z[0] = is_curved ? sin(x[0]) - 0.01 : x[0];
+    z[0] = shape == LINE ? x[0] : shape == SINE ? sin(x[0]) - 0.01 : t < 0.5 ? 1.1 : swing(t);
     return STATUS_OK;
 }
 
@@ -140,19 +146,22 @@ static double run(int method, enum indicator_kind kind) {
         .jacobian = jacobian,
         .series = series,
         .series_row_count = 1,
-        .row_of_indicator = row_of_indicator,
+        .row_of_indicator = shape == SWING ? NULL : row_of_indicator,
         .indicator_count = 1,
         .indicators = indicators,
     };
+    const int advances = shape == SWING ? 20 : 1;
     const struct indicator indicator = {.kind = kind, .factor = 1.0};
     const struct integrator_start from = {.horizon = INFINITY, .indicators = &indicator};
     const struct message_sink quiet = {0};
     double x[1] = {below};
-    double reached;
+    double reached = 0.0;
     ASSERT_OK(integrator_create(&ode, &quiet, &integrator));
-    configure_integrator(integrator, method, 1e-12, 0.0);
+    configure_integrator(integrator, method, 1e-12, 1.0 / advances);
     ASSERT_OK(integrator_restart(integrator, x, &from));
-    ASSERT_OK(integrator_advance(integrator, 1.0, 100000, &reached, x));
+    for (int i = 1; i <= advances && reached == (i - 1.0) / advances; i++) {
+        ASSERT_OK(integrator_advance(integrator, (double)i / advances, 100000, &reached, x));
+    }
     TEST_ASSERT_EQUAL_INT(reached < 1.0, integrator_event(integrator) != NULL);
     integrator_destroy(integrator);
     integrator = NULL;
@@ -174,10 +183,20 @@ static void test_only_a_fall_from_where_it_was_counts(void) {
     }
 }
 
+/* An indicator of the time that was calm, then swings so that it is the same at the begin, the
+ * middle and the end of each step. */
+static void test_a_swing_that_fits_the_steps_is_seen(void) {
+    shape = SWING;
+    rate = 0.0;
+    for (int method = 1; method < INTEGRATOR_METHODS; method++) {
+        const double fallen = run(method, INDICATOR_OF_MODEL);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5 + acos(-0.5 / 0.6) / (80.0 * pi), fallen);
+    }
+}
+
 /* How far below 0 an indicator begins is no error of its later falls. */
 static void test_later_falls_are_located_exactly(void) {
-    const double pi = 3.141592653589793;
-    is_curved = true;
+    shape = SINE;
     rate = 4.0;
     for (int method = 1; method < INTEGRATOR_METHODS; method++) {
         TEST_ASSERT_DOUBLE_WITHIN(1e-9, (pi - asin(0.01) - below) / rate,
