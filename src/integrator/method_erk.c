@@ -360,14 +360,15 @@ static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
         }
         if (fabs(next - t) <=
             fmax(negligible * (t - erk->step_begin), 2.0 * DBL_EPSILON * erk->watched)) {
-            next = fmin(fmax(next, erk->step_begin), erk->watched);
+            next = next > erk->step_begin ? fmin(next, erk->watched) : t;
             for (size_t i = 0; i < erk->base.problem->ode.state_count; i++) {
                 x[i] += (next - t) * erk->dx[i];
             }
             t = next;
             break;
         }
-        if (next > low - slack && next <= high + slack) {
+        // at the begin, where the modes were found valid, the event would come again and again
+        if (next > fmax(low - slack, erk->step_begin) && next <= high + slack) {
             t = next;
             corrections++;
         } else {
