@@ -188,7 +188,7 @@ class Series:
         return self.graph.simple("/", self.graph.number(1.0), value)
 
     def _change(self, x: Value, g: Value) -> str:
-        """The sum of i x_i g_(k-i) over i = 1 .. k - 1, over k; that of a state by its rate."""
+        """The sum of i x_i g_(k-i) over i = 1 .. k - 1, over k; of a state by its rate."""
         f, moving = self._varying(x)
         rate = self.rates.get(moving)
         if rate is None or not rate.moves:
