@@ -41,7 +41,11 @@ static struct instance_snapshot *new_snapshot(struct instance *instance) {
     }
     created->newer = NULL;
     created->older = instance->newest;
-    *(instance->newest != NULL ? &instance->newest->newer : &instance->oldest) = created;
+    if (instance->newest != NULL) {
+        instance->newest->newer = created;
+    } else {
+        instance->oldest = created;
+    }
     instance->newest = created;
     return created;
 }
@@ -74,9 +78,10 @@ static enum status resume(struct instance *instance) {
     if (!instance_has_integrator(instance)) {
         return STATUS_OK;
     }
-    const enum status status = instance_is_configured_otherwise(instance)
-                                   ? instance_configure_integrator(instance)
-                                   : STATUS_OK;
+    enum status status = STATUS_OK;
+    if (instance_is_configured_otherwise(instance)) {
+        status = instance_configure_integrator(instance);
+    }
     integrator_set_statistics(instance->integrator, &instance->state.statistics);
     return status;
 }

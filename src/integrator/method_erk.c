@@ -381,16 +381,19 @@ static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
     return flag;
 }
 
-/* Integrates with ERKStep. flag: of begin_watching. */
-static int integrate(struct erk *erk, int flag, double t, int64_t max_steps, const double begin_x[],
-                     double *stopped_at, double x[], struct method_work *work) {
+/* Integrates with ERKStep. watching: the flag of begin_watching. */
+static int integrate(struct erk *erk, int watching, double t, int64_t max_steps,
+                     const double begin_x[], double *stopped_at, double x[],
+                     struct method_work *work) {
     // parts of equal length leave no sliver at the end
     const double begin = erk->base.problem->reached;
     const double length = t - begin;
     const double first_step = erk->next_step > 0.0 ? length / ceil(length / erk->next_step) : 0.0;
     sundials_set_state(&erk->base, begin_x);
-    const int started = start(erk, begin, t, first_step);
-    flag = started == ARK_SUCCESS ? flag : started;
+    int flag = start(erk, begin, t, first_step);
+    if (flag == ARK_SUCCESS) {
+        flag = watching;
+    }
     if (flag == ARK_SUCCESS) {
         flag = ERKStepSetMaxNumSteps(erk->solver, sundials_steps(max_steps));
     }

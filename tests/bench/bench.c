@@ -99,18 +99,33 @@ static const struct {
     {"life", measure_life},
     {"plant", measure_plant},
 };
+enum { GROUPS = sizeof groups / sizeof groups[0] };
+
+/* Marks the groups of a list with commas. */
+static void choose(char *list, bool chosen[GROUPS]) {
+    for (char *name = strtok(list, ","); name != NULL; name = strtok(NULL, ",")) {
+        bool is_known = false;
+        for (size_t i = 0; i < GROUPS; i++) {
+            const bool is_named = strcmp(groups[i].name, name) == 0;
+            chosen[i] = chosen[i] || is_named;
+            is_known = is_known || is_named;
+        }
+        require(is_known, "no such group");
+    }
+}
 
 int main(int count, char **arguments) {
     struct bench bench = {.repeats = 11};
-    const char *only = "steps,free-motion,life,plant";
-    bool is_known = false;
+    bool all = true;
+    bool chosen[GROUPS] = {false};
     require(count >= 4, usage);
     for (int i = 4; i < count; i++) {
         const bool has_value = i + 1 < count;
         if (strcmp(arguments[i], "--repeats") == 0 && has_value) {
             bench.repeats = (int)strtol(arguments[++i], NULL, 10);
         } else if (strcmp(arguments[i], "--only") == 0 && has_value) {
-            only = arguments[++i];
+            choose(arguments[++i], chosen);
+            all = false;
         } else {
             require(false, usage);
         }
@@ -122,13 +137,11 @@ int main(int count, char **arguments) {
     require(fmu_library_open(arguments[3], &bench.plant) != NULL, "RPPlant cannot be loaded");
 
     report_open(bench.repeats);
-    for (size_t i = 0; i < sizeof groups / sizeof groups[0]; i++) {
-        if (strstr(only, groups[i].name) != NULL) {
+    for (size_t i = 0; i < GROUPS; i++) {
+        if (all || chosen[i]) {
             groups[i].measure(&bench);
-            is_known = true;
         }
     }
-    require(is_known, "no such group");
     report_close();
     return 0;
 }

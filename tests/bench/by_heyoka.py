@@ -12,10 +12,9 @@ import heyoka as hy
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path += [str(ROOT), str(ROOT / "fmu")]
-from equations.model_file import read  # noqa: E402
-
+sys.path.append(str(ROOT))
 from rparm.expressions.expression import in_order  # noqa: E402
+from tests.equations.compiled import read  # noqa: E402
 
 OPERATIONS = {"+": add, "-": sub, "*": mul, "/": truediv, "negative": neg, "pow": pow}
 OPERATIONS |= {"number": float, "sin": hy.sin, "cos": hy.cos, "exp": hy.exp}

@@ -7,8 +7,8 @@ from time import thread_time
 
 import numpy as np
 from by_heyoka import compiled
-from equations.model_file import read
 
+from tests.equations.compiled import read
 from tests.equations.examples import FOLDER, METHODS, initializing, made
 
 HERE = Path(__file__).resolve().parent
