@@ -6,6 +6,7 @@ begin, and those of stored archives in them. `rparm.shipped` puts them together 
 
 import hashlib
 import json
+import lzma
 import zipfile
 from itertools import pairwise
 from pathlib import Path
@@ -15,7 +16,7 @@ VERSIONS = {"2.0": "", "3.0": "fmi3"}  # of FMI, with the folder of the release
 
 
 def write_pieces(release: Path, folder: Path) -> None:
-    """Write `pieces` and `files.json`: the bytes of all FMUs and systems, each piece once."""
+    """Write `pieces` and `files.json.xz`: the bytes of all FMUs and systems, each piece once."""
     places: dict[bytes, tuple[int, int]] = {}
     files: dict[str, dict[str, object]] = {}
     with (folder / "pieces").open("wb") as stored:
@@ -33,7 +34,7 @@ def write_pieces(release: Path, folder: Path) -> None:
                     pieces.append(places[piece])
                 digest = hashlib.sha256(content).hexdigest()
                 files[f"{version}/{path.name}"] = {"sha256": digest, "pieces": pieces}
-    (folder / "files.json").write_text(json.dumps(files), encoding="utf-8")
+    (folder / "files.json.xz").write_bytes(lzma.compress(json.dumps(files).encode()))
     if not files:
         raise FileNotFoundError(f"{release}: has no FMU")
 

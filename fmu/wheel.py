@@ -3,7 +3,7 @@
 models/                    scenarios, references, campaigns, systems and their modules; tables as
                            .csv.xz, which `rparm.files` reads like .csv
 fmu/, src/                 what makes FMUs of own equations: Python, and what it reads
-pieces, files.json         all FMUs and systems of the release, as `rparm.shipped` reads them
+pieces, files.json.xz      all FMUs and systems of the release, as `rparm.shipped` reads them
 built.tar.xz               what else is built for each platform: built.py
 plotly/                    the library that draws on pages
 

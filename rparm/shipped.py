@@ -3,10 +3,10 @@
 It has the bytes of FMUs and systems in pieces, each once: FMUs share most of their sources, and
 systems contain FMUs. The files keep every byte of the release.
 
-share/pieces     all pieces
-share/files.json  by the name of a file, VERSION OF FMI/NAME: its SHA-256, and its pieces as
-                 [first byte, number of bytes]
-share/built.tar.xz  all else that is built for each platform (fmu/built.py)
+share/pieces         all pieces
+share/files.json.xz  by the name of a file, VERSION OF FMI/NAME: its SHA-256, and its pieces as
+                     [first byte, number of bytes]
+share/built.tar.xz   all else that is built for each platform (fmu/built.py)
 """
 
 import functools
@@ -22,7 +22,7 @@ from rparm.files import whole
 
 SHARE = Path(__file__).resolve().parent / "share"
 PIECES = SHARE / "pieces"
-FILES = SHARE / "files.json"
+FILES = SHARE / "files.json.xz"
 BUILT = SHARE / "built.tar.xz"
 
 
@@ -84,8 +84,8 @@ def _write(path: Path, content: bytes, is_program: bool = False) -> None:
 @functools.cache
 def _files() -> dict[str, dict]:
     try:
-        return json.loads(FILES.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        return json.loads(lzma.decompress(FILES.read_bytes()))
+    except (OSError, lzma.LZMAError, ValueError) as error:
         raise UserError(f"{FILES}: damaged, install rparm again: {error}") from error
 
 

@@ -37,7 +37,7 @@ def release(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         pack(below / "S.ssp", ({"SystemStructure.ssd": tmp_path / "A"} | fmus).items())
     write_pieces(folder, share)
     monkeypatch.setattr(shipped, "PIECES", share / "pieces")
-    monkeypatch.setattr(shipped, "FILES", share / "files.json")
+    monkeypatch.setattr(shipped, "FILES", share / "files.json.xz")
     shipped._files.cache_clear()
     yield folder
     shipped._files.cache_clear()
@@ -88,7 +88,7 @@ def test_a_damaged_package_is_named(release: Path, tmp_path: Path) -> None:
         shipped.file("2.0/A.fmu", tmp_path / "other")
     shipped.FILES.write_text("{")
     shipped._files.cache_clear()
-    with pytest.raises(UserError, match="files.json: damaged"):
+    with pytest.raises(UserError, match="files.json.xz: damaged"):
         shipped.names()
 
 
@@ -151,7 +151,7 @@ AT_ONCE = """
 import sys
 from pathlib import Path
 from rparm import shipped
-shipped.PIECES, shipped.FILES = Path(sys.argv[1], "pieces"), Path(sys.argv[1], "files.json")
+shipped.PIECES, shipped.FILES = Path(sys.argv[1], "pieces"), Path(sys.argv[1], "files.json.xz")
 input()
 print(shipped.file("2.0/S.ssp", Path(sys.argv[2])))
 """
