@@ -25,6 +25,7 @@
 #include "rp_series.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -60,8 +61,8 @@ struct series_motion {
     const struct rp_plant_parameters *p;
     struct rp_plant_modes modes;
     bool has_wrench;
+    bool depends_on_velocity[2]; /* true if the joint slides with such friction */
     double direction[2];         /* of a joint that slides: 1 or -1; else 0 */
-    bool depends_on_velocity[2]; /* friction of the joint, where it slides */
     double per_vs[2];
     double m2, a, g, m1_lc1; /* m2, a: of link 2 with payload */
     double L0;
@@ -189,6 +190,12 @@ static bool stands_still(const struct series_motion *m, double row[][SERIES_LENG
     return is_stuck(m, 0) && row[W][0] == 0.0;
 }
 
+/* Returns the direction of a joint that slides, 1 or -1; else 0. */
+static int direction_of(const struct series_motion *m, int joint) {
+    const int mode = m->modes.joint[joint];
+    return mode == RP_PLANT_FREE ? 0 : mode;
+}
+
 static bool has_breakaway(const struct rp_plant_parameters *p, int joint) {
     return p->breakaway_friction[joint] > p->coulomb_friction[joint];
 }
@@ -198,15 +205,11 @@ static bool has_payload(const struct series_motion *m) {
            (m->p->payload_mass > 0.0 || m->p->payload_inertia > 0.0);
 }
 
-static bool has_constant_friction(const struct series_motion *m, int joint) {
-    return m->direction[joint] != 0.0 && !m->depends_on_velocity[joint];
-}
-
 /* The motion is that of the manipulator, up to constant friction. */
 static bool is_plain(const struct series_motion *m) {
     const struct rp_plant_parameters *p = m->p;
-    return (m->modes.joint[0] == RP_PLANT_FREE || has_constant_friction(m, 0)) &&
-           (m->modes.joint[1] == RP_PLANT_FREE || has_constant_friction(m, 1)) &&
+    return !m->depends_on_velocity[0] && !m->depends_on_velocity[1] && !is_stuck(m, 0) &&
+           !is_stuck(m, 1) &&
            m->modes.contact[0] == RP_PLANT_APART && m->modes.contact[1] == RP_PLANT_APART &&
            p->armature[0] + p->armature[1] + p->damping[0] + p->damping[1] == 0.0 &&
            !m->has_wrench && !has_payload(m);
@@ -235,6 +238,10 @@ static void set_bodies(struct series_motion *m, double q2) {
     const double a = plant.arm.a;
     const double b2 = p->armature[1];
     const double J0 = plant.arm.J + p->armature[0];
+    for (int i = 0; i < 2; i++) {
+        m->direction[i] = direction_of(m, i);
+        m->per_vs[i] = m->depends_on_velocity[i] ? 1.0 / p->stribeck_velocity[i] : 0.0;
+    }
     m->m2 = m2;
     m->a = a;
     m->g = arm->g;
@@ -250,22 +257,25 @@ static void set_bodies(struct series_motion *m, double q2) {
 static void begin_motion(const struct series_origin *origin, double row[][SERIES_LENGTH],
                          struct series_motion *m) {
     const struct rp_plant_values *values = origin->values;
-    const double q[2] = {row[Q1][0], row[Q2][0]};
-    const double dq[2] = {row[W][0], row[V][0]};
-    const double(*u)[SERIES_INPUT_LENGTH] = origin->inputs;
-    const struct rp_plant_inputs inputs = {
-        .tau = {u[0][0], u[1][0]},
-        .wrench = {u[FX][0], u[FY][0], u[MZ][0]},
-    };
     m->origin = origin;
     m->p = &values->parameters;
-    rp_plant_modes_in_effect(values, q, dq, &inputs, &m->modes);
+    m->modes = values->modes;
+    if (values->modes.payload == RP_PLANT_UNDECIDED) {
+        const double(*u)[SERIES_INPUT_LENGTH] = origin->inputs;
+        const struct rp_plant_inputs inputs = {
+            .tau = {u[0][0], u[1][0]},
+            .wrench = {u[FX][0], u[FY][0], u[MZ][0]},
+        };
+        rp_plant_first_modes(values, (const double[]){row[Q1][0], row[Q2][0]},
+                             (const double[]){row[W][0], row[V][0]}, &inputs, &m->modes);
+    } else {
+        rp_plant_correct_modes(m->p, &m->modes);
+    }
     m->has_wrench = has_wrench(origin);
     for (int i = 0; i < 2; i++) {
-        m->direction[i] = plant_slides(m->modes.joint[i]) ? m->modes.joint[i] : 0.0;
         m->depends_on_velocity[i] =
-            has_breakaway(m->p, i) && fabs(dq[i]) < (fast + 1.0) * m->p->stribeck_velocity[i];
-        m->per_vs[i] = m->depends_on_velocity[i] ? 1.0 / m->p->stribeck_velocity[i] : 0.0;
+            plant_slides(m->modes.joint[i]) && has_breakaway(m->p, i) &&
+            fabs(row[W + i][0]) < (fast + 1.0) * m->p->stribeck_velocity[i];
     }
 }
 
@@ -280,8 +290,7 @@ struct products {
 
 static inline struct products products_of_order(double row[][SERIES_LENGTH], double next_L, int n) {
     struct products sum = {0};
-    for (int i = 0; i < n; i++) {
-        const int j = n - i;
+    for (ptrdiff_t i = 0, j = n; i < n; i++, j--) {
         sum.P_w += row[P][i] * row[W][j];
         sum.L_c += row[L][i] * row[C][j];
         sum.w_s += row[W][i] * row[S][j];
@@ -391,7 +400,8 @@ static enum status extend(const struct series_origin *origin, int first, int las
     begin_motion(origin, row, &m);
     if (is_plain(&m)) {
         const double *coulomb = m.p->coulomb_friction;
-        const double friction[2] = {m.direction[0] * coulomb[0], m.direction[1] * coulomb[1]};
+        const double friction[2] = {direction_of(&m, 0) * coulomb[0],
+                                    direction_of(&m, 1) * coulomb[1]};
         const bool slides = m.modes.joint[0] != RP_PLANT_FREE || m.modes.joint[1] != RP_PLANT_FREE;
         rp_series_extend(&m.p->arm, slides ? friction : NULL, origin, first, last, row);
         return STATUS_OK;

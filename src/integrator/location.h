@@ -99,5 +99,16 @@ MUST_CHECK NONNULL bool location_correction(struct location *location, double t,
  * would begin below their limits. */
 NONNULL void location_lead_from_restart(struct location *location);
 
+/* Returns a bound of how far a state moves over a step: the sum of |row[k]|, 0 < k <= degree. */
+static inline double location_way(const double row[], int degree) {
+    double way[2] = {0.0, 0.0};
+    const double *c = row + 1;
+    for (const double *end = row + degree; c < end; c += 2) {
+        way[0] += fabs(c[0]);
+        way[1] += fabs(c[1]);
+    }
+    return way[0] + way[1] + (degree % 2 != 0 ? fabs(row[degree]) : 0.0);
+}
+
 /* Writes the states at s of location->step, 0 to 1 from its begin on. */
 NONNULL void location_write_states(const struct location *location, double s, double x[]);
