@@ -209,8 +209,8 @@ static bool modes_are_possible(const void *values_pointer, bool is_held) {
 static bool moves_on(const struct rp_plant_values *values) {
     const struct rp_plant_parameters *p = &values->parameters;
     const struct rp_plant_modes *modes = &values->modes;
-    bool is_same = modes->payload ==
-                   (values->payload_attached != 0 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED);
+    bool is_same =
+        modes->payload == (values->payload_attached != 0 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED);
     for (int i = 0; i < 2 && is_same; i++) {
         is_same = p->stops[i] == RP_PLANT_STOPS_NONE && modes->contact[i] == RP_PLANT_APART &&
                   values->dq[i] * modes->joint[i] > 0.0 && plant_breakaway(p, i) > 0.0 &&

@@ -149,7 +149,7 @@ ALWAYS_INLINE double series_friction(const struct series_motion *m, int i, int k
 ALWAYS_INLINE double series_compliant_force(const struct series_motion *m, int i, int k,
                                             double row[][SERIES_LENGTH]) {
     const int contact = m->modes.contact[i];
-    if (abs(contact) != RP_PLANT_PUSHED) {
+    if (contact == RP_PLANT_APART || abs(contact) != RP_PLANT_PUSHED) {
         return 0.0;
     }
     const double q = row[Q1 + i][k];
@@ -173,10 +173,12 @@ ALWAYS_INLINE double series_effort(const struct series_motion *m, int i, int k,
 /* ---- Constants ------------------------------------------------------------------------------ */
 
 static bool has_wrench(const struct series_origin *origin) {
-    uint64_t bits[3 * SERIES_INPUT_LENGTH], any = 0;
-    memcpy(bits, origin->inputs[FX], sizeof bits);
-    for (size_t i = 0; i < sizeof bits / sizeof bits[0]; i++) {
-        any |= bits[i]; // one branch for all
+    const double *first = origin->inputs[FX];
+    uint64_t any = 0;
+    for (const double *u = first; u < first + 3 * (ptrdiff_t)SERIES_INPUT_LENGTH; u++) {
+        uint64_t bits;
+        memcpy(&bits, u, sizeof bits);
+        any |= bits; // one branch for all
     }
     return any << 1 != 0; // without the signs of zeros
 }
@@ -209,8 +211,8 @@ static bool has_payload(const struct series_motion *m) {
 static bool is_plain(const struct series_motion *m) {
     const struct rp_plant_parameters *p = m->p;
     return !m->depends_on_velocity[0] && !m->depends_on_velocity[1] && !is_stuck(m, 0) &&
-           !is_stuck(m, 1) &&
-           m->modes.contact[0] == RP_PLANT_APART && m->modes.contact[1] == RP_PLANT_APART &&
+           !is_stuck(m, 1) && m->modes.contact[0] == RP_PLANT_APART &&
+           m->modes.contact[1] == RP_PLANT_APART &&
            p->armature[0] + p->armature[1] + p->damping[0] + p->damping[1] == 0.0 &&
            !m->has_wrench && !has_payload(m);
 }
@@ -219,25 +221,33 @@ static bool is_plain(const struct series_motion *m) {
 static void set_bodies(struct series_motion *m, double q2) {
     const struct rp_plant_parameters *p = m->p;
     const struct rp_parameters *arm = &p->arm;
-    struct plant plant = {
-        .arm = {.m1 = arm->m1,
-                .m2 = arm->m2,
-                .I1z = arm->I1z,
-                .I2z = arm->I2z,
-                .l1 = arm->l1,
-                .lc1 = arm->lc1,
-                .a = arm->a,
-                .q = {0.0, q2}},
-    };
-    plant.arm.L = arm->l1 + q2;
-    plant.arm.J = arm_fixed_inertia(arm) + arm->m2 * plant.arm.L * plant.arm.L;
+    double m2 = arm->m2;
+    double a = arm->a;
+    m->L0 = arm->l1 + q2;
+    double J = arm_fixed_inertia(arm) + m2 * m->L0 * m->L0;
+    m->offset_z = 0.0;
     if (has_payload(m)) {
+        struct plant plant = {
+            .arm = {.m1 = arm->m1,
+                    .m2 = m2,
+                    .I1z = arm->I1z,
+                    .I2z = arm->I2z,
+                    .l1 = arm->l1,
+                    .lc1 = arm->lc1,
+                    .a = a,
+                    .L = m->L0,
+                    .J = J,
+                    .q = {0.0, q2}},
+        };
         plant_attach(&plant, p);
+        m2 = plant.arm.m2;
+        a = plant.arm.a;
+        J = plant.arm.J;
+        m->L0 = plant.arm.L;
+        m->offset_z = plant.offset_z;
     }
-    const double m2 = plant.arm.m2;
-    const double a = plant.arm.a;
     const double b2 = p->armature[1];
-    const double J0 = plant.arm.J + p->armature[0];
+    const double J0 = J + p->armature[0];
     for (int i = 0; i < 2; i++) {
         m->direction[i] = direction_of(m, i);
         m->per_vs[i] = m->depends_on_velocity[i] ? 1.0 / p->stribeck_velocity[i] : 0.0;
@@ -246,8 +256,6 @@ static void set_bodies(struct series_motion *m, double q2) {
     m->a = a;
     m->g = arm->g;
     m->m1_lc1 = arm->m1 * arm->lc1;
-    m->L0 = plant.arm.L;
-    m->offset_z = has_payload(m) ? plant.offset_z : 0.0;
     m->mu = b2 > 0.0 ? m2 / (m2 + b2) : 1.0;
     m->a_mu_b2 = a * m->mu * b2;
     m->per_m2 = 1.0 / m2;
@@ -273,9 +281,8 @@ static void begin_motion(const struct series_origin *origin, double row[][SERIES
     }
     m->has_wrench = has_wrench(origin);
     for (int i = 0; i < 2; i++) {
-        m->depends_on_velocity[i] =
-            plant_slides(m->modes.joint[i]) && has_breakaway(m->p, i) &&
-            fabs(row[W + i][0]) < (fast + 1.0) * m->p->stribeck_velocity[i];
+        m->depends_on_velocity[i] = plant_slides(m->modes.joint[i]) && has_breakaway(m->p, i) &&
+                                    fabs(row[W + i][0]) < (fast + 1.0) * m->p->stribeck_velocity[i];
     }
 }
 
@@ -394,6 +401,27 @@ static void begin_rows(const struct series_motion *m, double row[][SERIES_LENGTH
     row[C][0] = cos(row[Q1][0]);
 }
 
+/* Extends the series of any motion. */
+static NOINLINE void extend_any(struct series_motion *m, int first, int last,
+                                double row[][SERIES_LENGTH]) {
+    set_bodies(m, row[Q2][0]);
+    if (first == 0) {
+        begin_rows(m, row);
+    }
+    // indicators of an order take what follows from it
+    const bool sticks = is_stuck(m, 0) || is_stuck(m, 1);
+    const int end = sticks ? last + 1 : last;
+    for (int n = first > 0 ? first - 1 : 0; n < end; n++) {
+        const struct next next = next_order(m, n, row);
+        if (sticks && n >= first) {
+            write_indicators(m, n, &next, row);
+        }
+        if (n < last) {
+            write_order(m, n + 1, &next, row);
+        }
+    }
+}
+
 static enum status extend(const struct series_origin *origin, int first, int last,
                           double row[][SERIES_LENGTH]) {
     struct series_motion m;
@@ -406,22 +434,7 @@ static enum status extend(const struct series_origin *origin, int first, int las
         rp_series_extend(&m.p->arm, slides ? friction : NULL, origin, first, last, row);
         return STATUS_OK;
     }
-    set_bodies(&m, row[Q2][0]);
-    if (first == 0) {
-        begin_rows(&m, row);
-    }
-    // indicators of an order take what follows from it
-    const bool sticks = is_stuck(&m, 0) || is_stuck(&m, 1);
-    const int end = sticks ? last + 1 : last;
-    for (int n = first > 0 ? first - 1 : 0; n < end; n++) {
-        const struct next next = next_order(&m, n, row);
-        if (sticks && n >= first) {
-            write_indicators(&m, n, &next, row);
-        }
-        if (n < last) {
-            write_order(&m, n + 1, &next, row);
-        }
-    }
+    extend_any(&m, first, last, row);
     return STATUS_OK;
 }
 

@@ -20,7 +20,7 @@ bool location_create(const struct ode *ode, const struct integrator_settings *se
     location->used = calloc(count, sizeof *location->used);
     location->first = calloc(count, sizeof *location->first);
     location->samples = calloc(count, sizeof *location->samples);
-    location->x = calloc(3 * states, sizeof *location->x);
+    location->x = calloc(4 * states, sizeof *location->x);
     location->z = calloc(count, sizeof *location->z);
     location->has_row = calloc(count, sizeof *location->has_row);
     location->is_armed = calloc(count, sizeof *location->is_armed);
@@ -37,6 +37,7 @@ bool location_create(const struct ode *ode, const struct integrator_settings *se
     location->rounding = location->touch + count;
     location->dx = location->x + states;
     location->restart_x = location->dx + states;
+    location->way = location->restart_x + states;
     return true;
 }
 
@@ -197,7 +198,10 @@ static bool is_far_above(const struct location *location, size_t i) {
     const struct indicator *indicator = &location->indicators[i];
     const double value = indicator->offset + indicator->factor * step->row[indicator->state][0];
     const double noise = location->is_armed[i] ? 0.0 : location->noise[i];
-    const double way = location_way(step->row[indicator->state], step->degree);
+    double way = location->way[indicator->state];
+    if (step->row != location->way_row || step->degree != location->way_degree || way < 0.0) {
+        way = location_way(step->row[indicator->state], step->degree);
+    }
     const double slack = 0x1p-40; // far above all rounding here and in Horner's scheme
     return (1.0 - slack) * value > (1.0 + slack) * fabs(indicator->factor) * way + noise;
 }
@@ -474,11 +478,7 @@ static bool make_represent(double c[], int degree, double z, double relative_tol
 
 void location_check_rows(struct location *location, const double x[], double relative_tolerance) {
     const struct step_polynomial *step = &location->step;
-    bool has_any = false;
-    for (size_t k = 0; k < location->used_count; k++) {
-        has_any |= location->has_row[location->used[k]];
-    }
-    if (!has_any || evaluate(location, step->end, x) != STATUS_OK) {
+    if (evaluate(location, step->end, x) != STATUS_OK) {
         return;
     }
     for (size_t k = 0; k < location->used_count; k++) {
