@@ -205,10 +205,24 @@ static bool modes_are_possible(const void *values_pointer, bool is_held) {
            (!is_held || (fits(values, 0) && fits(values, 1)));
 }
 
+/* True if no mode changes because the joints, without stops, move as they did. */
+static bool moves_on(const struct rp_plant_values *values) {
+    const struct rp_plant_parameters *p = &values->parameters;
+    const struct rp_plant_modes *modes = &values->modes;
+    bool is_same =
+        modes->payload == (values->payload_attached != 0 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED);
+    for (int i = 0; i < 2 && is_same; i++) {
+        is_same = p->stops[i] == RP_PLANT_STOPS_NONE && modes->contact[i] == RP_PLANT_APART &&
+                  values->dq[i] * modes->joint[i] > 0.0 && plant_breakaway(p, i) > 0.0 &&
+                  plant_slides(modes->joint[i]);
+    }
+    return is_same;
+}
+
 static enum status update(void *values_pointer, const struct event *event) {
     static const int none[2] = {0, 0};
     struct rp_plant_values *values = values_pointer;
-    if (event->triggered == NULL && rp_plant_surely_holds(values)) {
+    if (event->triggered == NULL && (moves_on(values) || rp_plant_surely_holds(values))) {
         return STATUS_OK;
     }
     struct triggered triggered;
@@ -253,6 +267,9 @@ static bool are_possible(const void *values_pointer) {
 
 static bool is_at_rest(const void *values_pointer) {
     const struct rp_plant_values *values = values_pointer;
+    if (values->modes.joint[0] != RP_PLANT_STUCK && values->modes.payload != RP_PLANT_UNDECIDED) {
+        return false;
+    }
     struct rp_plant_modes modes;
     rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs, &modes);
     return modes.joint[0] == RP_PLANT_STUCK && modes.joint[1] == RP_PLANT_STUCK;

@@ -83,6 +83,19 @@ void rp_plant_first_modes(const struct rp_plant_values *values, const double q[2
                           const double dq[2], const struct rp_plant_inputs *inputs,
                           struct rp_plant_modes *modes);
 
+/* Corrects decided modes for parameters that have changed since. */
+static inline void rp_plant_correct_modes(const struct rp_plant_parameters *p,
+                                          struct rp_plant_modes *modes) {
+    for (int i = 0; i < 2; i++) {
+        if (!rp_plant_has_contacts(p, i)) {
+            modes->contact[i] = RP_PLANT_APART;
+        }
+        if (!rp_plant_can_stick(p, i)) {
+            modes->joint[i] = RP_PLANT_FREE;
+        }
+    }
+}
+
 /* Writes the modes in effect: those of the last event, or during initialization, when none has
  * been, the first ones. Inline, as each evaluation asks for them; a modified copy that is returned
  * stalls the processor, which cannot load parts together that were stored apart. */
@@ -93,14 +106,7 @@ static inline void rp_plant_modes_in_effect(const struct rp_plant_values *values
     *modes = values->modes;
     if (modes->payload == RP_PLANT_UNDECIDED) {
         rp_plant_first_modes(values, q, dq, inputs, modes);
-        return;
-    }
-    for (int i = 0; i < 2; i++) {
-        if (!rp_plant_has_contacts(&values->parameters, i)) {
-            modes->contact[i] = RP_PLANT_APART;
-        }
-        if (!rp_plant_can_stick(&values->parameters, i)) {
-            modes->joint[i] = RP_PLANT_FREE;
-        }
+    } else {
+        rp_plant_correct_modes(&values->parameters, modes);
     }
 }

@@ -25,6 +25,7 @@
 #include "rp_series.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -60,8 +61,8 @@ struct series_motion {
     const struct rp_plant_parameters *p;
     struct rp_plant_modes modes;
     bool has_wrench;
+    bool depends_on_velocity[2]; /* true if the joint slides with such friction */
     double direction[2];         /* of a joint that slides: 1 or -1; else 0 */
-    bool depends_on_velocity[2]; /* friction of the joint, where it slides */
     double per_vs[2];
     double m2, a, g, m1_lc1; /* m2, a: of link 2 with payload */
     double L0;
@@ -148,7 +149,7 @@ ALWAYS_INLINE double series_friction(const struct series_motion *m, int i, int k
 ALWAYS_INLINE double series_compliant_force(const struct series_motion *m, int i, int k,
                                             double row[][SERIES_LENGTH]) {
     const int contact = m->modes.contact[i];
-    if (abs(contact) != RP_PLANT_PUSHED) {
+    if (contact == RP_PLANT_APART || abs(contact) != RP_PLANT_PUSHED) {
         return 0.0;
     }
     const double q = row[Q1 + i][k];
@@ -172,10 +173,12 @@ ALWAYS_INLINE double series_effort(const struct series_motion *m, int i, int k,
 /* ---- Constants ------------------------------------------------------------------------------ */
 
 static bool has_wrench(const struct series_origin *origin) {
-    uint64_t bits[3 * SERIES_INPUT_LENGTH], any = 0;
-    memcpy(bits, origin->inputs[FX], sizeof bits);
-    for (size_t i = 0; i < sizeof bits / sizeof bits[0]; i++) {
-        any |= bits[i]; // one branch for all
+    const double *first = origin->inputs[FX];
+    uint64_t any = 0;
+    for (const double *u = first; u < first + 3 * (ptrdiff_t)SERIES_INPUT_LENGTH; u++) {
+        uint64_t bits;
+        memcpy(&bits, u, sizeof bits);
+        any |= bits; // one branch for all
     }
     return any << 1 != 0; // without the signs of zeros
 }
@@ -189,6 +192,12 @@ static bool stands_still(const struct series_motion *m, double row[][SERIES_LENG
     return is_stuck(m, 0) && row[W][0] == 0.0;
 }
 
+/* Returns the direction of a joint that slides, 1 or -1; else 0. */
+static int direction_of(const struct series_motion *m, int joint) {
+    const int mode = m->modes.joint[joint];
+    return mode == RP_PLANT_FREE ? 0 : mode;
+}
+
 static bool has_breakaway(const struct rp_plant_parameters *p, int joint) {
     return p->breakaway_friction[joint] > p->coulomb_friction[joint];
 }
@@ -198,16 +207,12 @@ static bool has_payload(const struct series_motion *m) {
            (m->p->payload_mass > 0.0 || m->p->payload_inertia > 0.0);
 }
 
-static bool has_constant_friction(const struct series_motion *m, int joint) {
-    return m->direction[joint] != 0.0 && !m->depends_on_velocity[joint];
-}
-
 /* The motion is that of the manipulator, up to constant friction. */
 static bool is_plain(const struct series_motion *m) {
     const struct rp_plant_parameters *p = m->p;
-    return (m->modes.joint[0] == RP_PLANT_FREE || has_constant_friction(m, 0)) &&
-           (m->modes.joint[1] == RP_PLANT_FREE || has_constant_friction(m, 1)) &&
-           m->modes.contact[0] == RP_PLANT_APART && m->modes.contact[1] == RP_PLANT_APART &&
+    return !m->depends_on_velocity[0] && !m->depends_on_velocity[1] && !is_stuck(m, 0) &&
+           !is_stuck(m, 1) && m->modes.contact[0] == RP_PLANT_APART &&
+           m->modes.contact[1] == RP_PLANT_APART &&
            p->armature[0] + p->armature[1] + p->damping[0] + p->damping[1] == 0.0 &&
            !m->has_wrench && !has_payload(m);
 }
@@ -216,31 +221,41 @@ static bool is_plain(const struct series_motion *m) {
 static void set_bodies(struct series_motion *m, double q2) {
     const struct rp_plant_parameters *p = m->p;
     const struct rp_parameters *arm = &p->arm;
-    struct plant plant = {
-        .arm = {.m1 = arm->m1,
-                .m2 = arm->m2,
-                .I1z = arm->I1z,
-                .I2z = arm->I2z,
-                .l1 = arm->l1,
-                .lc1 = arm->lc1,
-                .a = arm->a,
-                .q = {0.0, q2}},
-    };
-    plant.arm.L = arm->l1 + q2;
-    plant.arm.J = arm_fixed_inertia(arm) + arm->m2 * plant.arm.L * plant.arm.L;
+    double m2 = arm->m2;
+    double a = arm->a;
+    m->L0 = arm->l1 + q2;
+    double J = arm_fixed_inertia(arm) + m2 * m->L0 * m->L0;
+    m->offset_z = 0.0;
     if (has_payload(m)) {
+        struct plant plant = {
+            .arm = {.m1 = arm->m1,
+                    .m2 = m2,
+                    .I1z = arm->I1z,
+                    .I2z = arm->I2z,
+                    .l1 = arm->l1,
+                    .lc1 = arm->lc1,
+                    .a = a,
+                    .L = m->L0,
+                    .J = J,
+                    .q = {0.0, q2}},
+        };
         plant_attach(&plant, p);
+        m2 = plant.arm.m2;
+        a = plant.arm.a;
+        J = plant.arm.J;
+        m->L0 = plant.arm.L;
+        m->offset_z = plant.offset_z;
     }
-    const double m2 = plant.arm.m2;
-    const double a = plant.arm.a;
     const double b2 = p->armature[1];
-    const double J0 = plant.arm.J + p->armature[0];
+    const double J0 = J + p->armature[0];
+    for (int i = 0; i < 2; i++) {
+        m->direction[i] = direction_of(m, i);
+        m->per_vs[i] = m->depends_on_velocity[i] ? 1.0 / p->stribeck_velocity[i] : 0.0;
+    }
     m->m2 = m2;
     m->a = a;
     m->g = arm->g;
     m->m1_lc1 = arm->m1 * arm->lc1;
-    m->L0 = plant.arm.L;
-    m->offset_z = has_payload(m) ? plant.offset_z : 0.0;
     m->mu = b2 > 0.0 ? m2 / (m2 + b2) : 1.0;
     m->a_mu_b2 = a * m->mu * b2;
     m->per_m2 = 1.0 / m2;
@@ -250,22 +265,24 @@ static void set_bodies(struct series_motion *m, double q2) {
 static void begin_motion(const struct series_origin *origin, double row[][SERIES_LENGTH],
                          struct series_motion *m) {
     const struct rp_plant_values *values = origin->values;
-    const double q[2] = {row[Q1][0], row[Q2][0]};
-    const double dq[2] = {row[W][0], row[V][0]};
-    const double(*u)[SERIES_INPUT_LENGTH] = origin->inputs;
-    const struct rp_plant_inputs inputs = {
-        .tau = {u[0][0], u[1][0]},
-        .wrench = {u[FX][0], u[FY][0], u[MZ][0]},
-    };
     m->origin = origin;
     m->p = &values->parameters;
-    rp_plant_modes_in_effect(values, q, dq, &inputs, &m->modes);
+    m->modes = values->modes;
+    if (values->modes.payload == RP_PLANT_UNDECIDED) {
+        const double(*u)[SERIES_INPUT_LENGTH] = origin->inputs;
+        const struct rp_plant_inputs inputs = {
+            .tau = {u[0][0], u[1][0]},
+            .wrench = {u[FX][0], u[FY][0], u[MZ][0]},
+        };
+        rp_plant_first_modes(values, (const double[]){row[Q1][0], row[Q2][0]},
+                             (const double[]){row[W][0], row[V][0]}, &inputs, &m->modes);
+    } else {
+        rp_plant_correct_modes(m->p, &m->modes);
+    }
     m->has_wrench = has_wrench(origin);
     for (int i = 0; i < 2; i++) {
-        m->direction[i] = plant_slides(m->modes.joint[i]) ? m->modes.joint[i] : 0.0;
-        m->depends_on_velocity[i] =
-            has_breakaway(m->p, i) && fabs(dq[i]) < (fast + 1.0) * m->p->stribeck_velocity[i];
-        m->per_vs[i] = m->depends_on_velocity[i] ? 1.0 / m->p->stribeck_velocity[i] : 0.0;
+        m->depends_on_velocity[i] = plant_slides(m->modes.joint[i]) && has_breakaway(m->p, i) &&
+                                    fabs(row[W + i][0]) < (fast + 1.0) * m->p->stribeck_velocity[i];
     }
 }
 
@@ -280,8 +297,7 @@ struct products {
 
 static inline struct products products_of_order(double row[][SERIES_LENGTH], double next_L, int n) {
     struct products sum = {0};
-    for (int i = 0; i < n; i++) {
-        const int j = n - i;
+    for (ptrdiff_t i = 0, j = n; i < n; i++, j--) {
         sum.P_w += row[P][i] * row[W][j];
         sum.L_c += row[L][i] * row[C][j];
         sum.w_s += row[W][i] * row[S][j];
@@ -385,33 +401,40 @@ static void begin_rows(const struct series_motion *m, double row[][SERIES_LENGTH
     row[C][0] = cos(row[Q1][0]);
 }
 
+/* Extends the series of any motion. */
+static NOINLINE void extend_any(struct series_motion *m, int first, int last,
+                                double row[][SERIES_LENGTH]) {
+    set_bodies(m, row[Q2][0]);
+    if (first == 0) {
+        begin_rows(m, row);
+    }
+    // indicators of an order take what follows from it
+    const bool sticks = is_stuck(m, 0) || is_stuck(m, 1);
+    const int end = sticks ? last + 1 : last;
+    for (int n = first > 0 ? first - 1 : 0; n < end; n++) {
+        const struct next next = next_order(m, n, row);
+        if (sticks && n >= first) {
+            write_indicators(m, n, &next, row);
+        }
+        if (n < last) {
+            write_order(m, n + 1, &next, row);
+        }
+    }
+}
+
 static enum status extend(const struct series_origin *origin, int first, int last,
                           double row[][SERIES_LENGTH]) {
     struct series_motion m;
     begin_motion(origin, row, &m);
     if (is_plain(&m)) {
         const double *coulomb = m.p->coulomb_friction;
-        const double friction[2] = {m.direction[0] * coulomb[0], m.direction[1] * coulomb[1]};
+        const double friction[2] = {direction_of(&m, 0) * coulomb[0],
+                                    direction_of(&m, 1) * coulomb[1]};
         const bool slides = m.modes.joint[0] != RP_PLANT_FREE || m.modes.joint[1] != RP_PLANT_FREE;
         rp_series_extend(&m.p->arm, slides ? friction : NULL, origin, first, last, row);
         return STATUS_OK;
     }
-    set_bodies(&m, row[Q2][0]);
-    if (first == 0) {
-        begin_rows(&m, row);
-    }
-    // indicators of an order take what follows from it
-    const bool sticks = is_stuck(&m, 0) || is_stuck(&m, 1);
-    const int end = sticks ? last + 1 : last;
-    for (int n = first > 0 ? first - 1 : 0; n < end; n++) {
-        const struct next next = next_order(&m, n, row);
-        if (sticks && n >= first) {
-            write_indicators(&m, n, &next, row);
-        }
-        if (n < last) {
-            write_order(&m, n + 1, &next, row);
-        }
-    }
+    extend_any(&m, first, last, row);
     return STATUS_OK;
 }
 

@@ -32,12 +32,12 @@ static void write_tolerances(struct instance *instance) {
     const bool is_located_outside =
         instance->is_integrated_outside && instance->model->events->errors != NULL;
     double *tolerances = instance->event_tolerances;
+    const double relative = instance->state.own.effective_relative_tolerance;
     if (is_located_outside) {
         write_location_errors(instance, tolerances);
     }
     for (size_t i = 0; i < count_of(states); i++) {
-        const double allowed = instance->absolute_tolerances[i] +
-                               instance->state.own.effective_relative_tolerance * fabs(x[i]);
+        const double allowed = instance->absolute_tolerances[i] + relative * fabs(x[i]);
         tolerances[i] = is_located_outside ? fmax(allowed, 2.0 * tolerances[i]) : allowed;
     }
 }

@@ -20,7 +20,7 @@ bool location_create(const struct ode *ode, const struct integrator_settings *se
     location->used = calloc(count, sizeof *location->used);
     location->first = calloc(count, sizeof *location->first);
     location->samples = calloc(count, sizeof *location->samples);
-    location->x = calloc(3 * states, sizeof *location->x);
+    location->x = calloc(4 * states, sizeof *location->x);
     location->z = calloc(count, sizeof *location->z);
     location->has_row = calloc(count, sizeof *location->has_row);
     location->is_armed = calloc(count, sizeof *location->is_armed);
@@ -37,6 +37,7 @@ bool location_create(const struct ode *ode, const struct integrator_settings *se
     location->rounding = location->touch + count;
     location->dx = location->x + states;
     location->restart_x = location->dx + states;
+    location->way = location->restart_x + states;
     return true;
 }
 
@@ -129,13 +130,14 @@ enum status location_restart(struct location *location, const struct indicator *
     bool needs_model = false;
     location->used_count = 0;
     memcpy(location->restart_x, x, location->ode->state_count * sizeof *x);
-    for (size_t i = 0; i < location->ode->indicator_count; i++) {
-        const struct indicator *indicator = &indicators[i];
-        location->has_row[i] = false;
-        const bool is_fixed = indicator->kind == INDICATOR_OF_STATE && indicator->factor == 0.0;
-        if (indicator->kind == INDICATOR_UNUSED || is_fixed) {
+    const struct indicator *const end = indicators + location->ode->indicator_count;
+    for (const struct indicator *indicator = indicators; indicator < end; indicator++) {
+        if (indicator->kind == INDICATOR_UNUSED ||
+            (indicator->kind == INDICATOR_OF_STATE && indicator->factor == 0.0)) {
             continue;
         }
+        const size_t i = (size_t)(indicator - indicators);
+        location->has_row[i] = false;
         location->used[location->used_count] = i;
         location->used_count++;
         const double rounding = 2.0 * DBL_EPSILON * fabs(indicator->offset);
@@ -191,12 +193,14 @@ static void expand(const struct step_polynomial *step, const struct indicator *i
 
 /* True if the state moves by less than the indicator is above 0 and above its noise at a restart.
  */
-static bool is_far_above(const struct step_polynomial *step, const struct indicator *indicator,
-                         double value, double noise) {
-    const double *row = step->row[indicator->state];
-    double way = 0.0;
-    for (int k = 1; k <= step->degree; k++) {
-        way += fabs(row[k]);
+static bool is_far_above(const struct location *location, size_t i) {
+    const struct step_polynomial *step = &location->step;
+    const struct indicator *indicator = &location->indicators[i];
+    const double value = indicator->offset + indicator->factor * step->row[indicator->state][0];
+    const double noise = location->is_armed[i] ? 0.0 : location->noise[i];
+    double way = location->way[indicator->state];
+    if (step->row != location->way_row || step->degree != location->way_degree || way < 0.0) {
+        way = location_way(step->row[indicator->state], step->degree);
     }
     const double slack = 0x1p-40; // far above all rounding here and in Horner's scheme
     return (1.0 - slack) * value > (1.0 + slack) * fabs(indicator->factor) * way + noise;
@@ -207,10 +211,6 @@ static double first_of_state(struct location *location, size_t i, double latest)
     const struct indicator *indicator = &location->indicators[i];
     double c[ROOTS_LENGTH];
     c[0] = indicator->offset + indicator->factor * step->row[indicator->state][0];
-    if (is_far_above(step, indicator, c[0], location->is_armed[i] ? 0.0 : location->noise[i])) {
-        location->is_armed[i] = true;
-        return INFINITY;
-    }
     if (step->is_from_end) {
         // backwards in time a proof needs no shift
         expand(step, indicator, -1.0, c);
@@ -478,11 +478,7 @@ static bool make_represent(double c[], int degree, double z, double relative_tol
 
 void location_check_rows(struct location *location, const double x[], double relative_tolerance) {
     const struct step_polynomial *step = &location->step;
-    bool has_any = false;
-    for (size_t k = 0; k < location->used_count; k++) {
-        has_any |= location->has_row[location->used[k]];
-    }
-    if (!has_any || evaluate(location, step->end, x) != STATUS_OK) {
+    if (evaluate(location, step->end, x) != STATUS_OK) {
         return;
     }
     for (size_t k = 0; k < location->used_count; k++) {
@@ -505,6 +501,10 @@ enum status location_search(struct location *location) {
         const struct indicator *indicator = &location->indicators[i];
         location->first[i] = INFINITY;
         if (indicator->kind == INDICATOR_OF_STATE) {
+            if (is_far_above(location, i)) {
+                location->is_armed[i] = true;
+                continue;
+            }
             location->first[i] = first_of_state(location, i, s + same_time);
         } else if (location->has_row[i]) {
             location->first[i] = first_of_model(location, i, s + largest_correction);

@@ -44,7 +44,11 @@ struct location {
     double *x;                     /* states at one point */
     double *dx;                    /* room for states at another point */
     double *restart_x;             /* states at the restart */
-    double *z;                     /* indicators at one point */
+    double *way;                   /* location_way of the states, below 0 if not known; only if
+                                      step.row and step.degree are these: */
+    double (*way_row)[SERIES_LENGTH];
+    int way_degree;
+    double *z;       /* indicators at one point */
     double calm;     /* length of the last step if interpolated indicators hardly moved in it, s;
                         otherwise 0 */
     double calm_end; /* its end: samples[][0] are the indicators there */
@@ -98,6 +102,17 @@ MUST_CHECK NONNULL bool location_correction(struct location *location, double t,
  * at the restart. CVODE's polynomial misses it by about its tolerance, and flights that are lower
  * would begin below their limits. */
 NONNULL void location_lead_from_restart(struct location *location);
+
+/* Returns a bound of how far a state moves over a step: the sum of |row[k]|, 0 < k <= degree. */
+static inline double location_way(const double row[], int degree) {
+    double way[2] = {0.0, 0.0};
+    const double *c = row + 1;
+    for (const double *end = row + degree; c < end; c += 2) {
+        way[0] += fabs(c[0]);
+        way[1] += fabs(c[1]);
+    }
+    return way[0] + way[1] + (degree % 2 != 0 ? fabs(row[degree]) : 0.0);
+}
 
 /* Writes the states at s of location->step, 0 to 1 from its begin on. */
 NONNULL void location_write_states(const struct location *location, double s, double x[]);

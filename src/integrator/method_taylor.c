@@ -165,11 +165,20 @@ static double step_within_reach(struct taylor *taylor, const double x[], double 
     if (!taylor->is_searched || ode->reach == NULL) {
         return step;
     }
-    double *reach = series->problem->location.dx;
+    struct location *location = &series->problem->location;
+    double *reach = location->dx;
     ode->reach(x, reach, ode->context);
+    location->way_row = series->row;
+    location->way_degree = series->order;
     double within = step;
     for (size_t i = 0; i < ode->state_count; i++) {
+        // up to one time scale, with room for rounding
+        location->way[i] = -1.0;
         if (reach[i] == INFINITY) {
+            continue;
+        }
+        location->way[i] = location_way(series->row[i], series->order);
+        if (step <= 1.0 && 1.001 * location->way[i] < reach[i]) {
             continue;
         }
         double way = 0.0;
@@ -268,14 +277,18 @@ static enum status search(struct taylor *taylor, double end) {
     for (size_t i = 0; length != 1.0 && i < series->problem->ode.state_count; i++) {
         copy_row(taylor, series->row[i], length, step->row[i]);
     }
+    bool has_any = false;
     for (size_t k = 0; row_of_indicator != NULL && k < location->used_count; k++) {
         const size_t i = location->used[k];
         location->has_row[i] = location->indicators[i].kind == INDICATOR_OF_MODEL;
         if (location->has_row[i]) {
+            has_any = true;
             copy_row(taylor, series->row[row_of_indicator[i]], length, step->indicator_row[i]);
         }
     }
-    location_check_rows(location, taylor->end_x, series->problem->settings.relative_tolerance);
+    if (has_any) {
+        location_check_rows(location, taylor->end_x, series->problem->settings.relative_tolerance);
+    }
     return location_search(location);
 }
 

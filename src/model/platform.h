@@ -24,6 +24,7 @@
 #endif
 
 #define ALWAYS_INLINE static inline __attribute__((always_inline))
+#define NOINLINE      __attribute__((noinline))
 /* Stands in front of a function whose code is to be small rather than fast. */
 #define SELDOM_CALLED __attribute__((cold))
 
@@ -71,6 +72,7 @@ static inline _Bool processor_has_avx2(void) {
 #define NONNULL_ARGUMENTS(...)
 #define PRINTF_FORMAT(format_, first)
 #define ALWAYS_INLINE static inline
+#define NOINLINE
 #define SELDOM_CALLED
 #define INDEPENDENT_ITERATIONS
 #define HIDE_SYMBOLS
