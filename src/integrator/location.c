@@ -55,11 +55,6 @@ void location_destroy(struct location *location) {
     *location = (struct location){.time = INFINITY};
 }
 
-/* Returns the same as fmax, without the call. */
-static double larger(double x, double y) {
-    return x > y ? x : y;
-}
-
 static enum status evaluate(struct location *location, double t, const double x[]) {
     return location->ode->indicators(t, x, location->z, location->ode->context);
 }

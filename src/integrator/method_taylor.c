@@ -129,13 +129,11 @@ static double longest_step(const struct problem *problem, double t) {
     return max_step > 0.0 && max_step < left ? max_step : left;
 }
 
-static double longest_step_in_scales(const struct taylor_series *series, double t,
-                                     double time_scale) {
-    const struct problem *problem = series->problem;
-    const double longest = longest_step(problem, t) / time_scale;
-    const double most = !location_is_active(&problem->location) ? most_scales
-                        : series->is_event_near                 ? most_after_event
-                                                                : growing;
+static double longest_step_in_scales(const struct taylor *taylor, double t, double time_scale) {
+    const double longest = longest_step(taylor->series.problem, t) / time_scale;
+    const double most = !taylor->is_searched           ? most_scales
+                        : taylor->series.is_event_near ? most_after_event
+                                                       : growing;
     return longest < most ? longest : most;
 }
 
@@ -146,8 +144,7 @@ static enum status expand(struct taylor *taylor, double t, double length, bool i
                           const double x[], struct method_work *work) {
     double time_scale = taylor->longest_scale < length ? taylor->longest_scale : length;
     while (time_scale >= DBL_MIN) {
-        const double longest =
-            is_long ? longest_step_in_scales(&taylor->series, t, time_scale) : 0.0;
+        const double longest = is_long ? longest_step_in_scales(taylor, t, time_scale) : 0.0;
         const enum status status = taylor_series_expand(&taylor->series, t, time_scale, x, longest);
         if (status != STATUS_OK || !isnan(taylor->series.step)) {
             // the next step need not begin from the whole length again

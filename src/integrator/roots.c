@@ -99,10 +99,6 @@ static void next_powers(int i, double powers[], double before[]) {
     }
 }
 
-static double larger(double x, double y) {
-    return x > y ? x : y;
-}
-
 double chebyshev_interpolate(int count, const double values[], double c[]) {
     double coefficients[CHEBYSHEV_LENGTH] = {0.0};
     transform(count, values, coefficients);
@@ -152,11 +148,10 @@ struct node {
 static int prepare(const struct roots_polynomial *p, struct rising *rising) {
     double largest = 0.0;
     for (int k = 0; k <= p->degree; k++) {
-        const double size = fabs(p->c[k]);
-        if (!(size <= DBL_MAX)) {
+        if (!(fabs(p->c[k]) <= DBL_MAX)) {
             return 0;
         }
-        largest = size > largest ? size : largest;
+        largest = larger(fabs(p->c[k]), largest);
     }
     int first = 0;
     while (first <= p->degree && (p->c[first] == 0.0 || fabs(p->c[first]) <= p->noise)) {
