@@ -138,8 +138,7 @@ double fall_first(const struct roots_polynomial *p, const struct fall *fall) {
         return first_fall_from_zero(p, within, fall->is_armed);
     }
     // from below 0 it only rises, by the error of the polynomial
-    const bool rises = p->degree > 0 && p->c[0] <= 0.0 && p->c[1] > 0.0;
-    if (rises) {
+    if (p->degree > 0 && p->c[0] <= 0.0 && p->c[1] > 0.0) {
         return fall_beside(p, 0.0, true);
     }
     if (roots_is_above(p)) {

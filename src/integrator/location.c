@@ -513,8 +513,7 @@ enum status location_search(struct location *location) {
             return status;
         }
         for (size_t k = 0; k < location->used_count; k++) {
-            const double first = location->first[location->used[k]];
-            s = first < s ? first : s;
+            s = fmin(s, location->first[location->used[k]]);
         }
     }
     if (!(s <= 1.0)) {

@@ -131,9 +131,8 @@ static double longest_step(const struct problem *problem, double t) {
 
 static double longest_step_in_scales(const struct taylor *taylor, double t, double time_scale) {
     const double longest = longest_step(taylor->series.problem, t) / time_scale;
-    const double most = !taylor->is_searched           ? most_scales
-                        : taylor->series.is_event_near ? most_after_event
-                                                       : growing;
+    const double grown = taylor->series.is_event_near ? most_after_event : growing;
+    const double most = taylor->is_searched ? grown : most_scales;
     return longest < most ? longest : most;
 }
 
