@@ -121,7 +121,7 @@ enum status location_restart(struct location *location, const struct indicator *
     if (indicators == NULL) {
         return STATUS_OK;
     }
-    bool needs_model = false;
+    location->needs_model = false;
     location->used_count = 0;
     memcpy(location->restart_x, x, location->ode->state_count * sizeof *x);
     for (size_t i = 0; i < location->ode->indicator_count; i++) {
@@ -135,7 +135,7 @@ enum status location_restart(struct location *location, const struct indicator *
         location->used_count++;
         const double rounding = 2.0 * DBL_EPSILON * fabs(indicator->offset);
         if (indicator->kind == INDICATOR_OF_MODEL) {
-            needs_model = true;
+            location->needs_model = true;
             location->noise[i] = larger(2.0 * rounding, DBL_MIN);
             location->touch[i] = 2.0 * rounding;
         } else {
@@ -150,7 +150,7 @@ enum status location_restart(struct location *location, const struct indicator *
                                  8.0 * DBL_EPSILON * fabs(indicator->offset);
         }
     }
-    return needs_model ? restart_model(location, x) : STATUS_OK;
+    return location->needs_model ? restart_model(location, x) : STATUS_OK;
 }
 
 /* ---- Indicators of states ------------------------------------------------------------------- */

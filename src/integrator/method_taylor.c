@@ -25,8 +25,8 @@ static const double most_scales = 1000.0;
 static const double shrinking = 0x1p-20;
 static const double growing = 16.0;
 
-/* Largest length of the first step after an event, in time scales: the last event may have been far
- * nearer than the next one. Its few terms do not matter even if they underflow. */
+/* Largest length of the first step after an event, in time scales, if all indicators are states:
+ * others may be singular at an event. Terms so few do not matter even if they underflow. */
 static const double most_after_event = 0x1p40;
 
 struct taylor {
@@ -131,7 +131,9 @@ static double longest_step(const struct problem *problem, double t) {
 
 static double longest_step_in_scales(const struct taylor *taylor, double t, double time_scale) {
     const double longest = longest_step(taylor->series.problem, t) / time_scale;
-    const double grown = taylor->series.is_event_near ? most_after_event : growing;
+    const bool is_free =
+        taylor->series.is_event_near && !taylor->series.problem->location.needs_model;
+    const double grown = is_free ? most_after_event : growing;
     const double most = taylor->is_searched ? grown : most_scales;
     return longest < most ? longest : most;
 }

@@ -346,11 +346,7 @@ static double crossing(const struct rising *p, struct node low, struct node high
             return s;
         }
         const bool is_low = node.sign == low.sign;
-        if (is_low) {
-            low = node;
-        } else {
-            high = node;
-        }
+        *(is_low ? &low : &high) = node;
         const double next = s - node.value / slope;
         const double way = fabs(next - s);
         if (way <= (double)least * (with_bits(bits_of(s) + 1) - s)) {
