@@ -3,27 +3,17 @@
 #include <float.h>
 #include <math.h>
 
-/* Returns the last fall to 0 up to this s; INFINITY if there is none. */
-static double last_fall(const struct roots_polynomial *p, double s) {
+/* Returns the fall to 0 beside s: the first one after it, or the last one up to it. INFINITY if
+ * there is none. */
+static double fall_beside(const struct roots_polynomial *p, double s, bool is_after) {
     struct root roots[ROOTS_LENGTH];
     const int count = roots_find(p, roots);
-    double last = INFINITY;
-    for (int i = 0; i < count && roots[i].s <= s; i++) {
-        last = roots[i].kind == ROOT_FALLS ? roots[i].s : last;
+    double fall = INFINITY;
+    for (int i = 0; i < count && !(is_after ? fall < INFINITY : roots[i].s > s); i++) {
+        const bool is_beside = roots[i].kind == ROOT_FALLS && (roots[i].s > s) == is_after;
+        fall = is_beside ? roots[i].s : fall;
     }
-    return last;
-}
-
-/* Returns the first fall to 0 after this s; INFINITY if there is none. */
-static double fall_behind(const struct roots_polynomial *p, double s) {
-    struct root roots[ROOTS_LENGTH];
-    const int count = roots_find(p, roots);
-    for (int i = 0; i < count; i++) {
-        if (roots[i].s > s && roots[i].kind == ROOT_FALLS) {
-            return roots[i].s;
-        }
-    }
-    return INFINITY;
+    return fall;
 }
 
 /* True if p is at 0 at s, up to `touch` or its rounding, and turns before it falls farther below;
@@ -105,15 +95,15 @@ static bool rises_at_once(const struct roots_polynomial *p, double noise) {
 static double first_fall_from_zero(const struct roots_polynomial *p, double noise, bool *is_armed) {
     if (rises_at_once(p, noise)) {
         *is_armed = true;
-        return fall_behind(p, 0.0);
+        return fall_beside(p, 0.0, true);
     }
     const double below = first_beyond(p, -noise, -1.0);
     const double above = first_beyond(p, noise, 1.0);
     if (above < below) {
         *is_armed = true;
-        return fall_behind(p, above);
+        return fall_beside(p, above, true);
     }
-    return below == INFINITY ? INFINITY : fmin(below, last_fall(p, below));
+    return below == INFINITY ? INFINITY : fmin(below, fall_beside(p, below, false));
 }
 
 /* True if p stays above 0 up to s, by the quick proof; p may begin at a root. */
@@ -148,9 +138,8 @@ double fall_first(const struct roots_polynomial *p, const struct fall *fall) {
         return first_fall_from_zero(p, within, fall->is_armed);
     }
     // from below 0 it only rises, by the error of the polynomial
-    const bool rises = p->degree > 0 && p->c[0] <= 0.0 && p->c[1] > 0.0;
-    if (rises) {
-        return fall_behind(p, 0.0);
+    if (p->degree > 0 && p->c[0] <= 0.0 && p->c[1] > 0.0) {
+        return fall_beside(p, 0.0, true);
     }
     if (roots_is_above(p)) {
         return INFINITY;

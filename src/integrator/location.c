@@ -56,11 +56,6 @@ void location_destroy(struct location *location) {
     *location = (struct location){.time = INFINITY};
 }
 
-/* Returns the same as fmax, without the call. */
-static double larger(double x, double y) {
-    return x > y ? x : y;
-}
-
 static enum status evaluate(struct location *location, double t, const double x[]) {
     return location->ode->indicators(t, x, location->z, location->ode->context);
 }
@@ -127,7 +122,7 @@ enum status location_restart(struct location *location, const struct indicator *
     if (indicators == NULL) {
         return STATUS_OK;
     }
-    bool needs_model = false;
+    location->needs_model = false;
     location->used_count = 0;
     memcpy(location->restart_x, x, location->ode->state_count * sizeof *x);
     const struct indicator *const end = indicators + location->ode->indicator_count;
@@ -142,7 +137,7 @@ enum status location_restart(struct location *location, const struct indicator *
         location->used_count++;
         const double rounding = 2.0 * DBL_EPSILON * fabs(indicator->offset);
         if (indicator->kind == INDICATOR_OF_MODEL) {
-            needs_model = true;
+            location->needs_model = true;
             location->noise[i] = larger(2.0 * rounding, DBL_MIN);
             location->touch[i] = 2.0 * rounding;
         } else {
@@ -157,7 +152,7 @@ enum status location_restart(struct location *location, const struct indicator *
                                  8.0 * DBL_EPSILON * fabs(indicator->offset);
         }
     }
-    return needs_model ? restart_model(location, x) : STATUS_OK;
+    return location->needs_model ? restart_model(location, x) : STATUS_OK;
 }
 
 /* ---- Indicators of states ------------------------------------------------------------------- */
@@ -518,8 +513,7 @@ enum status location_search(struct location *location) {
             return status;
         }
         for (size_t k = 0; k < location->used_count; k++) {
-            const double first = location->first[location->used[k]];
-            s = first < s ? first : s;
+            s = fmin(s, location->first[location->used[k]]);
         }
     }
     if (!(s <= 1.0)) {

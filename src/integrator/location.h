@@ -30,6 +30,7 @@ struct location {
     const struct ode *ode;
     size_t *used; /* indices of the used indicators */
     size_t used_count;
+    bool needs_model; /* true if a used indicator is an INDICATOR_OF_MODEL */
     const struct integrator_settings *settings; /* at each restart */
     bool *
         has_row; /* by indicator: true if step.indicator_row has it; otherwise it is interpolated */

@@ -25,6 +25,10 @@ static const double most_scales = 1000.0;
 static const double shrinking = 0x1p-20;
 static const double growing = 16.0;
 
+/* Largest length of the first step after an event, in time scales, if all indicators are states:
+ * others may be singular at an event. Terms so few do not matter even if they underflow. */
+static const double most_after_event = 0x1p40;
+
 struct taylor {
     struct taylor_series series;
     bool is_searched;     /* true if events are searched since the restart */
@@ -125,9 +129,12 @@ static double longest_step(const struct problem *problem, double t) {
     return max_step > 0.0 && max_step < left ? max_step : left;
 }
 
-static double longest_step_in_scales(const struct problem *problem, double t, double time_scale) {
-    const double longest = longest_step(problem, t) / time_scale;
-    const double most = location_is_active(&problem->location) ? growing : most_scales;
+static double longest_step_in_scales(const struct taylor *taylor, double t, double time_scale) {
+    const double longest = longest_step(taylor->series.problem, t) / time_scale;
+    const bool is_free =
+        taylor->series.is_event_near && !taylor->series.problem->location.needs_model;
+    const double grown = is_free ? most_after_event : growing;
+    const double most = taylor->is_searched ? grown : most_scales;
     return longest < most ? longest : most;
 }
 
@@ -138,8 +145,7 @@ static enum status expand(struct taylor *taylor, double t, double length, bool i
                           const double x[], struct method_work *work) {
     double time_scale = taylor->longest_scale < length ? taylor->longest_scale : length;
     while (time_scale >= DBL_MIN) {
-        const double longest =
-            is_long ? longest_step_in_scales(taylor->series.problem, t, time_scale) : 0.0;
+        const double longest = is_long ? longest_step_in_scales(taylor, t, time_scale) : 0.0;
         const enum status status = taylor_series_expand(&taylor->series, t, time_scale, x, longest);
         if (status != STATUS_OK || !isnan(taylor->series.step)) {
             // the next step need not begin from the whole length again

@@ -99,10 +99,6 @@ static void next_powers(int i, double powers[], double before[]) {
     }
 }
 
-static double larger(double x, double y) {
-    return x > y ? x : y;
-}
-
 double chebyshev_interpolate(int count, const double values[], double c[]) {
     double coefficients[CHEBYSHEV_LENGTH] = {0.0};
     transform(count, values, coefficients);
@@ -152,11 +148,10 @@ struct node {
 static int prepare(const struct roots_polynomial *p, struct rising *rising) {
     double largest = 0.0;
     for (int k = 0; k <= p->degree; k++) {
-        const double size = fabs(p->c[k]);
-        if (!(size <= DBL_MAX)) {
+        if (!(fabs(p->c[k]) <= DBL_MAX)) {
             return 0;
         }
-        largest = size > largest ? size : largest;
+        largest = larger(fabs(p->c[k]), largest);
     }
     int first = 0;
     while (first <= p->degree && (p->c[first] == 0.0 || fabs(p->c[first]) <= p->noise)) {
@@ -319,12 +314,25 @@ static double middle(double low, double high) {
     return s > low && s < high ? s : with_bits((bits_of(low) + bits_of(high)) / 2);
 }
 
+/* Returns a guess of the root between two nodes: that of the first terms, or of a line. */
+static double guess(const struct rising *p, const struct node *low, const struct node *high) {
+    const double *c = p->c;
+    if (p->degree >= 2 && low->s == 0.0) {
+        const double root = sqrt(c[1] * c[1] - 4.0 * c[0] * c[2]);
+        const double s = c[1] > 0.0 ? -0.5 * (c[1] + root) / c[2] : 2.0 * c[0] / (root - c[1]);
+        if (s > 0.0 && s < high->s) {
+            return s;
+        }
+    }
+    return low->s + (high->s - low->s) * (low->value / (low->value - high->value));
+}
+
 /* Returns the first s at which p, monotone between two nodes of opposite sign, no longer has the
  * sign of the lower one. Uses Newton's method as long as its steps become shorter, otherwise
  * bisection. Steps of few units in the last place are lengthened to pass the root, so that it is
  * soon between neighbours. */
 static double crossing(const struct rising *p, struct node low, struct node high, bool is_exact) {
-    double s = low.s + (high.s - low.s) * (low.value / (low.value - high.value));
+    double s = guess(p, &low, &high);
     double step = high.s - low.s;
     uint64_t least = 1; // units in the last place
     while (bits_of(high.s) - bits_of(low.s) > 1) {
@@ -338,11 +346,7 @@ static double crossing(const struct rising *p, struct node low, struct node high
             return s;
         }
         const bool is_low = node.sign == low.sign;
-        if (is_low) {
-            low = node;
-        } else {
-            high = node;
-        }
+        *(is_low ? &low : &high) = node;
         const double next = s - node.value / slope;
         const double way = fabs(next - s);
         if (way <= (double)least * (with_bits(bits_of(s) + 1) - s)) {

@@ -25,6 +25,11 @@
 #include <math.h>
 #include <stdbool.h>
 
+/* Returns the same as fmax, without the call. */
+static inline double larger(double x, double y) {
+    return x > y ? x : y;
+}
+
 /* ---- Values of a polynomial, with their rounding -------------------------------------------- */
 
 struct horner_value {
