@@ -432,7 +432,8 @@ static enum status search_model_in(struct location *location, double begin, doub
                                    size_t from) {
     struct piece piece;
     enum status status = begin_piece(location, begin, length, &piece);
-    if (status != STATUS_OK || (length == 1.0 && are_calm(location, piece.count))) {
+    if (status != STATUS_OK || are_calm(location, piece.count)) {
+        location->calm = length == 1.0 ? location->calm : 0.0;
         return status;
     }
     size_t i = from;
@@ -566,6 +567,17 @@ void location_write_cubic(struct location *location, double begin, const double 
         step->row[i][2] = 3.0 * change - 2.0 * first - last;
         step->row[i][3] = first + last - 2.0 * change;
     }
+}
+
+bool location_falls_between(const struct location *location, const double x[],
+                            const double next[]) {
+    bool falls = false;
+    for (size_t k = 0; k < location->used_count; k++) {
+        const struct indicator *indicator = &location->indicators[location->used[k]];
+        falls |= indicator->kind == INDICATOR_OF_STATE && at_state(indicator, x) > 0.0 &&
+                 at_state(indicator, next) <= 0.0;
+    }
+    return falls;
 }
 
 bool location_correction(struct location *location, double t, const double x[], const double dx[],

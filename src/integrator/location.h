@@ -88,6 +88,10 @@ NONNULL void location_write_cubic(struct location *location, double begin, const
                                   const double begin_dx[], double end, const double x[],
                                   const double dx[]);
 
+/* True if an indicator of a state is above 0 at the state x, and not at the state `next`. */
+MUST_CHECK NONNULL bool location_falls_between(const struct location *location, const double x[],
+                                               const double next[]);
+
 /* Writes z, the value of the first indicator that has triggered, and Newton's correction (s) of the
  * event's time, -z / z', from the state x and its derivative dx at the time t. Returns false if
  * there is no correction. */
