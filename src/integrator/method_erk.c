@@ -43,6 +43,8 @@ struct erk {
     double *dx;        /* the right-hand side at the end, the last of the stages */
     double second_t;   /* of the second stage, if it is evaluated before ERKStep starts; else NaN */
     double *second_x;  /* the state there */
+    double last_t;     /* of the last stage that ERKStep has evaluated; NaN if there is none */
+    const double *last_dx; /* the right-hand side there */
     enum status search_status;
     ARKodeButcherTable coefficients; /* of the table, in ERKStep's memory */
 };
@@ -60,7 +62,7 @@ static void search(struct erk *erk, double t, const double x[]) {
 /* Evaluates the right-hand side of an advance that is watched: it is known at the begin of an
  * internal step and perhaps at the second stage, and behind the last step nothing needs it. */
 static int watched_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data) {
-    const struct erk *erk = user_data;
+    struct erk *erk = user_data;
     const size_t size = erk->base.problem->ode.state_count * sizeof(double);
     if (erk->is_cut_short) {
         return 0;
@@ -73,6 +75,8 @@ static int watched_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data) 
         memcpy(small_vector_data(dx), erk->step_dx + erk->base.problem->ode.state_count, size);
         return 0;
     }
+    erk->last_t = t;
+    erk->last_dx = small_vector_data(dx);
     return sundials_rhs(t, x, dx, user_data);
 }
 
@@ -86,7 +90,11 @@ static int observe(sunrealtype t, N_Vector x, void *user_data) {
     }
     erk->watched = t;
     if (location_is_active(&problem->location)) {
-        erk->search_status = problem_rhs(erk->base.problem, t, small_vector_data(x), erk->dx);
+        if (t == erk->last_t) { // the last stage is at the end of the step
+            memcpy(erk->dx, erk->last_dx, problem->ode.state_count * sizeof(double));
+        } else {
+            erk->search_status = problem_rhs(erk->base.problem, t, small_vector_data(x), erk->dx);
+        }
         erk->is_cut_short = erk->search_status != STATUS_OK;
         if (!erk->is_cut_short) {
             search(erk, t, small_vector_data(x));
@@ -120,6 +128,7 @@ static int begin_watching(struct erk *erk, double end, const double begin_x[], d
     erk->search_status = STATUS_OK;
     erk->step_begin = NAN;
     erk->second_t = NAN;
+    erk->last_t = NAN;
     if (is_searched) {
         memcpy(erk->step_x, begin_x, problem->ode.state_count * sizeof(double));
         if (problem_rhs(problem, problem->reached, begin_x, erk->step_dx) != STATUS_OK) {

@@ -324,8 +324,12 @@ static double middle(double low, double high) {
  * bisection. Steps of few units in the last place are lengthened to pass the root, so that it is
  * soon between neighbours. */
 static double crossing(const struct rising *p, struct node low, struct node high, bool is_exact) {
-    double s = low.s + (high.s - low.s) * (low.value / (low.value - high.value));
     double step = high.s - low.s;
+    double s = low.s + step * (low.value / (low.value - high.value));
+    if (low.s == 0.0) { // the root of the parabola with the slope there
+        const double bend = (high.value - low.value - p->c[1] * step) / (step * step);
+        s = 2.0 * low.value / (sqrt(p->c[1] * p->c[1] - 4.0 * bend * low.value) - p->c[1]);
+    }
     uint64_t least = 1; // units in the last place
     while (bits_of(high.s) - bits_of(low.s) > 1) {
         if (!(s > low.s && s < high.s)) {
