@@ -54,22 +54,30 @@ struct found {
     bool is_valid; /* false if the state has changed since */
 };
 
+/* Finds what follows from the state, unless it is known; is_forced: with no joint at rest, too. */
+static void find(const struct rp_plant_values *values, bool is_forced, struct found *found) {
+    const struct rp_plant_parameters *p = &values->parameters;
+    if (found->is_valid) {
+        return;
+    }
+    found->modes = values->modes;
+    found->rests =
+        rp_plant_find_rest(p, values->q, values->dq, &found->modes, &found->decision.rest);
+    if (found->rests || is_forced) {
+        rp_plant_decide(p, values->q, values->dq, &values->inputs, &found->modes, &found->decision);
+    }
+    found->is_valid = true;
+}
+
 /* True if a joint on a stop leaves it and comes back from no more than the tolerance of q: at v^2 /
  * (2 |q''|), where q'' points into the stop. */
 static bool hardly_leaves(const struct rp_plant_values *values, const struct event *event,
                           int joint, int side, struct found *found) {
-    const struct rp_plant_parameters *p = &values->parameters;
     const double dq = values->dq[joint];
     if (!(side * dq > 0.0)) {
         return false;
     }
-    if (!found->is_valid) {
-        found->modes = values->modes;
-        found->rests =
-            rp_plant_find_rest(p, values->q, values->dq, &found->modes, &found->decision.rest);
-        rp_plant_decide(p, values->q, values->dq, &values->inputs, &found->modes, &found->decision);
-        found->is_valid = true;
-    }
+    find(values, true, found);
     const double into = -side * found->decision.outcome.ddq[joint];
     return into > 0.0 && dq * dq <= 2.0 * into * fmax(event->rest, 1.0) * event->tolerance[joint];
 }
@@ -251,17 +259,10 @@ static enum status update(void *values_pointer, const struct event *event) {
 
     // what has triggered counts where the forces of the stuck joints have not changed since
     const struct rp_plant_parameters *p = &values->parameters;
-    struct rp_plant_decision *decision = &found.decision;
-    if (found.is_valid) {
-        values->modes = found.modes;
-    } else {
-        found.rests = rp_plant_find_rest(p, values->q, values->dq, &values->modes, &decision->rest);
-    }
-    if (found.rests && !found.is_valid) {
-        rp_plant_decide(p, values->q, values->dq, &values->inputs, &values->modes, decision);
-    }
+    find(values, false, &found);
+    values->modes = found.modes;
     if (found.rests) {
-        rp_plant_break_away(values, event, decision, jumps ? none : triggered.leaves);
+        rp_plant_break_away(values, event, &found.decision, jumps ? none : triggered.leaves);
     }
     rp_plant_begin_contacts(p, values->q, values->dq, &values->inputs, &values->modes);
     return STATUS_OK;

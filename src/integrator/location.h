@@ -47,7 +47,7 @@ struct location {
     double *z;                     /* indicators at one point */
     double calm;     /* length of the last step if interpolated indicators hardly moved in it, s;
                         otherwise 0 */
-    double calm_end; /* its end: samples[][0] are the indicators there */
+    double calm_end; /* its end, or 0 at a restart: samples[][0] are the indicators there */
     double *first;   /* by indicator: s of its first root in the step */
     double (*samples)[CHEBYSHEV_LENGTH]; /* by indicator */
 };

@@ -47,7 +47,6 @@ struct erk {
     const double *last_dx; /* the right-hand side there */
     enum status search_status;
     ARKodeButcherTable coefficients; /* of the table, in ERKStep's memory */
-    double *error_factors;           /* b - d */
 };
 
 /* ---- Observation ---------------------------------------------------------------------------- */
@@ -55,8 +54,10 @@ struct erk {
 /* Searches the step that has ended at t with the state x and the right-hand side erk->dx. */
 static void search(struct erk *erk, double t, const double x[]) {
     struct location *location = &erk->base.problem->location;
-    location_write_cubic(location, erk->step_begin, erk->step_x, erk->step_dx, t, x, erk->dx);
-    erk->search_status = location_search(location);
+    if (erk->search_status == STATUS_OK) {
+        location_write_cubic(location, erk->step_begin, erk->step_x, erk->step_dx, t, x, erk->dx);
+        erk->search_status = location_search(location);
+    }
     erk->is_cut_short = erk->search_status != STATUS_OK || location->time <= erk->end;
 }
 
@@ -96,10 +97,7 @@ static int observe(sunrealtype t, N_Vector x, void *user_data) {
         } else {
             erk->search_status = problem_rhs(erk->base.problem, t, small_vector_data(x), erk->dx);
         }
-        erk->is_cut_short = erk->search_status != STATUS_OK;
-        if (!erk->is_cut_short) {
-            search(erk, t, small_vector_data(x));
-        }
+        search(erk, t, small_vector_data(x));
         if (!erk->is_cut_short) {
             const size_t size = problem->ode.state_count * sizeof(double);
             erk->step_begin = t;
@@ -178,7 +176,7 @@ static enum status create(struct problem *problem, void **memory) {
     const size_t n = problem->ode.state_count;
     const bool has_solver = create_solver(erk);
     const size_t stages = has_solver ? (size_t)erk->coefficients->stages : 0;
-    erk->step_x = workspace_calloc((2 + stages) * n + stages, sizeof *erk->step_x);
+    erk->step_x = workspace_calloc((2 + stages) * n, sizeof *erk->step_x);
     const bool is_created = has_solver && erk->step_x != NULL;
     const enum status status = is_created ? sundials_warm_up(erk) : STATUS_OUT_OF_MEMORY;
     if (status != STATUS_OK) {
@@ -188,10 +186,6 @@ static enum status create(struct problem *problem, void **memory) {
     erk->step_dx = erk->step_x + n;
     erk->dx = erk->step_x + stages * n;
     erk->second_x = erk->dx + n;
-    erk->error_factors = erk->second_x + n;
-    for (size_t j = 0; j < stages; j++) {
-        erk->error_factors[j] = erk->coefficients->b[j] - erk->coefficients->d[j];
-    }
     *memory = erk;
     return STATUS_OK;
 }
@@ -248,10 +242,9 @@ static void add_work(const struct erk *erk, struct method_work *work) {
     }
 }
 
-/* Writes x = base + length times the sum of factors[j] dx_j, in ERKStep's order. base: NULL for 0.
- */
+/* Writes x = step_x + length times the sum of factors[j] dx_j, in the order of ERKStep. */
 ALWAYS_INLINE void combine(size_t n, int count, double length, const double factors[],
-                           const double *restrict dx, const double *restrict base,
+                           const double *restrict dx, const double *restrict step_x,
                            double *restrict x) {
     for (size_t i = 0; i < n; i++) {
         x[i] = length * factors[0] * dx[i];
@@ -262,18 +255,18 @@ ALWAYS_INLINE void combine(size_t n, int count, double length, const double fact
             x[i] += factor * dx[(size_t)j * n + i];
         }
     }
-    for (size_t i = 0; base != NULL && i < n; i++) {
-        x[i] += base[i];
+    for (size_t i = 0; i < n; i++) {
+        x[i] += step_x[i];
     }
 }
 
 static void combine_stages(const struct erk *erk, int count, double length, const double factors[],
-                           const double base[], double x[]) {
+                           double x[]) {
     const size_t n = erk->base.problem->ode.state_count;
     if (n == 4) { // the compiler unrolls these loops
-        combine(4, count, length, factors, erk->step_dx, base, x);
+        combine(4, count, length, factors, erk->step_dx, erk->step_x, x);
     } else {
-        combine(n, count, length, factors, erk->step_dx, base, x);
+        combine(n, count, length, factors, erk->step_dx, erk->step_x, x);
     }
 }
 
@@ -284,7 +277,7 @@ static bool evaluate_stage(struct erk *erk, int k, double t, double x[]) {
     const size_t n = erk->base.problem->ode.state_count;
     const double length = t - erk->step_begin;
     const double stage_t = of->c[k] < 1.0 ? erk->step_begin + of->c[k] * length : t;
-    combine_stages(erk, k, length, of->A[k], erk->step_x, x);
+    combine_stages(erk, k, length, of->A[k], x);
     return problem_rhs(erk->base.problem, stage_t, x, erk->step_dx + (size_t)k * n) == STATUS_OK;
 }
 
@@ -321,6 +314,7 @@ static bool foresees_event(struct erk *erk, double t, double x[]) {
  * of the work. Returns false if ERKStep is to advance: the step is long, or its error above a tenth
  * of the tolerances. */
 static bool leap(struct erk *erk, double t, double x[], struct method_work *work) {
+    const struct ARKodeButcherTableMem *of = erk->coefficients;
     const struct problem *problem = erk->base.problem;
     const size_t n = problem->ode.state_count;
     const double length = t - erk->step_begin;
@@ -330,14 +324,15 @@ static bool leap(struct erk *erk, double t, double x[], struct method_work *work
         !step_to(erk, problem->continues ? 1 : 2, t, x)) {
         return false;
     }
-    double *error = erk->second_x;
+    double *other = erk->second_x; // the state by the other weights of the table
     erk->second_t = NAN;
-    combine_stages(erk, erk->coefficients->stages, length, erk->error_factors, NULL, error);
+    combine_stages(erk, of->stages, length, of->d, other);
     double sum = 0.0;
     for (size_t i = 0; i < n; i++) {
-        error[i] /= problem->settings.relative_tolerance * fabs(erk->step_x[i]) +
-                    problem->settings.absolute_tolerances[i];
-        sum += error[i] * error[i];
+        const double error =
+            (x[i] - other[i]) / (problem->settings.relative_tolerance * fabs(erk->step_x[i]) +
+                                 problem->settings.absolute_tolerances[i]);
+        sum += error * error;
     }
     if (!(sum <= 0.01 * (double)n)) {
         return false;
