@@ -242,21 +242,23 @@ static void add_work(const struct erk *erk, struct method_work *work) {
     }
 }
 
-/* Writes x = step_x + length times the sum of factors[j] dx_j, in the order of ERKStep. */
+/* Writes x = step_x + length times the sum of factors[j] dx_j; the second stage, of one term, to
+ * the bit as ERKStep. */
 ALWAYS_INLINE void combine(size_t n, int count, double length, const double factors[],
                            const double *restrict dx, const double *restrict step_x,
                            double *restrict x) {
+    const double first = count == 1 ? length * factors[0] : factors[0];
+    const double scale = count == 1 ? 1.0 : length;
     for (size_t i = 0; i < n; i++) {
-        x[i] = length * factors[0] * dx[i];
+        x[i] = first * dx[i];
     }
     for (int j = 1; j < count; j++) {
-        const double factor = length * factors[j];
         for (size_t i = 0; i < n; i++) {
-            x[i] += factor * dx[(size_t)j * n + i];
+            x[i] += factors[j] * dx[(size_t)j * n + i];
         }
     }
     for (size_t i = 0; i < n; i++) {
-        x[i] += step_x[i];
+        x[i] = step_x[i] + scale * x[i];
     }
 }
 
