@@ -55,18 +55,17 @@ struct found {
 };
 
 /* Finds what follows from the state, unless it is known; is_forced: with no joint at rest, too. */
-static void find(const struct rp_plant_values *values, bool is_forced, struct found *found) {
+static void find(const struct rp_plant_values *values, bool is_forced, struct rp_plant_modes *modes,
+                 struct found *found) {
     const struct rp_plant_parameters *p = &values->parameters;
     if (found->is_valid) {
+        *modes = found->modes;
         return;
     }
-    found->modes = values->modes;
-    found->rests =
-        rp_plant_find_rest(p, values->q, values->dq, &found->modes, &found->decision.rest);
+    found->rests = rp_plant_find_rest(p, values->q, values->dq, modes, &found->decision.rest);
     if (found->rests || is_forced) {
-        rp_plant_decide(p, values->q, values->dq, &values->inputs, &found->modes, &found->decision);
+        rp_plant_decide(p, values->q, values->dq, &values->inputs, modes, &found->decision);
     }
-    found->is_valid = true;
 }
 
 /* True if a joint on a stop leaves it and comes back from no more than the tolerance of q: at v^2 /
@@ -77,7 +76,10 @@ static bool hardly_leaves(const struct rp_plant_values *values, const struct eve
     if (!(side * dq > 0.0)) {
         return false;
     }
-    find(values, true, found);
+    struct rp_plant_modes modes = values->modes;
+    find(values, true, &modes, found);
+    found->modes = modes;
+    found->is_valid = true;
     const double into = -side * found->decision.outcome.ddq[joint];
     return into > 0.0 && dq * dq <= 2.0 * into * fmax(event->rest, 1.0) * event->tolerance[joint];
 }
@@ -259,8 +261,7 @@ static enum status update(void *values_pointer, const struct event *event) {
 
     // what has triggered counts where the forces of the stuck joints have not changed since
     const struct rp_plant_parameters *p = &values->parameters;
-    find(values, false, &found);
-    values->modes = found.modes;
+    find(values, false, &values->modes, &found);
     if (found.rests) {
         rp_plant_break_away(values, event, &found.decision, jumps ? none : triggered.leaves);
     }
