@@ -46,19 +46,41 @@ static bool place_on_stops(struct rp_plant_values *values, const struct triggere
     return is_any;
 }
 
+/* What follows from the state. */
+struct found {
+    struct rp_plant_modes modes;
+    struct rp_plant_decision decision;
+    bool rests;    /* true if a joint is at rest */
+    bool is_valid; /* false if the state has changed since */
+};
+
+/* Finds what follows from the state, unless it is known; is_forced: with no joint at rest, too. */
+static void find(const struct rp_plant_values *values, bool is_forced, struct rp_plant_modes *modes,
+                 struct found *found) {
+    const struct rp_plant_parameters *p = &values->parameters;
+    if (found->is_valid) {
+        *modes = found->modes;
+        return;
+    }
+    found->rests = rp_plant_find_rest(p, values->q, values->dq, modes, &found->decision.rest);
+    if (found->rests || is_forced) {
+        rp_plant_decide(p, values->q, values->dq, &values->inputs, modes, &found->decision);
+    }
+}
+
 /* True if a joint on a stop leaves it and comes back from no more than the tolerance of q: at v^2 /
  * (2 |q''|), where q'' points into the stop. */
 static bool hardly_leaves(const struct rp_plant_values *values, const struct event *event,
-                          int joint, int side) {
+                          int joint, int side, struct found *found) {
     const double dq = values->dq[joint];
     if (!(side * dq > 0.0)) {
         return false;
     }
     struct rp_plant_modes modes = values->modes;
-    struct rp_plant_decision decision;
-    (void)rp_plant_find_rest(&values->parameters, values->q, values->dq, &modes, &decision.rest);
-    rp_plant_decide(&values->parameters, values->q, values->dq, &values->inputs, &modes, &decision);
-    const double into = -side * decision.outcome.ddq[joint];
+    find(values, true, &modes, found);
+    found->modes = modes;
+    found->is_valid = true;
+    const double into = -side * found->decision.outcome.ddq[joint];
     return into > 0.0 && dq * dq <= 2.0 * into * fmax(event->rest, 1.0) * event->tolerance[joint];
 }
 
@@ -85,11 +107,11 @@ static void apply_impact(struct rp_plant_values *values, const struct rp_plant_i
  * joint's impact kicks it. One that rests on its own stop stays with it; otherwise each would kick
  * the other, for ever. True if velocities jump. */
 static bool catch_on_stops(struct rp_plant_values *values, const struct event *event,
-                           const int side[2]) {
+                           const int side[2], struct found *found) {
     bool leaves = false;
     bool caught[2];
     for (int i = 0; i < 2; i++) {
-        const bool hardly = hardly_leaves(values, event, i, side[i]);
+        const bool hardly = hardly_leaves(values, event, i, side[i], found);
         caught[i] = hardly || (side[i] != 0 && values->dq[i] == 0.0);
         leaves = leaves || hardly;
     }
@@ -98,6 +120,7 @@ static bool catch_on_stops(struct rp_plant_values *values, const struct event *e
         struct rp_plant_impact impact;
         rp_plant_catch(&inertia, caught, values->dq, &impact);
         apply_impact(values, &impact);
+        found->is_valid = false;
     }
     return leaves;
 }
@@ -107,10 +130,10 @@ static bool catch_on_stops(struct rp_plant_values *values, const struct event *e
  * next impact, at the same time. There may be many before both leave or stay; from some number on
  * they are plastic, and one or two more end them. */
 static bool apply_impacts(struct rp_plant_values *values, const struct event *event,
-                          const int side[2]) {
+                          const int side[2], struct found *found) {
     enum { MOST_ELASTIC = 8, MOST = 16 };
     const struct rp_plant_parameters *p = &values->parameters;
-    bool jumps = catch_on_stops(values, event, side);
+    bool jumps = catch_on_stops(values, event, side, found);
     for (int count = 0; count < MOST && moves_into_stop(values, side); count++) {
         const bool elastic = count < MOST_ELASTIC;
         const struct rp_plant_contacts contacts = {
@@ -121,7 +144,8 @@ static bool apply_impacts(struct rp_plant_values *values, const struct event *ev
         struct rp_plant_impact impact;
         rp_plant_impact(&inertia, &contacts, values->dq, &impact);
         apply_impact(values, &impact);
-        (void)catch_on_stops(values, event, side);
+        found->is_valid = false;
+        (void)catch_on_stops(values, event, side, found);
         jumps = true;
     }
     return jumps;
@@ -243,16 +267,17 @@ static enum status update(void *values_pointer, const struct event *event) {
         jumps = true;
     }
     int side[2];
-    if (place_on_stops(values, &triggered, side) && apply_impacts(values, event, side)) {
+    struct found found;
+    found.is_valid = false;
+    if (place_on_stops(values, &triggered, side) && apply_impacts(values, event, side, &found)) {
         jumps = true;
     }
 
     // what has triggered counts where the forces of the stuck joints have not changed since
     const struct rp_plant_parameters *p = &values->parameters;
-    struct rp_plant_decision decision;
-    if (rp_plant_find_rest(p, values->q, values->dq, &values->modes, &decision.rest)) {
-        rp_plant_decide(p, values->q, values->dq, &values->inputs, &values->modes, &decision);
-        rp_plant_break_away(values, event, &decision, jumps ? none : triggered.leaves);
+    find(values, false, &values->modes, &found);
+    if (found.rests) {
+        rp_plant_break_away(values, event, &found.decision, jumps ? none : triggered.leaves);
     }
     rp_plant_begin_contacts(p, values->q, values->dq, &values->inputs, &values->modes);
     return STATUS_OK;

@@ -104,6 +104,8 @@ static enum status restart_model(struct location *location, const double x[]) {
             continue;
         }
         location->is_armed[i] = location->z[i] > 0.0;
+        location->samples[i][0] = location->z[i];
+        location->calm_end = 0.0;
         if (ode->rounding != NULL) {
             location->touch[i] *= falls_roundings;
             location->noise[i] = larger(location->first[i], DBL_MIN);
@@ -119,6 +121,7 @@ enum status location_restart(struct location *location, const struct indicator *
     location->indicators = indicators;
     location->time = INFINITY;
     location->calm = 0.0;
+    location->calm_end = NAN;
     if (indicators == NULL) {
         return STATUS_OK;
     }
@@ -297,7 +300,8 @@ static enum status sample(struct location *location, double s, int k) {
     location_write_states(location, s, location->x);
     const double t = step->begin + s * (step->end - step->begin);
     const enum status status = evaluate(location, t, location->x);
-    for (size_t i = 0; status == STATUS_OK && i < location->ode->indicator_count; i++) {
+    for (size_t j = 0; status == STATUS_OK && j < location->used_count; j++) {
+        const size_t i = location->used[j];
         location->samples[i][k] = location->z[i];
     }
     return status;
@@ -313,10 +317,10 @@ struct piece {
 /* Samples between the points of the piece, which then has 2 count - 1 points. */
 static enum status sample_between(struct location *location, struct piece *piece) {
     const int count = 2 * piece->count - 1;
-    for (size_t i = 0; i < location->ode->indicator_count; i++) {
+    for (size_t j = 0; j < location->used_count; j++) {
+        double *samples = location->samples[location->used[j]];
         for (int k = piece->count - 1; k > 0; k--) {
-            const int twice = 2 * k;
-            location->samples[i][twice] = location->samples[i][k];
+            samples[2 * k] = samples[k];
         }
     }
     enum status status = STATUS_OK;
@@ -333,7 +337,10 @@ static enum status begin_piece(struct location *location, double begin, double l
                                struct piece *piece) {
     *piece = (struct piece){begin, length, FEWEST_POINTS};
     enum status status = STATUS_OK;
-    for (int k = 0; status == STATUS_OK && k < FEWEST_POINTS; k++) {
+    const bool is_at_restart = begin == 0.0 && location->calm_end == 0.0 &&
+                               location->step.begin == 0.0 && !location->step.is_from_end;
+    location->calm_end = is_at_restart ? 0.0 : NAN;
+    for (int k = is_at_restart ? 1 : 0; status == STATUS_OK && k < FEWEST_POINTS; k++) {
         status = sample(location, begin + length * chebyshev_point(FEWEST_POINTS, k), k);
     }
     return status;
@@ -372,7 +379,8 @@ static bool are_calm(struct location *location, int count) {
         }
         location->is_armed[i] |= is_wanted;
     }
-    for (size_t i = 0; i < location->ode->indicator_count; i++) {
+    for (size_t k = 0; k < location->used_count; k++) {
+        const size_t i = location->used[k];
         location->samples[i][0] = location->samples[i][count - 1]; // the next step begins there
     }
     location->calm = location->step.end - location->step.begin;
@@ -427,7 +435,8 @@ static enum status search_model_in(struct location *location, double begin, doub
                                    size_t from) {
     struct piece piece;
     enum status status = begin_piece(location, begin, length, &piece);
-    if (status != STATUS_OK || (length == 1.0 && are_calm(location, piece.count))) {
+    if (status != STATUS_OK || are_calm(location, piece.count)) {
+        location->calm = length == 1.0 ? location->calm : 0.0;
         return status;
     }
     size_t i = from;
@@ -560,6 +569,17 @@ void location_write_cubic(struct location *location, double begin, const double 
         step->row[i][2] = 3.0 * change - 2.0 * first - last;
         step->row[i][3] = first + last - 2.0 * change;
     }
+}
+
+bool location_falls_between(const struct location *location, const double x[],
+                            const double next[]) {
+    bool falls = false;
+    for (size_t k = 0; k < location->used_count; k++) {
+        const struct indicator *indicator = &location->indicators[location->used[k]];
+        falls |= indicator->kind == INDICATOR_OF_STATE && at_state(indicator, x) > 0.0 &&
+                 at_state(indicator, next) <= 0.0;
+    }
+    return falls;
 }
 
 bool location_correction(struct location *location, double t, const double x[], const double dx[],

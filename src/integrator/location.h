@@ -52,7 +52,7 @@ struct location {
     double *z;       /* indicators at one point */
     double calm;     /* length of the last step if interpolated indicators hardly moved in it, s;
                         otherwise 0 */
-    double calm_end; /* its end: samples[][0] are the indicators there */
+    double calm_end; /* its end, or 0 at a restart: samples[][0] are the indicators there */
     double *first;   /* by indicator: s of its first root in the step */
     double (*samples)[CHEBYSHEV_LENGTH]; /* by indicator */
 };
@@ -92,6 +92,10 @@ MUST_CHECK NONNULL enum status location_search_at_rest(struct location *location
 NONNULL void location_write_cubic(struct location *location, double begin, const double begin_x[],
                                   const double begin_dx[], double end, const double x[],
                                   const double dx[]);
+
+/* True if an indicator of a state is above 0 at the state x, and not at the state `next`. */
+MUST_CHECK NONNULL bool location_falls_between(const struct location *location, const double x[],
+                                               const double next[]);
 
 /* Writes z, the value of the first indicator that has triggered, and Newton's correction (s) of the
  * event's time, -z / z', from the state x and its derivative dx at the time t. Returns false if

@@ -41,32 +41,30 @@ struct erk {
     double *step_x;    /* the state there */
     double *step_dx;   /* right-hand sides of all stages, one after the other; the first is there */
     double *dx;        /* the right-hand side at the end, the last of the stages */
+    double second_t;   /* of the second stage, if it is evaluated before ERKStep starts; else NaN */
+    double *second_x;  /* the state there */
+    double last_t;     /* of the last stage that ERKStep has evaluated; NaN if there is none */
+    const double *last_dx; /* the right-hand side there */
     enum status search_status;
     ARKodeButcherTable coefficients; /* of the table, in ERKStep's memory */
 };
 
 /* ---- Observation ---------------------------------------------------------------------------- */
 
-/* Searches the step that has ended at t with the state x and the right-hand side erk->dx. If it has
- * no event, the next step begins there. */
-static enum status search(struct erk *erk, double t, const double x[]) {
-    struct problem *problem = erk->base.problem;
-    const size_t n = problem->ode.state_count;
-    location_write_cubic(&problem->location, erk->step_begin, erk->step_x, erk->step_dx, t, x,
-                         erk->dx);
-    const enum status status = location_search(&problem->location);
-    if (problem->location.time == INFINITY) {
-        erk->step_begin = t;
-        memcpy(erk->step_x, x, n * sizeof(double));
-        memcpy(erk->step_dx, erk->dx, n * sizeof(double));
+/* Searches the step that has ended at t with the state x and the right-hand side erk->dx. */
+static void search(struct erk *erk, double t, const double x[]) {
+    struct location *location = &erk->base.problem->location;
+    if (erk->search_status == STATUS_OK) {
+        location_write_cubic(location, erk->step_begin, erk->step_x, erk->step_dx, t, x, erk->dx);
+        erk->search_status = location_search(location);
     }
-    return status;
+    erk->is_cut_short = erk->search_status != STATUS_OK || location->time <= erk->end;
 }
 
-/* Evaluates the right-hand side of an advance that is watched: at the begin of an internal step the
- * search has evaluated it already, and behind the last step nothing needs it. */
+/* Evaluates the right-hand side of an advance that is watched: it is known at the begin of an
+ * internal step and perhaps at the second stage, and behind the last step nothing needs it. */
 static int watched_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data) {
-    const struct erk *erk = user_data;
+    struct erk *erk = user_data;
     const size_t size = erk->base.problem->ode.state_count * sizeof(double);
     if (erk->is_cut_short) {
         return 0;
@@ -75,6 +73,12 @@ static int watched_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data) 
         memcpy(small_vector_data(dx), erk->step_dx, size);
         return 0;
     }
+    if (t == erk->second_t && memcmp(small_vector_data(x), erk->second_x, size) == 0) {
+        memcpy(small_vector_data(dx), erk->step_dx + erk->base.problem->ode.state_count, size);
+        return 0;
+    }
+    erk->last_t = t;
+    erk->last_dx = small_vector_data(dx);
     return sundials_rhs(t, x, dx, user_data);
 }
 
@@ -88,11 +92,18 @@ static int observe(sunrealtype t, N_Vector x, void *user_data) {
     }
     erk->watched = t;
     if (location_is_active(&problem->location)) {
-        erk->search_status = problem_rhs(erk->base.problem, t, small_vector_data(x), erk->dx);
-        if (erk->search_status == STATUS_OK) {
-            erk->search_status = search(erk, t, small_vector_data(x));
+        if (t == erk->last_t) { // the last stage is at the end of the step
+            memcpy(erk->dx, erk->last_dx, problem->ode.state_count * sizeof(double));
+        } else {
+            erk->search_status = problem_rhs(erk->base.problem, t, small_vector_data(x), erk->dx);
         }
-        erk->is_cut_short = erk->search_status != STATUS_OK || problem->location.time <= erk->end;
+        search(erk, t, small_vector_data(x));
+        if (!erk->is_cut_short) {
+            const size_t size = problem->ode.state_count * sizeof(double);
+            erk->step_begin = t;
+            memcpy(erk->step_x, small_vector_data(x), size);
+            memcpy(erk->step_dx, erk->dx, size);
+        }
     }
     if (!erk->is_cut_short && problem->observer != NULL && t < erk->end) {
         erk->is_cut_short = problem_ask_observer(problem, t, small_vector_data(x));
@@ -115,6 +126,8 @@ static int begin_watching(struct erk *erk, double end, const double begin_x[], d
     erk->watched = problem->reached;
     erk->search_status = STATUS_OK;
     erk->step_begin = NAN;
+    erk->second_t = NAN;
+    erk->last_t = NAN;
     if (is_searched) {
         memcpy(erk->step_x, begin_x, problem->ode.state_count * sizeof(double));
         if (problem_rhs(problem, problem->reached, begin_x, erk->step_dx) != STATUS_OK) {
@@ -163,7 +176,7 @@ static enum status create(struct problem *problem, void **memory) {
     const size_t n = problem->ode.state_count;
     const bool has_solver = create_solver(erk);
     const size_t stages = has_solver ? (size_t)erk->coefficients->stages : 0;
-    erk->step_x = workspace_calloc((1 + stages) * n, sizeof *erk->step_x);
+    erk->step_x = workspace_calloc((2 + stages) * n, sizeof *erk->step_x);
     const bool is_created = has_solver && erk->step_x != NULL;
     const enum status status = is_created ? sundials_warm_up(erk) : STATUS_OUT_OF_MEMORY;
     if (status != STATUS_OK) {
@@ -172,6 +185,7 @@ static enum status create(struct problem *problem, void **memory) {
     }
     erk->step_dx = erk->step_x + n;
     erk->dx = erk->step_x + stages * n;
+    erk->second_x = erk->dx + n;
     *memory = erk;
     return STATUS_OK;
 }
@@ -228,32 +242,79 @@ static void add_work(const struct erk *erk, struct method_work *work) {
     }
 }
 
-/* Steps from the begin of the running internal step to the time t. The last stage begins with the
- * state there: writes it to x and the right-hand side to erk->dx. Returns false if that cannot be
- * evaluated. */
-static bool step_to(struct erk *erk, double t, double x[]) {
+/* Writes x = step_x + length times the sum of factors[j] dx_j; the second stage, of one term, to
+ * the bit as ERKStep. */
+ALWAYS_INLINE void combine(size_t n, int count, double length, const double factors[],
+                           const double *restrict dx, const double *restrict step_x,
+                           double *restrict x) {
+    const double first = count == 1 ? length * factors[0] : factors[0];
+    const double scale = count == 1 ? 1.0 : length;
+    for (size_t i = 0; i < n; i++) {
+        x[i] = first * dx[i];
+    }
+    for (int j = 1; j < count; j++) {
+        for (size_t i = 0; i < n; i++) {
+            x[i] += factors[j] * dx[(size_t)j * n + i];
+        }
+    }
+    for (size_t i = 0; i < n; i++) {
+        x[i] = step_x[i] + scale * x[i];
+    }
+}
+
+static void combine_stages(const struct erk *erk, int count, double length, const double factors[],
+                           double x[]) {
+    const size_t n = erk->base.problem->ode.state_count;
+    if (n == 4) { // the compiler unrolls these loops
+        combine(4, count, length, factors, erk->step_dx, erk->step_x, x);
+    } else {
+        combine(n, count, length, factors, erk->step_dx, erk->step_x, x);
+    }
+}
+
+/* Writes the state to x and the right-hand side of stage k > 0 of a step to the time t. Returns
+ * false if that cannot be evaluated. */
+static bool evaluate_stage(struct erk *erk, int k, double t, double x[]) {
     const struct ARKodeButcherTableMem *of = erk->coefficients;
     const size_t n = erk->base.problem->ode.state_count;
     const double length = t - erk->step_begin;
+    const double stage_t = of->c[k] < 1.0 ? erk->step_begin + of->c[k] * length : t;
+    combine_stages(erk, k, length, of->A[k], x);
+    return problem_rhs(erk->base.problem, stage_t, x, erk->step_dx + (size_t)k * n) == STATUS_OK;
+}
+
+/* Steps from the begin of the running internal step to the time t, beginning with stage `first`.
+ * The last stage begins with the state there: writes it to x and the right-hand side to erk->dx.
+ * Returns false if that cannot be evaluated. */
+static bool step_to(struct erk *erk, int first, double t, double x[]) {
     bool is_evaluated = true;
-    for (int k = 1; is_evaluated && k < of->stages; k++) {
-        for (size_t i = 0; i < n; i++) {
-            double slope = 0.0;
-            for (int j = 0; j < k; j++) {
-                slope += of->A[k][j] * erk->step_dx[(size_t)j * n + i];
-            }
-            x[i] = erk->step_x[i] + length * slope;
-        }
-        const double stage_t = of->c[k] < 1.0 ? erk->step_begin + of->c[k] * length : t;
-        double *dx = erk->step_dx + (size_t)k * n;
-        is_evaluated = problem_rhs(erk->base.problem, stage_t, x, dx) == STATUS_OK;
+    for (int k = first; is_evaluated && k < erk->coefficients->stages; k++) {
+        is_evaluated = evaluate_stage(erk, k, t, x);
     }
     return is_evaluated;
 }
 
-/* Makes the advance after an event in one step, without the start of ERKStep, a half of the work.
- * Returns false if ERKStep is to advance: the step is long, or its error above a tenth of the
- * tolerances. */
+/* True if an indicator of a state falls to 0 up to the time t as far as the first two stages, which
+ * it evaluates, can say. x: room for a state. */
+static bool foresees_event(struct erk *erk, double t, double x[]) {
+    const size_t n = erk->base.problem->ode.state_count;
+    const double length = t - erk->step_begin;
+    if (!location_is_active(&erk->base.problem->location) ||
+        !evaluate_stage(erk, 1, t, erk->second_x)) {
+        return false;
+    }
+    erk->second_t = erk->step_begin + erk->coefficients->c[1] * length;
+    const double of_change = 0.5 / erk->coefficients->c[1];
+    for (size_t i = 0; i < n; i++) {
+        const double change = erk->step_dx[n + i] - erk->step_dx[i];
+        x[i] = erk->step_x[i] + length * (erk->step_dx[i] + of_change * change);
+    }
+    return location_falls_between(&erk->base.problem->location, erk->step_x, x);
+}
+
+/* Makes the advance after an event, or onto one, in one step, without the start of ERKStep, a half
+ * of the work. Returns false if ERKStep is to advance: the step is long, or its error above a tenth
+ * of the tolerances. */
 static bool leap(struct erk *erk, double t, double x[], struct method_work *work) {
     const struct ARKodeButcherTableMem *of = erk->coefficients;
     const struct problem *problem = erk->base.problem;
@@ -261,25 +322,25 @@ static bool leap(struct erk *erk, double t, double x[], struct method_work *work
     const double length = t - erk->step_begin;
     const double max_step = problem->settings.max_step;
     const bool is_short = length <= erk->next_step && !(max_step > 0.0 && length > max_step);
-    if (!problem->continues || !is_short || !step_to(erk, t, x)) {
+    if (!is_short || !(problem->continues || foresees_event(erk, t, x)) ||
+        !step_to(erk, problem->continues ? 1 : 2, t, x)) {
         return false;
     }
+    double *other = erk->second_x; // the state by the other weights of the table
+    erk->second_t = NAN;
+    combine_stages(erk, of->stages, length, of->d, other);
     double sum = 0.0;
     for (size_t i = 0; i < n; i++) {
-        double error = 0.0;
-        for (int j = 0; j < of->stages; j++) {
-            error += (of->b[j] - of->d[j]) * erk->step_dx[(size_t)j * n + i];
-        }
-        error *= length / (problem->settings.relative_tolerance * fabs(erk->step_x[i]) +
-                           problem->settings.absolute_tolerances[i]);
+        const double error =
+            (x[i] - other[i]) / (problem->settings.relative_tolerance * fabs(erk->step_x[i]) +
+                                 problem->settings.absolute_tolerances[i]);
         sum += error * error;
     }
     if (!(sum <= 0.01 * (double)n)) {
         return false;
     }
     erk->watched = t;
-    erk->search_status = search(erk, t, x);
-    erk->is_cut_short = erk->search_status != STATUS_OK || problem->location.time <= t;
+    search(erk, t, x);
     *work =
         (struct method_work){.steps = 1, .last_step = length, .last_order = order, .internal = t};
     return true;
@@ -342,7 +403,7 @@ static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
     int corrections = 0;
     int divisions = 0;
     while (flag >= 0 && corrections < MOST_CORRECTIONS && divisions < MOST_DIVISIONS) {
-        flag = step_to(erk, t, x) ? ARK_SUCCESS : ARK_RHSFUNC_FAIL;
+        flag = step_to(erk, 1, t, x) ? ARK_SUCCESS : ARK_RHSFUNC_FAIL;
         double z = 0.0;
         double correction = 0.0;
         if (flag < 0 || !location_correction(location, t, x, erk->dx, &z, &correction)) {

@@ -314,26 +314,17 @@ static double middle(double low, double high) {
     return s > low && s < high ? s : with_bits((bits_of(low) + bits_of(high)) / 2);
 }
 
-/* Returns a guess of the root between two nodes: that of the first terms, or of a line. */
-static double guess(const struct rising *p, const struct node *low, const struct node *high) {
-    const double *c = p->c;
-    if (p->degree >= 2 && low->s == 0.0) {
-        const double root = sqrt(c[1] * c[1] - 4.0 * c[0] * c[2]);
-        const double s = c[1] > 0.0 ? -0.5 * (c[1] + root) / c[2] : 2.0 * c[0] / (root - c[1]);
-        if (s > 0.0 && s < high->s) {
-            return s;
-        }
-    }
-    return low->s + (high->s - low->s) * (low->value / (low->value - high->value));
-}
-
 /* Returns the first s at which p, monotone between two nodes of opposite sign, no longer has the
  * sign of the lower one. Uses Newton's method as long as its steps become shorter, otherwise
  * bisection. Steps of few units in the last place are lengthened to pass the root, so that it is
  * soon between neighbours. */
 static double crossing(const struct rising *p, struct node low, struct node high, bool is_exact) {
-    double s = guess(p, &low, &high);
     double step = high.s - low.s;
+    double s = low.s + step * (low.value / (low.value - high.value));
+    if (low.s == 0.0) { // the root of the parabola with the slope there
+        const double bend = (high.value - low.value - p->c[1] * step) / (step * step);
+        s = 2.0 * low.value / (sqrt(p->c[1] * p->c[1] - 4.0 * bend * low.value) - p->c[1]);
+    }
     uint64_t least = 1; // units in the last place
     while (bits_of(high.s) - bits_of(low.s) > 1) {
         if (!(s > low.s && s < high.s)) {

@@ -103,25 +103,7 @@ EACH_METHOD static void test_the_error_follows_the_tolerance(void) {
     }
 }
 
-EACH_CVODE_METHOD static void test_asking_for_more_points_costs_no_steps(void) {
-    double x[2];
-    struct integrator_statistics few;
-    struct integrator_statistics many;
-    restart(INFINITY);
-    advance(0.1, x);
-    advance(10.0, x);
-    integrator_get_statistics(integrator, &few);
-
-    configure(1e-10);
-    restart(INFINITY);
-    for (int i = 1; i <= 100; i++) {
-        advance(0.1 * i, x);
-    }
-    integrator_get_statistics(integrator, &many);
-    TEST_ASSERT_TRUE(labs(many.steps - few.steps) <= 1);
-}
-
-/* To the bit: where else there was a stop does not matter. */
+/* To the bit: other stops do not matter, and cost no steps. */
 EACH_CVODE_METHOD static void test_many_points_lie_where_each_lies_alone(void) {
     enum { POINTS = 300 };
     // otherwise the first step depends on the first point

@@ -107,14 +107,6 @@ static void test_a_row_that_has_not_converged_is_none(void) {
     TEST_ASSERT_TRUE(calls_between(0.0) > 5);
 }
 
-static void test_without_rows_indicators_are_interpolated(void) {
-    const struct ode ode = oscillator();
-    start(&ode, 0.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-11, quarter_turn, go_to(2.0));
-    TEST_ASSERT_TRUE(integrator_event(integrator)[0]);
-    TEST_ASSERT_TRUE(indicator_calls > 5);
-}
-
 static void test_no_state_moves_farther_than_it_may(void) {
     struct ode ode = oscillator();
     ode.row_of_indicator = row_of_indicator;
