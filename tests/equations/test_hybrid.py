@@ -42,7 +42,7 @@ def run_of(
 
 
 def test_random_models_follow_the_event_loop() -> None:
-    """All kinds in turn, and two that had failed; each failure gives the command that repeats it."""
+    """All kinds in turn, and two that had failed; a failure gives the command that repeats it."""
     seeds, judged = [*range(COUNT), 777, 812], partial(failures, is_full=COUNT > 100)
     with ProcessPoolExecutor(os.cpu_count()) as pool:
         found = [failure for each in pool.map(judged, seeds) for failure in each]
