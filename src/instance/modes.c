@@ -144,9 +144,10 @@ static void refuse_state_event(const struct instance *instance, const struct eve
         (void)snprintf(times, sizeof times, ", the same %d times in a row,", counts->in_a_row);
     }
     message_write(&instance->sink, STATUS_TOO_MANY_EVENTS,
-                  "the step ended at t = %.17g: %s%s is one event more than max_events = %d",
+                  "the step ended at t = %.17g: %s%s is one event more than max_events = %d%s",
                   instance->state.own.time, instance->model->events->indicator_names[counts->last],
-                  times, instance->state.own.max_events);
+                  times, instance->state.own.max_events,
+                  counts->in_a_row > 1 ? ": a mode must hold what stays at its limit" : "");
 }
 
 static void refuse_time_event(const struct instance *instance) {
@@ -441,9 +442,15 @@ static enum status refuse_unseen_events(struct instance *instance, const bool tr
         return STATUS_OK;
     }
     const double *z = instance->z;
+    double *bands = instance->z + count;
+    double *turns = instance->z + 2 * count;
     for (size_t i = 0; i < count; i++) {
-        if (triggered[i] && instance->indicators[i].kind != INDICATOR_UNUSED &&
-            turns_before_zero(z[i], z[count + i], z[2 * count + i])) {
+        turns[i] = turns_before_zero(z[i], z[count + i], z[2 * count + i]);
+    }
+    write_bands(instance, bands);
+    for (size_t i = 0; i < count; i++) { // a state that has jumped far away is not at its limit
+        if (triggered[i] && instance->indicators[i].kind != INDICATOR_UNUSED && turns[i] != 0.0 &&
+            fabs(z[i]) <= 4.0 * bands[i]) {
             message_write(&instance->sink, STATUS_INTERNAL,
                           "at t = %.17g: events follow each other faster than they can be seen "
                           "from outside: %s; let a mode rest, or set the states onto the limit",
