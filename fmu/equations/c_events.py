@@ -365,7 +365,9 @@ class Events:
         states = [state.name for state in self.file.of("states")]
         code = Code(leaves(self.file))
         lines = self._assigned(code, {name: e.value for name, e in change.given.items()})
-        lines += [f"tolerance[{states.index(name)}] = 0.0;" for name in change.reinit]
+        errors = Errors(code, {("state", name): f"tolerance[{i}]" for i, name in enumerate(states)})
+        jumped = {name: errors.of(e.value) for name, e in change.reinit.items()}
+        lines += [f"tolerance[{states.index(name)}] = {e};" for name, e in jumped.items()]
         if isinstance(change, Sampler) and change.during is not None:
             lines = [f"if ({code.of(change.during.value)}) {{", *indented(lines), "}"]
         return [f"if (event == {index}) {{", *indented(code.lines + lines), "}"]

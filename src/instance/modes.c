@@ -24,9 +24,21 @@ static void write_location_errors(const struct instance *instance, double errors
     }
 }
 
+/* After an event an indicator that rises again from its band is above 0 at once, so that importers
+ * see no second event: the bands are this much wider there, and as before after this time, s. */
+static const double widening = 63.0;
+static const double widening_time = 1e-3;
+
+/* Returns how much wider the bands of indicators are a time after an event, s. */
+static double widened(double since) {
+    const double ratio = since / widening_time;
+    return 1.0 + widening / (1.0 + ratio * ratio);
+}
+
 /* Writes the error of each state at an event: the integrator's tolerance or, outside, twice the
- * error of the location, since indicators fall to 0 beyond their roots. */
-static void write_tolerances(struct instance *instance) {
+ * error of the location, since indicators fall to 0 beyond their roots. since: time from the event
+ * before, s. */
+static void write_tolerances(struct instance *instance, double since) {
     const struct range states = instance->model->states;
     const double *x = doubles_of(instance->memory.values, states);
     const bool is_located_outside =
@@ -38,7 +50,8 @@ static void write_tolerances(struct instance *instance) {
     }
     for (size_t i = 0; i < count_of(states); i++) {
         const double allowed = instance->absolute_tolerances[i] + relative * fabs(x[i]);
-        tolerances[i] = is_located_outside ? fmax(allowed, 2.0 * tolerances[i]) : allowed;
+        tolerances[i] =
+            is_located_outside ? fmax(allowed, 2.0 * widened(since) * tolerances[i]) : allowed;
     }
 }
 
@@ -62,9 +75,9 @@ static enum status check_next_time(const struct instance *instance, double passe
     return STATUS_INTERNAL;
 }
 
-static enum status update(struct instance *instance, const bool *triggered) {
+static enum status update(struct instance *instance, const bool *triggered, double since) {
     const struct model_events *events = instance->model->events;
-    write_tolerances(instance);
+    write_tolerances(instance, since);
     const struct polynomial *inputs = instance->memory.current_inputs;
     const size_t input_count = count_of(instance->model->inputs);
     for (size_t i = 0; i < input_count; i++) {
@@ -111,7 +124,7 @@ enum status instance_update_modes(struct instance *instance, const bool *trigger
         return STATUS_OK;
     }
     instance->outputs_are_valid = false;
-    return update(instance, triggered);
+    return update(instance, triggered, INFINITY);
 }
 
 /* Counts how often an indicator has fallen in a row. */
@@ -131,9 +144,10 @@ static void refuse_state_event(const struct instance *instance, const struct eve
         (void)snprintf(times, sizeof times, ", the same %d times in a row,", counts->in_a_row);
     }
     message_write(&instance->sink, STATUS_TOO_MANY_EVENTS,
-                  "the step ended at t = %.17g: %s%s is one event more than max_events = %d",
+                  "the step ended at t = %.17g: %s%s is one event more than max_events = %d%s",
                   instance->state.own.time, instance->model->events->indicator_names[counts->last],
-                  times, instance->state.own.max_events);
+                  times, instance->state.own.max_events,
+                  counts->in_a_row > 1 ? ": a mode must hold what stays at its limit" : "");
 }
 
 static void refuse_time_event(const struct instance *instance) {
@@ -224,11 +238,6 @@ static double size_of(const struct instance *instance, const struct indicator *i
            fabs(indicator->offset);
 }
 
-/* After an event an indicator that rises again from its band is above 0 at once, so that importers
- * see no second event: the bands are this much wider there, and as before after this time, s. */
-static const double widening = 63.0;
-static const double widening_time = 1e-3;
-
 /* Writes the band that is added to each indicator: it falls to 0 only this far beyond its root. A
  * mode may begin at the root, and integrators miss falls that begin at 0. For an indicator of a
  * state the band is far above the rounding of its two parts, the state's nominal value and the
@@ -237,8 +246,7 @@ static const double widening_time = 1e-3;
  * kinds of indicators, too. */
 static void write_bands(struct instance *instance, double bands[]) {
     const struct model_events *events = instance->model->events;
-    const double since =
-        (instance->state.time.s - instance->state.own.last_event_time) / widening_time;
+    const double factor = widened(instance->state.time.s - instance->state.own.last_event_time);
     events->describe(instance->memory.values, instance->indicators);
     if (events->errors != NULL) {
         double *errors = doubles_of(instance->first_derivatives, instance->model->states);
@@ -256,7 +264,7 @@ static void write_bands(struct instance *instance, double bands[]) {
         } else if (events->errors == NULL) {
             bands[i] = 2.0 * near_root + 1e-9 * fabs(indicator->offset);
         }
-        bands[i] *= events->errors != NULL ? 1.0 + widening / (1.0 + since * since) : 1.0;
+        bands[i] *= events->errors != NULL ? factor : 1.0;
     }
 }
 
@@ -434,9 +442,15 @@ static enum status refuse_unseen_events(struct instance *instance, const bool tr
         return STATUS_OK;
     }
     const double *z = instance->z;
+    double *bands = instance->z + count;
+    double *turns = instance->z + 2 * count;
     for (size_t i = 0; i < count; i++) {
-        if (triggered[i] && instance->indicators[i].kind != INDICATOR_UNUSED &&
-            turns_before_zero(z[i], z[count + i], z[2 * count + i])) {
+        turns[i] = turns_before_zero(z[i], z[count + i], z[2 * count + i]);
+    }
+    write_bands(instance, bands);
+    for (size_t i = 0; i < count; i++) { // a state that has jumped far away is not at its limit
+        if (triggered[i] && instance->indicators[i].kind != INDICATOR_UNUSED && turns[i] != 0.0 &&
+            fabs(z[i]) <= 4.0 * bands[i]) {
             message_write(&instance->sink, STATUS_INTERNAL,
                           "at t = %.17g: events follow each other faster than they can be seen "
                           "from outside: %s; let a mode rest, or set the states onto the limit",
@@ -462,6 +476,7 @@ enum status instance_update_at_point(struct instance *instance, bool *states_cha
     const bool is_any =
         instance->state.event_point == EVENT_UNHANDLED || triggered[events->indicator_count];
     instance_forget_unhandled(instance);
+    const double since = is_any ? now - instance->state.own.last_event_time : INFINITY;
     enum status status = STATUS_OK;
     if (is_any) {
         struct event_counts none = {0};
@@ -473,7 +488,8 @@ enum status instance_update_at_point(struct instance *instance, bool *states_cha
     char *before = instance->second_derivatives + states.offset;
     memcpy(before, instance->memory.values + states.offset, states.size);
     if (status == STATUS_OK) {
-        status = instance_update_modes(instance, is_any ? triggered : NULL);
+        instance->outputs_are_valid = false;
+        status = update(instance, is_any ? triggered : NULL, since);
     }
     *states_changed = memcmp(before, instance->memory.values + states.offset, states.size) != 0;
     return status == STATUS_OK && is_any ? refuse_unseen_events(instance, triggered) : status;

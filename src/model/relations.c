@@ -8,6 +8,7 @@
 /* Relative distance of a state from its limit where its event may be located; and of the time. */
 static const double location_error = 1e-11;
 static const double time_error = 1e-12;
+static const double rest_time = 1e-3;        // s: a relation at rest stays within its noise so long
 static const double shortest_period = 1e-12; // s, of samplers
 
 /* Arguments of all functions during one event: a model, its values, and memory. */
@@ -212,8 +213,8 @@ static double signed_slope(const struct compared *compared, int holds) {
 
 /* Switches relations after an event has changed values: a relation at its limit that now falls
  * switches, or its next event would be due at once; a relation that the event has placed at its
- * limit, at rest, holds if it includes zero. The motion of inputs may not be known, but it is part
- * of the slopes before and after the change.
+ * limit, at rest, holds if it includes zero, as does one that nothing has read before. The motion
+ * of inputs may not be known, but it is part of the slopes before and after the change.
  *
  * call->room.before: the relations before the change. */
 static void switch_fallen(const struct call *call) {
@@ -230,7 +231,8 @@ static void switch_fallen(const struct call *call) {
     }
     compare(call, call->room.zeros, after);
     for (int k = 0; k < model->relation_count; k++) {
-        const bool rests = after[k].slope == 0.0 && signed_slope(&before[k], call->holds[k]) > 0.0;
+        const bool is_new = !before[k].used || signed_slope(&before[k], call->holds[k]) > 0.0;
+        const bool rests = is_new && fabs(after[k].slope) * rest_time <= after[k].noise;
         if (!model->relation[k].is_timed && is_near(&after[k]) && rests) {
             call->room.turned[k] = 1;
             call->holds[k] = model->relation[k].includes_zero;
@@ -312,7 +314,7 @@ static void allow_rounding(const struct call *call, bool is_allowed) {
     double *tolerance = call->room.tolerance;
     for (int i = 0; i < call->model->state_count; i++) {
         const double rounding = 8.0 * DBL_EPSILON * fabs(x[i]);
-        if (tolerance[i] <= rounding) { // others are larger
+        if (!(tolerance[i] > rounding)) { // others are larger; NaN is no error
             tolerance[i] = is_allowed ? rounding : 0.0;
         }
     }

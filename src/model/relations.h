@@ -90,7 +90,7 @@ struct relations {
     void (*locate)(const void *values, double t, int segment[]);
     void (*find_due)(const void *values, double t, int due[]);
     /* Performs an event or, with event_count added to its number, a sampler: right sides use the
-     * values before it; a state that jumps gets tolerance 0. */
+     * values before it; a state that jumps gets the tolerance of its right side. */
     void (*change)(void *values, double t, int event, double tolerance[]);
 };
 

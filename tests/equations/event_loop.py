@@ -55,6 +55,7 @@ class Motion:
     reason: str  # for it
     impacts: list[Impact] = field(default_factory=list)
     growth: Numbers = field(default_factory=lambda: np.ones(0))  # of a disturbance, up to each time
+    lateness: Numbers = field(default_factory=lambda: np.zeros(0))  # error, over that of each limit
 
     def count(self, t: float) -> int:
         """Number of impacts before a time."""
@@ -122,8 +123,9 @@ class EventLoop:
         distance = self._function([f"({left}) - ({right})"], np)
         return lambda time, x: distance(time, x)[0]
 
-    def run(self, times: Numbers, start: Numbers | None = None) -> Motion:
-        """The motion from time 0 to the last of the times."""
+    def run(self, times: Numbers, start: Numbers | None = None, late: float = 0.0) -> Motion:
+        """The motion from time 0 to the last of the times; late: beyond each limit, units of it."""
+        self.late = late
         motion = Motion(times, np.full((len(times), len(self.start)), np.nan), times[-1], "end")
         t, x = 0.0, np.array(self.start if start is None else start, dtype=float)
         if any(c.distance(t, x) < 20 * NEAREST_MISS * c.unit for c in self.conditions):
@@ -176,14 +178,15 @@ class EventLoop:
         """The earliest time at which a condition comes true within a step."""
         found = []
         for condition in self.conditions:
-            past = condition.distance(t, at) < 0.0
+            late = self.late * condition.unit
+            past = condition.distance(t, at) + late < 0.0
             if past.any():
                 k = int(np.argmax(past))
                 before = t[k - 1] if k else begin
                 root = before
-                if condition.distance(before, dense(before)) > 0.0:
+                if condition.distance(before, dense(before)) + late > 0.0:
                     root = brentq(
-                        lambda s, c=condition: c.distance(s, dense(s)), before, t[k],
+                        lambda s, c=condition, d=late: c.distance(s, dense(s)) + d, before, t[k],
                         xtol=1e-15, rtol=1e-15,
                     )  # fmt: skip
                 found.append((root, condition))
@@ -242,5 +245,9 @@ class EventLoop:
         kept = times <= motion.horizon
         motion.times, motion.x = times[kept], motion.x[kept]
         motion.growth = np.maximum.accumulate(motion.growth[kept])
+        # in a limit's distance a disturbance of the start may cancel, but not what impacts are late
+        late = np.abs(self.run(motion.times, late=DISTURBANCE).x - motion.x).max(axis=1)
+        late[[not motion.away(t, 0.0) for t in motion.times]] = 0.0
+        motion.lateness = np.maximum.accumulate(late) / (DISTURBANCE * self.unit)
         motion.impacts = [i for i in motion.impacts if i.t < motion.horizon]
         return motion

@@ -35,6 +35,7 @@ OTHERS = 10.0
 ROUNDING = 1e-9  # likewise, whatever the tolerance
 OF_OFFSET = 2e-10  # likewise of each impact, if the condition has an offset of a million units
 OF_MASTER = 1e-6  # what the master of Model Exchange adds
+OF_LOCATION = 1e-9  # units beyond its limit: two states, each by 2e-10 of nominal value and size
 LARGEST_ERROR = 2e-3  # where more is possible, nothing is compared
 
 
@@ -59,10 +60,11 @@ class Failure:
 class Judge:
     """Compares runs of a model with its motion, as far as a tolerance permits."""
 
-    def __init__(self, model: Hybrid, error: float) -> None:
+    def __init__(self, model: Hybrid, error: float, is_outside: bool = False) -> None:
         self.model, self.motion = model, model.motion
-        growth = self.motion.growth
-        self.errors = error * growth  # units of length, at all times of the motion
+        self.errors = error * self.motion.growth  # units of length, at all times of the motion
+        if is_outside:
+            self.errors += OF_LOCATION * self.motion.lateness
         sure = self.errors <= LARGEST_ERROR
         self.worst = 0.0  # error of the states, of what is allowed
         self.known = len(sure) if sure.all() else int(np.argmin(sure))
@@ -158,7 +160,7 @@ def failures(
                 + OF_OFFSET * (model.form == "offset") * len(model.motion.impacts)
                 + OF_MASTER * (kind == "model_exchange")
             )
-            judge = Judge(model, error)
+            judge = Judge(model, error, kind == "model_exchange")
             count = judge.steps(float(step))
             made = run(unit, model, label, count)
             wrong = [Failure(seed, model.kind, label, *pair) for pair in judge.judge(made)]

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
 
 from tests.equations.examples import MODELS
 from tests.equations.hybrid import failures
@@ -42,8 +44,8 @@ def run_of(
 
 
 def test_random_models_follow_the_event_loop() -> None:
-    """All kinds in turn; what fails is named with the command that repeats it."""
-    seeds, judged = range(COUNT), partial(failures, is_full=COUNT > 100)
+    """All kinds in turn, and two that had failed; a failure gives the command that repeats it."""
+    seeds, judged = [*range(COUNT), 777, 812], partial(failures, is_full=COUNT > 100)
     with ProcessPoolExecutor(os.cpu_count()) as pool:
         found = [failure for each in pool.map(judged, seeds) for failure in each]
     assert len(KINDS) <= COUNT
@@ -214,6 +216,36 @@ def test_a_rocking_block_loses_speed_once_an_impact(unit: Callable, kind: str) -
     assert run.x[-1][2] == 1 + sum(impact < 4 for impact in impacts)
     flown, v = 4 - impacts[3], speed / 16
     assert run.x[-1][0] == pytest.approx(v * flown - flown**2 / 2, abs=1e-6)
+
+
+@pytest.mark.parametrize("step", [0.1, 0.01])
+@pytest.mark.parametrize("kind", ["cvode_adams", "erk", "taylor", "model_exchange"])
+def test_a_ball_leaves_a_table_and_lands_once_a_period(
+    unit: Callable, kind: str, step: float
+) -> None:
+    """It leaves where the table falls by G, and sticks where it lands."""
+    leaves = np.arcsin(G / 10.8) / 6
+    y, v = 0.3 * np.sin(6 * leaves), 1.8 * np.cos(6 * leaves)
+    lands = brentq(lambda s: y + v * s - G * s**2 / 2 - 0.3 * np.sin(6 * (leaves + s)), 0.1, 0.4)
+    run = run_of(unit(TEXTS["TABLE"]), kind, step, round(4 / step), tolerance=1e-9)
+    periods = np.arange(4) * np.pi / 3
+    events = np.concatenate([leaves + periods, leaves + lands + periods])
+    assert not run.failure
+    assert run.counts == [np.sum(events < t) for t in run.times]
+
+
+@EACH_KIND
+def test_a_wheel_of_spokes_steps_once_a_spoke(unit: Callable, kind: str) -> None:
+    """Each step puts it onto the limit of steps back, which it leaves."""
+    begins, square, events = 0.0, 1.44, [0.0]
+    for _ in range(5):
+        rises = partial(lambda a, b, s: (s + 2 * G * (np.cos(b) - np.cos(a))) ** -0.5, b=begins)
+        events.append(events[-1] + quad(partial(rises, s=square), begins, 0.48)[0])
+        square = (square + 2 * G * (np.cos(begins) - np.cos(0.48))) * np.cos(0.8) ** 2
+        begins = -0.32
+    run = run_of(unit(TEXTS["SPOKES"]), kind, 0.1, 50)
+    assert not run.failure
+    assert run.counts == [np.sum(np.array(events[1:]) < t) for t in run.times]
 
 
 @pytest.mark.parametrize("step", [0.25, 0.1, 0.05])
