@@ -1,6 +1,7 @@
-"""Models in equations, a step of their FMUs: next to heyoka, and a chain as a band."""
+"""Models in equations, a step of their FMUs: next to heyoka, loops, and a chain as a band."""
 
-from collections.abc import Callable
+import ctypes
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import median
 from time import thread_time
@@ -25,11 +26,18 @@ MODELS = {
     "Hodgkin-Huxley": ((HERE / "neuron.toml").read_text(), 50.0, 1e-9),
 }
 PAIRS = {"Pleiades": HERE / "pairs.toml"}  # the same equations, as they suit heyoka
+NAMES = ("Lorenz", "CartAndPole", "HodgkinHuxley", "Chain", "Pleiades")  # in loops.c, in this order
+DOUBLES = ctypes.POINTER(ctypes.c_double)
+RESTARTS = "0.1 s steps, inputs changing"
+FORCES = 10.0 * np.sin(np.arange(100.0))  # on the cart, held over a step each, N
+FRACTION = 2e-3  # of the tolerance, at which an FMU runs CVODE
 Run = Callable[..., tuple[float, np.ndarray]]  # by tolerance: processor time, s; states
 
 
-def by_fmu(fmu_file: Path, method: str, step: float) -> tuple[Run, tuple]:
-    """Return what makes the step by an FMU beside its equations, and the start."""
+def by_fmu(
+    fmu_file: Path, method: str, step: float, forces: Sequence[float] = ()
+) -> tuple[Run, tuple]:
+    """Return what makes the step by an FMU beside its equations, or one a force; and the start."""
     instance = initializing(fmu_file)
     references, fmu = instance.loaded.references, instance.fmi
     states = [references[x.name] for x in read(fmu_file.with_suffix(".toml")).of("states")]
@@ -42,7 +50,11 @@ def by_fmu(fmu_file: Path, method: str, step: float) -> tuple[Run, tuple]:
         fmu.enterInitializationMode()
         fmu.exitInitializationMode()
         begin = thread_time()
-        fmu.doStep(0.0, step)
+        for i, force in enumerate(forces):
+            fmu.setReal([references["force"]], [force])
+            fmu.doStep(i * step, step)
+        if len(forces) == 0:
+            fmu.doStep(0.0, step)
         return thread_time() - begin, np.array(fmu.getReal(states))
 
     return run, start
@@ -61,6 +73,26 @@ def by_heyoka(file: Path, step: float, start: tuple) -> Run:
     return run
 
 
+def by_loop(
+    program: Path, file: Path, method: str, step: float, start: tuple, forces: Sequence[float] = ()
+) -> Run:
+    """Return what makes the same steps by a loop of CVODE (loops.c)."""
+    loop = ctypes.CDLL(str(program)).loop_run_model
+    loop.restype = ctypes.c_double
+    model = read(file)
+    nominal = np.array([x.nominal or 1.0 for x in model.of("states")])
+    held = np.array(forces)
+
+    def run(tolerance: float) -> tuple[float, np.ndarray]:
+        states, count = np.array(start), len(held) or 1
+        whole = map(ctypes.c_int, (NAMES.index(model.name), method == "cvode_bdf", len(start), count))
+        real = map(ctypes.c_double, (FRACTION * tolerance, step))
+        arrays = (array.ctypes.data_as(DOUBLES) for array in (nominal, held, states))
+        return loop(*whole, *real, *arrays), states
+
+    return run
+
+
 def row(name: str, turns: int, exact: np.ndarray, limit: float, *peers: tuple[Run, float]) -> dict:
     """Let two take turns at their tolerances."""
     times = np.array([[run(tolerance)[0] for run, tolerance in peers] for _ in range(turns)])
@@ -75,15 +107,35 @@ def row(name: str, turns: int, exact: np.ndarray, limit: float, *peers: tuple[Ru
     }  # fmt: skip
 
 
-def rows(folder: Path, turns: int) -> list[dict]:
-    """Measure; heyoka has an error no larger than the FMU's."""
+def by_hand(folder: Path, turns: int, loops: Path, exact: dict[str, np.ndarray]) -> list[dict]:
+    """Measure against loops at the same tolerance: the largest ratio and errors of all models."""
+
+    def race(name: str, method: str, limit: float, step: float, forces: Sequence[float]) -> dict:
+        fmu = made(folder, MODELS[name][0])
+        own, start = by_fmu(fmu, method, step, forces)
+        loop = by_loop(loops, fmu.with_suffix(".toml"), method, step, start, forces)
+        true = loop(1e-11)[1] if len(forces) else exact[name]
+        title = f"{name if len(forces) else 'own equations'}, {method} to a loop by hand"
+        return row(title, turns, true, limit, (own, 1e-8), (loop, 1e-8))
+
     found = []
+    for method in ("cvode_adams", "cvode_bdf"):
+        names = [name for name in MODELS if (name, method) != ("Pleiades", "cvode_bdf")]
+        of_models = [race(name, method, 1.05, MODELS[name][1], ()) for name in names]
+        found.append({key: max(one[key] for one in of_models) for key in of_models[0]})
+    restarts = race("cart and pole", "cvode_adams", 0.5, 0.1, FORCES)
+    return [*found, restarts | {"work": RESTARTS, "column": RESTARTS}]
+
+
+def rows(folder: Path, turns: int, loops: Path) -> list[dict]:
+    """Measure; heyoka has an error no larger than the FMU's. loops: the library of loops.c."""
+    found, solutions = [], {}
     for name, (text, step, tolerance) in MODELS.items():
         fmu = made(folder, text)
         own, start = by_fmu(fmu, "taylor", step)
         peer = by_heyoka(PAIRS.get(name, fmu.with_suffix(".toml")), step, start)
         named, of_peer = f"{name}, taylor to heyoka", 10.0 * tolerance
-        exact = peer(1e-19, np.longdouble)[1]
+        exact = solutions[name] = peer(1e-19, np.longdouble)[1]
         judged = exact, 1.0, (own, tolerance)
         while (one := row(named, 1, *judged, (peer, of_peer)))["error_of_peer"] > one["error"]:
             of_peer *= 10.0**-0.25
@@ -92,4 +144,5 @@ def rows(folder: Path, turns: int) -> list[dict]:
     band, dense = (by_fmu(made(folder, text), "cvode_bdf", 2.0)[0] for text in (CHAIN, full))
     exact = band(1e-9)[1]
     chain = "300 masses, cvode_bdf to full matrices", turns, exact, 0.2
-    return [*found, row(*chain, (band, 1e-6), (dense, 1e-6))]
+    found.append(row(*chain, (band, 1e-6), (dense, 1e-6)))
+    return [*found, *by_hand(folder, turns, loops, solutions)]

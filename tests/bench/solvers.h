@@ -5,6 +5,7 @@
 
 #include "fmu3_library.h"
 #include "fmu_library.h"
+#include "loops.h"
 #include "rp_manipulator.h"
 
 #include <stdbool.h>
@@ -12,11 +13,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* ---- bench.c: clock and median; the end of a program that cannot measure */
-
-/* Returns the s that a processor has worked for this thread: other programs disturb it less than
- * the time of day. */
-double processor_time(void);
+/* ---- bench.c: median; the end of a program that cannot measure */
 
 /* Returns the s between two readings of this clock in a row. */
 double clock_cost(void);
