@@ -145,6 +145,8 @@ class Series:
             f"at[k][{i}] = (struct pair){{{{row[{a}][k], row[{b}][k]}}}};"
             for (a, b), i in columns.items()
         ]
+        if not columns:
+            return
         parts["still"].append(f"struct pair at[SERIES_LENGTH][{len(columns)}];")
         parts["start"] += ["for (int k = 0; k == 0 || k < first; k++) {", *indented(own), "}"]
         parts["sums"] = sums + [f"double {name} = 0.0;" for name in single]
@@ -328,8 +330,12 @@ class Series:
                 return f"{self._sum(a, b)} + {ends}"
             case "/" if b.moves:
                 end = f"{self._at(b)} * {self.start.of(value)}"
-                over = self.start.of(self._over(b))
-                return f"({self._at(a)} - {self._sum(b, value)} - {end}) * {over}"
+                rest, over = f"({self._at(a)} - {self._sum(b, value)} - {end})", self._over(b)
+                product = f"{rest} * {self.start.of(over)}"
+                if self.is_wide:  # too many conditions
+                    return product
+                is_known = self.start.of(self.graph.value("isfinite", over))
+                return f"{is_known} ? {product} : {rest} / {self.start.of(b)}"
             case "/":
                 return f"{self._at(a)} * {self.still.of(self._over(b))}"
         given = [self._at(x) if x.moves else self.still.of(x) for x in value.arguments]

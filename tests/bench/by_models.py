@@ -81,11 +81,13 @@ def by_loop(
     loop.restype = ctypes.c_double
     model = read(file)
     nominal = np.array([x.nominal or 1.0 for x in model.of("states")])
-    held = np.array(forces)
+    held = np.array(forces if len(forces) else [0.0])
 
     def run(tolerance: float) -> tuple[float, np.ndarray]:
-        states, count = np.array(start), len(held) or 1
-        whole = map(ctypes.c_int, (NAMES.index(model.name), method == "cvode_bdf", len(start), count))
+        states = np.array(start)
+        whole = map(
+            ctypes.c_int, (NAMES.index(model.name), method == "cvode_bdf", len(start), len(held))
+        )
         real = map(ctypes.c_double, (FRACTION * tolerance, step))
         arrays = (array.ctypes.data_as(DOUBLES) for array in (nominal, held, states))
         return loop(*whole, *real, *arrays), states

@@ -2,12 +2,11 @@
  * hand, which are also FMUs from equations (by_models.py). */
 #define _POSIX_C_SOURCE 199309L // clock_gettime
 
-#include "loops.h"
+#include "solvers.h"
 
 #include <math.h>
 #include <nvector/nvector_serial.h>
 #include <string.h>
-#include <sundials/sundials_context.h>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
