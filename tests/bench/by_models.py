@@ -27,15 +27,16 @@ MODELS = {
 }
 PAIRS = {"Pleiades": HERE / "pairs.toml"}  # the same equations, as they suit heyoka
 NAMES = ("Lorenz", "CartAndPole", "HodgkinHuxley", "Chain", "Pleiades")  # in loops.c, in this order
-DOUBLES = ctypes.POINTER(ctypes.c_double)
+TYPES = [*[ctypes.c_int] * 4, *[ctypes.c_double] * 2, *[np.ctypeslib.ndpointer(float)] * 3]
 RESTARTS = "0.1 s steps, inputs changing"
+NONE = (0.0,)  # force in one step
 FORCES = 10.0 * np.sin(np.arange(100.0))  # on the cart, held over a step each, N
 FRACTION = 2e-3  # of the tolerance, at which an FMU runs CVODE
 Run = Callable[..., tuple[float, np.ndarray]]  # by tolerance: processor time, s; states
 
 
 def by_fmu(
-    fmu_file: Path, method: str, step: float, forces: Sequence[float] = ()
+    fmu_file: Path, method: str, step: float, forces: Sequence[float] = NONE
 ) -> tuple[Run, tuple]:
     """Return what makes the step by an FMU beside its equations, or one a force; and the start."""
     instance = initializing(fmu_file)
@@ -51,10 +52,9 @@ def by_fmu(
         fmu.exitInitializationMode()
         begin = thread_time()
         for i, force in enumerate(forces):
-            fmu.setReal([references["force"]], [force])
+            if len(forces) > 1:
+                fmu.setReal([references["force"]], [force])
             fmu.doStep(i * step, step)
-        if len(forces) == 0:
-            fmu.doStep(0.0, step)
         return thread_time() - begin, np.array(fmu.getReal(states))
 
     return run, start
@@ -74,23 +74,23 @@ def by_heyoka(file: Path, step: float, start: tuple) -> Run:
 
 
 def by_loop(
-    program: Path, file: Path, method: str, step: float, start: tuple, forces: Sequence[float] = ()
+    program: Path,
+    file: Path,
+    method: str,
+    step: float,
+    start: tuple,
+    forces: Sequence[float] = NONE,
 ) -> Run:
     """Return what makes the same steps by a loop of CVODE (loops.c)."""
     loop = ctypes.CDLL(str(program)).loop_run_model
-    loop.restype = ctypes.c_double
-    model = read(file)
+    loop.restype, loop.argtypes = ctypes.c_double, TYPES
+    model, held = read(file), np.array(forces)
+    which = NAMES.index(model.name), method == "cvode_bdf", len(start), len(held)
     nominal = np.array([x.nominal or 1.0 for x in model.of("states")])
-    held = np.array(forces if len(forces) else [0.0])
 
     def run(tolerance: float) -> tuple[float, np.ndarray]:
         states = np.array(start)
-        whole = map(
-            ctypes.c_int, (NAMES.index(model.name), method == "cvode_bdf", len(start), len(held))
-        )
-        real = map(ctypes.c_double, (FRACTION * tolerance, step))
-        arrays = (array.ctypes.data_as(DOUBLES) for array in (nominal, held, states))
-        return loop(*whole, *real, *arrays), states
+        return loop(*which, FRACTION * tolerance, step, nominal, held, states), states
 
     return run
 
@@ -116,14 +116,14 @@ def by_hand(folder: Path, turns: int, loops: Path, exact: dict[str, np.ndarray])
         fmu = made(folder, MODELS[name][0])
         own, start = by_fmu(fmu, method, step, forces)
         loop = by_loop(loops, fmu.with_suffix(".toml"), method, step, start, forces)
-        true = loop(1e-11)[1] if len(forces) else exact[name]
-        title = f"{name if len(forces) else 'own equations'}, {method} to a loop by hand"
+        whose, true = (name, loop(1e-11)[1]) if len(forces) > 1 else ("own equations", exact[name])
+        title = f"{whose}, {method} to a loop by hand"
         return row(title, turns, true, limit, (own, 1e-8), (loop, 1e-8))
 
     found = []
     for method in ("cvode_adams", "cvode_bdf"):
         names = [name for name in MODELS if (name, method) != ("Pleiades", "cvode_bdf")]
-        of_models = [race(name, method, 1.05, MODELS[name][1], ()) for name in names]
+        of_models = [race(name, method, 1.05, MODELS[name][1], NONE) for name in names]
         found.append({key: max(one[key] for one in of_models) for key in of_models[0]})
     restarts = race("cart and pole", "cvode_adams", 0.5, 0.1, FORCES)
     return [*found, restarts | {"work": RESTARTS, "column": RESTARTS}]

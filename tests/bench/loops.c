@@ -21,33 +21,33 @@ double processor_time(void) {
 double loop_run(const struct loop *loop, double x[]) {
     const bool is_stiff = loop->jacobian != NULL;
     SUNContext context;
-    bool is_good = SUNContext_Create(NULL, &context) == 0;
+    require(SUNContext_Create(NULL, &context) == 0, "no context");
     N_Vector states = N_VMake_Serial(loop->n, x, context);
     N_Vector absolute = N_VNew_Serial(loop->n, context);
     for (int i = 0; i < loop->n; i++) {
         NV_Ith_S(absolute, i) = 1e-2 * loop->tolerance * (loop->nominal ? loop->nominal[i] : 1.0);
     }
     void *cvode = CVodeCreate(is_stiff ? CV_BDF : CV_ADAMS, context);
-    is_good = is_good && CVodeInit(cvode, loop->rhs, 0.0, states) == CV_SUCCESS &&
-              CVodeSVtolerances(cvode, loop->tolerance, absolute) == CV_SUCCESS &&
-              CVodeSetMaxNumSteps(cvode, 100000) == CV_SUCCESS;
+    require(CVodeInit(cvode, loop->rhs, 0.0, states) == CV_SUCCESS &&
+                CVodeSVtolerances(cvode, loop->tolerance, absolute) == CV_SUCCESS &&
+                CVodeSetMaxNumSteps(cvode, 100000) == CV_SUCCESS,
+            "no CVODE");
     SUNMatrix J = is_stiff ? SUNDenseMatrix(loop->n, loop->n, context) : NULL;
     SUNLinearSolver dense = is_stiff ? SUNLinSol_Dense(states, J, context) : NULL;
     SUNNonlinearSolver fixed_point = is_stiff ? NULL : SUNNonlinSol_FixedPoint(states, 0, context);
-    if (is_stiff) {
-        is_good = is_good && CVodeSetLinearSolver(cvode, dense, J) == CV_SUCCESS &&
-                  CVodeSetJacFn(cvode, loop->jacobian) == CV_SUCCESS;
-    } else {
-        is_good = is_good && CVodeSetNonlinearSolver(cvode, fixed_point) == CV_SUCCESS;
-    }
+    const bool has_solver = is_stiff ? CVodeSetLinearSolver(cvode, dense, J) == CV_SUCCESS &&
+                                           CVodeSetJacFn(cvode, loop->jacobian) == CV_SUCCESS
+                                     : CVodeSetNonlinearSolver(cvode, fixed_point) == CV_SUCCESS;
+    require(has_solver, "no solver");
     const double begin = processor_time();
-    for (int i = 0; i < loop->steps && is_good; i++) {
+    for (int i = 0; i < loop->steps; i++) {
         double reached;
         CVodeSetUserData(cvode, (void *)(loop->inputs + i * loop->input_count));
         if (loop->restarts) {
             CVodeReInit(cvode, loop->step * i, states);
         }
-        is_good = CVode(cvode, loop->step * (i + 1), states, &reached, CV_NORMAL) == CV_SUCCESS;
+        require(CVode(cvode, loop->step * (i + 1), states, &reached, CV_NORMAL) == CV_SUCCESS,
+                "CVode failed");
         if (loop->states != NULL) {
             memcpy(loop->states + i * loop->n, x, (size_t)loop->n * sizeof *x);
         }
@@ -61,7 +61,7 @@ double loop_run(const struct loop *loop, double x[]) {
     N_VDestroy(absolute);
     N_VDestroy(states);
     SUNContext_Free(&context);
-    return is_good ? elapsed : NAN;
+    return elapsed;
 }
 
 /* ---- Models: rates dx, and their derivatives J, which begin as zeros, in columns */
@@ -94,30 +94,41 @@ static void cart_slopes(const double x[], double force, double J[]) {
     J[7] = -2.0 * (a_phi * c - a * s + 9.81 * c), J[15] = -2.0 * a_w * c;
 }
 
+/* Rates at which the gates m, h and n open and close. */
+static void gates(double V, double opening[3], double closing[3]) {
+    opening[0] = 0.1 * (V + 40.0) / (1.0 - exp(-0.1 * (V + 40.0)));
+    closing[0] = 4.0 * exp((V + 65.0) / -18.0);
+    opening[1] = 0.07 * exp(-0.05 * (V + 65.0));
+    closing[1] = 1.0 / (1.0 + exp(-0.1 * (V + 35.0)));
+    opening[2] = 0.01 * (V + 55.0) / (1.0 - exp(-0.1 * (V + 55.0)));
+    closing[2] = 0.125 * exp((V + 65.0) / -80.0);
+}
+
 static void neuron(const double x[], double force, double dx[]) {
     const double V = x[0], m = x[1], h = x[2], n = x[3];
+    double a[3], b[3];
+    gates(V, a, b);
     dx[0] = 10.0 - 120.0 * m * m * m * h * (V - 50.0) - 36.0 * n * n * n * n * (V + 77.0) -
             0.3 * (V + 54.387);
-    dx[1] = 0.1 * (V + 40.0) / (1.0 - exp(-0.1 * (V + 40.0))) * (1.0 - m) -
-            4.0 * exp((V + 65.0) / -18.0) * m;
-    dx[2] = 0.07 * exp(-0.05 * (V + 65.0)) * (1.0 - h) - h / (1.0 + exp(-0.1 * (V + 35.0)));
-    dx[3] = 0.01 * (V + 55.0) / (1.0 - exp(-0.1 * (V + 55.0))) * (1.0 - n) -
-            0.125 * exp((V + 65.0) / -80.0) * n;
+    for (int i = 0; i < 3; i++) {
+        dx[i + 1] = a[i] * (1.0 - x[i + 1]) - b[i] * x[i + 1];
+    }
 }
 
 static void neuron_slopes(const double x[], double force, double J[]) {
-    const double V = x[0], m = x[1], h = x[2], n = x[3], n3 = n * n * n;
-    const double e_m = exp(-0.1 * (V + 40.0)), e_n = exp(-0.1 * (V + 55.0));
-    const double a_m = 0.1 * (V + 40.0) / (1.0 - e_m), b_m = 4.0 * exp((V + 65.0) / -18.0);
-    const double a_n = 0.01 * (V + 55.0) / (1.0 - e_n), b_n = 0.125 * exp((V + 65.0) / -80.0);
-    const double a_h = 0.07 * exp(-0.05 * (V + 65.0)), e_h = exp(-0.1 * (V + 35.0));
-    const double b_h = 1.0 / (1.0 + e_h);
-    J[0] = -120.0 * m * m * m * h - 36.0 * n3 * n - 0.3;
+    const double V = x[0], m = x[1], h = x[2], n = x[3], of_m = V + 40.0, of_n = V + 55.0;
+    double a[3], b[3];
+    gates(V, a, b);
+    J[0] = -120.0 * m * m * m * h - 36.0 * n * n * n * n - 0.3;
     J[4] = -360.0 * m * m * h * (V - 50.0), J[8] = -120.0 * m * m * m * (V - 50.0);
-    J[12] = -144.0 * n3 * (V + 77.0), J[5] = -a_m - b_m, J[10] = -a_h - b_h, J[15] = -a_n - b_n;
-    J[1] = (0.1 - 0.1 * a_m * e_m) / (1.0 - e_m) * (1.0 - m) + b_m / 18.0 * m;
-    J[2] = -0.05 * a_h * (1.0 - h) - 0.1 * b_h * b_h * e_h * h;
-    J[3] = (0.01 - 0.1 * a_n * e_n) / (1.0 - e_n) * (1.0 - n) + b_n / 80.0 * n;
+    J[12] = -144.0 * n * n * n * (V + 77.0);
+    const double a_V[] = {a[0] * (1.0 - a[0] + 0.1 * of_m) / of_m, -0.05 * a[1],
+                          a[2] * (1.0 - 10.0 * a[2] + 0.1 * of_n) / of_n};
+    const double b_V[] = {b[0] / -18.0, 0.1 * b[1] * (1.0 - b[1]), b[2] / -80.0};
+    for (int i = 0; i < 3; i++) {
+        J[i + 1] = a_V[i] * (1.0 - x[i + 1]) - b_V[i] * x[i + 1];
+        J[5 * (i + 1)] = -a[i] - b[i];
+    }
 }
 
 static void chain(const double x[], double force, double dx[]) {

@@ -1,13 +1,11 @@
 #include "solvers.h"
 
-#include <math.h>
 #ifdef BENCH_MUJOCO_MODEL
 #include <mujoco/mujoco.h>
 #endif
 #include <string.h>
 
 static int rhs(sunrealtype t, N_Vector x, N_Vector dx, void *u) {
-    (void)t;
     problem_rhs(N_VGetArrayPointer(x), u, N_VGetArrayPointer(dx));
     return 0;
 }
@@ -19,9 +17,7 @@ double plain_loop_run(const struct problem *problem, double tolerance, double st
     const struct loop loop = {rhs,           NULL,           4, tolerance,          NULL,
                               problem->step, problem->steps, 2, problem->inputs[0], restarts,
                               states[0]};
-    const double elapsed = loop_run(&loop, x);
-    require(!isnan(elapsed), "CVODE failed");
-    return elapsed;
+    return loop_run(&loop, x);
 }
 
 /* ---- MuJoCo */

@@ -35,7 +35,7 @@ struct loop {
     double *states;       /* at the end of each step; may be NULL */
 };
 
-/* Makes all steps from x, which becomes the last state; NAN if CVODE fails. */
+/* Makes all steps from x, which becomes the last state. Returns the processor time of them, s. */
 double loop_run(const struct loop *loop, double x[]);
 
 /* Runs a model of loops.c by its number; with restarts if there is more than one step. forces: of
