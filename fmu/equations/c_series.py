@@ -9,7 +9,7 @@ move is taken out of the sums, so that more of them are the same.
 import re
 from collections.abc import Iterable, Mapping
 from functools import partial, reduce
-from itertools import groupby
+from itertools import combinations, groupby
 
 from equations.c_code import Code, Leaves, formula, indented
 from equations.graph import (
@@ -26,6 +26,8 @@ from equations.graph import (
 from equations.rolled import SHORTEST, rolled
 from rparm.expressions.expression import in_order
 
+FACTORS = re.compile(r"row\[(\d+)\]\[i( - 1|)\] \* row\[(\d+)\]\[k - i\]")
+FEWEST_IN_PAIRS = 4  # sums of a series that gains by adding up two at once
 WIDE = 150  # values that move in a model whose series has elements side by side
 
 
@@ -101,7 +103,10 @@ class Series:
             "integrals": self.integrals,
             "later": self.later.lines,
         }
-        if self.is_wide or sum(map(len, parts.values())) >= SHORTEST:
+        is_short = not self.is_wide and sum(map(len, parts.values())) < SHORTEST
+        if is_short and len(terms) >= FEWEST_IN_PAIRS:
+            self._pair(parts)
+        elif not is_short:
             for part in ("sums", "terms", "later"):
                 parts[part] = [re.sub(r"\bs(\d+)\b", r"s[\1]", line) for line in parts[part]]
             own = [line.removeprefix("double ") for line in parts["sums"]]
@@ -114,6 +119,40 @@ class Series:
             last = ["if (k % 2 == 0) {", "    const int i = k - 1;", *found["terms"][1:]]
             found["terms"] = ["for (int i = 1; i + 1 < k; i += 2) {", *both, "}", *last]
         return found
+
+    def _pair(self, parts: dict[str, list[str]]) -> None:
+        """Add up two sums at once, with the same bits: their factors stand side by side."""
+        columns: dict[tuple[str, str], int] = {}
+        sums, terms, after, single = [], [], [], {name: term for term, name in self.sums.items()}
+        found = ((name, FACTORS.fullmatch(term)) for name, term in single.items())
+        left = {name: factors for name, factors in found if factors}
+
+        def cost(pair: tuple[str, str]) -> tuple[int, bool]:
+            """Count the columns that it adds; then prefer two sums with the same factor."""
+            sides = [(left[pair[0]][i], left[pair[1]][i]) for i in (1, 3)]
+            return sum(side not in columns for side in sides), all(a != b for a, b in sides)
+
+        while both := [p for p in combinations(left, 2) if left[p[0]][2] == left[p[1]][2]]:
+            best, pair = min(both, key=cost), f"p{len(sums)}"
+            one, other = map(left.pop, best)
+            a, b = (columns.setdefault((one[i], other[i]), len(columns)) for i in (1, 3))
+            product = f"at[i{one[2]}][{a}].of LANE * at[k - i][{b}].of LANE"
+            sums.append(f"struct pair {pair} = {{{{0.0, 0.0}}}};")
+            terms.append(f"EACH {pair}.of LANE += {product};")
+            after += [f"const double {name} = {pair}.of[{i}];" for i, name in enumerate(best)]
+            single = {name: term for name, term in single.items() if name not in best}
+        own = [
+            f"at[k][{i}] = (struct pair){{{{row[{a}][k], row[{b}][k]}}}};"
+            for (a, b), i in columns.items()
+        ]
+        if not columns:
+            return
+        parts["still"].append(f"struct pair at[SERIES_LENGTH][{len(columns)}];")
+        parts["start"] += ["for (int k = 0; k == 0 || k < first; k++) {", *indented(own), "}"]
+        parts["sums"] = sums + [f"double {name} = 0.0;" for name in single]
+        parts["terms"] = terms + [f"{name} += {term};" for name, term in single.items()]
+        parts["integrals"] = after + parts["integrals"]
+        parts["later"] += own
 
     def _sort_sums(self) -> None:
         """Put sums of one form side by side."""
@@ -291,8 +330,12 @@ class Series:
                 return f"{self._sum(a, b)} + {ends}"
             case "/" if b.moves:
                 end = f"{self._at(b)} * {self.start.of(value)}"
-                over = self.start.of(self._over(b))
-                return f"({self._at(a)} - {self._sum(b, value)} - {end}) * {over}"
+                rest, over = f"({self._at(a)} - {self._sum(b, value)} - {end})", self._over(b)
+                product = f"{rest} * {self.start.of(over)}"
+                if self.is_wide:  # too many conditions
+                    return product
+                is_known = self.start.of(self.graph.value("isfinite", over))
+                return f"{is_known} ? {product} : {rest} / {self.start.of(b)}"
             case "/":
                 return f"{self._at(a)} * {self.still.of(self._over(b))}"
         given = [self._at(x) if x.moves else self.still.of(x) for x in value.arguments]

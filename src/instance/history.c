@@ -91,7 +91,7 @@ static void expand_inputs(const struct instance *instance, double t, double time
 enum status instance_series(double t, double time_scale, int first, int last,
                             double rows[][SERIES_LENGTH], void *instance_pointer) {
     const struct instance *instance = instance_pointer;
-    if (first == 0 && instance->inputs_move) {
+    if (first <= 1 && instance->inputs_move) {
         expand_inputs(instance, t, time_scale);
     }
     const struct series_origin origin = {

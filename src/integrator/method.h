@@ -73,12 +73,12 @@ static inline enum status problem_jacobian(struct problem *problem, double t, co
     return problem_fail(problem, t, x);
 }
 
-/* Writes coefficients as in ode.h; a series begun at order 0 counts as an evaluation. Fails like
- * problem_rhs; the caller checks whether coefficients are finite. */
+/* Writes coefficients as in ode.h; a series begun at order 0, or 1 if that is known, counts as
+ * an evaluation. Fails like problem_rhs; the caller checks whether coefficients are finite. */
 static inline enum status problem_series(struct problem *problem, double t, double time_scale,
                                          int first, int last, double rows[][SERIES_LENGTH]) {
     const struct ode *ode = &problem->ode;
-    problem->evaluation_count += first == 0 ? 1 : 0;
+    problem->evaluation_count += first <= 1 ? 1 : 0;
     if (ode->series(t, time_scale, first, last, rows, ode->context) == STATUS_OK) {
         return STATUS_OK;
     }

@@ -307,6 +307,7 @@ static double begin_advance(struct taylor *taylor, const double begin_x[], doubl
     const double begin = has_passed ? taylor->passed : problem->reached;
     taylor->passed = -INFINITY;
     taylor->longest_scale = INFINITY;
+    taylor->series.end = NAN;
     return begin;
 }
 
@@ -363,15 +364,20 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
     struct taylor_series *series = &taylor->series;
     const struct problem *problem = series->problem;
     const bool is_long = problem->reached == 0.0 ? problem->continues : taylor->is_searched;
-    // only a step that goes past requested times, or is searched, is read later
-    const bool is_kept =
-        is_long || taylor->is_searched || !taylor_series_has_few_rows(&problem->ode);
-    double few_rows[TAYLOR_FEW_ROWS][SERIES_LENGTH];
+    double few_rows[2][TAYLOR_FEW_ROWS][SERIES_LENGTH];
     double(*const kept)[SERIES_LENGTH] = series->row;
-    series->row = is_kept ? kept : few_rows;
+    const bool has_few_rows = taylor_series_has_few_rows(&problem->ode);
+    if (has_few_rows) {
+        // only a step that goes past requested times, or is searched, is read later
+        series->row = is_long || taylor->is_searched ? kept : few_rows[0];
+        series->end_row = few_rows[1];
+    }
     const enum status status =
         take_steps(taylor, t, max_steps, is_long, begin_x, stopped_at, x, work);
-    series->row = kept;
+    if (has_few_rows) {
+        series->row = kept;
+        series->end_row = NULL;
+    }
     return status;
 }
 

@@ -54,10 +54,16 @@ void taylor_series_configure(struct taylor_series *series) {
 
 /* ---- Orders --------------------------------------------------------------------------------- */
 
-/* Begins the series, with the orders from 0 to last. */
+/* Begins the series, with the orders from 0 to last. Order 0 may be known from the step before. */
 static enum status begin(struct taylor_series *series, double t, double time_scale,
                          const double x[], int last) {
     const struct integrator_settings *settings = &series->problem->settings;
+    const int first = t == series->end ? 1 : 0;
+    if (first == 1) {
+        double(*const known)[SERIES_LENGTH] = series->end_row;
+        series->end_row = series->row;
+        series->row = known;
+    }
     for (size_t i = 0; i < series->problem->ode.state_count; i++) {
         series->row[i][0] = x[i];
         series->weight[i] =
@@ -66,7 +72,8 @@ static enum status begin(struct taylor_series *series, double t, double time_sca
     series->begin = t;
     series->time_scale = time_scale;
     series->order = last;
-    return problem_series(series->problem, t, time_scale, 0, last, series->row);
+    series->end = NAN;
+    return problem_series(series->problem, t, time_scale, first, last, series->row);
 }
 
 enum status taylor_series_add_orders(struct taylor_series *series, int last) {
@@ -156,17 +163,19 @@ enum status taylor_series_expand(struct taylor_series *series, double t, double 
 enum status taylor_series_measure_defect(struct taylor_series *series, double s, double end_x[],
                                          double end_dx[], double *defect) {
     const size_t n = series->problem->ode.state_count;
-    double few_rows[TAYLOR_FEW_ROWS][SERIES_LENGTH];
-    double(*end_row)[SERIES_LENGTH] = series->end_row != NULL ? series->end_row : few_rows;
+    double(*const end_row)[SERIES_LENGTH] = series->end_row;
+    const double end = series->begin + s * series->time_scale;
+    series->end = NAN;
     taylor_series_evaluate(series, s, end_x, end_dx);
     for (size_t i = 0; i < n; i++) {
         end_row[i][0] = end_x[i];
     }
-    const enum status status = problem_series(
-        series->problem, series->begin + s * series->time_scale, series->time_scale, 0, 1, end_row);
+    const enum status status =
+        problem_series(series->problem, end, series->time_scale, 0, 1, end_row);
     if (status != STATUS_OK) {
         return status;
     }
+    series->end = location_is_active(&series->problem->location) ? NAN : end;
     *defect = 0.0;
     for (size_t i = 0; i < n; i++) {
         const double derivative = end_dx[i];

@@ -26,8 +26,9 @@ struct taylor_series {
     double time_scale;  /* s */
     double step;        /* step for which the series is good; NaN if a term is not finite */
     double (*row)[SERIES_LENGTH];     /* the coefficients */
-    double (*end_row)[SERIES_LENGTH]; /* orders 0 and 1 at the end of a step; NULL with few rows */
-    double *weight;                   /* 1 over the tolerance of each state */
+    double (*end_row)[SERIES_LENGTH]; /* orders 0 and 1 at the end of a step */
+    double end;     /* its time, s since the restart, if the next step can begin with it, or NaN */
+    double *weight; /* 1 over the tolerance of each state */
 };
 
 /* Returns the largest number of bytes that create allocates. */

@@ -54,6 +54,13 @@ static inline _Bool processor_has_avx2(void) {
 }
 #endif
 
+/* Two numbers, with which one statement calculates at once: EACH a.of LANE += b.of LANE; */
+struct pair {
+    double of __attribute__((vector_size(16)));
+};
+#define EACH
+#define LANE
+
 /* Hides all symbols below from the shared object's users, unless one says so itself. */
 #define HIDE_SYMBOLS _Pragma("GCC visibility push(hidden)")
 
@@ -76,6 +83,11 @@ static inline _Bool processor_has_avx2(void) {
 #define SELDOM_CALLED
 #define INDEPENDENT_ITERATIONS
 #define HIDE_SYMBOLS
+struct pair {
+    double of[2];
+};
+#define EACH for (int lane = 0; lane < 2; lane++)
+#define LANE [lane]
 #if defined(_MSC_VER)
 #define NO_FUSED_OPERATIONS __pragma(fp_contract(off))
 #else

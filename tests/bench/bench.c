@@ -2,8 +2,6 @@
  * CVodeReInit and CVode on N_Vector_Serial that a user of CVODE would write, at the same tolerance
  * as the FMU. All do the same work in turns. Figures are medians of the repeats, as JSON on
  * stdout; compare.py makes tables of them. */
-#define _POSIX_C_SOURCE 199309L // clock_gettime
-
 #include "bench.h"
 
 #include <math.h>
@@ -13,12 +11,6 @@
 #include <time.h>
 
 /* ---- Clock and median ------------------------------------------------------------------------ */
-
-double processor_time(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 double clock_cost(void) {
     double cost[1001];

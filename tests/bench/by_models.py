@@ -1,6 +1,7 @@
-"""Models in equations, a step of their FMUs: next to heyoka, and a chain as a band."""
+"""Models in equations, a step of their FMUs: next to heyoka, loops, and a chain as a band."""
 
-from collections.abc import Callable
+import ctypes
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import median
 from time import thread_time
@@ -25,11 +26,19 @@ MODELS = {
     "Hodgkin-Huxley": ((HERE / "neuron.toml").read_text(), 50.0, 1e-9),
 }
 PAIRS = {"Pleiades": HERE / "pairs.toml"}  # the same equations, as they suit heyoka
+NAMES = ("Lorenz", "CartAndPole", "HodgkinHuxley", "Chain", "Pleiades")  # in loops.c, in this order
+TYPES = [*[ctypes.c_int] * 4, *[ctypes.c_double] * 2, *[np.ctypeslib.ndpointer(float)] * 3]
+RESTARTS = "0.1 s steps, inputs changing"
+NONE = (0.0,)  # force in one step
+FORCES = 10.0 * np.sin(np.arange(100.0))  # on the cart, held over a step each, N
+FRACTION = 2e-3  # of the tolerance, at which an FMU runs CVODE
 Run = Callable[..., tuple[float, np.ndarray]]  # by tolerance: processor time, s; states
 
 
-def by_fmu(fmu_file: Path, method: str, step: float) -> tuple[Run, tuple]:
-    """Return what makes the step by an FMU beside its equations, and the start."""
+def by_fmu(
+    fmu_file: Path, method: str, step: float, forces: Sequence[float] = NONE
+) -> tuple[Run, tuple]:
+    """Return what makes the step by an FMU beside its equations, or one a force; and the start."""
     instance = initializing(fmu_file)
     references, fmu = instance.loaded.references, instance.fmi
     states = [references[x.name] for x in read(fmu_file.with_suffix(".toml")).of("states")]
@@ -42,7 +51,10 @@ def by_fmu(fmu_file: Path, method: str, step: float) -> tuple[Run, tuple]:
         fmu.enterInitializationMode()
         fmu.exitInitializationMode()
         begin = thread_time()
-        fmu.doStep(0.0, step)
+        for i, force in enumerate(forces):
+            if len(forces) > 1:
+                fmu.setReal([references["force"]], [force])
+            fmu.doStep(i * step, step)
         return thread_time() - begin, np.array(fmu.getReal(states))
 
     return run, start
@@ -61,6 +73,28 @@ def by_heyoka(file: Path, step: float, start: tuple) -> Run:
     return run
 
 
+def by_loop(
+    program: Path,
+    file: Path,
+    method: str,
+    step: float,
+    start: tuple,
+    forces: Sequence[float] = NONE,
+) -> Run:
+    """Return what makes the same steps by a loop of CVODE (loops.c)."""
+    loop = ctypes.CDLL(str(program)).loop_run_model
+    loop.restype, loop.argtypes = ctypes.c_double, TYPES
+    model, held = read(file), np.array(forces)
+    which = NAMES.index(model.name), method == "cvode_bdf", len(start), len(held)
+    nominal = np.array([x.nominal or 1.0 for x in model.of("states")])
+
+    def run(tolerance: float) -> tuple[float, np.ndarray]:
+        states = np.array(start)
+        return loop(*which, FRACTION * tolerance, step, nominal, held, states), states
+
+    return run
+
+
 def row(name: str, turns: int, exact: np.ndarray, limit: float, *peers: tuple[Run, float]) -> dict:
     """Let two take turns at their tolerances."""
     times = np.array([[run(tolerance)[0] for run, tolerance in peers] for _ in range(turns)])
@@ -75,15 +109,35 @@ def row(name: str, turns: int, exact: np.ndarray, limit: float, *peers: tuple[Ru
     }  # fmt: skip
 
 
-def rows(folder: Path, turns: int) -> list[dict]:
-    """Measure; heyoka has an error no larger than the FMU's."""
+def by_hand(folder: Path, turns: int, loops: Path, exact: dict[str, np.ndarray]) -> list[dict]:
+    """Measure against loops at the same tolerance: the largest ratio and errors of all models."""
+
+    def race(name: str, method: str, limit: float, step: float, forces: Sequence[float]) -> dict:
+        fmu = made(folder, MODELS[name][0])
+        own, start = by_fmu(fmu, method, step, forces)
+        loop = by_loop(loops, fmu.with_suffix(".toml"), method, step, start, forces)
+        whose, true = (name, loop(1e-11)[1]) if len(forces) > 1 else ("own equations", exact[name])
+        title = f"{whose}, {method} to a loop by hand"
+        return row(title, turns, true, limit, (own, 1e-8), (loop, 1e-8))
+
     found = []
+    for method in ("cvode_adams", "cvode_bdf"):
+        names = [name for name in MODELS if (name, method) != ("Pleiades", "cvode_bdf")]
+        of_models = [race(name, method, 1.05, MODELS[name][1], NONE) for name in names]
+        found.append({key: max(one[key] for one in of_models) for key in of_models[0]})
+    restarts = race("cart and pole", "cvode_adams", 0.5, 0.1, FORCES)
+    return [*found, restarts | {"work": RESTARTS, "column": RESTARTS}]
+
+
+def rows(folder: Path, turns: int, loops: Path) -> list[dict]:
+    """Measure; heyoka has an error no larger than the FMU's. loops: the library of loops.c."""
+    found, solutions = [], {}
     for name, (text, step, tolerance) in MODELS.items():
         fmu = made(folder, text)
         own, start = by_fmu(fmu, "taylor", step)
         peer = by_heyoka(PAIRS.get(name, fmu.with_suffix(".toml")), step, start)
         named, of_peer = f"{name}, taylor to heyoka", 10.0 * tolerance
-        exact = peer(1e-19, np.longdouble)[1]
+        exact = solutions[name] = peer(1e-19, np.longdouble)[1]
         judged = exact, 1.0, (own, tolerance)
         while (one := row(named, 1, *judged, (peer, of_peer)))["error_of_peer"] > one["error"]:
             of_peer *= 10.0**-0.25
@@ -92,4 +146,5 @@ def rows(folder: Path, turns: int) -> list[dict]:
     band, dense = (by_fmu(made(folder, text), "cvode_bdf", 2.0)[0] for text in (CHAIN, full))
     exact = band(1e-9)[1]
     chain = "300 masses, cvode_bdf to full matrices", turns, exact, 0.2
-    return [*found, row(*chain, (band, 1e-6), (dense, 1e-6))]
+    found.append(row(*chain, (band, 1e-6), (dense, 1e-6)))
+    return [*found, *by_hand(folder, turns, loops, solutions)]

@@ -291,7 +291,8 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=11, help="within bench")
     parser.add_argument("--readme", action="store_true", help="put the ratios into the page")
     options = parser.parse_args()
-    needed = [options.build / "tests/bench/bench", *libraries(options.build)]
+    loops = options.build / "tests/bench/libbench_loops.so"
+    needed = [options.build / "tests/bench/bench", *libraries(options.build), loops]
     output = options.output or options.build / "report/benchmark"
     for path in needed:
         if not path.exists():
@@ -300,7 +301,7 @@ def main() -> None:
                      "cmake --build build --target benchmark")  # fmt: skip
     output.mkdir(parents=True, exist_ok=True)
     about = machine()  # with the load before
-    program = [str(path) for path in needed]
+    program = [str(path) for path in needed[:-1]]
 
     first = run_bench(program, "--only", "steps,free-motion", "--repeats", "1")
     peers = make_peers(first["rows"])
@@ -311,7 +312,7 @@ def main() -> None:
         "machine": about | first["machine"],
         "rounds": options.rounds,
         "repeats": options.repeats,
-        "rows": judge(rows + by_models.rows(output, options.repeats) + rest["rows"]),
+        "rows": judge(rows + by_models.rows(output, options.repeats, loops) + rest["rows"]),
     }
     (output / "benchmark.json").write_text(
         json.dumps(result, indent=1) + "\n", encoding="utf-8", newline="\n"

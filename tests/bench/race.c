@@ -25,10 +25,7 @@ static double run_once(const struct run *run, const struct fmu_functions *fmu,
 }
 
 void race_add_method(struct race *race, enum method method, double tolerance) {
-    race_add(race, (struct run){.name = method_names[method],
-                                .solver = FMU,
-                                .method = method,
-                                .tolerance = tolerance});
+    race_add(race, (struct run){method_names[method], FMU, method, .tolerance = tolerance});
 }
 
 void race_add_usual(struct race *race, const struct fmu_functions *fmu, double tolerance) {
@@ -37,9 +34,7 @@ void race_add_usual(struct race *race, const struct fmu_functions *fmu, double t
     double states[1][4];
     fmu_run(fmu, problem, CVODE_ADAMS, tolerance, states, &counts);
     problem_destroy(problem);
-    race_add(race, (struct run){.name = "plain loop",
-                                .solver = PLAIN_LOOP,
-                                .tolerance = counts.effective_tolerance});
+    race_add(race, (struct run){"plain loop", PLAIN_LOOP, .tolerance = counts.effective_tolerance});
     for (enum method method = FIRST_METHOD; method < METHODS; method++) {
         race_add_method(race, method, tolerance);
     }

@@ -7,16 +7,43 @@
 #include "fmu_library.h"
 #include "rp_manipulator.h"
 
+#include <cvode/cvode.h>
+#include <cvode/cvode_ls.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-/* ---- bench.c: clock and median; the end of a program that cannot measure */
+/* ---- loops.c */
 
 /* Returns the s that a processor has worked for this thread: other programs disturb it less than
  * the time of day. */
 double processor_time(void);
+
+/* A loop of CVODE on N_Vector_Serial, as a user would write it. */
+struct loop {
+    CVRhsFn rhs;           /* user data: the inputs */
+    CVLsJacFn jacobian;    /* for BDF; NULL: Adams */
+    int n;                 /* states */
+    double tolerance;      /* relative; absolute ones are a hundredth of it, times nominal values */
+    const double *nominal; /* NULL: 1 */
+    double step;           /* s */
+    int steps;
+    int input_count;
+    const double *inputs; /* of each step */
+    bool restarts;        /* CVodeReInit at every step; else CV_NORMAL interpolates */
+    double *states;       /* at the end of each step; may be NULL */
+};
+
+/* Makes all steps from x, which becomes the last state. Returns the processor time of them, s. */
+double loop_run(const struct loop *loop, double x[]);
+
+/* Runs a model of loops.c by its number; with restarts if there is more than one step. forces: of
+ * each step, N. */
+double loop_run_model(int index, bool is_stiff, int n, int steps, double tolerance, double step,
+                      const double nominal[], const double forces[], double x[]);
+
+/* ---- bench.c: median; the end of a program that cannot measure */
 
 /* Returns the s between two readings of this clock in a row. */
 double clock_cost(void);
@@ -105,8 +132,7 @@ double fmu3_run(const struct fmu3_functions *fmu, const struct problem *problem,
 
 /* ---- peer_runs.c */
 
-/* What a user of CVODE would write: CVodeReInit and CVode on N_Vector_Serial. Restarts at every
- * step where inputs change, else continues (CV_NORMAL, with CVODE's interpolation). */
+/* Restarts where inputs change. */
 double plain_loop_run(const struct problem *problem, double tolerance, double states[][4]);
 
 enum mujoco_integrator { MUJOCO_RK4, MUJOCO_IMPLICITFAST };

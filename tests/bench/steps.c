@@ -34,9 +34,8 @@ static void add_mujoco(struct race *race, int substeps) {
         [MUJOCO_RK4] = "MuJoCo RK4", [MUJOCO_IMPLICITFAST] = "MuJoCo implicitfast"};
     for (enum mujoco_integrator i = MUJOCO_RK4; mujoco_available() && i <= MUJOCO_IMPLICITFAST;
          i++) {
-        race_add(race,
-                 (struct run){
-                     .name = names[i], .solver = MUJOCO, .integrator = i, .substeps = substeps});
+        const struct run run = {names[i], MUJOCO, .integrator = i, .substeps = substeps};
+        race_add(race, run);
     }
 }
 
@@ -47,10 +46,7 @@ static void add_fmi3(struct race *race, const struct fmu3_functions *fmu3, doubl
                                                [TAYLOR] = "taylor, FMI 3.0"};
     for (enum method method = FIRST_METHOD; method < METHODS; method++) {
         if (names[method] != NULL) {
-            race_add(race, (struct run){.name = names[method],
-                                        .solver = FMU3,
-                                        .method = method,
-                                        .tolerance = tolerance,
+            race_add(race, (struct run){names[method], FMU3, method, .tolerance = tolerance,
                                         .fmu3 = fmu3});
         }
     }

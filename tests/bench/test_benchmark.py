@@ -140,9 +140,13 @@ def test_program_refuses_nonsense() -> None:
 
 
 def test_models_in_equations_do_the_same_as_their_peers(tmp_path: Path) -> None:
-    stars, *others, chain = by_models.rows(tmp_path, 1)
+    loops = BUILD / "tests/bench/libbench_loops.so"
+    stars, *others, chain, adams, bdf, restarts = by_models.rows(tmp_path, 1, loops)
     assert stars["error_of_peer"] <= stars["error"] < 1e-10
     assert all(row["error_of_peer"] <= row["error"] < 1e-8 for row in others)
     assert max(chain["error"], chain["error_of_peer"]) < 1e-3
+    for row, bound in ((adams, 1e-6), (bdf, 1e-6), (restarts, 1e-4)):
+        assert max(row["error"], row["error_of_peer"]) < bound
+        assert 0.1 < row["error"] / row["error_of_peer"] < 10.0
     table = compare.summary({"rows": compare.judge([stars, chain])})
     assert f"| {stars['run']} |  |  |  |  |  | {compare.number(stars['ratio'])} |" in table

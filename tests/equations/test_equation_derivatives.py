@@ -197,10 +197,25 @@ def test_a_series_with_values_side_by_side_is_the_same(
         np.array([[point["u"], 0.3, -0.2, 0.1]]),
         12,
     )
+    monkeypatch.setattr("equations.c_series.FEWEST_IN_PAIRS", WIDE)
+    one_by_one = Model(tmp_path, model.file.text)
+    np.testing.assert_array_equal(one_by_one.series(*given), model.series(*given))
     monkeypatch.setattr("equations.c_series.WIDE", 0)
     wide = Model(tmp_path, model.file.text)
     assert "const at)" in (tmp_path / "equations.c").read_text()
     np.testing.assert_allclose(wide.series(*given), model.series(*given), rtol=1e-12, atol=1e-14)
+
+
+def test_1_over_a_denominator_may_be_infinite(tmp_path: Path) -> None:
+    rate = '"-b * x / (b + b * x**2)"'
+    model = Model(
+        tmp_path, f'name = "M"\n[inputs]\nb = {{}}\n[states]\nx = {{ derivative = {rate} }}'
+    )
+    tiny, usual = (
+        model.series(model.values(x=0.7), 0.0, 0.5, np.array([[b, 0.0, 0.0, 0.0]]), 12)
+        for b in (1e-310, 1.0)
+    )
+    np.testing.assert_allclose(tiny, usual, rtol=0.0, atol=1e-12)
 
 
 def test_avx2_gives_the_bits_of_sse2(tmp_path: Path) -> None:
