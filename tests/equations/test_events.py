@@ -1,14 +1,13 @@
 """Events of files with equations: the ball, the thermostat, relations that switch."""
 
-from functools import cache
 from pathlib import Path
 
 import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi2 import _FMU2, FMU2Model, FMU2Slave
+from fmpy.fmi2 import FMU2Model
 
-from tests.equations.examples import METHODS, MODELS, build, example, simulated
+from tests.equations.examples import METHODS, MODELS, example, initializing, made, simulated
 
 TEXTS = MODELS["events"]
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
@@ -73,19 +72,16 @@ def test_the_thermostat_switches_when_its_exponentials_do(folder: Path, method: 
     assert run["last_event_time"][-1] == pytest.approx(times[-2], abs=1e-4)
 
 
-@cache
-def made(folder: Path, text: str) -> Path:
-    """The FMU of a text, built once."""
-    folder.mkdir()
-    (folder / "model.toml").write_text('name = "Made"\n' + text)
-    return build(folder / "model.toml", folder)
+def named(folder: Path, text: str) -> Path:
+    """The FMU of a text without a name."""
+    return made(folder, 'name = "Made"\n' + text)
 
 
 @EACH_METHOD
 def test_a_one_sided_spring_swings_in_two_halves(folder: Path, method: int) -> None:
     """On one side with sqrt(101) rad/s, on the other with 1 rad/s."""
     run = simulated(
-        made(folder / "spring", TEXTS["SPRING"]), 12.0, 0.05, {"solver_method": method},
+        named(folder, TEXTS["SPRING"]), 12.0, 0.05, {"solver_method": method},
         relative_tolerance=1e-12, also=["event_count"],
     )  # fmt: skip
     stiff = np.sqrt(101.0)
@@ -105,7 +101,7 @@ def test_a_one_sided_spring_swings_in_two_halves(folder: Path, method: int) -> N
 def test_tanks_run_empty(folder: Path, method: int, pump: float) -> None:
     """By Torricelli's law, whose root ends where the guard does; s is the root of the height."""
     run = simulated(
-        made(folder / "tanks", TEXTS["TANKS"]), 24.0, 0.7, {"solver_method": method, "pump": pump},
+        named(folder, TEXTS["TANKS"]), 24.0, 0.7, {"solver_method": method, "pump": pump},
         relative_tolerance=1e-9, also=["event_count", "last_event_time"],
     )  # fmt: skip
     s = np.linspace(1, 0, 100001)
@@ -125,34 +121,30 @@ def test_tanks_run_empty(folder: Path, method: int, pump: float) -> None:
     [(1.5, {"guarded": 2, "either": 1}), (2.5, {"large": 3, "both": 1, "guarded": 1, "either": 2})],
 )
 def test_what_follows_from_an_undefined_relation_is_not_finite(
-    folder: Path, tmp_path: Path, x: float, defined: dict[str, float]
+    folder: Path, x: float, defined: dict[str, float]
 ) -> None:
     """A relation that is not looked at need not be defined."""
-    fmu = made(folder / "undefined", TEXTS["UNDEFINED"])
-    unit = opened(fmu, tmp_path)
-    unit.setReal([reference(fmu, "x")], [x])
-    unit.exitInitializationMode()
-    for name in ("small", "sign", "large", "both", "guarded", "either"):
-        if name in defined:
-            assert unit.getReal([reference(fmu, name)]) == [defined[name]]
-        else:
-            with pytest.raises(fmpy.fmi1.FMICallException, match="discard"):
-                unit.getReal([reference(fmu, name)])
-    unit.freeInstance()
+    with initializing(named(folder, TEXTS["UNDEFINED"])) as unit:
+        unit.set(x=x)
+        unit.fmi.exitInitializationMode()
+        for name in ("small", "sign", "large", "both", "guarded", "either"):
+            if name in defined:
+                assert unit.get(name) == [defined[name]]
+            else:
+                with pytest.raises(fmpy.fmi1.FMICallException, match="discard"):
+                    unit.get(name)
 
 
-def test_a_check_that_is_not_defined_is_broken(folder: Path, tmp_path: Path) -> None:
-    fmu = made(folder / "undefined", TEXTS["UNDEFINED"])
-    unit = opened(fmu, tmp_path)
-    unit.setReal([reference(fmu, "p")], [-1.0])
-    with pytest.raises(fmpy.fmi1.FMICallException, match="error"):
-        unit.exitInitializationMode()
-    unit.freeInstance()
+def test_a_check_that_is_not_defined_is_broken(folder: Path) -> None:
+    with initializing(named(folder, TEXTS["UNDEFINED"])) as unit:
+        unit.set(p=-1.0)
+        with pytest.raises(fmpy.fmi1.FMICallException, match="error"):
+            unit.fmi.exitInitializationMode()
 
 
 @EACH_METHOD
 def test_relations_in_branches_that_are_not_taken_make_no_events(folder: Path, method: int) -> None:
-    fmu = made(folder / "branches", TEXTS["BRANCHES"])
+    fmu = named(folder, TEXTS["BRANCHES"])
     run = simulated(
         fmu, 12.0, 0.5, {"solver_method": method}, relative_tolerance=1e-10, also=["event_count"]
     )
@@ -163,65 +155,42 @@ def test_relations_in_branches_that_are_not_taken_make_no_events(folder: Path, m
 
 @EACH_METHOD
 def test_a_relation_of_time_switches_at_its_time(folder: Path, method: int) -> None:
-    fmu = made(folder / "pulse", TEXTS["PULSE"])
+    fmu = named(folder, TEXTS["PULSE"])
     run = simulated(fmu, 2.0, 0.2, {"solver_method": method}, relative_tolerance=1e-8)
     expected = np.clip(run["time"] - 0.73, 0.0, 0.73)
     np.testing.assert_allclose(run["x"], expected, rtol=0, atol=1e-14)
     np.testing.assert_allclose(run["y"], 1.0 - np.cos(run["time"]), rtol=0, atol=1e-7)
 
 
-def test_a_relation_of_inputs_switches_where_they_are_set(folder: Path, tmp_path: Path) -> None:
-    fmu = made(folder / "pulse", TEXTS["PULSE"])
-    unit = opened(fmu, tmp_path)
-    unit.exitInitializationMode()
-    u, above, y = (reference(fmu, name) for name in ("u", "above", "y"))
-    for value, expected in ((0.5, 0.0), (0.5 + 1e-15, 1.0), (0.5, 0.0), (3.0, 1.0)):
-        unit.setReal([u], [value])
-        assert unit.getReal([above]) == [expected]
-    unit.doStep(0.0, 0.25)
-    assert unit.getReal([y]) == pytest.approx([0.5], abs=1e-14)
-    unit.freeInstance()
+def test_a_relation_of_inputs_switches_where_they_are_set(folder: Path) -> None:
+    with initializing(named(folder, TEXTS["PULSE"])) as unit:
+        unit.fmi.exitInitializationMode()
+        for value, expected in ((0.5, 0.0), (0.5 + 1e-15, 1.0), (0.5, 0.0), (3.0, 1.0)):
+            unit.set(u=value)
+            assert unit.get("above") == [expected]
+        unit.step(0.0, 0.25)
+        assert unit.get("y") == pytest.approx([0.5], abs=1e-14)
 
 
-def test_relations_that_decide_each_other_switch_in_one_event(folder: Path, tmp_path: Path) -> None:
+def test_relations_that_decide_each_other_switch_in_one_event(folder: Path) -> None:
     """An input decides the first one, each the next."""
     text = '[inputs]\nu = {}\n[where]\na0 = "u"\n'
     text += "".join(f'a{i} = "u if a{i - 1} > 0 else -1"\n' for i in range(1, 9))
     text += '[states]\nx = { derivative = "a8" }\n[outputs]\ny = { value = "a8" }\n'
-    fmu = made(folder / "decide", text)
-    unit = opened(fmu, tmp_path, FMU2Model)
-    unit.exitInitializationMode()
-    for value in (-1.0, 1.0):
-        unit.enterEventMode()
-        unit.setReal([reference(fmu, "u")], [value])
-        unit.newDiscreteStates()
-        assert unit.getReal([reference(fmu, "y")]) == [value]
-    unit.freeInstance()
-
-
-def opened(fmu: Path, folder: Path, kind: type[_FMU2] = FMU2Slave) -> _FMU2:
-    description = fmpy.read_model_description(fmu)
-    unit = kind(
-        guid=description.guid,
-        unzipDirectory=fmpy.extract(str(fmu), str(folder)),
-        modelIdentifier=description.coSimulation.modelIdentifier,
-    )
-    unit.instantiate()
-    unit.setupExperiment()
-    unit.enterInitializationMode()
-    return unit
-
-
-def reference(fmu: Path, name: str) -> int:
-    variables = fmpy.read_model_description(fmu).modelVariables
-    return next(v.valueReference for v in variables if v.name == name)
+    with initializing(named(folder, text), FMU2Model) as unit:
+        unit.fmi.exitInitializationMode()
+        for value in (-1.0, 1.0):
+            unit.fmi.enterEventMode()
+            unit.set(u=value)
+            unit.fmi.newDiscreteStates()
+            assert unit.get("y") == [value]
 
 
 @EACH_METHOD
 def test_events_at_one_instant_run_in_order_and_see_what_the_others_left(
     folder: Path, method: int
 ) -> None:
-    fmu = made(folder / "chain", TEXTS["CHAIN"])
+    fmu = named(folder, TEXTS["CHAIN"])
     run = simulated(fmu, 2.4, 0.3, {"solver_method": method}, also=["a", "b"])
     # at 1 both; at 2 the first clears a, so that the second does not run
     np.testing.assert_array_equal(run["n"], [0, 0, 0, 0, 12, 12, 12, 121, 121])
@@ -233,7 +202,7 @@ def test_events_at_one_instant_run_in_order_and_see_what_the_others_left(
 
 
 def test_right_sides_of_an_event_see_the_values_before_it(folder: Path) -> None:
-    run = simulated(made(folder / "swap", TEXTS["SWAP"]), 0.5, 0.5, {}, also=["a", "b"])
+    run = simulated(named(folder, TEXTS["SWAP"]), 0.5, 0.5, {}, also=["a", "b"])
     assert [run[name][-1] for name in ("x", "y", "a", "b")] == [2.0, 1.0, True, False]
 
 
@@ -243,7 +212,7 @@ def test_events_follow_each_other_max_events_times(folder: Path, most: int) -> N
     text = '[states]\nx = { start = 0, derivative = "0" }\n'
     for i in range(4, 0, -1):
         text += f'[events.e{i}]\nwhen = "x > {i}.5"\nreinit = {{ x = "{i + 1}.75" }}\n'
-    fmu = made(folder / "four", text)
+    fmu = named(folder, text)
     if most < 4:
         with pytest.raises(fmpy.fmi1.FMICallException):
             simulated(fmu, 1.0, 0.5, {"x": 1.75, "max_events": most})
@@ -253,17 +222,15 @@ def test_events_follow_each_other_max_events_times(folder: Path, most: int) -> N
 
 def test_events_without_end_are_an_error(folder: Path) -> None:
     with pytest.raises(fmpy.fmi1.FMICallException):
-        simulated(made(folder / "endless", TEXTS["ENDLESS"]), 1.0, 0.1, {})
+        simulated(named(folder, TEXTS["ENDLESS"]), 1.0, 0.1, {})
 
 
-def test_a_model_without_states_has_modes(folder: Path, tmp_path: Path) -> None:
-    fmu = made(folder / "latch", TEXTS["LATCH"])
-    unit = opened(fmu, tmp_path)
-    unit.exitInitializationMode()
+def test_a_model_without_states_has_modes(folder: Path) -> None:
     found = []
-    for step, value in enumerate((0.0, 2.0, 3.0, 1.0, 2.0, 0.5)):
-        unit.setReal([reference(fmu, "u")], [value])
-        unit.doStep(step * 0.1, 0.1)
-        found += unit.getReal([reference(fmu, "y")])
+    with initializing(named(folder, TEXTS["LATCH"])) as unit:
+        unit.fmi.exitInitializationMode()
+        for step, value in enumerate((0.0, 2.0, 3.0, 1.0, 2.0, 0.5)):
+            unit.set(u=value)
+            unit.step(step * 0.1, 0.1)
+            found += unit.get("y")
     assert found == [0.0, 4.0, 6.0, 2.0, 0.0, 0.0]
-    unit.freeInstance()
