@@ -3,13 +3,12 @@
 from pathlib import Path
 from shutil import copy
 
-import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi2 import FMU2Slave
 
 from tests.equations.examples import FOLDER as EXAMPLES
-from tests.equations.examples import METHODS, build, simulated
+from tests.equations.examples import METHODS, build, initializing, simulated
+from tests.support.instances import Instance, LoadedFmu
 
 FOLDER = Path(__file__).parent
 POINTS = 500
@@ -19,32 +18,12 @@ FOUND = ["ddq1", "ddq2", "ee_x", "ee_y", "ee_vx", "ee_vy", "kinetic_energy", "po
 FOUND += ["total_energy", "actuator_power", "D11", "coriolis1", "coriolis2", "gravity1", "gravity2"]
 
 
-class Opened:
-    """An FMU in its initialization."""
-
-    def __init__(self, path: Path, folder: Path) -> None:
-        description = fmpy.read_model_description(path)
-        self.references = {v.name: v.valueReference for v in description.modelVariables}
-        self.slave = FMU2Slave(
-            guid=description.guid,
-            unzipDirectory=fmpy.extract(str(path), str(folder)),
-            modelIdentifier=description.coSimulation.modelIdentifier,
-        )
-        self.slave.instantiate()
-        self.slave.setupExperiment()
-        self.slave.enterInitializationMode()
-
-    def of(self, names: list[str]) -> list[int]:
-        return [self.references[name] for name in names]
-
-    def values(self, point: np.ndarray) -> list[float]:
-        self.slave.setReal(self.of(GIVEN), point)
-        return self.slave.getReal(self.of(FOUND))
-
-    def directional(self, direction: np.ndarray) -> list[float]:
-        return self.slave.getDirectionalDerivative(
-            self.of(FOUND), self.of([*STATES, "tau1", "f2"]), direction
-        )
+def found(unit: Instance, point: np.ndarray, direction: np.ndarray) -> tuple[list, list]:
+    """Values at a point, and their derivatives in a direction."""
+    given, outputs = ([unit.loaded.references[x] for x in names] for names in (GIVEN, FOUND))
+    unit.fmi.setReal(given, point)
+    derivatives = unit.fmi.getDirectionalDerivative(outputs, given[-len(direction) :], direction)
+    return unit.fmi.getReal(outputs), derivatives
 
 
 @pytest.fixture(scope="module")
@@ -60,17 +39,16 @@ def own_spring(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_values_and_directional_derivatives_have_the_same_bits(
-    arm: Path, fmu: Path, tmp_path: Path
+    arm: Path, loaded: LoadedFmu
 ) -> None:
-    own, by_hand = Opened(arm, tmp_path / "own"), Opened(fmu, tmp_path / "hand")
     chance = np.random.default_rng(5)
-    for _ in range(POINTS):
-        point = np.concatenate([chance.uniform(0.1, 3, 8), chance.uniform(-3, 3, 6)])
-        assert own.values(point) == by_hand.values(point)
-        direction = chance.uniform(-1, 1, 6)
-        assert own.directional(direction) == by_hand.directional(direction)
-    for one in (own, by_hand):
-        one.slave.freeInstance()
+    with initializing(arm) as own, Instance(loaded) as by_hand:
+        by_hand.fmi.setupExperiment()
+        by_hand.fmi.enterInitializationMode()
+        for _ in range(POINTS):
+            point = np.concatenate([chance.uniform(0.1, 3, 8), chance.uniform(-3, 3, 6)])
+            direction = chance.uniform(-1, 1, 6)
+            assert found(own, point, direction) == found(by_hand, point, direction)
 
 
 @pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
