@@ -89,7 +89,4 @@ def loaded(fmu: Path) -> LoadedFmu:
 
 def initializing(fmu: Path, kind: type = FMU2Slave) -> Instance:
     """An instance of an FMU of FMI 2.0 at time 0, in initialization mode."""
-    instance = Instance(loaded(fmu), kind)
-    instance.fmi.setupExperiment(startTime=0.0, tolerance=1e-11)
-    instance.fmi.enterInitializationMode()
-    return instance
+    return Instance(loaded(fmu), kind).begin(tolerance=1e-11)

@@ -42,9 +42,7 @@ def test_values_and_directional_derivatives_have_the_same_bits(
     arm: Path, loaded: LoadedFmu
 ) -> None:
     chance = np.random.default_rng(5)
-    with initializing(arm) as own, Instance(loaded) as by_hand:
-        by_hand.fmi.setupExperiment()
-        by_hand.fmi.enterInitializationMode()
+    with initializing(arm) as own, Instance(loaded).begin() as by_hand:
         for _ in range(POINTS):
             point = np.concatenate([chance.uniform(0.1, 3, 8), chance.uniform(-3, 3, 6)])
             direction = chance.uniform(-1, 1, 6)

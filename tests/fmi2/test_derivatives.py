@@ -49,15 +49,8 @@ def some(point: Values, names: tuple[str, ...]) -> Values:
     return {name: point[name] for name in names}
 
 
-@contextmanager
-def in_initialization_mode(
-    loaded: LoadedFmu, seed: int, kind: type = FMU2Slave
-) -> Iterator[Instance]:
-    with Instance(loaded, kind) as instance:
-        instance.fmi.setupExperiment()
-        instance.set(**generic_point(seed))
-        instance.fmi.enterInitializationMode()
-        yield instance
+def in_initialization_mode(loaded: LoadedFmu, seed: int, kind: type = FMU2Slave) -> Instance:
+    return Instance(loaded, kind).begin(**generic_point(seed))
 
 
 @contextmanager

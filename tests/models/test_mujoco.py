@@ -102,9 +102,7 @@ def test_accelerations_are_those_of_mujoco(
     force = [parameters.get(key, 0.0) for key in ("ee_fx", "ee_fy")]
     data.xfrc_applied[link2] = [*force, 0.0, 0.0, 0.0, parameters.get("ee_mz", 0.0)]
     loaded = LoadedFmu(fmu.with_name(f"{name}.fmu"), tmp_path)
-    with Instance(loaded) as instance:
-        instance.fmi.setupExperiment()
-        instance.fmi.enterInitializationMode()
+    with Instance(loaded).begin() as instance:
         instance.set(**parameters)
         for variable in loaded.description.modelVariables:
             if variable.name == "payload_attached":

@@ -4,8 +4,6 @@ The closed forms are in test_rp_actuator.c.
 """
 
 import random
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -49,15 +47,6 @@ def random_point(limit: str, seed: int) -> Values:
     return point
 
 
-@contextmanager
-def in_initialization_mode(loaded: LoadedFmu, point: Values) -> Iterator[Instance]:
-    with Instance(loaded) as instance:
-        instance.fmi.setupExperiment()
-        instance.set(**point)
-        instance.fmi.enterInitializationMode()
-        yield instance
-
-
 def expected(point: Values, limit: str) -> dict[str, float]:
     """All calculated variables where `limit` decides the currents."""
     result = {}
@@ -87,7 +76,7 @@ def test_values_are_those_of_the_equations(loaded: LoadedFmu, limit: str) -> Non
     for seed in range(20):
         point = random_point(limit, seed)
         values = expected(point, limit)
-        with in_initialization_mode(loaded, point) as instance:
+        with Instance(loaded).begin(**point) as instance:
             assert instance.get(*values) == pytest.approx([*values.values()], rel=1e-12)
 
 

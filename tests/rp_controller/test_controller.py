@@ -39,12 +39,9 @@ FOLDER = ROOT / "models" / "rp_controller"
 @contextmanager
 def in_initialization_mode(loaded: LoadedFmu, case: Case, point: Values) -> Iterator[Instance]:
     with Instance(loaded) as instance:
-        instance.fmi.setupExperiment()
-        instance.set(**point)
         instance.fmi.setInteger([loaded.references["mode"]], [LAWS[case.mode]])
         instance.fmi.setBoolean([loaded.references["payload_attached"]], [case.is_attached])
-        instance.fmi.enterInitializationMode()
-        yield instance
+        yield instance.begin(**point)
 
 
 # ---- Values and derivatives ----------------------------------------------------------------------
@@ -87,16 +84,14 @@ def test_the_taylor_method_is_refused_where_the_fmu_integrates(loaded: LoadedFmu
     references = [loaded.references["solver_method"]]
     with Instance(loaded) as instance:
         instance.fmi.setInteger(references, [4])
-        instance.fmi.setupExperiment()
-        instance.fmi.enterInitializationMode()
+        instance.begin()
         assert status_of(instance.fmi.exitInitializationMode) == ERROR
         text = instance.messages[-1].text
         assert "solver_method = 4 (taylor) is refused: RPController has no Taylor series" in text
         assert all(name in text for name in ("1 (cvode_adams)", "2 (cvode_bdf)", "3 (erk)"))
     with Instance(loaded, kind=FMU2Model) as instance:
         instance.fmi.setInteger(references, [4])
-        instance.fmi.setupExperiment()
-        instance.fmi.enterInitializationMode()
+        instance.begin()
         assert status_of(instance.fmi.exitInitializationMode) == OK
         saved = instance.fmi.getFMUstate()
         read = instance.fmi.deSerializeFMUstate(instance.fmi.serializeFMUstate(saved))

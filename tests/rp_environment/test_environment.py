@@ -139,9 +139,7 @@ def test_the_default_wall_touches_nothing_in_reach(loaded: LoadedFmu, path: Path
     """At every pose with a slide of up to 2 m, at any velocity."""
     plant = LoadedFmu(path.with_name("RPPlant.fmu"), loaded.folder / "plant")
     source = random.Random(2)
-    with running(loaded, {}) as wall_instance, Instance(plant) as arm:
-        arm.fmi.setupExperiment()
-        arm.fmi.enterInitializationMode()
+    with running(loaded, {}) as wall_instance, Instance(plant).begin() as arm:
         for _ in range(50):
             names = ("q1", "q2", "dq1", "dq2")
             limits = (math.pi, 2.0, 20.0, 20.0)

@@ -214,10 +214,7 @@ def test_it_is_attached_from_grasp_to_release(loaded: LoadedFmu, per_second: int
 )
 def test_initialization_knows_it(loaded: LoadedFmu, start: float, expected: bool) -> None:
     """Before initialization ends a payload becomes a part of the plant without a jump."""
-    with Instance(loaded) as instance:
-        instance.fmi.setupExperiment(startTime=start)
-        instance.set(**GRASPED)
-        instance.fmi.enterInitializationMode()
+    with Instance(loaded).begin(start, **GRASPED) as instance:
         assert is_attached(instance) == expected
         instance.fmi.exitInitializationMode()
         assert is_attached(instance) == expected

@@ -78,18 +78,22 @@ class Instance:
     ) -> None:
         self.messages.append(Message(status, category.decode(), text.decode()))
 
-    def initialize(
+    def begin(
         self,
         start: float = 0.0,
         stop: float | None = None,
         tolerance: float | None = None,
         **values: float,
     ) -> "Instance":
-        """From instantiated to the first communication point, or the first event mode."""
+        """From instantiated into initialization."""
         self.fmi.setupExperiment(tolerance=tolerance, startTime=start, stopTime=stop)
         self.set(**values)
         self.fmi.enterInitializationMode()
-        self.fmi.exitInitializationMode()
+        return self
+
+    def initialize(self, *experiment: float | None, **values: float | None) -> "Instance":
+        """From instantiated to the first communication point, or the first event mode."""
+        self.begin(*experiment, **values).fmi.exitInitializationMode()
         return self
 
     def set(self, **values: float) -> None:
