@@ -1,7 +1,5 @@
 /* Time events: a hammer strikes a mass at given times, with each method. The motion between two
  * strokes is that of a constant force. */
-#include "continuous_states.h"
-#include "derivatives.h"
 #include "each_method.h"
 #include "toy_run.h"
 
@@ -62,11 +60,9 @@ static void test_inputs_are_those_of_the_time(void) {
         const double h = steps[i];
         start_hammer(1, 0.0, period, first);
         for (int k = 0; k < (int)(1.0 / h); k++) {
-            const unsigned input = TOY_INPUT;
-            const int order = 1;
             const double slope = 2.0;
             set(TOY_INPUT, slope * k * h);
-            ASSERT_OK(instance_set_input_derivatives(instance, &input, 1, &order, &slope));
+            set_input_derivative(TOY_INPUT, 1, slope);
             ASSERT_OK(instance_do_step(instance, k * h, h));
             if (hammer()->strokes > 0) {
                 const double stroke = first + (hammer()->strokes - 1) * period;

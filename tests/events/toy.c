@@ -369,40 +369,37 @@ static const struct model hammer_model = MODEL(hammer, period, f, x);
     OF_SOLVER(MAX_STEP, FLOAT64, max_step, FIXED, 0.0, 0.0, INFINITY, 1.0)
 // clang-format on
 
+#define OF_TOY(reference, toy, field, ...)                                                         \
+    { TOY_##reference, #field, OF_MODEL(struct toy##_values, field), __VA_ARGS__ }
+#define MOTION(toy, input, position, start)                                                        \
+    OF_TOY(INPUT, toy, input, INPUT, 0.0, ANY),                                                    \
+        OF_TOY(POSITION, toy, position, STATE, start, ANY),                                        \
+        OF_TOY(SPEED, toy, v, STATE, 0.0, ANY), OF_TOY(ACCELERATION, toy, a, OUTPUT, 0.0, ANY)
+
 static const struct variable ball_variables[] = {
-    {TOY_TIME, "time", OF_INSTANCE(VARIABLE_FLOAT64, time), TIME, 0.0, ANY},
-    {TOY_PARAMETER1, "g", OF_MODEL(struct ball_values, g), TUNABLE, 9.81, ANY},
-    {TOY_PARAMETER2, "restitution", OF_MODEL(struct ball_values, restitution), TUNABLE, 0.8, 0.0,
-     1.0, 1.0},
-    {TOY_PARAMETER3, "has_floor", OF_MODEL(struct ball_values, has_floor), TUNABLE, 1.0, ANY},
-    {TOY_INPUT, "lift", OF_MODEL(struct ball_values, lift), INPUT, 0.0, ANY},
-    {TOY_POSITION, "h", OF_MODEL(struct ball_values, h), STATE, 1.0, ANY},
-    {TOY_SPEED, "v", OF_MODEL(struct ball_values, v), STATE, 0.0, ANY},
-    {TOY_ACCELERATION, "a", OF_MODEL(struct ball_values, a), OUTPUT, 0.0, ANY},
+    OF_SOLVER(TIME, FLOAT64, time, TIME, 0.0, ANY),
+    OF_TOY(PARAMETER1, ball, g, TUNABLE, 9.81, ANY),
+    OF_TOY(PARAMETER2, ball, restitution, TUNABLE, 0.8, 0.0, 1.0, 1.0),
+    OF_TOY(PARAMETER3, ball, has_floor, TUNABLE, 1.0, ANY),
+    MOTION(ball, lift, h, 1.0),
     OWN,
 };
 
 static const struct variable block_variables[] = {
-    {TOY_TIME, "time", OF_INSTANCE(VARIABLE_FLOAT64, time), TIME, 0.0, ANY},
-    {TOY_PARAMETER1, "m", OF_MODEL(struct block_values, m), TUNABLE, 1.0, ANY},
-    {TOY_PARAMETER2, "coulomb", OF_MODEL(struct block_values, coulomb), TUNABLE, 1.0, ANY},
-    {TOY_PARAMETER3, "breakaway", OF_MODEL(struct block_values, breakaway), TUNABLE, 1.0, ANY},
-    {TOY_INPUT, "f", OF_MODEL(struct block_values, f), INPUT, 0.0, ANY},
-    {TOY_POSITION, "x", OF_MODEL(struct block_values, x), STATE, 0.0, ANY},
-    {TOY_SPEED, "v", OF_MODEL(struct block_values, v), STATE, 0.0, ANY},
-    {TOY_ACCELERATION, "a", OF_MODEL(struct block_values, a), OUTPUT, 0.0, ANY},
+    OF_SOLVER(TIME, FLOAT64, time, TIME, 0.0, ANY),
+    OF_TOY(PARAMETER1, block, m, TUNABLE, 1.0, ANY),
+    OF_TOY(PARAMETER2, block, coulomb, TUNABLE, 1.0, ANY),
+    OF_TOY(PARAMETER3, block, breakaway, TUNABLE, 1.0, ANY),
+    MOTION(block, f, x, 0.0),
     OWN,
 };
 
 static const struct variable hammer_variables[] = {
-    {TOY_TIME, "time", OF_INSTANCE(VARIABLE_FLOAT64, time), TIME, 0.0, ANY},
-    {TOY_PARAMETER1, "period", OF_MODEL(struct hammer_values, period), TUNABLE, 1.0, ANY},
-    {TOY_PARAMETER2, "first", OF_MODEL(struct hammer_values, first), TUNABLE, 1.0, ANY},
-    {TOY_PARAMETER3, "kick", OF_MODEL(struct hammer_values, kick), TUNABLE, 1.0, ANY},
-    {TOY_INPUT, "f", OF_MODEL(struct hammer_values, f), INPUT, 0.0, ANY},
-    {TOY_POSITION, "x", OF_MODEL(struct hammer_values, x), STATE, 1.0, ANY},
-    {TOY_SPEED, "v", OF_MODEL(struct hammer_values, v), STATE, 0.0, ANY},
-    {TOY_ACCELERATION, "a", OF_MODEL(struct hammer_values, a), OUTPUT, 0.0, ANY},
+    OF_SOLVER(TIME, FLOAT64, time, TIME, 0.0, ANY),
+    OF_TOY(PARAMETER1, hammer, period, TUNABLE, 1.0, ANY),
+    OF_TOY(PARAMETER2, hammer, first, TUNABLE, 1.0, ANY),
+    OF_TOY(PARAMETER3, hammer, kick, TUNABLE, 1.0, ANY),
+    MOTION(hammer, f, x, 1.0),
     OWN,
 };
 

@@ -2,6 +2,7 @@
 #ifndef TOY_RUN_H
 #define TOY_RUN_H
 
+#include "continuous_states.h"
 #include "one_instance.h"
 #include "serialization.h"
 #include "snapshot.h"
@@ -24,6 +25,14 @@ static inline void prepare(const struct model_description *description, int with
 static inline void initialize(void) {
     ASSERT_OK(instance_enter_initialization(instance));
     ASSERT_OK(instance_exit_initialization(instance));
+}
+
+/* For an integrator outside, which begins. */
+static inline void prepare_outside(const struct model_description *description) {
+    prepare(description, 1, 1e-8);
+    instance_integrate_outside(instance);
+    initialize();
+    ASSERT_OK(instance_enter_continuous_time(instance));
 }
 
 /* Steps of h from the time t on, which must be the instance's. */

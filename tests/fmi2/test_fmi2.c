@@ -135,6 +135,8 @@ static void test_reset_brings_back_start_values_and_no_experiment(void) {
     if (fmu_version == 2) { // in FMI 3.0 the experiment comes with this call
         ASSERT_OK(fmu.Reset(c));
         ASSERT_ERROR(fmu.EnterInitializationMode(c));
+        fmu_assert_logged(&messages, "experiment");
+        fmu_assert_in_error(c);
         fmu_assert_reset_is_fresh(c, "after an initialization without experiment");
     }
 }

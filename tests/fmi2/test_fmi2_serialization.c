@@ -95,18 +95,6 @@ EACH_METHOD static void test_a_small_buffer_is_refused(void) {
     fmu_bytes_free(&exact);
 }
 
-/* On entry the handle says nothing: importers leave it uninitialized. */
-EACH_METHOD static void test_the_new_handle_is_only_written(void) {
-    int nothing = 0;
-    fmi2FMUstate made = &nothing;
-    const fmi2Component c = fmu_used(method, &messages);
-    struct fmu_bytes bytes = fmu_save_bytes(c);
-    ASSERT_OK(fmu.DeSerializeFMUstate(c, bytes.data, bytes.size, &made));
-    TEST_ASSERT_TRUE(made != (void *)&nothing);
-    fmu_restore(c, made);
-    fmu_bytes_free(&bytes);
-}
-
 /* ---- Kinds of instances --------------------------------------------------------------------- */
 
 static void check_kind(fmi2Type from, fmi2Type to) {

@@ -158,19 +158,6 @@ EACH_METHOD static void test_get_into_a_handle_reuses_it(void) {
     TEST_ASSERT_TRUE(q1 == fmu_get(c, RP_MANIPULATOR_q1));
 }
 
-EACH_METHOD static void test_handles_survive_a_reset_and_an_error(void) {
-    const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
-    step(c, 0.0);
-    fmi2FMUstate saved = fmu_save(c);
-    ASSERT_OK(fmu.Reset(c));
-    ASSERT_ERROR(fmu.CancelStep(c));
-    fmu_restore(c, saved);
-    step(c, 0.125);
-    ASSERT_ERROR(fmu.CancelStep(c));
-    fmu_forget(c, &saved); // allowed in the error state
-    ASSERT_OK(fmu.Reset(c));
-}
-
 /* Every function that takes a handle, by one signature. */
 static const enum fmu_function handle_functions[] = {
     FMU_GetFMUstate,       FMU_SetFMUstate,  FMU_SerializedFMUstateSize,

@@ -49,15 +49,6 @@ static void test_what_is_not_defined_is_not_looked_at(void) {
     ASSERT_OK(fmu.DoStep(c, 1.0, 1.0, fmi2True));
 }
 
-static void test_initialization_needs_an_experiment(void) {
-    fmu_only_in(2, "in FMI 3.0 the experiment comes with the initialization");
-    const fmi2Component c = fmu_instantiate(&messages, false);
-    ASSERT_ERROR(fmu.EnterInitializationMode(c));
-    fmu_assert_logged(&messages, "experiment");
-    fmu_assert_in_error(c);
-    fmu_assert_reset_is_fresh(c, "without experiment");
-}
-
 static double effective_tolerance(double parameter, double experiment) {
     const fmi2Component c = fmu_instantiate(&messages, false);
     fmu_set(c, RP_MANIPULATOR_relative_tolerance, parameter);

@@ -1,29 +1,10 @@
-/* What an instance checks when it is created, and its life: reset, nominal values, snapshots. */
+/* What an instance checks when it is created, and its life: reset, nominal values. */
 #include "continuous_states.h"
-#include "each_method.h"
 #include "one_instance.h"
 #include "oscillator_by_hand.h"
-#include "snapshot.h"
 
 void setUp(void) {
     create(&oscillator_description);
-}
-
-/* As if variables.toml named a calculated field for the input: it compiles and would do nothing. */
-static void test_a_field_of_another_kind_is_refused(void) {
-    struct variable variables[16];
-    struct model_description wrong = oscillator_description;
-    struct instance *none = instance;
-    TEST_ASSERT_TRUE(oscillator_description.variable_count <= 16);
-    for (size_t i = 0; i < oscillator_description.variable_count; i++) {
-        variables[i] = oscillator_description.variables[i];
-        if (variables[i].reference == OSCILLATOR_U) {
-            variables[i].offset = offsetof(struct oscillator_values, energy);
-        }
-    }
-    wrong.variables = variables;
-    TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, instance_create(&wrong, &last_text_sink, &none));
-    TEST_ASSERT_NULL(none);
 }
 
 /* The texts of one call, one after the other. */
@@ -33,7 +14,7 @@ static void collect(void *context, enum status status, const char *text) {
     (void)strncat(texts, text, sizeof texts - strlen(texts) - 1);
 }
 
-/* The first row is checked as all others. */
+/* The first row is checked as all others: tests/wheel/test_wheel_states.c. */
 static void test_a_wrong_field_in_the_first_row_is_refused(void) {
     struct variable variable = oscillator_description.variables[1]; // omega, a parameter
     struct model_description wrong = oscillator_description;
@@ -78,23 +59,4 @@ static void test_calculated_values_follow_a_reset(void) {
     TEST_ASSERT_TRUE(get(OSCILLATOR_ENERGY) > fresh);
     instance_reset(instance);
     TEST_ASSERT_TRUE(get(OSCILLATOR_ENERGY) == fresh);
-}
-
-EACH_METHOD static void test_a_snapshot_can_be_forgotten_in_any_order(void) {
-    struct instance_snapshot *snapshots[5] = {NULL};
-    static const int order[] = {2, 4, 0, 3, 1};
-    set_int(OSCILLATOR_SOLVER_METHOD, method);
-    initialize_at(0.0);
-    for (int i = 0; i < 5; i++) {
-        ASSERT_OK(instance_do_step(instance, instance_time(instance), 0.1));
-        ASSERT_OK(instance_save(instance, (unsigned)i, &snapshots[i]));
-    }
-    for (int i = 0; i < 5; i++) {
-        unsigned tag = 99;
-        enum phase phase = PHASE_COUNT;
-        ASSERT_OK(instance_snapshot_tag(instance, snapshots[order[i]], &tag, &phase));
-        TEST_ASSERT_EQUAL_UINT(order[i], tag);
-        ASSERT_OK(instance_forget(instance, &snapshots[order[i]]));
-        TEST_ASSERT_NULL(snapshots[order[i]]);
-    }
 }

@@ -1,5 +1,4 @@
 /* The Jacobian that the implicit method gets from the model, and the evaluations it saves. */
-#include "derivatives.h"
 #include "history.h"
 #include "one_instance.h"
 #include "oscillator_by_hand.h"
@@ -47,12 +46,6 @@ static void begin(int method, double omega, double gain) {
     set(OSCILLATOR_OMEGA, omega);
     set(OSCILLATOR_GAIN, gain);
     initialize_at(start);
-}
-
-static void set_slope(double slope) {
-    const unsigned input = OSCILLATOR_U;
-    const int order = 1;
-    ASSERT_OK(instance_set_input_derivatives(instance, &input, 1, &order, &slope));
 }
 
 /* ---- With which values it is evaluated ------------------------------------------------------ */
@@ -110,7 +103,7 @@ static void run_watched(int method) {
         expected.t = start + i * h;
         expected.slope = i % 4 == 3 ? 3.0 : 0.0;
         if (expected.slope != 0.0) {
-            set_slope(expected.slope);
+            set_input_derivative(OSCILLATOR_U, 1, expected.slope);
         }
         if (i == 32) {
             expected.omega = 3.0;
@@ -182,7 +175,7 @@ static void test_a_wrong_one_shows_in_the_evaluations(void) {
 static void test_inputs_are_those_of_the_jacobians_time(void) {
     begin(INTEGRATOR_CVODE_BDF, 3.0, 0.5);
     set(OSCILLATOR_U, 0.25);
-    set_slope(2.0);
+    set_input_derivative(OSCILLATOR_U, 1, 2.0);
     ASSERT_OK(instance_do_step(instance, start, 0.5));
     const double x[2] = {0.3, -0.1};
     double dx[2];

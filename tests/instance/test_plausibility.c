@@ -72,11 +72,6 @@ static void check_count(int64_t *value, const char *name, int64_t good, const in
     TEST_ASSERT_TRUE_MESSAGE(is_plausible(), name);
 }
 
-static void test_a_state_as_it_was_saved_is_plausible(void) {
-    TEST_ASSERT_TRUE(is_plausible());
-    TEST_ASSERT_EQUAL_STRING("", last_text);
-}
-
 static void test_times_are_finite(void) {
     const double finite[2] = {-1e300, 1e300};
     const double infinite[2] = {-INFINITY, INFINITY};
@@ -146,11 +141,6 @@ static void test_phase_method_and_limit_exist(void) {
     state = saved;
     state.own.event_count = -1;
     assert_refused("event_count = -1");
-}
-
-static void test_an_experiment_can_be_run(void) {
-    state.experiment.stop_time = -1.0;
-    assert_refused("stop time");
 }
 
 /* A replay goes from the restart to first_time and on to latest_time, within the horizon and the
@@ -292,6 +282,8 @@ static void test_the_clock_and_the_history_agree(void) {
     state.time.s = state.own.time = 1.0;
     state.experiment.stop_time = 5.0;
     assert_refused("horizon = 10");
+    state.experiment.stop_time = -1.0;
+    assert_refused("stop time");
     state.experiment.stop_time = 10.0;
     state.experiment_defined = false;
     assert_refused("experiment_defined");

@@ -1,6 +1,5 @@
 /* From one communication point to the next, with each method, against the solution in closed form.
  */
-#include "derivatives.h"
 #include "each_method.h"
 #include "one_instance.h"
 #include "oscillator_by_hand.h"
@@ -123,15 +122,12 @@ EACH_METHOD static void test_a_rollback_repeats_one_series_at_most(void) {
 
 /* In the step with a derivative and in one right after steps that went beyond. */
 EACH_METHOD static void test_no_internal_step_passes_the_end_of_a_polynomial(void) {
-    const unsigned input = OSCILLATOR_U;
-    const int order = 1;
-    const double slope = 0.5;
     const double h = 1.0 / 1024.0;
     initialize_at(0.0);
     step_held(1024, h);
     for (int i = 1024; i < 1100; i++) {
         latest = -INFINITY;
-        ASSERT_OK(instance_set_input_derivatives(instance, &input, 1, &order, &slope));
+        set_input_derivative(OSCILLATOR_U, 1, 0.5);
         ASSERT_OK(instance_do_step(instance, i * h, h));
         TEST_ASSERT_TRUE(latest <= (i + 1) * h * (1.0 + 1e-12));
     }

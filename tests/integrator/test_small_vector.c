@@ -1,8 +1,6 @@
 /* Every operation of the small vector against N_Vector_Serial. */
 #include "small_vector.h"
 
-#include "allocations.h"
-
 #include <float.h>
 #include <math.h>
 #include <nvector/nvector_serial.h>
@@ -224,19 +222,5 @@ static void test_nan_stays_in_the_norm(void) {
     create(4);
     N_VGetArrayPointer(small[0][0])[2] = NAN;
     TEST_ASSERT_TRUE(isnan(N_VWrmsNorm(small[0][0], small[1][0])));
-    destroy();
-}
-
-static void test_a_vector_is_one_block_and_operations_take_none(void) {
-    sunrealtype factors[COUNT] = {0.5, -2.0, 3.25, 1.0, -0.125};
-    create(4);
-    const long before = allocation_count();
-    N_Vector another = N_VClone(small[0][0]);
-    TEST_ASSERT_EQUAL_INT(before + 1, allocation_count());
-    N_VLinearCombination(COUNT, factors, small[0], another);
-    N_VScaleAddMulti(COUNT, factors, another, small[1], small[2]);
-    TEST_ASSERT_TRUE(N_VWrmsNorm(another, small[1][0]) > 0.0);
-    TEST_ASSERT_EQUAL_INT(before + 1, allocation_count());
-    N_VDestroy(another);
     destroy();
 }

@@ -238,6 +238,15 @@ static enum status decay_series(double t, double time_scale, int first, int last
     return STATUS_OK;
 }
 
+static struct ode decay_of(size_t *count) {
+    return (struct ode){.state_count = *count,
+                        .rhs = decay,
+                        .jacobian = decay_jacobian,
+                        .series = decay_series,
+                        .series_row_count = *count,
+                        .context = count};
+}
+
 /* Methods in this order: every pair follows one another. */
 static void test_the_workspace_of_an_integrator_is_enough(void) {
     enum { MOST = 100 };
@@ -252,12 +261,7 @@ static void test_the_workspace_of_an_integrator_is_enough(void) {
         tolerances[i] = 1e-10;
     }
     for (size_t n = 1; n <= MOST; n += n < 20 ? 1 : 20) {
-        const struct ode ode = {.state_count = n,
-                                .rhs = decay,
-                                .jacobian = decay_jacobian,
-                                .series = decay_series,
-                                .series_row_count = n,
-                                .context = &n};
+        const struct ode ode = decay_of(&n);
         const struct message_sink quiet = {0};
         struct integrator *integrator = NULL;
         const long before = allocator_calls();
@@ -300,12 +304,7 @@ static size_t bytes_taken(const struct method *method, const struct ode *ode) {
 
 static void test_the_workspace_of_an_integrator_is_no_larger_than_needed(void) {
     for (size_t n = 1; n <= 100; n++) {
-        const struct ode ode = {.state_count = n,
-                                .rhs = decay,
-                                .jacobian = decay_jacobian,
-                                .series = decay_series,
-                                .series_row_count = n,
-                                .context = &n};
+        const struct ode ode = decay_of(&n);
         size_t size = 0;
         size_t most = 0;
         for (size_t i = 0; i < sizeof all_methods / sizeof all_methods[0]; i++) {

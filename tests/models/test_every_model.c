@@ -410,30 +410,11 @@ static void check(int which) {
     }
 }
 
-static void test_arm(void) {
-    check(ARM);
-}
-
-static void test_plant(void) {
-    check(PLANT);
-}
-
-static void test_controller(void) {
-    check(CONTROLLER);
-}
-
-static void test_actuator(void) {
-    check(ACTUATOR);
-}
-
-static void test_trajectory(void) {
-    check(TRAJECTORY);
-}
-
-static void test_sensor(void) {
-    check(SENSOR);
-}
-
-static void test_wall(void) {
-    check(WALL);
+static void test_each_model(void) {
+    static const char *const names[SUBJECTS] = {"arm",        "plant",  "controller", "actuator",
+                                                "trajectory", "sensor", "wall"};
+    for (int which = 0; which < SUBJECTS; which++) {
+        TEST_MESSAGE(names[which]); // the last one is the one that fails
+        check(which);
+    }
 }

@@ -2,6 +2,7 @@
 #ifndef ONE_INSTANCE_H
 #define ONE_INSTANCE_H
 
+#include "derivatives.h"
 #include "instance.h"
 #include "last_text.h"
 #include "state.h"
@@ -53,6 +54,10 @@ static inline void set(unsigned reference, double value) {
 
 static inline void set_int(unsigned reference, int value) {
     ASSERT_OK(instance_set_integer(instance, &reference, 1, &value));
+}
+
+static inline void set_input_derivative(unsigned input, int order, double value) {
+    ASSERT_OK(instance_set_input_derivatives(instance, &input, 1, &order, &value));
 }
 
 /* ---- Life ----------------------------------------------------------------------------------- */

@@ -40,6 +40,12 @@ static void assert_forged_is_refused(const char *text) {
     instance_destroy(other);
 }
 
+static void assert_accepted(void) {
+    struct instance *other;
+    ASSERT_OK(transfer(&other));
+    instance_destroy(other);
+}
+
 static void assert_event_points_are_possible(void) {
     const struct instance_state kept = instance->state;
     instance->state.event_point = EVENT_HANDLED;
@@ -83,15 +89,7 @@ static void test_forged_states_are_refused_with_the_value(void) {
     values_of(instance)->lost_speed = 0.0;
     values_of(instance)->turns = 1234; // calculated: not among the bytes
     assert_event_points_are_possible();
-    struct instance *other;
-    ASSERT_OK(transfer(&other));
-    instance_destroy(other);
-}
-
-static void assert_accepted(void) {
-    struct instance *other;
-    ASSERT_OK(transfer(&other));
-    instance_destroy(other);
+    assert_accepted();
 }
 
 static void test_no_mode_is_decided_before_the_initialization_ends(void) {
