@@ -88,6 +88,7 @@ PACKAGES = [path.parent for path in sorted(ROOT.glob("rparm/**/__init__.py"))]
 
 # what Python runs, and large packages that it must not load
 NOT_LOADED = {
+    "import rparm": {"fmpy", "numpy", "matplotlib"},
     "import rparm.campaign.runs": {"scipy.stats", "SALib", "matplotlib"},
     "from rparm.__main__ import main; main(['list']);"
     "import rparm.commands.run, rparm.commands.system": {

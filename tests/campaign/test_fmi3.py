@@ -58,12 +58,11 @@ def assert_same_bits(found: Rows, expected: Rows) -> None:
 @pytest.mark.parametrize(
     ("text", "fmu"),
     [
-        (ARM, ARM3),
         (PLANT, fmi3_fmu(FMUS["rp_plant"])),
         (EXPONENT, fmi3_fmu(FMUS["rp_plant"])),
         (CLOSED_LOOP, BUILD / "fmi3" / "ClosedLoop.ssp"),
     ],
-    ids=["arm", "Boolean input", "exponent", "closed loop"],
+    ids=["Boolean input", "exponent", "closed loop"],
 )
 def test_both_versions_give_the_same_bits(text: str, fmu: Path, tmp_path: Path) -> None:
     assert_same_bits(made(tmp_path / "3", text, fmu), made(tmp_path / "2", text))

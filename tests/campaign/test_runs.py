@@ -10,6 +10,7 @@ import pytest
 from rparm.campaign import bases
 from rparm.campaign.job import LYAPUNOV
 from rparm.fmi.fmu_file import Fmu
+from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import simulate
 from rparm.systems import ssp
 from rparm.systems.master import Master
@@ -22,6 +23,13 @@ from tests.support.ssp_files import EXPERIMENT, FROM_TRAJECTORY, SETS, TYPES, wi
 
 OSCILLATOR = BUILD / "tests" / "oscillator" / "Oscillator.fmu"
 OUTPUTS = ("q1", "q2", "dq1", "dq2", "total_energy", "ee_x")
+
+
+def assert_bits_of_simulation(record: np.ndarray, names: Sequence[str], run: Scenario) -> None:
+    with Fmu(FMUS[run.model]) as fmu:
+        result = simulate(fmu, run)
+    for i, name in enumerate(names):
+        assert np.array_equal(record[:, i], result.values[:, result.names.index(name)])
 
 
 @pytest.mark.parametrize("name", ["hanging_swing", "sine_efforts", "irregular_steps"])
@@ -37,11 +45,7 @@ def test_a_run_has_the_bits_of_a_simulation(name: str, tmp_path: Path) -> None:
         initial=scenario.initial | {"q1": q1},
         reference_every=1,
     )
-    with Fmu(FMUS["rp_manipulator"]) as fmu:
-        result = simulate(fmu, changed)
-    for output in OUTPUTS:
-        expected = result.values[:, result.names.index(output)]
-        assert np.array_equal(record[:, job.watched.index(output)], expected)
+    assert_bits_of_simulation(record, job.watched, changed)
 
 
 def test_boolean_inputs_are_those_of_a_simulation(tmp_path: Path) -> None:
@@ -56,10 +60,7 @@ def test_boolean_inputs_are_those_of_a_simulation(tmp_path: Path) -> None:
     changed = dataclasses.replace(
         scenario, parameters=scenario.parameters | {"damping1": 0.0}, reference_every=1
     )
-    with Fmu(FMUS["rp_plant"]) as fmu:
-        result = simulate(fmu, changed)
-    for i, name in enumerate(job.watched):
-        assert np.array_equal(record[:, i], result.values[:, result.names.index(name)])
+    assert_bits_of_simulation(record, job.watched, changed)
 
 
 SYSTEM = HEAD + (

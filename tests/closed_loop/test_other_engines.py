@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from rparm import project
-from rparm.errors import UserError
 from rparm.systems import comparison, ecos, master, ssp
 from tests.importers.osp import libcosim, only_variant
 from tests.support.rparm_project import Console
-from tests.support.ssp_files import SSP, edited, edited_fmu, replace
+from tests.support.ssp_files import SSP, edited, replace
 from tests.support.systems import BOUND, CASES, CLOSED_LOOP, MACHINE_SYSTEM, System, difference
 
 ABSENT = "ecospy is not installed"
@@ -86,14 +85,6 @@ def test_what_ecos_would_not_set_is_refused(tmp_path: Path, console: Console, so
     path = edited(source, tmp_path / "law.ssp", {"resources/controller_nominal.ssv": added})
     error = console.failed("system", "nominal", "--ssp", path, "--report", tmp_path / "report")
     assert "component 'controller': 'mode' is an Enumeration, which Ecos does not set" in error
-
-
-def test_another_version_of_fmi_is_refused(tmp_path: Path) -> None:
-    change = edited_fmu({"modelDescription.xml": replace('fmiVersion="3.0"', 'fmiVersion="3.1"')})
-    path = edited(SSP3, tmp_path / "later.ssp", {"resources/RPController.fmu": change})
-    refused = r"component 'controller': .* an FMU of FMI 2\.0 or 3\.0 .*, found FMI 3\.1"
-    with pytest.raises(UserError, match=refused), ssp.unpacked(path):
-        pass
 
 
 ROUNDING = 1e-9  # two engines with the same order

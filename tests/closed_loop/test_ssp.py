@@ -246,22 +246,6 @@ def test_a_wrong_ssp_is_refused(file: str, edit: Edit, said: str, tmp_path: Path
         assert part in text
 
 
-def test_a_damaged_archive_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "damaged.ssp"
-    path.write_bytes(SSP.read_bytes()[:-1000])
-    assert "damaged" in refused(path)
-    content = bytearray(SSP.read_bytes())
-    content[2000:2100] = bytes(100)
-    path.write_bytes(content)
-    assert "damaged" in refused(path)
-    path.write_text("no archive")
-    assert "not an SSP" in refused(path)
-    path.unlink()
-    assert "no such file" in refused(path)
-    path.mkdir()
-    assert "is a folder" in refused(path)
-
-
 def test_the_command_line_explains_in_one_line(tmp_path: Path, console: Console) -> None:
     path = edited(SSP, tmp_path / "wrong.ssp", {STRUCTURE: replace(TAU1, TAU1.replace("N.m", "N"))})
     error = console.refused("system", "--ssp", path, "--report", tmp_path / "report")

@@ -167,16 +167,6 @@ def test_a_wrong_origin_is_named(
     assert message in result.stderr
 
 
-def test_the_same_bytes_every_time(tmp_path: Path) -> None:
-    generated(VARIABLES, tmp_path / "first")
-    generated(VARIABLES, tmp_path / "second")
-    files = [path for path in (tmp_path / "first").rglob("*") if path.is_file()]
-    assert len(files) == 5
-    for file in files:
-        name = file.relative_to(tmp_path / "first")
-        assert file.read_bytes() == (tmp_path / "second" / name).read_bytes()
-
-
 def test_generated_files_in_the_build_are_fresh(fmu: Path, tmp_path: Path) -> None:
     built = fmu.parent / "fmu" / "RPManipulator"
     root = ET.parse(built / "modelDescription.xml").getroot()

@@ -111,17 +111,21 @@ def test_sources_and_description_stay_small(fmu: Path, tmp_path: Path, version: 
     assert max(sizes.values()) < LARGEST, sizes
 
 
-def test_fmpy_compiles_an_fmu_without_binaries(
-    releases: dict[str, Path], built: dict[str, LoadedFmu], tmp_path: Path
-) -> None:
-    archive = tmp_path / "RPManipulator.fmu"
-    release = releases[archive.stem]
+def compiled_by_fmpy(archive: Path, release: Path) -> None:
+    """Pack the sources of `release` without binaries, and have fmpy check and compile them."""
     entries = [f"{name}={release / name}" for name in ("modelDescription.xml", "sources")]
     run_checked(sys.executable, ROOT / "fmu" / "package.py", archive, *entries)
     command = Path(sys.executable).parent / "fmpy"
     assert "No problems found." in run_checked(command, "validate", archive)
     options = ["--configuration", "Debug"]  # compiles three times faster than Release
     run_checked(command, "compile", archive, *options, CMAKE_BUILD_PARALLEL_LEVEL="2")
+
+
+def test_fmpy_compiles_an_fmu_without_binaries(
+    releases: dict[str, Path], built: dict[str, LoadedFmu], tmp_path: Path
+) -> None:
+    archive = tmp_path / "RPManipulator.fmu"
+    compiled_by_fmpy(archive, releases[archive.stem])
     assert_same_bits(built[archive.stem], LoadedFmu(archive, tmp_path / "compiled"))
 
 
@@ -131,12 +135,7 @@ def test_fmpy_compiles_an_fmu_of_fmi_3(fmu: Path, tmp_path: Path) -> None:
     release = fmu.parent / "fmu" / "RPManipulator" / "fmi3" / "release"
     assert not list(release.rglob("fmi3Functions.h"))
     archive = tmp_path / "RPManipulator.fmu"
-    entries = [f"{name}={release / name}" for name in ("modelDescription.xml", "sources")]
-    run_checked(sys.executable, ROOT / "fmu" / "package.py", archive, *entries)
-    command = Path(sys.executable).parent / "fmpy"
-    assert "No problems found." in run_checked(command, "validate", archive)
-    options = ["--configuration", "Debug"]
-    run_checked(command, "compile", archive, *options, CMAKE_BUILD_PARALLEL_LEVEL="2")
+    compiled_by_fmpy(archive, release)
     runs = [
         fmpy.simulate_fmu(
             str(path), stop_time=2.0, output_interval=0.01, start_values={"q1": 0.3, "tau1": 2.0}

@@ -223,32 +223,6 @@ def test_all_references_fail_with_one(copies: Path, capsys: pytest.CaptureFixtur
     assert "FAILED" in page and "line 9, column q1" in page
 
 
-MALFORMED: dict[str, tuple[Callable[[list[list[str]]], object], str]] = {
-    "rows swapped": (lambda t: t.insert(5, t.pop(6)), "line 6: does not match"),
-    "row twice": (lambda t: t.insert(5, t[5]), "line 7: does not match"),
-    "row dropped": (lambda t: t.pop(5), "line 6: does not match"),
-    "last row dropped": (lambda t: t.pop(), "line 361: does not match"),
-    "column dropped": (lambda t: [row.pop(6) for row in t], "line 1: has no column 'ddq2'"),
-    "value dropped": (lambda t: t[7].pop(6), "line 8: expected 15 values, found 14"),
-    "no number": (lambda t: t[7].__setitem__(6, "nan"), "line 8: expected finite numbers"),
-    "time": (lambda t: t[7].__setitem__(0, "0.11"), "line 8: does not match"),
-}
-
-
-@pytest.mark.parametrize("fault", MALFORMED)
-def test_a_malformed_reference_is_refused(
-    fault: str, copies: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    change, text = MALFORMED[fault]
-    path = copies / "sixtieth" / "RPManipulator_ref.csv"
-    table = table_of(path)
-    change(table)
-    write_table(path, table)
-    assert main(["prove", "sixtieth", "--method", "erk"]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert f"{path}, {text}" in line
-
-
 def test_a_truncated_reference_is_refused(copies: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = copies / "sixtieth" / "RPManipulator_ref.csv"
     path.write_bytes(path.read_bytes()[:-30])

@@ -287,8 +287,3 @@ def test_what_stands_on_the_page_runs(tmp_path: Path) -> None:
     assert lines[0].endswith(" rad") and lines[-1].startswith("no model 'RPPlnt', did you")
     check_near(np.genfromtxt(tmp_path / "fall.csv", delimiter=",", names=True))
     assert (tmp_path / "payload/manifest.json").is_file()
-
-
-def test_importing_it_is_light() -> None:
-    script = "import sys, rparm; print(sorted({'fmpy', 'numpy', 'matplotlib'} & set(sys.modules)))"
-    assert python("-c", script, check=True).stdout.strip() == "[]"

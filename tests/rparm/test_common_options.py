@@ -227,14 +227,6 @@ def test_mistakes_of_the_user(
     assert reason in console.refused(*arguments)
 
 
-def test_file_that_is_no_fmu_or_cut_off(project: Path, fmu: Path, console: Console) -> None:
-    content, file = fmu.read_bytes(), project / "cut.fmu"
-    cuts = (content[:length] for length in (0, 100, len(content) // 2, len(content) - 10))
-    for wrong in (b"not a zip archive", *cuts):
-        file.write_bytes(wrong)
-        assert "cut.fmu: not an FMU" in console.refused("run", "--fmu", file)
-
-
 def test_fmu_with_another_guid(project: Path, fmu: Path, console: Console) -> None:
     other = repacked(fmu, project / "guid.fmu", lambda xml: xml.replace('guid="', 'guid="x', 1))
     error = console.failed("run", SHORT, "--fmu", other, "--report", project / "report")

@@ -12,12 +12,10 @@ import pytest
 import rparm
 from rparm.errors import StoppedError
 from rparm.fmi.fmu_file import Fmu
-from rparm.runs import scenario as scenarios
 from rparm.runs import simulation
 from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import Result
-from tests.support.rparm_project import BUILD, FMUS, NAMES, edit, fmi3_fmu, load
-from tests.support.toy_model import timed
+from tests.support.rparm_project import FMUS, NAMES, edit, fmi3_fmu, load
 
 both_versions = pytest.mark.parametrize("version", [2, 3])
 
@@ -61,19 +59,6 @@ def test_a_scenario_has_the_same_bits(name: str, version: int, which_loop: list[
         result = assert_same(fmu, scenario)
     assert len(result.values) == len(scenario.reference_rows)
     assert which_loop == ["_step_through", "_step_compiled"]
-
-
-@pytest.mark.parametrize("version", ["fmi2", "fmi3"])
-def test_boolean_inputs_switch_at_the_same_steps(write, version: str) -> None:
-    path = BUILD / "tests" / "wheel" / "Wheel.fmu"
-    text = (
-        timed(0, 10, 0.5) + "[inputs.speed]\nsines = [{amplitude = 3.0, frequency = 0.1}]\n"
-        "[inputs.is_counting]\ntable = [[0, false], [4, true], [7, false]]\n"
-    )
-    with Fmu(path if version == "fmi2" else fmi3_fmu(path)) as wheel:
-        loaded = scenarios.load(write(text), wheel.model)
-        angle = assert_same(wheel, loaded)
-        assert len(np.unique(angle.values[:, angle.names.index("angle")])) > 5
 
 
 @both_versions

@@ -250,11 +250,6 @@ def test_missing_file(write) -> None:
         scenario.load(path, TOY)
 
 
-def test_folder_instead_of_a_file(write) -> None:
-    with pytest.raises(UserError, match="cannot be read: Is a directory"):
-        scenario.load(write("").parent, TOY)
-
-
 def test_bytes_that_are_not_text(write) -> None:
     path = write("")
     path.write_bytes(b"title = '\xff'")
