@@ -2,6 +2,7 @@
 
 import ctypes
 from collections.abc import Callable, Sequence
+from operator import truediv
 from pathlib import Path
 from statistics import median
 from time import thread_time
@@ -97,14 +98,15 @@ def by_loop(
 
 def row(name: str, turns: int, exact: np.ndarray, limit: float, *peers: tuple[Run, float]) -> dict:
     """Let two take turns at their tolerances."""
-    times = np.array([[run(tolerance)[0] for run, tolerance in peers] for _ in range(turns)])
+    times = [[run(tolerance)[0] for run, tolerance in peers] for _ in range(turns)]
+    own_times, other_times = zip(*times, strict=True)
     ends = [run(tolerance)[1] for run, tolerance in peers]
     own, other = (
         float(np.abs(end[: exact.size] - exact).max() / np.abs(exact).max()) for end in ends
     )
     return {
         "group": "models", "work": "one step", "column": COLUMN, "run": name,
-        "us": 1e6 * median(times[:, 0]), "ratio": median(times[:, 0] / times[:, 1]),
+        "us": 1e6 * median(own_times), "ratio": median(map(truediv, own_times, other_times)),
         "error": own, "error_of_peer": other, "judged": "ratio", "limit": limit,
     }  # fmt: skip
 
