@@ -175,7 +175,7 @@ def test_generated_files_in_the_build_are_fresh(fmu: Path, tmp_path: Path) -> No
     options = ("--version", root.get("version", ""), "--license", ROOT / "LICENSE")
     generated(VARIABLES, tmp_path, *options, SOURCE_DATE_EPOCH=epoch)
     descriptions = ("modelDescription.xml", "fmi3/modelDescription.xml")
-    for name in (*descriptions, "variables.c", "value_references.h"):
+    for name in (*descriptions, "terminalsAndIcons.xml", "variables.c", "value_references.h"):
         assert (built / name).read_text() == (tmp_path / name).read_text()
 
 
