@@ -21,7 +21,7 @@ METHODS = {"cvode_adams": 1, "taylor": 4}
 # Largest work of a step over the median of those without events, by events in the step: the first
 # for a step without any, the second more for each event.
 BOUNDS = {"cvode_adams": (13, 4), "taylor": (8, 6)}
-RARE = 2 if int(STEPS) > 1_000_000 else 0  # what ten million steps add to the first
+RARE = {"cvode_adams": 4, "taylor": 2}  # what ten million steps add to the first
 
 
 @dataclass
@@ -81,8 +81,9 @@ def test_work_of_a_step_is_bounded_by_its_events(
     print(method, restitution, *steps, figures, sep="\n")
     assert steps[0].events == 0 and steps[1].events == 1 and steps[1].count > 300
     without, each = BOUNDS[method]
+    without += RARE[method] if int(STEPS) > 1_000_000 else 0
     for found in steps:
-        assert found.largest <= (without + RARE + each * found.events) * steps[0].median, found
+        assert found.largest <= (without + each * found.events) * steps[0].median, found
     # what the blocks say holds for the instructions of the delivered library, too
     blocks = max(found.largest for found in steps) / steps[0].median
     assert figures[1] / figures[0] == pytest.approx(blocks, rel=0.3)
