@@ -6,6 +6,7 @@
 #include <arkode/arkode_erkstep.h>
 #include <float.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 /* Dormand-Prince 5(4). Other tables of ERKStep: Cash-Karp 5(4) is 10 to 20 % faster and has 1.2 to
@@ -356,7 +357,7 @@ static int advance_carefully(struct erk *erk, double begin, double end, int64_t 
     const struct message_sink sink = problem->sink;
     double step = end - begin;
     double good = begin;        // the time of x
-    problem->sink.write = NULL; // the failure before has sent the message of all
+    problem->sink.write = NULL; // the failure before has kept its message
     sundials_set_state(&erk->base, begin_x);
     sundials_get_state(&erk->base, x);
     int flag = start(erk, begin, end, erk->next_step);
@@ -442,6 +443,20 @@ static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
     return flag;
 }
 
+/* The first message of an advance, which is sent if the advance fails in the end. */
+struct kept_message {
+    enum status status;
+    char text[512];
+};
+
+static void keep_message(void *kept_pointer, enum status status, const char *text) {
+    struct kept_message *kept = kept_pointer;
+    if (kept->text[0] == '\0') {
+        kept->status = status;
+        (void)snprintf(kept->text, sizeof kept->text, "%s", text);
+    }
+}
+
 /* Integrates with ERKStep. watching: the flag of begin_watching. */
 static int integrate(struct erk *erk, int watching, double t, int64_t max_steps,
                      const double begin_x[], double *stopped_at, double x[],
@@ -450,6 +465,9 @@ static int integrate(struct erk *erk, int watching, double t, int64_t max_steps,
     const double begin = erk->base.problem->reached;
     const double length = t - begin;
     const double first_step = erk->next_step > 0.0 ? length / ceil(length / erk->next_step) : 0.0;
+    struct kept_message kept = {.text = ""};
+    const struct message_sink sink = erk->base.problem->sink;
+    erk->base.problem->sink = (struct message_sink){.write = keep_message, .context = &kept};
     sundials_set_state(&erk->base, begin_x);
     int flag = start(erk, begin, t, first_step);
     if (flag == ARK_SUCCESS) {
@@ -467,6 +485,10 @@ static int integrate(struct erk *erk, int watching, double t, int64_t max_steps,
         flag = advance_carefully(erk, begin, t, max_steps, begin_x, stopped_at, x, work);
     } else if (!erk->is_cut_short) {
         sundials_get_state(&erk->base, x);
+    }
+    erk->base.problem->sink = sink;
+    if (flag < 0 && kept.text[0] != '\0') {
+        message_write(&sink, kept.status, "%s", kept.text);
     }
     add_work(erk, work);
     // an event says nothing about the length of steps

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Model
 
-from tests.equations.examples import METHODS, MODELS, example, initializing, made, simulated
+from tests.equations.examples import METHODS, MODELS, example, initializing, loaded, made, simulated
+from tests.support.instances import OK, Instance
 
 TEXTS = MODELS["events"]
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
@@ -220,11 +221,6 @@ def test_events_follow_each_other_max_events_times(folder: Path, most: int) -> N
         assert simulated(fmu, 1.0, 0.5, {"x": 1.75, "max_events": most})["x"][-1] == 5.75
 
 
-def test_events_without_end_are_an_error(folder: Path) -> None:
-    with pytest.raises(fmpy.fmi1.FMICallException):
-        simulated(named(folder, TEXTS["ENDLESS"]), 1.0, 0.1, {})
-
-
 def test_a_model_without_states_has_modes(folder: Path) -> None:
     found = []
     with initializing(named(folder, TEXTS["LATCH"])) as unit:
@@ -234,3 +230,12 @@ def test_a_model_without_states_has_modes(folder: Path) -> None:
             unit.step(step * 0.1, 0.1)
             found += unit.get("y")
     assert found == [0.0, 4.0, 6.0, 2.0, 0.0, 0.0]
+
+
+def test_a_step_that_is_tried_again_and_succeeds_sends_no_message(folder: Path) -> None:
+    """Long steps of `erk` go where the tank is emptier than empty."""
+    with Instance(loaded(named(folder, TEXTS["SIPHON"])), logging_on=True) as unit:
+        unit.fmi.setInteger([unit.loaded.references["solver_method"]], [METHODS["erk"]])
+        unit.initialize(0.0, None, 1e-9).step(0.0, 200.0)
+        assert unit.count("event_count") == 3
+        assert [m.text for m in unit.messages if m.status != OK] == []
