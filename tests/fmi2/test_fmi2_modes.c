@@ -18,28 +18,16 @@ static const struct {
     {RP_MANIPULATOR_tau1, "IMC", "IMVN", "tau1"},
     {RP_MANIPULATOR_f2, "IMC", "IMVN", "f2"},
     {RP_MANIPULATOR_m1, "IMC", "IMV", "m1"}, // tunable
-    {RP_MANIPULATOR_m2, "IMC", "IMV", "m2"},
-    {RP_MANIPULATOR_I1z, "IMC", "IMV", "I1z"},
-    {RP_MANIPULATOR_I2z, "IMC", "IMV", "I2z"},
-    {RP_MANIPULATOR_l1, "IMC", "IMV", "l1"},
-    {RP_MANIPULATOR_lc1, "IMC", "IMV", "lc1"},
-    {RP_MANIPULATOR_a, "IMC", "IMV", "a"},
     {RP_MANIPULATOR_g, "IMC", "IMV", "g"},
     {RP_MANIPULATOR_q1, "IM", "IMN", "q1"}, // a start value, then a state
-    {RP_MANIPULATOR_q2, "IM", "IMN", "q2"},
-    {RP_MANIPULATOR_dq1, "IM", "IMN", "dq1"},
     {RP_MANIPULATOR_dq2, "IM", "IMN", "dq2"},
     {RP_MANIPULATOR_relative_tolerance, "IM", "IM", "relative_tolerance"}, // fixed
-    {RP_MANIPULATOR_max_step, "IM", "IM", "max_step"},
     {RP_MANIPULATOR_max_internal_steps, "IM", "IM", "max_internal_steps"},
     {RP_MANIPULATOR_solver_method, "IM", "IM", "solver_method"},
     {RP_MANIPULATOR_solver_steps, "", "", "solver_steps"},
     {RP_MANIPULATOR_ddq1, "", "", "ddq1"},
     {RP_MANIPULATOR_time, "", "", "time"},
-    {RP_MANIPULATOR_ee_x, "", "", "ee_x"},
     {RP_MANIPULATOR_total_energy, "", "", "total_energy"},
-    {RP_MANIPULATOR_D11, "", "", "D11"},
-    {RP_MANIPULATOR_coriolis1, "", "", "coriolis1"},
     {RP_MANIPULATOR_tau1_y, "", "", "tau1_y"},
     {RP_MANIPULATOR_effective_relative_tolerance, "", "", "effective_relative_tolerance"},
 };

@@ -226,23 +226,6 @@ static void test_distance_of_an_arc(void) {
     }
 }
 
-static void test_an_arc_may_leave_out_what_is_out_of_reach(void) {
-    p.center[0] = 0.3;
-    p.center[1] = 0.0;
-    p.radius = 0.35; // nearest 0.05 at the angle pi
-    p.turns = 0.5;
-    p.frequency = 0.25;
-    p.start_angle = -pi / 2.0;
-    TEST_ASSERT_EQUAL_INT(RP_TRAJECTORY_VALID, rp_trajectory_check(&p));
-    p.frequency = -0.25;
-    TEST_ASSERT_EQUAL_INT(RP_TRAJECTORY_OUT_OF_REACH, rp_trajectory_check(&p));
-    p.frequency = 0.25;
-    p.turns = 0.76; // just beyond the angle pi
-    TEST_ASSERT_EQUAL_INT(RP_TRAJECTORY_OUT_OF_REACH, rp_trajectory_check(&p));
-    p.a = -0.04;
-    TEST_ASSERT_EQUAL_INT(RP_TRAJECTORY_VALID, rp_trajectory_check(&p));
-}
-
 static void test_what_belongs_to_another_motion_is_not_checked(void) {
     p.frequency = 0.0;
     p.ramp_time = 1e9;
