@@ -83,8 +83,7 @@ static double error_of(const struct location *location, size_t state, double x) 
     const struct integrator_settings *settings = location->settings;
     const double tolerance = settings->absolute_tolerances[state];
     const double usual = 100.0 * tolerance / settings->relative_tolerance;
-    return larger(tolerance + settings->relative_tolerance * fabs(x),
-                  2.0 * falls_roundings * DBL_EPSILON * larger(fabs(x), usual));
+    return larger(tolerance, 2.0 * falls_roundings * DBL_EPSILON * larger(fabs(x), usual));
 }
 
 /* Restarts the indicators of the model, whose noise follows from their limits so far. */

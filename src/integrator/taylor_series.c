@@ -59,8 +59,8 @@ static enum status begin(struct taylor_series *series, double t, double time_sca
                          const double x[], int last) {
     const struct integrator_settings *settings = &series->problem->settings;
     const int first = t == series->end ? 1 : 0;
+    double(*const known)[SERIES_LENGTH] = series->end_row;
     if (first == 1) {
-        double(*const known)[SERIES_LENGTH] = series->end_row;
         series->end_row = series->row;
         series->row = known;
     }

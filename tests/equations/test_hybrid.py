@@ -219,7 +219,7 @@ def test_a_rocking_block_loses_speed_once_an_impact(unit: Callable, kind: str) -
 
 
 @pytest.mark.parametrize("step", [0.1, 0.01])
-@EACH_KIND
+@pytest.mark.parametrize("kind", ["cvode_adams", "erk", "taylor", "model_exchange"])
 def test_a_ball_leaves_a_table_and_lands_once_a_period(
     unit: Callable, kind: str, step: float
 ) -> None:
