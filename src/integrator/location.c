@@ -319,7 +319,7 @@ static enum status sample_between(struct location *location, struct piece *piece
     const int count = 2 * piece->count - 1;
     for (size_t j = 0; j < location->used_count; j++) {
         double *samples = location->samples[location->used[j]];
-        for (int k = piece->count - 1; k > 0; k--) {
+        for (size_t k = (size_t)piece->count - 1; k > 0; k--) {
             samples[2 * k] = samples[k];
         }
     }

@@ -321,7 +321,7 @@ static double middle(double low, double high) {
 static double crossing(const struct rising *p, struct node low, struct node high, bool is_exact) {
     double step = high.s - low.s;
     double s = low.s + step * (low.value / (low.value - high.value));
-    if (low.s == 0.0) { // the root of the parabola with the slope there
+    if (low.s == 0.0 && p->degree > 0) { // the root of the parabola with the slope there
         const double bend = (high.value - low.value - p->c[1] * step) / (step * step);
         s = 2.0 * low.value / (sqrt(p->c[1] * p->c[1] - 4.0 * bend * low.value) - p->c[1]);
     }
