@@ -522,7 +522,8 @@ enum status location_search(struct location *location) {
             return status;
         }
         for (size_t k = 0; k < location->used_count; k++) {
-            s = fmin(s, location->first[location->used[k]]);
+            const double first = location->first[location->used[k]];
+            s = first < s ? first : s;
         }
     }
     if (!(s <= 1.0)) {

@@ -55,7 +55,7 @@ class Motion:
     reason: str  # for it
     impacts: list[Impact] = field(default_factory=list)
     growth: Numbers = field(default_factory=lambda: np.ones(0))  # of a disturbance, up to each time
-    lateness: Numbers = field(default_factory=lambda: np.zeros(0))  # error, over that of each limit
+    lateness: Numbers = field(default_factory=lambda: np.zeros(0))  # error by late impacts, a unit
 
     def count(self, t: float) -> int:
         """Number of impacts before a time."""
