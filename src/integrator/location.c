@@ -462,8 +462,8 @@ static enum status search_model_in(struct location *location, double begin, doub
 /* ---- Steps ---------------------------------------------------------------------------------- */
 
 /* True if the polynomial will do for an indicator that is z at the end of the step: its error, by
- * its last terms and what the sum misses, is small, or it stays above 0 by far more. In that case
- * c[0] is lowered, so that later proofs hold. */
+ * its last terms and what the sum misses, is small, or the first fall is known in spite of it. If
+ * the polynomial stays above 0 by far more, c[0] is lowered, so that later proofs hold. */
 static bool make_represent(double c[], int degree, double z, double relative_tolerance) {
     double sum = 0.0;
     double size = 0.0;
@@ -476,8 +476,16 @@ static bool make_represent(double c[], int degree, double z, double relative_tol
     if (!isfinite(size) || error <= relative_tolerance * size) {
         return isfinite(size);
     }
+    const double begin = c[0];
     c[0] -= far_above * error;
-    return roots_is_above(&(struct roots_polynomial){c, degree, -1.0});
+    const double first = roots_first(&(struct roots_polynomial){c, degree, -1.0});
+    if (first == INFINITY) {
+        return true;
+    }
+    // surely above 0 up to here, and surely below soon after
+    const double soon = first + 0.5 * largest_correction;
+    c[0] = begin;
+    return first > 0.0 && soon < 1.0 && horner(c, degree, soon).value < -far_above * error;
 }
 
 void location_check_rows(struct location *location, const double x[], double relative_tolerance) {
