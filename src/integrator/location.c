@@ -504,26 +504,73 @@ void location_check_rows(struct location *location, const double x[], double rel
 /* Part of a step within which roots of several indicators are one event. */
 static const double same_time = 4.0 * 0x1p-52;
 
-enum status location_search(struct location *location) {
+/* Returns about where an indicator falls, s: by the parabola with the first terms. */
+static double guessed_fall(const struct location *location, size_t i) {
     const struct step_polynomial *step = &location->step;
-    bool needs_model = false;
-    double s = INFINITY; // first event so far: no later one is located
+    const struct indicator *indicator = &location->indicators[i];
+    const bool is_of_state = indicator->kind == INDICATOR_OF_STATE;
+    const double *row = is_of_state ? step->row[indicator->state] : step->indicator_row[i];
+    const double factor = is_of_state ? indicator->factor : 1.0;
+    const double c0 = factor * row[0] + (is_of_state ? indicator->offset : 0.0);
+    const double c1 = factor * row[1];
+    const double c2 = factor * row[2];
+    const double square = c1 * c1 - 4.0 * c0 * c2;
+    if (!(square >= 0.0) || (c1 > 0.0 && c2 >= 0.0)) {
+        return INFINITY;
+    }
+    return c1 > 0.0 ? (c1 + sqrt(square)) / (-2.0 * c2) : 2.0 * c0 / (sqrt(square) - c1);
+}
+
+/* Returns the place in `used` of the indicator that is likely to fall first, of those whose first[]
+ * is 0. */
+static size_t likely_first(const struct location *location) {
+    size_t likely = 0;
+    double soonest = INFINITY;
     for (size_t k = 0; k < location->used_count; k++) {
         const size_t i = location->used[k];
-        const struct indicator *indicator = &location->indicators[i];
-        location->first[i] = INFINITY;
-        if (indicator->kind == INDICATOR_OF_STATE) {
-            if (is_far_above(location, i)) {
-                location->is_armed[i] = true;
-                continue;
-            }
-            location->first[i] = first_of_state(location, i, s + same_time);
-        } else if (location->has_row[i]) {
-            location->first[i] = first_of_model(location, i, s + largest_correction);
-        }
-        s = location->first[i] < s ? location->first[i] : s;
-        needs_model |= indicator->kind == INDICATOR_OF_MODEL && !location->has_row[i];
+        const double guess = location->first[i] == 0.0 ? guessed_fall(location, i) : INFINITY;
+        likely = guess < soonest ? k : likely;
+        soonest = guess < soonest ? guess : soonest;
     }
+    return likely;
+}
+
+/* Searches the polynomials of the indicators whose first[] is 0. Returns the first fall; later ones
+ * are not located. */
+static double search_polynomials(struct location *location) {
+    const bool has_parabola = location->step.degree >= 2 && !location->step.is_from_end;
+    const size_t likely = has_parabola ? likely_first(location) : 0;
+    double s = INFINITY;
+    for (size_t k = 0; k < location->used_count; k++) {
+        const size_t i = location->used[k == 0 ? likely : k <= likely ? k - 1 : k];
+        if (location->first[i] == 0.0) {
+            location->first[i] = location->indicators[i].kind == INDICATOR_OF_STATE
+                                     ? first_of_state(location, i, s + same_time)
+                                     : first_of_model(location, i, s + largest_correction);
+            s = location->first[i] < s ? location->first[i] : s;
+        }
+    }
+    return s;
+}
+
+enum status location_search(struct location *location) {
+    const struct step_polynomial *step = &location->step;
+    bool needs_search = false;
+    bool needs_model = false;
+    for (size_t k = 0; k < location->used_count; k++) {
+        const size_t i = location->used[k];
+        location->first[i] = INFINITY;
+        if (location->indicators[i].kind != INDICATOR_OF_STATE && !location->has_row[i]) {
+            needs_model = true;
+        } else if (location->indicators[i].kind == INDICATOR_OF_STATE &&
+                   is_far_above(location, i)) {
+            location->is_armed[i] = true;
+        } else {
+            location->first[i] = 0.0;
+            needs_search = true;
+        }
+    }
+    double s = needs_search ? search_polynomials(location) : INFINITY;
     if (needs_model && !stay_calm(location)) {
         const enum status status = search_model_in(location, 0.0, fmin(s + same_time, 1.0), 0);
         if (status != STATUS_OK) {
