@@ -73,9 +73,9 @@ static inline bool location_is_active(const struct location *location) {
     return location->indicators != NULL;
 }
 
-/* Drops the rows of location->step that do not represent their indicators up to the relative
- * tolerance: the series may end before an indicator of fast motion has converged. x: the states at
- * the end of the step. */
+/* Drops the rows of location->step that neither represent their indicators up to the relative
+ * tolerance nor show the first fall nearly: the series may end before an indicator of fast motion
+ * has converged. x: the states at the end of the step. */
 NONNULL void location_check_rows(struct location *location, const double x[],
                                  double relative_tolerance);
 
