@@ -23,8 +23,8 @@ bool location_create(const struct ode *ode, const struct integrator_settings *se
     location->x = calloc(4 * states, sizeof *location->x);
     location->z = calloc(count, sizeof *location->z);
     location->has_row = calloc(count, sizeof *location->has_row);
-    location->is_armed = calloc(count, sizeof *location->is_armed);
-    location->noise = calloc(3 * count, sizeof *location->noise);
+    location->is_armed = calloc(2 * count, sizeof *location->is_armed);
+    location->noise = calloc(5 * count, sizeof *location->noise);
     location->triggered = calloc(count, sizeof *location->triggered);
     if (location->rows == NULL || location->step.indicator_row == NULL || location->used == NULL ||
         location->first == NULL || location->samples == NULL || location->x == NULL ||
@@ -35,6 +35,8 @@ bool location_create(const struct ode *ode, const struct integrator_settings *se
     }
     location->touch = location->noise + count;
     location->rounding = location->touch + count;
+    location->kept = location->rounding + count;
+    location->kept_armed = location->is_armed + count;
     location->dx = location->x + states;
     location->restart_x = location->dx + states;
     location->way = location->restart_x + states;
@@ -591,6 +593,29 @@ enum status location_search(struct location *location) {
     }
     location->time = s == 1.0 ? step->end : step->begin + s * (step->end - step->begin);
     return STATUS_OK;
+}
+
+enum status location_try(struct location *location) {
+    const size_t count = location->ode->indicator_count;
+    const double calm = location->calm;
+    const double calm_end = location->calm_end;
+    memcpy(location->kept_armed, location->is_armed, count * sizeof *location->is_armed);
+    memcpy(location->kept, location->noise, count * sizeof *location->noise);
+    for (size_t i = 0; location->needs_model && i < count; i++) {
+        location->kept[count + i] = location->samples[i][0];
+    }
+    const enum status status = location_search(location);
+    if (status == STATUS_OK && location->time < INFINITY) {
+        return STATUS_OK;
+    }
+    memcpy(location->is_armed, location->kept_armed, count * sizeof *location->is_armed);
+    memcpy(location->noise, location->kept, count * sizeof *location->noise);
+    for (size_t i = 0; location->needs_model && i < count; i++) {
+        location->samples[i][0] = location->kept[count + i];
+    }
+    location->calm = calm;
+    location->calm_end = calm_end;
+    return status;
 }
 
 enum status location_search_at_rest(struct location *location, const double x[], double t) {

@@ -55,6 +55,8 @@ struct location {
     double calm_end; /* its end, or 0 at a restart: samples[][0] are the indicators there */
     double *first;   /* by indicator: s of its first root in the step */
     double (*samples)[CHEBYSHEV_LENGTH]; /* by indicator */
+    bool *kept_armed;                    /* room of location_try: is_armed */
+    double *kept;                        /* and noise, then the first of the samples */
 };
 
 /* Allocates all memory. Returns false if memory is short: then nothing has to be freed.
@@ -82,6 +84,10 @@ NONNULL void location_check_rows(struct location *location, const double x[],
 /* Searches location->step. If it has an event, writes its time and the indicators that have
  * triggered. */
 MUST_CHECK NONNULL enum status location_search(struct location *location);
+
+/* Does the same if the step has an event. If not, or on failure, it leaves no trace, so that a
+ * better step can be searched. */
+MUST_CHECK NONNULL enum status location_try(struct location *location);
 
 /* Searches the time from 0 to t, over which the states stay at x. */
 MUST_CHECK NONNULL enum status location_search_at_rest(struct location *location, const double x[],

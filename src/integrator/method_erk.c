@@ -52,12 +52,14 @@ struct erk {
 
 /* ---- Observation ---------------------------------------------------------------------------- */
 
-/* Searches the step that has ended at t with the state x and the right-hand side erk->dx. */
-static void search(struct erk *erk, double t, const double x[]) {
+/* Searches the step that has ended at t with the state x and the right-hand side erk->dx.
+ * search_step: location_search or location_try. */
+static void search(struct erk *erk, double t, const double x[],
+                   enum status search_step(struct location *location)) {
     struct location *location = &erk->base.problem->location;
     if (erk->search_status == STATUS_OK) {
         location_write_cubic(location, erk->step_begin, erk->step_x, erk->step_dx, t, x, erk->dx);
-        erk->search_status = location_search(location);
+        erk->search_status = search_step(location);
     }
     erk->is_cut_short = erk->search_status != STATUS_OK || location->time <= erk->end;
 }
@@ -98,7 +100,7 @@ static int observe(sunrealtype t, N_Vector x, void *user_data) {
         } else {
             erk->search_status = problem_rhs(erk->base.problem, t, small_vector_data(x), erk->dx);
         }
-        search(erk, t, small_vector_data(x));
+        search(erk, t, small_vector_data(x), location_search);
         if (!erk->is_cut_short) {
             const size_t size = problem->ode.state_count * sizeof(double);
             erk->step_begin = t;
@@ -314,8 +316,8 @@ static bool foresees_event(struct erk *erk, double t, double x[]) {
 }
 
 /* Makes the advance after an event, or onto one, in one step, without the start of ERKStep, a half
- * of the work. Returns false if ERKStep is to advance: the step is long, or its error above a tenth
- * of the tolerances. */
+ * of the work. Returns false if ERKStep is to advance: the step is long, its error above a tenth of
+ * the tolerances, or the event that was foreseen does not come. */
 static bool leap(struct erk *erk, double t, double x[], struct method_work *work) {
     const struct ARKodeButcherTableMem *of = erk->coefficients;
     const struct problem *problem = erk->base.problem;
@@ -340,8 +342,13 @@ static bool leap(struct erk *erk, double t, double x[], struct method_work *work
     if (!(sum <= 0.01 * (double)n)) {
         return false;
     }
+    search(erk, t, x, problem->continues ? location_search : location_try);
+    if (!problem->continues && !(problem->location.time <= t)) { // without an event ERKStep's bits
+        erk->search_status = STATUS_OK;
+        erk->is_cut_short = false;
+        return false;
+    }
     erk->watched = t;
-    search(erk, t, x);
     *work =
         (struct method_work){.steps = 1, .last_step = length, .last_order = order, .internal = t};
     return true;

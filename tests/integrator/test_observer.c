@@ -20,6 +20,7 @@ static void begin(const struct integrator_start *start_of, double max_step) {
                             .jacobian = circle_jacobian,
                             .series = circle_series,
                             .series_row_count = 2,
+                            .indicator_count = 1,
                             .context = &circle};
     const struct message_sink sink = {.write = count_message};
     circle = (struct circle){.failing_from = INFINITY};
@@ -197,4 +198,32 @@ EACH_METHOD static void test_only_a_point_that_was_passed_is_interpolated(void) 
     ASSERT_OK(advance(next, 100000, &reached, expected));
     TEST_ASSERT_EQUAL_MEMORY(expected, x, sizeof x);
     TEST_ASSERT_FALSE(integrator_interpolate(integrator, 100.0, x));
+}
+
+/* ---- Events that do not come ---------------------------------------------------------------- */
+
+/* The circle falls towards the level of an indicator and turns, just above it or as low as a touch.
+ * With taylor steps are longer where events are searched. */
+EACH_METHOD static void test_an_event_that_does_not_come_changes_no_bit(void) {
+    const bool is_erk = method == INTEGRATOR_ERK;
+    configure_integrator(integrator, method, is_erk ? 1e-3 : 1e-10, 0.0);
+    for (int i = 0; i < 480 && method != INTEGRATOR_TAYLOR; i++) {
+        const double distance = pow(10.0, -3 - i % 12) * (is_erk && i % 24 > 14 ? -1.0 : 1.0);
+        const double before = pow((8.8 + 0.05 * i) * fabs(distance), 0.25); // s, from the turn
+        const double from[2] = {-cos(before), -sin(before)};
+        const struct indicator indicator = {
+            .kind = INDICATOR_OF_STATE, .factor = 1.0, .offset = 1.0 + distance};
+        struct integrator_start on = {.horizon = INFINITY, .first_step = 1.0};
+        double x[2][3][2];
+        double reached;
+        for (int watched = 0; watched < 2; watched++) {
+            ASSERT_OK(integrator_restart(integrator, from, &on));
+            for (int k = 0; k < 3; k++) {
+                ASSERT_OK(advance((1.0 + 0.5 * k) * before, 100000, &reached, x[watched][k]));
+                TEST_ASSERT_NULL(integrator_event(integrator));
+            }
+            on.indicators = &indicator;
+        }
+        TEST_ASSERT_EQUAL_MEMORY(x[0], x[1], sizeof x[0]);
+    }
 }
