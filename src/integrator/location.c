@@ -20,7 +20,7 @@ bool location_create(const struct ode *ode, const struct integrator_settings *se
     location->used = calloc(count, sizeof *location->used);
     location->first = calloc(count, sizeof *location->first);
     location->samples = calloc(count, sizeof *location->samples);
-    location->x = calloc(4 * states, sizeof *location->x);
+    location->x = calloc(3 * states, sizeof *location->x);
     location->z = calloc(count, sizeof *location->z);
     location->has_row = calloc(count, sizeof *location->has_row);
     location->is_armed = calloc(2 * count, sizeof *location->is_armed);
@@ -39,7 +39,6 @@ bool location_create(const struct ode *ode, const struct integrator_settings *se
     location->kept_armed = location->is_armed + count;
     location->dx = location->x + states;
     location->restart_x = location->dx + states;
-    location->way = location->restart_x + states;
     return true;
 }
 
@@ -198,10 +197,7 @@ static bool is_far_above(const struct location *location, size_t i) {
     const struct indicator *indicator = &location->indicators[i];
     const double value = indicator->offset + indicator->factor * step->row[indicator->state][0];
     const double noise = location->is_armed[i] ? 0.0 : location->noise[i];
-    double way = location->way[indicator->state];
-    if (step->row != location->way_row || step->degree != location->way_degree || way < 0.0) {
-        way = location_way(step->row[indicator->state], step->degree);
-    }
+    const double way = location_way(step->row[indicator->state], step->degree);
     const double slack = 0x1p-40; // far above all rounding here and in Horner's scheme
     return (1.0 - slack) * value > (1.0 + slack) * fabs(indicator->factor) * way + noise;
 }

@@ -45,10 +45,6 @@ struct location {
     double *x;                     /* states at one point */
     double *dx;                    /* room for states at another point */
     double *restart_x;             /* states at the restart */
-    double *way;                   /* location_way of the states, below 0 if not known; only if
-                                      step.row and step.degree are these: */
-    double (*way_row)[SERIES_LENGTH];
-    int way_degree;
     double *z;       /* indicators at one point */
     double calm;     /* length of the last step if interpolated indicators hardly moved in it, s;
                         otherwise 0 */

@@ -174,17 +174,13 @@ static double step_within_reach(struct taylor *taylor, const double x[], double 
     struct location *location = &series->problem->location;
     double *reach = location->dx;
     ode->reach(x, reach, ode->context);
-    location->way_row = series->row;
-    location->way_degree = series->order;
     double within = step;
     for (size_t i = 0; i < ode->state_count; i++) {
         // up to one time scale, with room for rounding
-        location->way[i] = -1.0;
         if (reach[i] == INFINITY) {
             continue;
         }
-        location->way[i] = location_way(series->row[i], series->order);
-        if (step <= 1.0 && 1.001 * location->way[i] < reach[i]) {
+        if (step <= 1.0 && 1.001 * location_way(series->row[i], series->order) < reach[i]) {
             continue;
         }
         double way = 0.0;
