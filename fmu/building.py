@@ -141,6 +141,7 @@ class Runtime:
         """Compile source files in the folder `work`; return their objects."""
         # what warnings are about, the user has not written
         options = [o for o in self.content["options"] if o and not o.startswith("-W")]
+        options = [str(self.folder / o) if o.endswith(".h") else o for o in options]
         folders = [f"-I{path}" for path in self.paths(self.content["include"])]
         objects = []
         for source in sources:

@@ -1,24 +1,29 @@
 """The archives of a release as an installed package has them: in pieces, each once.
 
 FMUs share most of their sources, and systems contain FMUs: archives are cut where the files in them
-begin, and those of stored archives in them. `rparm.shipped` puts them together again.
+and their contents begin, and those of stored archives in them. `rparm.shipped` joins them again.
 """
 
 import hashlib
+import io
 import json
 import lzma
+import struct
 import zipfile
 from itertools import pairwise
 from pathlib import Path
 from typing import IO
 
 VERSIONS = {"2.0": "", "3.0": "fmi3"}  # of FMI, with the folder of the release
+BETWEEN = b"PK"  # begins all that zip writes in front of contents and behind them
 
 
 def write_pieces(release: Path, folder: Path) -> None:
     """Write `pieces` and `files.json.xz`: the bytes of all FMUs and systems, each piece once."""
-    places: dict[bytes, tuple[int, int]] = {}
+    numbers: dict[bytes, int] = {}
+    places = []
     files: dict[str, dict[str, object]] = {}
+    between = io.BytesIO()
     with (folder / "pieces").open("wb") as stored:
         for version, below in VERSIONS.items():
             archives = (release / below).iterdir()
@@ -26,15 +31,18 @@ def write_pieces(release: Path, folder: Path) -> None:
                 content = path.read_bytes()
                 pieces = []
                 cuts = sorted({0, *_beginnings(path, 0, content), len(content)})
-                for first, last in pairwise(cuts):
-                    piece = content[first:last]
-                    if piece not in places:
-                        places[piece] = (stored.tell(), len(piece))
-                        stored.write(piece)
-                    pieces.append(places[piece])
+                for begin, end in pairwise(cuts):
+                    piece = content[begin:end]
+                    if piece not in numbers:
+                        first = between.tell() if piece.startswith(BETWEEN) else ~stored.tell()
+                        numbers[piece] = len(places)
+                        places.append((first, len(piece)))
+                        (stored if first < 0 else between).write(piece)
+                    pieces.append(numbers[piece])
                 digest = hashlib.sha256(content).hexdigest()
                 files[f"{version}/{path.name}"] = {"sha256": digest, "pieces": pieces}
-    (folder / "files.json.xz").write_bytes(lzma.compress(json.dumps(files).encode()))
+    listed = {"files": files, "places": places, "between": between.getvalue().hex()}
+    (folder / "files.json.xz").write_bytes(lzma.compress(json.dumps(listed).encode()))
     if not files:
         raise FileNotFoundError(f"{release}: has no FMU")
 
@@ -44,10 +52,11 @@ def _beginnings(archive: Path | IO[bytes], offset: int, content: bytes) -> list[
     cuts = []
     with zipfile.ZipFile(archive) as opened:
         for entry in opened.infolist():
-            cuts.append(offset + entry.header_offset)
+            head = offset + entry.header_offset
+            name, extra = struct.unpack_from("<HH", content, head + 26)
+            cuts += [head, head + 30 + name + extra]
             if entry.compress_type == zipfile.ZIP_STORED and entry.filename.endswith(".fmu"):
-                first = content.index(b"PK\x03\x04", offset + entry.header_offset + 4)
                 with opened.open(entry) as inner:
-                    cuts += _beginnings(inner, first, content)
+                    cuts += _beginnings(inner, cuts[-1], content)
         cuts.append(offset + opened.start_dir)
     return cuts

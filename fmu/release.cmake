@@ -125,7 +125,7 @@ function(add_release)
   set(page ${PROJECT_BINARY_DIR}/playground/index.html)
   add_custom_command(
     OUTPUT ${built}
-    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/built.py ${platform_builds}
+    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/built.py ${platform_builds} ${PROJECT_BINARY_DIR}/platforms/wasm32-wasi
             --page ${page} --output ${built}
     DEPENDS ${platform_targets} ${libraries} ${platform_provers} playground ${page}
             ${FMU_SOURCE_DIR}/built.py ${FMU_SOURCE_DIR}/source_code.py

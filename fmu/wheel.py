@@ -32,6 +32,8 @@ OF_FMU += ("src/instance/*.toml",)
 OF_RELEASES = ("bill_of_materials", "built", "derive", "pieces", "references", "wheel")
 OF_RELEASES += ("blocks", "derived")  # of plain_c: they write C of models
 FOR_TESTS = ("_in", "sampled", "tightest")  # ends of names of tables that no command reads
+FOR_TESTS += ("heavy_payload/monolithic", "heavy_payload_integral/monolithic")
+FOR_TESTS += ("horizontal_plane/monolithic", "limited_effort/monolithic")
 
 
 class CustomBuildHook(BuildHookInterface):
@@ -73,7 +75,7 @@ class CustomBuildHook(BuildHookInterface):
 def _is_used(file: Path) -> bool:
     """Whether a file of a model is of use where there are no tests and no references are made."""
     makes_references = file.suffix == ".py" and file.parent.name == "references"
-    only_tested = file.suffix == ".csv" and file.stem.endswith(FOR_TESTS)
+    only_tested = file.suffix == ".csv" and file.with_suffix("").as_posix().endswith(FOR_TESTS)
     return file.suffix in OF_MODELS and not makes_references and not only_tested
 
 

@@ -55,6 +55,7 @@ START = "start.toml"
 STUDY = "study"  # the module of a system's folder that rparm.systems.comparison describes
 IDENTIFICATION = "identification"  # module of a system's folder, read by identification.request
 ANIMATION = "animation"  # the module of a model's or system's folder for rparm.report.motion
+WEB = "wasm32-wasi"  # platform of FMUs for browsers
 PROOF = "proof"  # folder of a model with the program that encloses its motions
 SCENARIO_FOLDERS = ("scenarios", "convergence")
 BUILD_FOLDERS = {"2.0": "build", "3.0": "build/fmi3"}  # by version of FMI
@@ -291,16 +292,13 @@ def model_builder() -> Path:
 def runtimes(all_platforms: bool, web: bool = False) -> list[Path]:
     """Return the runtimes to link models with, here or on all platforms; UserError if not there."""
     if all_platforms:
-        return sorted(built_for_all().glob("*.json"))
-    if web:
-        runtime = ROOT / "build" / "platforms" / "wasm32-wasi" / "runtime" / "runtime.json"
-        way_out = "./run.sh playground makes it"
-        if INSTALLED:
-            need = "a checkout of the project: ./run.sh playground, ./run.sh build --web FILE.toml"
-            raise UserError(f"--web: needs what is not in this package, {need}")
-    elif INSTALLED:
-        runtime = built_for_all() / f"{platform_name()}.json"
+        return sorted(path for path in built_for_all().glob("*.json") if path.stem != WEB)
+    if INSTALLED:
+        runtime = built_for_all() / f"{WEB if web else platform_name()}.json"
         way_out = f"{PROGRAM} build --platforms builds for others"
+    elif web:
+        runtime = ROOT / "build" / "platforms" / WEB / "runtime" / "runtime.json"
+        way_out = "./run.sh playground makes it"
     else:
         runtime, way_out = ROOT / "build" / "runtime" / "runtime.json", f"{PROGRAM} build makes it"
     if not runtime.is_file():

@@ -3,9 +3,10 @@
 It has the bytes of FMUs and systems in pieces, each once: FMUs share most of their sources, and
 systems contain FMUs. The files keep every byte of the release.
 
-share/pieces         all pieces
-share/files.json.xz  by the name of a file, VERSION OF FMI/NAME: its SHA-256, and its pieces as
-                     [first byte, number of bytes]
+share/pieces         contents of files in archives, as they are compressed there
+share/files.json.xz  "files": by VERSION OF FMI/NAME its SHA-256 and the numbers of its pieces;
+                     "places": the first byte of each piece, in `pieces` if negative (~first),
+                     else in "between", and its length
 share/built.tar.xz   all else that is built for each platform (fmu/built.py)
 """
 
@@ -16,6 +17,7 @@ import json
 import lzma
 import tarfile
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from rparm.errors import UserError, reason
 from rparm.files import whole
@@ -28,12 +30,12 @@ BUILT = SHARE / "built.tar.xz"
 
 def names() -> list[str]:
     """Return all files, as VERSION OF FMI/NAME."""
-    return list(_files())
+    return list(_listed()["files"])
 
 
 def file(name: str, cache: Path) -> Path:
     """Return a file of the release in `cache`; UserError if it cannot be written or is damaged."""
-    entry = _files()[name]
+    entry = _listed()["files"][name]
     path = cache / entry["sha256"][:16] / PurePosixPath(name).name
     try:
         if path.is_file() and _digest(path.read_bytes()) == entry["sha256"]:
@@ -82,19 +84,23 @@ def _write(path: Path, content: bytes, is_program: bool = False) -> None:
 
 
 @functools.cache
-def _files() -> dict[str, dict]:
+def _listed() -> dict[str, Any]:
     try:
         return json.loads(lzma.decompress(FILES.read_bytes()))
     except (OSError, lzma.LZMAError, ValueError) as error:
         raise UserError(f"{FILES}: damaged, install rparm again: {error}") from error
 
 
-def _joined(pieces: list[list[int]]) -> bytes:
+def _joined(pieces: list[int]) -> bytes:
     content = bytearray()
     try:
-        with PIECES.open("rb") as file:
-            for first, length in pieces:
-                file.seek(first)
+        with (
+            PIECES.open("rb") as stored,
+            io.BytesIO(bytes.fromhex(_listed()["between"])) as between,
+        ):
+            for first, length in map(_listed()["places"].__getitem__, pieces):
+                file = stored if first < 0 else between
+                file.seek(~first if first < 0 else first)
                 content += file.read(length)
     except OSError as error:
         raise UserError(f"{PIECES}: cannot be read: {reason(error)}") from error

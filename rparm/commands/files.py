@@ -289,7 +289,7 @@ def add_build_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("file", metavar="FILE.toml", type=Path, help="the file with the equations")
     add_flag(parser, "--platforms", "for all platforms, by zig, not for this machine")
-    add_flag(parser, "--web", "as WebAssembly, by zig, to drop on the playground; in a checkout")
+    add_flag(parser, "--web", "as WebAssembly, by zig, to drop on the playground")
     add_output(parser, "folder for the FMUs (default: the current one)")
 
 

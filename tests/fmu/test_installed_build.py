@@ -138,6 +138,15 @@ def test_builds_at_once_give_the_same_bytes(
     assert {path.name for path in output.rglob("*")} == {f"{NAME}.fmu", "fmi3"}
 
 
+def test_a_module_for_the_web_is_that_of_the_checkout(
+    installed: Installed, model: Path, tmp_path: Path
+) -> None:
+    entry = f"binaries/{project.WEB}/{NAME}.wasm"
+    made = zipfile.ZipFile(built(installed, model, tmp_path / "installed", "--web"))
+    expected = zipfile.ZipFile(rparm.build(model, output=tmp_path / "checkout", web=True)[0])
+    assert made.read(entry) == expected.read(entry)
+
+
 def test_what_cannot_be_written_is_one_line_and_leaves_nothing(
     installed: Installed, model: Path, tmp_path: Path
 ) -> None:
@@ -171,8 +180,6 @@ def test_what_is_not_installed_is_named(
     monkeypatch.setattr(project, "find_spec", lambda name: None if name == "pydantic" else True)
     with pytest.raises(UserError, match=r'^pydantic: not installed, pip install "rparm\[build\]"'):
         rparm.build(model)
-    with pytest.raises(UserError, match=r"^--web: needs .* checkout .*: \./run\.sh playground, "):
-        project.runtimes(False, web=True)
 
 
 # ---- The programs that prove ---------------------------------------------------------------------

@@ -38,9 +38,9 @@ def release(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     write_pieces(folder, share)
     monkeypatch.setattr(shipped, "PIECES", share / "pieces")
     monkeypatch.setattr(shipped, "FILES", share / "files.json.xz")
-    shipped._files.cache_clear()
+    shipped._listed.cache_clear()
     yield folder
-    shipped._files.cache_clear()
+    shipped._listed.cache_clear()
 
 
 def original(release: Path, name: str) -> bytes:
@@ -87,7 +87,7 @@ def test_a_damaged_package_is_named(release: Path, tmp_path: Path) -> None:
     with pytest.raises(UserError, match="pieces: cannot be read: No such file"):
         shipped.file("2.0/A.fmu", tmp_path / "other")
     shipped.FILES.write_text("{")
-    shipped._files.cache_clear()
+    shipped._listed.cache_clear()
     with pytest.raises(UserError, match="files.json.xz: damaged"):
         shipped.names()
 
