@@ -3,7 +3,7 @@
 #
 #   ./test.sh               optimized, C and Python, and C with gcc's sanitizers
 #   ./test.sh --all         then slow tests, clang's warnings, threads, analysers, other platforms, other importers, browsers
-#   ./test.sh --long        all, then C tests by clang, on Arm and in valgrind, fuzzing, mutants and long campaigns: two hours, with a list of figures
+#   ./test.sh --long        all, then C tests by clang, on Arm and in valgrind, fuzzing, mutants and long campaigns: several hours, with a list of figures
 #   ./test.sh ARGUMENTS     optimized only; of all tests those that ctest chooses by ARGUMENTS: ./test.sh -R instance
 #
 # Each installs what it needs. Tests for which something is missing nevertheless are skipped and named; in CI they fail.

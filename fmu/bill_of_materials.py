@@ -25,7 +25,7 @@ BILL = "sbom.cdx.json"
 
 
 def part(text: str) -> Component:
-    """What is compiled into all of them, from NAME,VERSION,LICENSE,ADDRESS; licenses as in SPDX."""
+    """Read a part of all files from NAME,VERSION,LICENSE,ADDRESS; the license is as in SPDX."""
     try:
         name, version, license_id, address = text.split(",")
     except ValueError:

@@ -93,7 +93,7 @@ def value_attributes(variable: Variable) -> dict[str, str]:
 
 
 def add_log_categories(root: ET.Element, prefix: str) -> None:
-    """Write LogCategories; the prefix is that of the version's constants."""
+    """Write LogCategories; the version's constants begin with `prefix`."""
     categories = ET.SubElement(root, "LogCategories")
     for name, description in LOG_CATEGORIES.items():
         text = description.format(prefix=prefix)

@@ -72,7 +72,7 @@ def mathml(latex: str, display: str) -> str:
 
 
 def check(element: ET.Element) -> None:
-    """Refuse what is left over from LaTeX that the converter did not understand."""
+    """Refuse LaTeX that the converter did not understand."""
     text = element.text or ""
     if element.tag == "mi" and text.startswith("\\"):
         raise FormulaError(f"{text} is unknown")

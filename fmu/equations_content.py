@@ -213,7 +213,7 @@ class ModelFile:
                 raise ModelFileError(f"{error}{instead_of(text)}") from None
             nodes = in_order([tree])
             self.operations += len(nodes)
-            always = [tree]  # what is calculated whatever holds; a branch need not have a value
+            always = [tree]  # calculated in any case; a branch need not have a value
             for node in always:
                 always += node.arguments[:1] if node.op == "if" else node.arguments
                 if node.op == "/" and (by := node.arguments[1]).op == "number" and by.value == 0:
@@ -290,6 +290,6 @@ def placed(*place: object) -> Iterator[None]:
 
 
 def instead_of(text: str) -> str:
-    """Propose a replacement of what is not supported, or nothing."""
+    """Propose a replacement for an unsupported word, or nothing."""
     found = [sentence for pattern, sentence in INSTEAD.items() if re.search(pattern, text)]
     return f"; {found[0]}" if found else ""

@@ -54,7 +54,7 @@ def main() -> int:
 
 
 def _warnings(file: ModelFile) -> Iterator[str]:
-    """Yield what is allowed, but will hardly be meant."""
+    """Yield warnings: allowed, but hardly meant."""
     yield from file.code.warnings if file.code else ()
     for state in file.of("states"):
         start, nominal = abs(state.start or 0.0), state.nominal or 1.0

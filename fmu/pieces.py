@@ -48,7 +48,7 @@ def write_pieces(release: Path, folder: Path) -> None:
 
 
 def _beginnings(archive: Path | IO[bytes], offset: int, content: bytes) -> list[int]:
-    """Return where files of an archive begin, and those of stored archives in it."""
+    """Return where files of an archive begin, and files of stored archives in it."""
     cuts = []
     with zipfile.ZipFile(archive) as opened:
         for entry in opened.infolist():

@@ -2,7 +2,7 @@
  * the series hold its states and, of each equation, the factors and intermediate results.
  *
  * A jet is the array of the coefficients of a quantity. Each function gives coefficient k of a
- * result. A sum, a difference or a multiple needs no function: it is that of the coefficients.
+ * result. A sum, a difference or a multiple needs no function: take it of each coefficient.
  * Griewank and Walther, Evaluating Derivatives (2nd edition, SIAM 2008), section 13.2, have the
  * recurrences of quotients and functions. */
 #pragma once

@@ -87,7 +87,7 @@ class Table(Mapping[str, np.ndarray]):
         return pandas.DataFrame(dict(self))
 
     def plot(self, *names: str, output: str | Path | None = None, show: bool = True) -> Path:
-        """Plot columns over the time on a page, those of one unit together; return its path.
+        """Plot columns over time on a page, a diagram for each unit; return its path.
 
         Parameters
         ----------

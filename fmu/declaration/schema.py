@@ -87,7 +87,7 @@ INITIALS = {
 
 
 def identifier(text: str) -> str:
-    """Refuse what is not a C identifier."""
+    """Refuse a text that is no C identifier."""
     if not re.fullmatch("[A-Za-z_][A-Za-z0-9_]*", text):
         raise ValueError("must be a C identifier")
     return text
@@ -402,7 +402,7 @@ class Include(Table):
 
 
 class Change(Table):
-    """What is other here than in the file that declares a variable."""
+    """Changes of a variable that another file declares."""
 
     description: str = ""
     reinit: bool = False

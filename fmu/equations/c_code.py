@@ -15,7 +15,7 @@ from equations_tables import Table
 from equations.graph import CONDITIONS, LEAVES, MOST_COUNTED, Value
 from rparm.expressions.expression import RELATIONS, in_order, written
 
-# what a formula of C is made of; that of a function is its call
+# operations as C writes them; a function is written as its call
 FORMULAS = {op: f"{{}} {op} {{}}" for op in ("+", "-", "*", "/", "==", *RELATIONS)}
 FORMULAS |= {"and": "{} && {}", "or": "{} || {}", "not": "!{}"}
 FORMULAS |= {"negative": "-{}", "if": "{} ? {} : {}"}
@@ -160,7 +160,7 @@ def indented(lines: list[str]) -> list[str]:
 
 
 def filled(template: str, **parts: object) -> str:
-    """Text of a file of this folder; a line that is only $NAME becomes those of that part."""
+    """Text of a file of this folder; a line that is only $NAME becomes the lines of that part."""
 
     def filled_in(found: re.Match[str]) -> str:
         indent, lines, within = found.groups()

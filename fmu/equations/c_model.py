@@ -258,7 +258,7 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, Any]:
 
 
 def _at_start(file: ModelFile, structure: str, derivatives: Mapping[str, Value]) -> list[str]:
-    """Add derivatives of start values to those of the states, until the initialization ends."""
+    """Add derivatives of start values to the states' derivatives, until the initialization ends."""
     derivatives = {to: d for to, d in derivatives.items() if not is_number(d, 0.0)}
     if not derivatives:
         return []

@@ -120,7 +120,7 @@ class Types:
 
 @dataclass
 class State:
-    """What variables hold on a path, and what is known on it."""
+    """Values of the variables on a path, and facts known there."""
 
     memory: dict[Address, Any] = field(default_factory=dict)
     known: Known = field(default_factory=Known)

@@ -175,7 +175,7 @@ def exact_least_damping(
 MASS = 1.0  # kg, of link 2
 STEP = 1e-3  # s
 STEPS = 200
-IGNORED = 20  # first points, before the motion is that of the slowest eigenvalues
+IGNORED = 20  # first points, where faster eigenvalues still count
 PUSH = 0.05  # N
 FAR = 50.0  # m, to where the controller wants the slide
 MOVED = 2e-7  # m, out of equilibrium

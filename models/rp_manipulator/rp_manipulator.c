@@ -4,19 +4,8 @@
 
 #include <stdio.h>
 
-static bool is_valid(const struct rp_parameters *p) {
-    const double not_negative[] = {p->m1, p->I1z, p->I2z, p->l1, p->lc1};
-    for (size_t i = 0; i < sizeof not_negative / sizeof not_negative[0]; i++) {
-        if (!isfinite(not_negative[i]) || not_negative[i] < 0.0) {
-            return false;
-        }
-    }
-    return isfinite(p->m2) && p->m2 > 0.0 && isfinite(p->a) && isfinite(p->g) &&
-           arm_fixed_inertia(p) > 0.0;
-}
-
 bool rp_parameters_check(const struct rp_parameters *p, char *text, size_t size) {
-    if (is_valid(p)) {
+    if (arm_fixed_inertia(p) > 0.0) {
         return true;
     }
     (void)snprintf(text, size,

@@ -30,9 +30,9 @@ struct rp_parameters {
     double g;   /* m/s2: gravitational acceleration along -y0; 0 is the horizontal plane */
 };
 
-/* True where the equations have a solution: every parameter finite and within the range stated in
- * struct rp_parameters, and m1 lc1^2 + I1z + I2z > 0, without which link 2 at L = 0 leaves joint 1
- * without inertia. False: why is in text, for parameters in their ranges. */
+/* True where the equations have a solution, for parameters in the ranges of struct rp_parameters:
+ * m1 lc1^2 + I1z + I2z > 0, without which link 2 at L = 0 leaves joint 1 without inertia. False:
+ * why is in text. */
 bool rp_parameters_check(const struct rp_parameters *p, char *text, size_t size);
 
 /* Force and moment that each link receives through its joint, in the frame of the link. */

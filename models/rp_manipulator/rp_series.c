@@ -56,7 +56,7 @@ static void begin(const struct rp_parameters *p, double row[][SERIES_LENGTH]) {
     row[C][0] = cos(row[Q1][0]);
 }
 
-/* Right sides of order n that the efforts give: those of N' and y'. */
+/* Right sides of N' and y' of order n that the efforts give. */
 ALWAYS_INLINE void efforts(const struct series_origin *origin, const struct rp_parameters *p,
                            const double friction[2], int n, double effort[2]) {
     effort[0] = 0.0;

@@ -32,7 +32,7 @@ struct rp_plant_values {
     double ee_angle;           /* rad, of the slide z2 from x0 */
     double ee_rate;            /* rad/s */
     double kinetic_energy;     /* J: energies include armature and an attached payload */
-    double potential_energy;   /* with that of compliant stops */
+    double potential_energy;   /* with compliant stops */
     double total_energy;
     double actuator_power; /* W */
     double D[2][2];        /* with armature and an attached payload */

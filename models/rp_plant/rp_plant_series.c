@@ -73,7 +73,7 @@ struct series_motion {
 
 _Static_assert(X == (int)RP_SERIES_ROWS, "the rows of the manipulator come first");
 
-/* Where q' is so many times vs, friction is that of a fast joint: exp(-36) of the difference is
+/* Where q' is so many times vs, friction is as of a fast joint: exp(-36) of the difference is
  * left. */
 static const double fast = 6.0;
 
@@ -207,7 +207,7 @@ static bool has_payload(const struct series_motion *m) {
            (m->p->payload_mass > 0.0 || m->p->payload_inertia > 0.0);
 }
 
-/* The motion is that of the manipulator, up to constant friction. */
+/* True if the manipulator moves alike, up to constant friction. */
 static bool is_plain(const struct series_motion *m) {
     const struct rp_plant_parameters *p = m->p;
     return !m->depends_on_velocity[0] && !m->depends_on_velocity[1] && !is_stuck(m, 0) &&
@@ -370,7 +370,7 @@ static inline void write_order(const struct series_motion *m, int k, const struc
 
 /* ---- Indicators ----------------------------------------------------------------------------- */
 
-/* With both sides in use; those of other joints are not of the model. */
+/* Of joints that stick, with both sides in use; others have no indicator of the model. */
 static void write_indicators(const struct series_motion *m, int k, const struct next *next,
                              double row[][SERIES_LENGTH]) {
     const double rate = (k + 1) / m->origin->time_scale;
@@ -455,7 +455,7 @@ void rp_plant_reach(const void *values_pointer, const double x[], double reach[]
     }
 }
 
-/* 0: one that is never of the model. */
+/* 0: never an indicator of the model. */
 static const size_t row_of_indicator[RP_PLANT_INDICATORS] = {
     FORWARD, BACKWARD, 0, 0, FORWARD + 1, BACKWARD + 1, 0, 0, 0, 0,
 };

@@ -39,7 +39,7 @@ static double next_time(const void *values_pointer) {
     return values->start + values->ticks * values->parameters.sample_time;
 }
 
-/* Takes the sample of the start, at the end of the initialization, and that of each tick. */
+/* Takes the sample of the start, at the end of the initialization, and the sample of each tick. */
 static enum status update(void *values_pointer, const struct event *event) {
     struct rp_sensor_values *values = values_pointer;
     const bool is_start = values->ticks == 0.0;

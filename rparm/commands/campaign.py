@@ -63,7 +63,7 @@ def add_campaign_options(parser: argparse.ArgumentParser) -> None:
 
 
 def do_campaign(options: argparse.Namespace) -> Ended:
-    """Run what is missing of the campaign; 0 when all runs are there, failed ones among them."""
+    """Run the missing runs of the campaign; 0 when all are there, failed ones among them."""
     if options.list:
         found = [
             {"name": name, "title": title(path)} for name, path in project.campaign_files().items()

@@ -69,7 +69,7 @@ stop = {stop!r}  # s
 {guesses}
 [inputs]  # other unconnected inputs keep their start values
 {inputs}
-[parameters]  # other values than those of the FMUs, as numbers or with a unit: "12 kg"
+[parameters]  # values other than the FMUs' own, as numbers or with a unit: "12 kg"
 """
 
 

@@ -240,7 +240,7 @@ class _Questions:
 
 
 class Federate:
-    """Process that publishes a vector, and reads those of `sources`, each with its exchange."""
+    """Process that publishes a vector and reads the vectors of `sources`, with their exchanges."""
 
     def __init__(
         self, name: str, address: str, sources: Sequence[str], publishes: bool = True

@@ -42,7 +42,7 @@ SMALLEST_TOLERANCES = {"cvode_adams": 5e-12, "cvode_bdf": 5e-12, "erk": 1e-12, "
 class Variable:
     name: str
     reference: int  # value reference
-    type: str  # Real, Integer, Boolean, String, Enumeration, or one that is neither read nor set
+    type: str  # Real, Integer, Boolean, String, Enumeration; others are neither read nor set
     causality: str
     initial: str | None  # exact, approx or calculated
     unit: str | None

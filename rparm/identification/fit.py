@@ -56,7 +56,7 @@ REJECTED = 0.01  # probability below which residuals are not taken for noise
 # ---- Residuals -----------------------------------------------------------------------------------
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """Residuals of a segment, (rows,), linear in what is changed, at one point."""
+    """Residuals of a segment, (rows,), linear in the changes, at one point."""
 
     residuals: np.ndarray  # (rows,)
     by_states: np.ndarray  # (rows, states), of their scales

@@ -67,7 +67,7 @@ class Study:
 
 
 def study(request: Request) -> Study:
-    """Linearize what is asked for."""
+    """Linearize the FMU or system of a request."""
     path = _path(request)
     if path.suffix.lower() in SUFFIXES:
         with open_system(path, version=request.version) as opened:

@@ -67,7 +67,7 @@ def lay(
         signal = Logged(found.times, columns[curve.name], False, "")
         other = np.where(signal.covers(elapsed), signal.values(elapsed), np.nan)
         left = curve.values - other
-        if is_thinned:  # elsewhere they differ by what is between the rows
+        if is_thinned:  # between its rows the other result is not known
             left = np.interp(elapsed, elapsed[both], left[both]) + 0 * other
         rounding = FILED * max(np.abs(curve.values).max(), SMALLEST_SCALE)
         left = np.where(np.abs(left) < rounding, 0.0, left)

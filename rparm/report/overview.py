@@ -24,7 +24,7 @@ from rparm.report.run_data import LINKS, Plot
 from rparm.units import number
 
 ENTRY = ".entry.json"
-DEEPEST = 4  # folders in which entries are looked for, that of the start page among them
+DEEPEST = 4  # levels of folders that are searched for entries, with the start page's own
 PASSED, FAILED, RAN = "passed", "FAILED", "completed"  # RAN: there was nothing to compare with
 SCENARIOS, STUDIES, SYSTEM, FILES = "scenarios", "studies", "system", "files"
 LINEAR, COUPLING, CAMPAIGNS = "linearize", "coupling", "campaigns"

@@ -44,7 +44,7 @@ class ReportWriter:
     def __init__(
         self, folder: Path, options: str = "", others: Others = MappingProxyType({})
     ) -> None:
-        """`options` are those of the command, for its pages; `others` what to draw over results."""
+        """`options`: the command's, for its pages; `others`: results to draw over the runs."""
         self.folder, self.options, self._others = folder, options, others
         self.files: dict[str, Path] = {}  # pages of users' own files that were written, by name
         self.entries: list[Entry] = []  # of scenarios and files

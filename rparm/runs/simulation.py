@@ -271,7 +271,7 @@ def is_finite_number(given: object) -> bool:
 def times_of(
     usual: Experiment, start: float | None, stop: float | None, step: float | None
 ) -> np.ndarray:
-    """Return communication points in s; what is None is that of the default experiment."""
+    """Return communication points in s; None: as in the default experiment."""
     start = usual.start or 0.0 if start is None else start
     stop = usual.stop if stop is None else stop
     if stop is None:

@@ -15,7 +15,7 @@ SUFFIXES = (LOOP, SSP)
 
 
 def given_file(first: str | None, ssp: Path | None) -> Path | None:
-    """Return the system's file: the first argument, if it names one, or that of --ssp."""
+    """Return the system's file: the first argument, if it names one, or the value of --ssp."""
     if first is None or Path(first).suffix.lower() not in SUFFIXES:
         return ssp
     if ssp:

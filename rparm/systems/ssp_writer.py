@@ -38,7 +38,7 @@ Sets = Mapping[str, Mapping[str, Mapping[str, Value]]]  # by variant, component 
 
 
 def write(path: Path, opened: OpenedSystem) -> dict[str, str]:
-    """Write a system with its FMUs and variants; what its file makes move becomes inputs of it.
+    """Write a system with its FMUs and variants; inputs that move become inputs of the system.
 
     Return what components in Python need to run. Without these the bytes depend only on the
     contents.

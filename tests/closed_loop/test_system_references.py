@@ -145,13 +145,6 @@ def test_energy_changes_by_the_work_of_the_efforts(variant: str) -> None:
         assert np.sum(np.abs(np.diff(energy) - work) > 1e-14) <= 8
 
 
-@pytest.mark.parametrize("variant", ["nominal", "horizontal_plane"])
-def test_matched_computed_torque_tracks_to_rounding(variant: str) -> None:
-    column = monolithic(VARIANTS[variant], np.arange(121) / 20)
-    for name in closed_loop.ERRORS:
-        assert np.max(np.abs(column[f"controller.{name}"])) < 1e-15
-
-
 def test_error_obeys_its_linear_equation() -> None:
     """e'' + Kd e' + Kp e + w = 0, w' = Ki e: by eigenvalues, for a start off the trajectory."""
     gains = {"1": (400.0, 40.0, 500.0), "2": (150.0, 18.0, 0.0)}

@@ -79,15 +79,6 @@ def test_it_runs_from_any_folder(
     np.testing.assert_allclose(table["x"], 2.0 * np.exp(-1.5 * table["time"]), rtol=1e-8)
 
 
-def test_one_of_fmi_3_gives_the_same_bits(scenario: Path, tmp_path: Path) -> None:
-    path = tmp_path / "decay.toml"
-    path.write_text(
-        TEXTS["SCENARIO"].format(fmu=fmu_of(scenario).parent / "fmi3" / "Dahlquist.fmu")
-    )
-    one, other = (rparm.Scenario(file).run() for file in (scenario, path))
-    assert one["x"].tobytes() == other["x"].tobytes()
-
-
 def test_an_fmu_of_another_version_is_refused(
     scenario: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

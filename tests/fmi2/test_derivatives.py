@@ -244,13 +244,3 @@ def test_output_derivatives_with_input_derivatives(
             inputs = {name: at_end[name][0] for name in INPUTS}
             rates = [[at_end[name][k] for name in INPUTS] for k in (1, 2)]
             assert_output_derivatives(instance, model, inputs, rates)
-
-
-@each_seed
-def test_input_derivatives_apply_to_one_step(loaded: LoadedFmu, model: Model, seed: int) -> None:
-    with in_initialization_mode(loaded, seed) as instance:
-        instance.fmi.exitInitializationMode()
-        instance.set_input_derivatives(tau1=(30.0, -400.0), f2=(-20.0, 0.0, 1e4))
-        t = instance.step(0.0, 0.01)
-        t = instance.step(t, 0.01)
-        assert_output_derivatives(instance, model, {}, NO_RATES)

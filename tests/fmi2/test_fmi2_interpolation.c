@@ -167,25 +167,6 @@ static void test_setting_the_value_again_ends_the_polynomial(void) {
                               fmu_get(c, RP_MANIPULATOR_ddq2));
 }
 
-static void test_a_polynomial_that_was_saved_applies_again(void) {
-    const struct fmu_polynomial *force = &fmu_slide_forces[4];
-    const fmi2Component c = fmu_slide(&messages, 0.0);
-    fmi2FMUstate saved = NULL;
-    fmu_slide_begin(c);
-    fmu_set_polynomial(c, RP_MANIPULATOR_f2, force);
-    ASSERT_OK(fmu.GetFMUstate(c, &saved));
-    step(c, 0.0, 0.5);
-    step(c, 0.5, 0.5); // with a constant input
-    ASSERT_OK(fmu.SetFMUstate(c, saved));
-    if (fmu_version == 3) { // asks for it in each step
-        fmu_set_polynomial(c, RP_MANIPULATOR_f2, force);
-    }
-    step(c, 0.0, 0.5);
-    assert_slid(c, force, 0.5, 0.0, 0.0);
-    ASSERT_OK(fmu.FreeFMUstate(c, &saved));
-    fmu_free(c);
-}
-
 /* ---- Arguments that are refused ------------------------------------------------------------- */
 
 static void test_input_derivatives_that_are_refused(void) {

@@ -1,5 +1,5 @@
 /* The parameters of the integrator: solver_method and max_step. That all methods give the same
- * motion: test_solver_methods.py. */
+ * motion: rparm/test_accuracy.py. */
 #include "each_method.h"
 #include "fmu_harness.h"
 

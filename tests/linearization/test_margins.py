@@ -241,25 +241,6 @@ def test_marks_are_the_margins_of_the_table() -> None:
         assert rows[name][1] == f"{crossing / (2 * np.pi):.6g}"
 
 
-def test_minimal_keeps_the_response_and_drops_what_plays_no_part() -> None:
-    source = np.random.default_rng(1)
-    A, B, C = source.normal(size=(4, 4)), source.normal(size=(4, 1)), source.normal(size=(1, 4))
-    whole = np.block([[A, np.zeros((4, 2))], [source.normal(size=(2, 6))]])
-    mixed = source.normal(size=(6, 6))
-    big = linear(
-        mixed @ whole @ np.linalg.inv(mixed),
-        mixed @ np.vstack([B, np.ones((2, 1))]),
-        np.hstack([C, np.zeros((1, 2))]) @ np.linalg.inv(mixed),
-    )
-    small = minimal(big)
-    assert len(small.states) == 4
-    for w in (0.1, 1.0, 10.0):
-        s = 1j * w
-        expected = C @ np.linalg.solve(s * np.eye(4) - A, B)
-        found = small.C @ np.linalg.solve(s * np.eye(4) - small.A, small.B)
-        assert found == pytest.approx(expected, rel=1e-8)
-
-
 # ---- Random loops --------------------------------------------------------------------------------
 
 

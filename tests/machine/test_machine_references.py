@@ -6,7 +6,7 @@ from rparm.models.machine import continuous
 from rparm.models.machine.continuous import VARIANTS
 from rparm.models.machine.experiment import STEPS_PER_SECOND
 from rparm.models.machine.references import make_references
-from rparm.models.machine.references.components import Actuator, Environment, Sensor, Ticks, real
+from rparm.models.machine.references.components import Environment, Sensor, real
 from rparm.models.machine.references.machine import COMPONENTS, completed, declared
 from rparm.models.machine.references.make_references import variants
 from rparm.models.machine.references.monolithic import COLUMNS, monolithic
@@ -63,19 +63,6 @@ def test_unknown_parameters_are_refused() -> None:
         completed({"plant.m3": 1.0})
 
 
-def test_currents_follow_the_step_response() -> None:
-    values = dict(completed({})["actuator"])
-    actuator = Actuator(values)
-    still = {"dq1": 0.0, "dq2": 0.0}
-    inputs = still | {"tau1_cmd": 2.0, "f2_cmd": 1e6}
-    for i in range(5):
-        actuator.step(inputs, real(i) / 1000, real(i + 1) / 1000)
-    reached = 1 - np.exp(-5.0)
-    found = actuator.outputs(still)
-    assert float(found["tau1"]) == pytest.approx(2.0 * reached, rel=1e-14)
-    assert float(found["current2"]) == pytest.approx(values["current_max2"] * reached, rel=1e-14)
-
-
 def test_counts_come_late_and_round_half_up() -> None:
     values = completed({})["sensor"] | {"sample_time": 1.5e-3, "latency": 1}
     values |= {"resolution1": 0.5, "resolution2": 1.0}
@@ -95,12 +82,6 @@ def test_counts_come_late_and_round_half_up() -> None:
     assert [[float(x) for x in s.margins] for s in sensor.samples] == [[0.25, 0.5], [0.25, 0.5]]
     assert [[float(x) for x in s.positions] for s in sensor.samples] == [[0.0, 0.0], [0.5, -1.0]]
     assert [float(s.time) for s in sensor.samples] == [0.0, 0.001]
-
-
-def test_ticks_do_not_drift() -> None:
-    ticks = Ticks(0.1)
-    assert list(ticks.until(real("0.95"))) == list(range(1, 10))
-    assert ticks.time(10) == 10 * real(0.1)
 
 
 def test_the_wall_answers_by_its_law() -> None:

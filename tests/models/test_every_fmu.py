@@ -1,5 +1,6 @@
-"""Promises of every FMU, over all FMUs and their scenarios: scenarios meet their references, fmpy
-runs it, rollback leaves no trace, names have one unit. Dependencies: test_initialization.py."""
+"""Promises of every FMU, over all FMUs and their scenarios: scenarios meet their references, both
+versions have the same bits, fmpy runs it, rollback leaves no trace, names have one unit.
+Dependencies: test_initialization.py."""
 
 import random
 from collections.abc import Iterator
@@ -19,7 +20,7 @@ from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import initialize
 from tests.support.instances import restore, serialized
 from tests.support.paths import EVERY
-from tests.support.rparm_project import FILES, FMUS, NAMES, fmi3_fmu, load, names_of
+from tests.support.rparm_project import FILES, FMUS, NAMES, fmi3_fmu, load, names_of, staircase
 
 each_version = pytest.mark.parametrize("version", ["fmi2", "fmi3"])
 
@@ -174,3 +175,42 @@ def test_a_name_has_one_unit_in_all_fmus(fmu: Path) -> None:
         for v in fmpy.read_model_description(fmu.with_name(f"{name}.fmu")).modelVariables:
             units.setdefault(v.name, set()).add(v.unit)
     assert [name for name, found in units.items() if len(found) > 1] == []
+
+
+# ---- Versions of FMI in Model Exchange -----------------------------------------------------------
+
+
+def float_names(path: Path) -> list[str]:
+    """All floating-point variables."""
+    description = fmpy.read_model_description(path)
+    return [v.name for v in description.modelVariables if v.type in ("Real", "Float64")]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_model_exchange(name: str) -> None:
+    """By fmpy's CVode, over the first steps; fmpy gives no tolerance to the FMU."""
+    path = FMUS[model_folder(FILES[name]).name]
+    scenario = load(name)
+    if any(values.dtype == bool for values in scenario.inputs.values()):
+        pytest.skip("fmpy's CVode sets Booleans in continuous-time mode")
+    points = min(300, len(scenario.times) - 1)
+    stop = float(scenario.times[points])
+    outputs = [n for n in float_names(fmi3_fmu(path)) if n != "effective_relative_tolerance"]
+    results = [
+        fmpy.simulate_fmu(
+            str(fmu),
+            fmi_type="ModelExchange",
+            start_time=scenario.start,
+            stop_time=stop,
+            output_interval=(stop - scenario.start) / 100,
+            start_values=scenario.parameters | scenario.initial,
+            input=staircase(scenario, points),
+            output=outputs,
+            relative_tolerance=scenario.tolerance,
+        )
+        for fmu in (path, fmi3_fmu(path))
+    ]
+    assert len(results[0]) > 100
+    assert results[0].dtype.names == results[1].dtype.names
+    for column in results[0].dtype.names:
+        np.testing.assert_array_equal(results[1][column], results[0][column], err_msg=column)

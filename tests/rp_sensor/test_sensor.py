@@ -187,18 +187,6 @@ def test_parameters_are_fixed(sensor: Fmu, name: str) -> None:
         instance.set(name, declared(MODEL.name).variables[name].start)
 
 
-def test_a_start_that_swallows_the_sample_time(sensor: Fmu) -> None:
-    with started(sensor, start=1e9) as instance:
-        instance.do_step(1e9, 0.0021)
-    with (
-        pytest.raises(UserError, match="sample_time = 0.001 s is refused: at a start"),
-        started(sensor, start=1e10),
-    ):
-        pass
-    with pytest.raises(UserError), started(sensor, start=-1e300, sample_time=1.0):
-        pass
-
-
 # ---- FMI 3.0's event mode ----------------------------------------------------------------------
 
 STILL = {"q1": 0.4, "q2": -0.01}

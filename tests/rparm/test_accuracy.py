@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,11 +15,13 @@ from rparm.report import scenario_page
 from rparm.report.writer import ReportWriter
 from rparm.runs import comparison, simulation
 from rparm.runs.comparison import Reference, Runs, Sweep
+from rparm.runs.scenario import Scenario
 from tests.support.paths import FOLDERS
-from tests.support.rparm_project import LONG, MISTAKES, NAMES, SHORT, load
+from tests.support.rparm_project import LONG, MISTAKES, NAMES, SHORT, load, names_of
 
 # bytes of a report for all scenarios, studies, the overview, scripts and styles
 OF_SCENARIOS = 8_000_000
+OTHER_METHODS = (2, 3, 4)  # than cvode_adams
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +39,12 @@ def runs(opened: Fmu) -> Iterator[Runs]:
 @pytest.fixture(scope="module")
 def sweeps(runs: Runs) -> dict[str, Sweep]:
     return {name: comparison.sweep(runs, load(name)) for name in NAMES}
+
+
+def changed(fmu: Fmu, name: str, **parameters: float) -> tuple[Runs, Scenario]:
+    """A scenario of the arm with further parameters, and runs of its own: they go by names."""
+    found = load(name)
+    return Runs({found.model: fmu}), replace(found, parameters=found.parameters | parameters)
 
 
 # ---- error measure and bounds
@@ -100,6 +109,23 @@ def test_error_follows_the_tolerance(sweeps: dict[str, Sweep], name: str) -> Non
     swept = sweeps[name]
     assert swept.tolerances == (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
     assert swept.violations == []
+
+
+@pytest.mark.parametrize("method", OTHER_METHODS)
+@pytest.mark.parametrize("name", names_of("rp_manipulator"))
+def test_errors_of_the_other_methods_stay_within_the_same_bounds(
+    opened: Fmu, name: str, method: int
+) -> None:
+    assert comparison.sweep(*changed(opened, name, solver_method=method)).violations == []
+
+
+@pytest.mark.parametrize("method", [1, *OTHER_METHODS])
+def test_a_limit_of_the_step_keeps_the_bounds(opened: Fmu, method: int) -> None:
+    runs, limited = changed(opened, "constant_effort", solver_method=method, max_step=1e-3)
+    for tolerance in comparison.TOLERANCES:
+        run = runs.run(limited, tolerance)
+        assert run.passed, run.worst
+        assert run.result.solver_steps >= 5000  # 5 s
 
 
 def test_nothing_runs_twice(

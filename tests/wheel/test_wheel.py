@@ -91,33 +91,6 @@ def test_an_integer_counts_while_a_boolean_input_says_so(version: str, kind: str
     assert result["is_turning"][1:].all()
 
 
-@both_versions
-def test_indicators_in_an_integrator_that_looks_for_roots(version: str) -> None:
-    result = fmpy.simulate_fmu(
-        str(FMUS[version]),
-        fmi_type="ModelExchange",
-        stop_time=2.0,
-        output_interval=0.5,
-        start_values={"stop": 20.0, "is_counting": False},
-        input=np.array([(0.0, SPEED)], dtype=[("time", float), ("speed", float)]),
-        output=["angle", "to_stop", "push", "turns"],
-    )
-    np.testing.assert_allclose(result["angle"], SPEED * result["time"], rtol=0, atol=1e-9)
-    np.testing.assert_allclose(result["to_stop"], 20.0 - result["angle"], rtol=0, atol=1e-11)
-    assert set(result["push"]) == {1.0} and set(result["turns"]) == {0}
-
-
-@both_versions
-def test_a_boolean_parameter(version: str) -> None:
-    result = fmpy.simulate_fmu(
-        str(FMUS[version]),
-        stop_time=1.0,
-        start_values={"angle": 20.0, "is_reversed": True},
-        output=["turns"],
-    )
-    assert set(result["turns"]) == {-3}
-
-
 def test_early_return_is_announced_with_events_only(fmu: Path) -> None:
     flags = {}
     for path in FMUS["fmi3"], fmu.parent / "fmi3" / fmu.name:

@@ -202,7 +202,7 @@ def _segments(motion: str, number: Mapping[str, np.floating], real: type) -> np.
     else:
         ramp = number["trajectory.ramp_time"]
         moved = number["trajectory.turns"] / abs(number["trajectory.frequency"])
-        # integral of s over the ramp, and that of 1 - s, which begins and ends like it
+        # integral of s over the ramp; the integral of 1 - s begins and ends like it
         blend = np.array([0, 0, 0, 0, 2.5, -3, 1], real) / ramp ** np.arange(-1, 6)
         line = np.array([0, 1, 0, 0, 0, 0, 0], real)
         offset = np.array([1, 0, 0, 0, 0, 0, 0], real)

@@ -36,7 +36,7 @@ struct jet {
     struct ball of[1 + VARIABLES];
 };
 
-/* Coefficients of order k are those of t^k times (the step)^k. */
+/* Coefficients of t^k, times (the step)^k. */
 struct arm_series {
     int directions;
     struct ball row[ARM_ROWS][1 + VARIABLES][ORDERS]; /* the states, then what they determine */

@@ -32,7 +32,7 @@ void rp_plant_begin_contacts(const struct rp_plant_parameters *p, const double q
                              const double dq[2], const struct rp_plant_inputs *inputs,
                              struct rp_plant_modes *modes);
 
-/* Whether the contact can be that of a joint in this state. */
+/* True if a joint in this state can have the contact. */
 bool rp_plant_contact_fits(const struct rp_plant_parameters *p, int joint, double q, double dq,
                            int contact);
 

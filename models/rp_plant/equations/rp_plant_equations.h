@@ -89,7 +89,7 @@ static inline real plant_stribeck_decay(real w) {
     return x < -750.0 ? 0.0 : exp(x);
 }
 
-/* What is added to e where a joint has turned back, up to the event that ends its mode, w = v / vs:
+/* Added to e where a joint has turned back, up to the event that ends its mode, w = v / vs:
  * 0 at v = 0 with seven derivatives. Otherwise an internal step from a fast motion forward to one
  * backward would find Fc at both ends, and no trace of what lies between. */
 static inline real plant_turned_back(real w) {

@@ -107,7 +107,7 @@ def _dry_friction(s: dict[str, sp.Symbol], joint: int, rate: sp.Expr) -> tuple[s
 
 
 def prepared(values: dict[str, float]) -> dict[str, float]:
-    """Return parameters of these equations from those of the FMU, where 0 means a default."""
+    """Return parameters of these equations from the FMU's, where 0 means a default."""
     result = {name: float(values[name]) for name in PARAMETERS}
     for joint in (1, 2):
         if result[f"breakaway_friction{joint}"] == 0:

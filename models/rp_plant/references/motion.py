@@ -188,7 +188,7 @@ class Motion(Plant):
             self.state[i] = self._get(f"{what}{i + 1}")
             self._strike()
             self._decide()
-        elif self.joints.held[i]:  # the acceleration is 0 still: the direction is that of the force
+        elif self.joints.held[i]:  # the acceleration is 0 still: the force gives the direction
             self.joints.held[i] = False
             self._quiet[i] = self.time + QUIET
             breaks = self._blocks()[3][i] > 0

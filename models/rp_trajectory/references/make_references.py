@@ -129,7 +129,7 @@ class Motion:
         self.q1: mp.mpf | None = None  # the last one
 
     def coordinates(self, t: float | mp.mpf) -> list[mp.mpc]:
-        """Position, velocity, acceleration; where two segments meet, those of the later one."""
+        """Position, velocity, acceleration; where two segments meet, the later one's."""
         u = mp.mpf(t) - mp.mpf(self.value["start_time"])
         segment = next(segment for segment in self.segments if u < segment.end)
         x = segment.evaluate(u)
