@@ -24,7 +24,7 @@ bool location_create(const struct ode *ode, const struct integrator_settings *se
     location->z = calloc(count, sizeof *location->z);
     location->has_row = calloc(count, sizeof *location->has_row);
     location->is_armed = calloc(2 * count, sizeof *location->is_armed);
-    location->noise = calloc(5 * count, sizeof *location->noise);
+    location->noise = calloc(6 * count, sizeof *location->noise);
     location->triggered = calloc(count, sizeof *location->triggered);
     if (location->rows == NULL || location->step.indicator_row == NULL || location->used == NULL ||
         location->first == NULL || location->samples == NULL || location->x == NULL ||
@@ -35,7 +35,8 @@ bool location_create(const struct ode *ode, const struct integrator_settings *se
     }
     location->touch = location->noise + count;
     location->rounding = location->touch + count;
-    location->kept = location->rounding + count;
+    location->error = location->rounding + count;
+    location->kept = location->error + count;
     location->kept_armed = location->is_armed + count;
     location->dx = location->x + states;
     location->restart_x = location->dx + states;
@@ -90,6 +91,7 @@ static double error_of(const struct location *location, size_t state, double x) 
 /* Restarts the indicators of the model, whose noise follows from their limits so far. */
 static enum status restart_model(struct location *location, const double x[]) {
     const struct ode *ode = location->ode;
+    const struct integrator_settings *settings = location->settings;
     const enum status status = evaluate(location, 0.0, x);
     if (ode->rounding != NULL) {
         for (size_t i = 0; i < ode->state_count; i++) {
@@ -98,9 +100,15 @@ static enum status restart_model(struct location *location, const double x[]) {
         }
         ode->rounding(location->dx, location->touch, ode->context);
         ode->rounding(location->x, location->first, ode->context);
+        for (size_t i = 0; i < ode->state_count; i++) {
+            location->x[i] =
+                settings->absolute_tolerances[i] + settings->relative_tolerance * fabs(x[i]);
+        }
+        ode->rounding(location->x, location->error, ode->context);
     }
     for (size_t k = 0; status == STATUS_OK && k < location->used_count; k++) {
         const size_t i = location->used[k];
+        location->touch[i] *= ode->rounding != NULL ? falls_roundings : 1.0;
         if (location->indicators[i].kind != INDICATOR_OF_MODEL) {
             continue;
         }
@@ -108,10 +116,9 @@ static enum status restart_model(struct location *location, const double x[]) {
         location->samples[i][0] = location->z[i];
         location->calm_end = 0.0;
         if (ode->rounding != NULL) {
-            location->touch[i] *= falls_roundings;
-            location->noise[i] = larger(location->first[i], DBL_MIN);
-            location->rounding[i] = location->noise[i];
-            location->is_armed[i] = location->z[i] > location->noise[i];
+            location->rounding[i] = larger(location->first[i], DBL_MIN);
+            location->noise[i] = larger(location->error[i], location->rounding[i]);
+            location->is_armed[i] = location->z[i] > location->rounding[i];
         }
     }
     return status;
@@ -166,7 +173,9 @@ enum status location_restart(struct location *location, const struct indicator *
 static double first_fall(const struct location *location, size_t i,
                          const struct roots_polynomial *p, const struct fall *given) {
     struct fall fall = *given;
-    fall.touch = location->touch[i];
+    const bool is_near =
+        location->indicators[i].kind == INDICATOR_OF_MODEL && p->c[0] <= location->error[i];
+    fall.touch = larger(location->touch[i], is_near ? location->error[i] : 0.0);
     fall.is_armed = &location->is_armed[i];
     fall.noise = &location->noise[i];
     return fall_first(p, &fall);
@@ -411,7 +420,7 @@ static bool search_piece(struct location *location, const struct piece *piece, s
     const bool is_exact = error <= noise;
     const int degree = piece->count - 1;
     if (!is_exact && !is_last_try) {
-        c[0] -= far_above * error;
+        c[0] -= larger(far_above * error, location->is_armed[i] ? 0.0 : location->noise[i]);
         const bool is_above = roots_is_above(&(struct roots_polynomial){c, degree, -1.0});
         location->is_armed[i] |= is_above;
         return is_above;

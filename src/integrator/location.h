@@ -39,6 +39,7 @@ struct location {
                       since the restart */
     double *touch; /* by indicator, as in struct fall */
     double *rounding;              /* by indicator, at the restart; 0 if not known */
+    double *error;                 /* by indicator */
     bool *triggered;               /* by indicator: true if it is at 0 at `time` */
     struct step_polynomial step;   /* last internal step; methods write it */
     double (*rows)[SERIES_LENGTH]; /* room for the rows of the states */

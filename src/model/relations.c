@@ -9,6 +9,7 @@
 static const double location_error = 1e-11;
 static const double time_error = 1e-12;
 static const double rest_time = 1e-3;        // s: a relation at rest stays within its noise so long
+static const double flat_time = 1.0;         // s: nor need a slope be known that leaves it later
 static const double shortest_period = 1e-12; // s, of samplers
 
 /* Arguments of all functions during one event: a model, its values, and memory. */
@@ -226,8 +227,11 @@ static void switch_fallen(const struct call *call) {
         const double slope = signed_slope(&after[k], call->holds[k]);
         const bool falls = slope < 0.0 && slope < signed_slope(&before[k], call->holds[k]);
         const bool may_turn = !model->relation[k].is_timed && is_near(&after[k]);
-        call->room.turned[k] = may_turn && falls;
-        call->holds[k] ^= may_turn && falls;
+        const bool is_flat = fabs(slope) * flat_time <= after[k].noise;
+        const bool is_reset = !before[k].used && call->holds[k] != model->relation[k].includes_zero;
+        const bool turns = is_flat ? is_reset : falls;
+        call->room.turned[k] = may_turn && turns;
+        call->holds[k] ^= may_turn && turns;
     }
     compare(call, call->room.zeros, after);
     for (int k = 0; k < model->relation_count; k++) {

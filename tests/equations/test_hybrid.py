@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.optimize import brentq
 
 from tests.equations.examples import MODELS
 from tests.equations.hybrid import failures
@@ -218,20 +217,17 @@ def test_a_rocking_block_loses_speed_once_an_impact(unit: Callable, kind: str) -
     assert run.x[-1][0] == pytest.approx(v * flown - flown**2 / 2, abs=1e-6)
 
 
-@pytest.mark.parametrize("step", [0.1, 0.01])
-@pytest.mark.parametrize("kind", ["cvode_adams", "erk", "taylor", "model_exchange"])
-def test_a_ball_leaves_a_table_and_lands_once_a_period(
-    unit: Callable, kind: str, step: float
-) -> None:
-    """It leaves where the table falls by G, and sticks where it lands."""
-    leaves = np.arcsin(G / 10.8) / 6
-    y, v = 0.3 * np.sin(6 * leaves), 1.8 * np.cos(6 * leaves)
-    lands = brentq(lambda s: y + v * s - G * s**2 / 2 - 0.3 * np.sin(6 * (leaves + s)), 0.1, 0.4)
-    run = run_of(unit(TEXTS["TABLE"]), kind, step, round(4 / step), tolerance=1e-9)
-    periods = np.arange(4) * np.pi / 3
-    events = np.concatenate([leaves + periods, leaves + lands + periods])
-    assert not run.failure
-    assert run.counts == [np.sum(events < t) for t in run.times]
+@pytest.mark.parametrize("opens", TEXTS["OPENS"].values(), ids=TEXTS["OPENS"])
+@EACH_KIND
+def test_what_opens_at_rest_opens_once(unit: Callable, kind: str, opens: dict) -> None:
+    """Where an indicator and its rate vanish together, errors do not decide which event follows."""
+    periods = np.arange(10) * opens["period"]
+    events = np.add.outer(opens["events"], periods).ravel()
+    for step in (1.0, 0.1, 0.01, 0.003):
+        run = run_of(unit(opens["text"]), kind, step, round(opens["until"] / step), tolerance=1e-9)
+        assert not run.failure
+        for t, count in zip(run.times, run.counts, strict=True):
+            assert np.sum(events < t - 1e-3) <= count <= np.sum(events < t + 1e-3), (step, t)
 
 
 @EACH_KIND
