@@ -5,10 +5,8 @@ and their contents begin, and those of stored archives in them. `rparm.shipped` 
 """
 
 import hashlib
-import io
 import json
 import lzma
-import struct
 import zipfile
 from itertools import pairwise
 from pathlib import Path
@@ -21,30 +19,25 @@ BETWEEN = b"PK"  # begins all that zip writes in front of contents and behind th
 def write_pieces(release: Path, folder: Path) -> None:
     """Write `pieces` and `files.json.xz`: the bytes of all FMUs and systems, each piece once."""
     numbers: dict[bytes, int] = {}
-    places = []
     files: dict[str, dict[str, object]] = {}
-    between = io.BytesIO()
-    with (folder / "pieces").open("wb") as stored:
-        for version, below in VERSIONS.items():
-            archives = (release / below).iterdir()
-            for path in sorted(path for path in archives if path.suffix in (".fmu", ".ssp")):
-                content = path.read_bytes()
-                pieces = []
-                cuts = sorted({0, *_beginnings(path, 0, content), len(content)})
-                for begin, end in pairwise(cuts):
-                    piece = content[begin:end]
-                    if piece not in numbers:
-                        first = between.tell() if piece.startswith(BETWEEN) else ~stored.tell()
-                        numbers[piece] = len(places)
-                        places.append((first, len(piece)))
-                        (stored if first < 0 else between).write(piece)
-                    pieces.append(numbers[piece])
-                digest = hashlib.sha256(content).hexdigest()
-                files[f"{version}/{path.name}"] = {"sha256": digest, "pieces": pieces}
-    listed = {"files": files, "places": places, "between": between.getvalue().hex()}
-    (folder / "files.json.xz").write_bytes(lzma.compress(json.dumps(listed).encode()))
+    for version, below in VERSIONS.items():
+        archives = (release / below).iterdir()
+        for path in sorted(path for path in archives if path.suffix in (".fmu", ".ssp")):
+            content = path.read_bytes()
+            cuts = pairwise(sorted({0, *_beginnings(path, 0, content), len(content)}))
+            pieces = [numbers.setdefault(content[a:b], len(numbers)) for a, b in cuts]
+            digest = hashlib.sha256(content).hexdigest()
+            files[f"{version}/{path.name}"] = {"sha256": digest, "pieces": pieces}
     if not files:
         raise FileNotFoundError(f"{release}: has no FMU")
+    stored, between, places = bytearray(), bytearray(), []
+    for piece in numbers:
+        part = between if piece.startswith(BETWEEN) else stored
+        places.append((len(part) if part is between else ~len(part), len(piece)))
+        part += piece
+    (folder / "pieces").write_bytes(stored)
+    listed = json.dumps({"files": files, "places": places, "between": between.hex()})
+    (folder / "files.json.xz").write_bytes(lzma.compress(listed.encode()))
 
 
 def _beginnings(archive: Path | IO[bytes], offset: int, content: bytes) -> list[int]:
@@ -53,8 +46,7 @@ def _beginnings(archive: Path | IO[bytes], offset: int, content: bytes) -> list[
     with zipfile.ZipFile(archive) as opened:
         for entry in opened.infolist():
             head = offset + entry.header_offset
-            name, extra = struct.unpack_from("<HH", content, head + 26)
-            cuts += [head, head + 30 + name + extra]
+            cuts += [head, head + zipfile.sizeFileHeader + len(entry.filename)]
             if entry.compress_type == zipfile.ZIP_STORED and entry.filename.endswith(".fmu"):
                 with opened.open(entry) as inner:
                     cuts += _beginnings(inner, cuts[-1], content)

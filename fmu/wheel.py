@@ -32,8 +32,7 @@ OF_FMU += ("src/instance/*.toml",)
 OF_RELEASES = ("bill_of_materials", "built", "derive", "pieces", "references", "wheel")
 OF_RELEASES += ("blocks", "derived")  # of plain_c: they write C of models
 FOR_TESTS = ("_in", "sampled", "tightest")  # ends of names of tables that no command reads
-FOR_TESTS += ("heavy_payload/monolithic", "heavy_payload_integral/monolithic")
-FOR_TESTS += ("horizontal_plane/monolithic", "limited_effort/monolithic")
+FOR_TESTS += tuple(f"{name}/monolithic" for name in ("payload", "integral", "plane", "effort"))
 
 
 class CustomBuildHook(BuildHookInterface):

@@ -296,11 +296,9 @@ def runtimes(all_platforms: bool, web: bool = False) -> list[Path]:
     if INSTALLED:
         runtime = built_for_all() / f"{WEB if web else platform_name()}.json"
         way_out = f"{PROGRAM} build --platforms builds for others"
-    elif web:
-        runtime = ROOT / "build" / "platforms" / WEB / "runtime" / "runtime.json"
-        way_out = "./run.sh playground makes it"
     else:
-        runtime, way_out = ROOT / "build" / "runtime" / "runtime.json", f"{PROGRAM} build makes it"
+        runtime = ROOT / "build" / (f"platforms/{WEB}" if web else "") / "runtime/runtime.json"
+        way_out = f"{PROGRAM} {'playground' if web else 'build'} makes it"
     if not runtime.is_file():
         raise UserError(f"{runtime}: not there; {way_out}")
     return [runtime]

@@ -17,7 +17,6 @@ import json
 import lzma
 import tarfile
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from rparm.errors import UserError, reason
 from rparm.files import whole
@@ -84,7 +83,7 @@ def _write(path: Path, content: bytes, is_program: bool = False) -> None:
 
 
 @functools.cache
-def _listed() -> dict[str, Any]:
+def _listed() -> dict:
     try:
         return json.loads(lzma.decompress(FILES.read_bytes()))
     except (OSError, lzma.LZMAError, ValueError) as error:
@@ -92,16 +91,12 @@ def _listed() -> dict[str, Any]:
 
 
 def _joined(pieces: list[int]) -> bytes:
-    content = bytearray()
+    content, between = bytearray(), bytes.fromhex(_listed()["between"])
     try:
-        with (
-            PIECES.open("rb") as stored,
-            io.BytesIO(bytes.fromhex(_listed()["between"])) as between,
-        ):
+        with PIECES.open("rb") as stored:
             for first, length in map(_listed()["places"].__getitem__, pieces):
-                file = stored if first < 0 else between
-                file.seek(~first if first < 0 else first)
-                content += file.read(length)
+                stored.seek(~min(first, -1))
+                content += stored.read(length) if first < 0 else between[first : first + length]
     except OSError as error:
         raise UserError(f"{PIECES}: cannot be read: {reason(error)}") from error
     return bytes(content)

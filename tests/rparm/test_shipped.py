@@ -92,12 +92,6 @@ def test_a_damaged_package_is_named(release: Path, tmp_path: Path) -> None:
         shipped.names()
 
 
-def test_a_cache_that_cannot_be_written_is_named(release: Path, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(UserError, match="cannot be written: Not a directory; RPARM_CACHE names"):
-        shipped.file("2.0/A.fmu", tmp_path / "file" / "cache")
-
-
 def test_a_full_disk_leaves_nothing_behind(release: Path, tmp_path: Path) -> None:
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))
@@ -141,10 +135,13 @@ def test_a_damaged_archive_is_named(archive: Path, tmp_path: Path, length: int) 
         shipped.unpacked(archive, tmp_path / "cache")
 
 
-def test_an_archive_with_no_place_to_go_is_named(archive: Path, tmp_path: Path) -> None:
+def test_a_cache_that_cannot_be_written_is_named(
+    release: Path, archive: Path, tmp_path: Path
+) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(UserError, match="cannot be written: Not a directory; RPARM_CACHE names"):
-        shipped.unpacked(archive, tmp_path / "file" / "cache")
+    for function, argument in ((shipped.file, "2.0/A.fmu"), (shipped.unpacked, archive)):
+        with pytest.raises(UserError, match="written: Not a directory; RPARM_CACHE names"):
+            function(argument, tmp_path / "file" / "cache")
 
 
 AT_ONCE = """
