@@ -3,6 +3,7 @@
 #include "rp_plant_calculated.h"
 #include "rp_plant_modes.h"
 
+#include <stdio.h>
 #include <string.h>
 
 _Static_assert(sizeof(struct rp_plant_inputs) == sizeof(double[5]),
@@ -76,6 +77,76 @@ static enum status propagate(const void *values_pointer, double t, double dt, vo
     return STATUS_OK;
 }
 
+/* ---- Parameters and start values that do not fit each other; ranges: variables.toml ---------- */
+
+static bool check_friction(const struct rp_plant_parameters *p, int i, char *text, size_t size) {
+    const double coulomb = p->coulomb_friction[i];
+    const double breakaway = p->breakaway_friction[i];
+    const int joint = i + 1;
+    if (breakaway > 0.0 && breakaway < coulomb) {
+        (void)snprintf(text, size,
+                       "breakaway_friction%d = %.17g is refused: it must not be below "
+                       "coulomb_friction%d = %.17g (0: the same)",
+                       joint, breakaway, joint, coulomb);
+        return false;
+    }
+    if (breakaway > coulomb && p->stribeck_velocity[i] == 0.0) {
+        (void)snprintf(text, size,
+                       "stribeck_velocity%d = 0 is refused: it must be above 0 where "
+                       "breakaway_friction%d = %.17g is above coulomb_friction%d = %.17g",
+                       joint, joint, breakaway, joint, coulomb);
+        return false;
+    }
+    return true;
+}
+
+static bool check_stops(const struct rp_plant_parameters *p, int i, char *text, size_t size) {
+    const int joint = i + 1;
+    if (p->stops[i] == RP_PLANT_STOPS_COMPLIANT && p->stop_stiffness[i] == 0.0) {
+        (void)snprintf(text, size,
+                       "stop_stiffness%d = 0 is refused: with compliant stops it must be above 0",
+                       joint);
+        return false;
+    }
+    if (p->stops[i] != RP_PLANT_STOPS_NONE && !(p->lower[i] < p->upper[i])) {
+        (void)snprintf(
+            text, size,
+            "lower%d = %.17g and upper%d = %.17g are refused: with stops lower%d must be "
+            "below upper%d",
+            joint, p->lower[i], joint, p->upper[i], joint, joint);
+        return false;
+    }
+    return true;
+}
+
+/* A limit that is moved past a joint while it runs takes the joint along; a start outside is a
+ * mistake. */
+static bool check_start(const struct rp_plant_values *values, int i, char *text, size_t size) {
+    const struct rp_plant_parameters *p = &values->parameters;
+    const double q = values->q[i];
+    const int joint = i + 1;
+    if (values->modes.payload != RP_PLANT_UNDECIDED || p->stops[i] != RP_PLANT_STOPS_RIGID ||
+        (q >= p->lower[i] && q <= p->upper[i])) {
+        return true;
+    }
+    (void)snprintf(
+        text, size,
+        "q%d = %.17g is refused: a start must be within lower%d = %.17g and upper%d = %.17g", joint,
+        q, joint, p->lower[i], joint, p->upper[i]);
+    return false;
+}
+
+static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
+    const struct rp_plant_values *values = values_pointer;
+    const struct rp_plant_parameters *p = &values->parameters;
+    bool fits = rp_parameters_check(&p->arm, text, size);
+    for (int i = 0; i < 2 && fits; i++) {
+        fits = check_friction(p, i, text, size) && check_stops(p, i, text, size) &&
+               check_start(values, i, text, size);
+    }
+    return fits ? STATUS_OK : STATUS_INVALID_PARAMETERS;
+}
+
 const struct model rp_plant_model = {
     .values_size = sizeof(struct rp_plant_values),
     .parameters = {offsetof(struct rp_plant_values, parameters),
@@ -88,6 +159,6 @@ const struct model rp_plant_model = {
     .series = &rp_plant_series,
     .outputs = outputs,
     .propagate = propagate,
-    .check_parameters = rp_plant_check_parameters,
+    .check_parameters = check_parameters,
     .events = &rp_plant_events,
 };

@@ -45,9 +45,6 @@ struct rp_plant_values {
     double indicators[RP_PLANT_INDICATORS]; /* rad/s, m/s; N.m, N; rad, m; 1; 1: unused */
 };
 
-/* check_parameters of struct model (rp_plant_check.c). */
-enum status rp_plant_check_parameters(const void *values, char *text, size_t size);
-
 /* Events of the plant: a joint comes to rest, breaks away, reaches a stop; the payload is grasped
  * or released; an input or a parameter jumps (rp_plant_events.c). */
 extern const struct model_events rp_plant_events;

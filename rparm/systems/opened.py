@@ -1,4 +1,4 @@
-"""The door of all commands to systems: SSPs and loop files."""
+"""Opens systems by path or name: SSPs and loop files."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
