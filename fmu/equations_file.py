@@ -70,7 +70,10 @@ def tables_of(path: Path) -> tuple[str, dict[str, Any]]:
         line = content.count(b"\n", 0, error.start) + 1
         raise ModelFileError(f"line {line}: is not UTF-8: save it in this encoding") from None
     except tomllib.TOMLDecodeError as error:
-        raise ModelFileError(f"is not valid TOML: {' '.join(str(error).split()):.200}") from None
+        bare = re.search(r"(?m)^\s*(\w+\[[^]\n]+\])\s*=", text)
+        hint = f'; write "{bare[1]}" in quotes' if bare else ""
+        text = f"is not valid TOML: {' '.join(str(error).split()):.200}{hint}"
+        raise ModelFileError(text) from None
     except (ValueError, RecursionError):
         raise ModelFileError("has a number or a table that is too long") from None
 
@@ -145,6 +148,9 @@ def _elements(
     """Yield the entries of a section, each as often as its `for` says."""
     for key, entry in entries:
         with placed(place):
+            of = {"modes": list, "experiment": dict}.get(key)
+            if type(entry) is of and (of is list or entry.keys() & keys.EXPERIMENT):
+                raise ModelFileError(f"{key} belongs above the first [section]")
             found = [*elements(file, key, entry)]
         yield from found
 

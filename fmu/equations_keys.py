@@ -165,7 +165,8 @@ def entries(
             listed = f"unknown {what} {shown(key)}, expected one of {', '.join(known)}"
             raise ModelFileError(place + listed + instead_of(key))
     if needed and needed not in table:
-        raise ModelFileError(f"{needed} is missing")
+        above = " above the first [section]" if what == "section" else ""
+        raise ModelFileError(f"{needed} is missing{above}")
     return {key: _value(key, value, what) for key, value in table.items()}
 
 

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Collection, Mapping
-from difflib import get_close_matches
 from graphlib import CycleError, TopologicalSorter
 
 from declaration.load import shown
@@ -14,6 +13,7 @@ from rparm.expressions.expression import (
     derivative_of,
     evaluated,
     in_order,
+    meant,
     names,
     with_kinds,
 )
@@ -60,13 +60,14 @@ def _hint(name: str, allowed: Collection[str], file: ModelFile) -> str:
     """Say what may have been meant by an unknown name."""
     base, bracket, _ = name.partition("[")
     count = file.dimensions.get(base, 0)
+    if name in file.functions:
+        return f", a function or table: write {name}(...)"
     if count and not bracket:
         return f", expected {base}[{', '.join('ijklmn'[:count])}]"
     if count:
         elements = [other for other in allowed if other.startswith(f"{base}[")]
         return f", expected {elements[0]} .. {elements[-1]}" if elements else ""
-    meant = get_close_matches(name, allowed, n=1) if len(allowed) <= MOST_COMPARED else []
-    return f", did you mean {meant[0]!r}?" if meant else ""
+    return meant(name, allowed) if len(allowed) <= MOST_COMPARED else ""
 
 
 def _in_order(file: ModelFile) -> list[Expression]:

@@ -116,7 +116,7 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
         "modulated": modulated(file),
         "time_events": len(indicators) < len(relations) or bool(file.sampled),
     }
-    includes = [TIME, *([EVENTS] if relations else [])]
+    includes = [TIME, *([EVENTS] if relations or file.sampled else [])]
     includes += [SOLVER] if states else [TIME_EVENTS] if file.sampled else []
     helpers = {variable.name for variable in file.of("where")}  # last, if shown at all
     return {

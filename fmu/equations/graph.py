@@ -29,6 +29,7 @@ LEAVES = (
 MOVING = ("input", "state", "time")
 RUNTIME = ("first", "second")  # derivatives that may be 0 in one call and not in another
 CONDITIONS = ("mode", "and", "or", "not", "isnan", "isfinite", "==", *RELATIONS)
+OPPOSITE = {"<": ">=", ">=": "<", ">": "<=", "<=": ">"}
 STILL = (*CONDITIONS, "value_of", "entry", "locate", "floor")  # derivatives are 0
 PRODUCTS_UP_TO = 8  # whole exponents that are repeated multiplication
 MOST_COUNTED = 2**30  # by floor of what moves
@@ -154,6 +155,7 @@ class Graph:
     def of_tree(self, root: Node, names: Mapping[str, Value], is_instant: bool = False) -> Value:
         """What an expression calculates; is_instant: at an event, where nothing moves."""
         compare = self.value if is_instant else self.relation
+        relate = self._at_instant if is_instant else self.relation
         found: dict[Node, Value] = {}
         for node in in_order([root]):
             given = [found[argument] for argument in node.arguments]
@@ -185,7 +187,7 @@ class Graph:
                 case "unit":
                     value = given[0]
                 case op:
-                    value = (compare if op in RELATIONS else self.value)(op, *given)
+                    value = (relate if op in RELATIONS else self.value)(op, *given)
             found[node] = value
             self.nodes += [node] * (len(self.relations) - len(self.nodes))
         return found[root]
@@ -291,24 +293,43 @@ class Graph:
             return self.switch(op, left, right)
         return self.value(op, left, right)
 
+    def _at_instant(self, op: str, left: Value, right: Value) -> Value:
+        """A comparison at an event, as switches of this limit say: rounding decides where it is."""
+        value = self.value(op, left, right)
+        if not (self.has_switches and (left.moves or right.moves)):
+            return value
+        if (same := self._known_switch(self._switch(op, left, right))) is not None:
+            return same
+        if (no := self._known_switch(self._switch(OPPOSITE[op], left, right))) is not None:
+            return self.value("not", no)
+        turned = self._known_switch(self._switch(op, right, left))
+        if turned is None:
+            return value
+        return self.value("or" if "=" in op else "and", value, self.value("not", turned))
+
     def switch(self, op: str, left: Value, right: Value) -> Value:
         """The mode of a comparison: its result, which changes at events only."""
+        relation = self._switch(op, left, right)
+        if (known := self._known_switch(relation)) is not None:
+            return known
+        mode = self.value("mode", name=f"{len(self.relations) + 1}")
+        self.relations[mode.name] = replace(relation, mode=mode)
+        return mode
+
+    def _known_switch(self, relation: Relation) -> Value | None:
+        return next((known.mode for known in self.relations.values() if known == relation), None)
+
+    def _switch(self, op: str, left: Value, right: Value) -> Relation:
         if op in ("<", "<="):
             left, right = right, left
         still = [side for side in (left, right) if not side.moves]
         other = right if left in still else left
-        relation = Relation(
+        return Relation(
             distance=self.value("-", left, right),
             includes_zero=op in ("<=", ">="),
             limit=still[0] if still else None,
             time=still[0] if still and other.op == "time" else None,
         )
-        for known in self.relations.values():
-            if known == relation:
-                return known.mode
-        mode = self.value("mode", name=f"{len(self.relations) + 1}")
-        self.relations[mode.name] = replace(relation, mode=mode)
-        return mode
 
     def _power(self, base: Value, exponent: Value) -> Value:
         whole = exponent.op == "number" and exponent.number in range(1, PRODUCTS_UP_TO + 1)

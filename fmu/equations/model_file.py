@@ -50,7 +50,8 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     known |= {mode: graph.value("mode", name=mode) for mode in file.modes}
     known |= {"time": graph.value("time"), "pi": graph.number(math.pi)}
     sources: list[Expression] = []  # of each relation
-    for expression in file.order:
+    # right sides last: their conditions are switches of others
+    for expression in sorted(file.order, key=lambda expression: expression.event == "then"):
         tree = expression.tree
         with equations_file.located(path, file.text), placed(*expression.place):
             if expression.event == "when" and tree.op in RELATIONS:

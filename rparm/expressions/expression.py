@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from functools import cached_property, reduce
 from typing import Any, TypeVar
 
@@ -25,6 +26,17 @@ LITERALS = {"true": 1.0, "false": 0.0}
 # not to be used as names: operators, and words that other languages execute or give a value
 WORDS = ("and", "or", "not", "if", "else")
 NO_NAMES = (*WORDS, *LITERALS, "True", "False", "None", "lambda")
+# what other languages have for what is here
+HERE = "t=time e=exp(1) ln=log lg=log10 log2=log(x)/log(2) pow=x**y power=x**y square=x**2 sqr=x**2"
+HERE += " absolute=abs fabs=abs fmin=min fmax=max minimum=min maximum=max sgn=sign signum=sign"
+HERE += (
+    " clip=min(max(x,a),b) step=A_if_C_else_B heaviside=A_if_C_else_B int=floor fmod=mod rem=mod"
+)
+HERE += " derivative=der ddt=der diff=der arcsin=asin arccos=acos arctan=atan arctan2=atan2"
+INSTEAD = dict(pair.replace("_", " ").split("=") for pair in HERE.split())
+SIGNS = {"^": "powers are written **", "?": "write A if C else B", "%": "write mod(x, y)"}
+SIGNS |= {"&": "write and", "|": "write or", "!": "write not"}
+SIGNS |= dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212", "no minus sign of ASCII, write -")
 Item = TypeVar("Item", bound=Any)  # hashable, with `arguments` of its own kind
 LOGIC = ("and", "or", "not")
 DEEPEST = 100  # levels of brackets and other nesting
@@ -110,6 +122,15 @@ def in_order(roots: Iterable[Item], known: Container[Item] = ()) -> list[Item]:
         else:
             done.setdefault(todo.pop())
     return list(done)
+
+
+def meant(name: str, known: Iterable[str]) -> str:
+    """Say what may have been meant by an unknown name."""
+    plain = {other.casefold(): other for other in known}
+    last = name.rpartition(".")[2]
+    wanted = last if last in plain else name.casefold()
+    guess = INSTEAD.get(last) or "".join(plain[x] for x in get_close_matches(wanted, plain, n=1))
+    return f", did you mean {guess!r}?" if guess else ""
 
 
 def names(root: Node) -> frozenset[str]:
@@ -357,7 +378,7 @@ def _tokens(text: str) -> list[Token]:
         found = TOKEN.match(text, at)
         if found is None:
             piece = text[at : at + SHOWN].split()[0]
-            hint = ": powers are written **" if piece.startswith("^") else ""
+            hint = f": {SIGNS[piece[0]]}" if piece[0] in SIGNS else ""
             raise ExpressionError(at + 1, f"{piece!r} is no number, name or operator{hint}")
         kind = "operator" if found[0] in WORDS else str(found.lastgroup)
         tokens.append(Token(kind, found[0], at + 1))
@@ -484,8 +505,9 @@ class _Parser:
             return self.sum(function.column)
         further = self._functions.get(function.text)
         if function.text not in FUNCTIONS and further is None:
-            known = ", ".join([*FUNCTIONS, *self._functions, DERIVATIVE, "sum"])
-            raise ExpressionError(function.column, f"no function {function.shown} (known: {known})")
+            known = [*FUNCTIONS, *self._functions, DERIVATIVE, "sum"]
+            text = f"no function {function.shown}{meant(function.text, known)}"
+            raise ExpressionError(function.column, f"{text} (known: {', '.join(known)})")
         arguments = []
         separator = "("
         while self.token.text == separator:

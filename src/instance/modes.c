@@ -127,13 +127,15 @@ enum status instance_update_modes(struct instance *instance, const bool *trigger
     return update(instance, triggered, INFINITY);
 }
 
-/* Counts how often an indicator has fallen in a row. */
-static void note_indicator(const bool triggered[], struct event_counts *in_step) {
+/* Counts how often an indicator has fallen in a row; the two limits of a floor have one name. */
+static void note_indicator(const char *const names[], const bool triggered[],
+                           struct event_counts *in_step) {
     size_t first = 0;
     while (!triggered[first]) {
         first++;
     }
-    in_step->in_a_row = first == in_step->last ? in_step->in_a_row + 1 : 1;
+    const bool is_last = strcmp(names[first], names[in_step->last]) == 0;
+    in_step->in_a_row = is_last ? in_step->in_a_row + 1 : 1;
     in_step->last = first;
 }
 
@@ -166,7 +168,7 @@ enum status instance_count_event(struct instance *instance, const bool triggered
         return STATUS_TOO_MANY_EVENTS;
     }
     if (!is_time_event) {
-        note_indicator(triggered, in_step);
+        note_indicator(instance->model->events->indicator_names, triggered, in_step);
     }
     if (!is_time_event && in_step->of_states >= own->max_events) {
         refuse_state_event(instance, in_step);

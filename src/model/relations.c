@@ -492,8 +492,9 @@ enum status relations_update(const struct relations *model, struct relations_roo
         status = run_due_events(&call, event, count == event->max_events, &fires);
     }
     if (status == STATUS_OK && fires) {
-        char more[60];
-        (void)snprintf(more, sizeof more, ": more than max_events = %d times", event->max_events);
+        char more[100];
+        (void)snprintf(more, sizeof more, ": true again, more than max_events = %d times at once",
+                       event->max_events);
         add_name(event, more);
         status = STATUS_INTERNAL;
     }

@@ -15,64 +15,21 @@ from lxml import etree
 import rparm
 from rparm.errors import UserError
 from rparm.systems import ecos, opened, ssp, ssp_writer
+from tests.closed_loop.test_loop_file import TABLES
 from tests.importers.osp import libcosim
 from tests.importers.test_importers import CHECKER, folder_of
 from tests.support.rparm_project import Console
 from tests.support.ssp_files import edited
 
 STEP, STEPS, KP, KD, REFERENCE = 0.01, 100, 9.0, 4.0, 0.2
-LAW = """
-from lawyer import law
-
-
-class Law:
-    inputs = ["reference", "q2", "dq2"]
-    outputs = ["f2"]
-    start = {"f2": 0.5}
-    kd = 1.0
-    gains = [1.0]
-
-    def step(self, t, h, inputs):
-        return {"f2": law(self.gains[0], self.kd, inputs)}
-"""
-HELPER = """
-import json  # a module of Python, which needs nothing
-
-
-def law(kp, kd, given):
-    return kp * (given["reference"] - given["q2"]) - kd * given["dq2"]
-"""
-LOOP = f"""
-name = "Slide"
-description = "A slide & its law"
-step = {STEP}
-stop = 1.0
-[components]
-arm = "RPManipulator"
-class = "law.py"
-[connections]
-"arm.f2" = "class.f2"
-"class.q2" = "arm.q2"
-"class.dq2" = "arm.dq2"
-[inputs]
-"class.reference" = {{ constant = {REFERENCE} }}
-[parameters]
-"arm.a" = 0
-"arm.g" = 0
-"arm.m2" = "2 kg"
-"class.kd" = {KD}
-"class.gains" = [{KP}]
-[variants.light]
-description = 'Half of it, "light"'
-"arm.m2" = 1.0
-"""
+LOOP = TABLES["slide"]["loop.toml"]
 MOVING = ("constant = 0.2", "sines = [{ amplitude = 0.2, frequency = 1.0 }]")
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("slide")
-    for name, text in {"law.py": LAW, "lawyer.py": HELPER, "loop.toml": LOOP}.items():
+    for name, text in TABLES["slide"].items():
         (made / name).write_text(text)
     (made / "moving.toml").write_text(LOOP.replace(*MOVING))
     return made

@@ -231,6 +231,20 @@ def test_what_opens_at_rest_opens_once(unit: Callable, kind: str, opens: dict) -
 
 
 @EACH_KIND
+def test_an_integrator_leaves_its_limit_where_its_rate_turns(unit: Callable, kind: str) -> None:
+    """There rounding decides whether x' = cos t is above 0; x = sin t, less 1 / 2 after 1 / 2."""
+    run = run_of(unit(TEXTS["CLAMP"]), kind, 0.1, 75)
+    t, x = np.array(run.times), np.array(run.x)[:, 0]
+    falls = np.maximum(np.sin(t) - 0.5, -0.5)
+    rises = np.minimum(np.sin(t) + 0.5, 0.5)
+    assert not run.failure
+    expected = [np.minimum(np.sin(t), 0.5), falls, rises]
+    assert x == pytest.approx(
+        np.choose(np.searchsorted([np.pi / 2, 1.5 * np.pi], t), expected), abs=1e-6
+    )
+
+
+@EACH_KIND
 def test_a_wheel_of_spokes_steps_once_a_spoke(unit: Callable, kind: str) -> None:
     """Each step puts it onto the limit of steps back, which it leaves."""
     begins, square, events = 0.0, 1.44, [0.0]

@@ -78,5 +78,5 @@ def test_values_that_are_read_are_explained(fmu: Path) -> None:
             assert instance.messages[-1].text == text
         instance.fmi.enterContinuousTimeMode()
         with pytest.raises(FMICallException):
-            instance.fmi.getDerivatives((c_double * 9)(), 9)
+            instance.fmi.getDerivatives((c_double * 10)(), 10)
         assert instance.messages[-1].text == f"derivative of v: half + gap {since}"

@@ -128,22 +128,7 @@ def test_a_scenario_is_within_its_bound() -> None:
 
 # ---- systems of files
 
-LOOP = """
-name = "Pushed"
-step = 0.01
-stop = 1.0
-keep = ["arm.q2"]
-[components]
-arm = "RPManipulator"
-[inputs]
-"arm.f2" = { constant = 3.0 }
-[parameters]
-"arm.g" = 0.0
-"arm.a" = "0 mm"
-"arm.m2" = "2 kg"
-[variants.heavy]
-"arm.m2" = "4 kg"
-"""
+LOOP = MISTAKES["api"]["pushed"]
 
 
 def test_a_system_of_a_file_runs_with_other_values_and_steps(tmp_path: Path) -> None:

@@ -411,31 +411,14 @@ ENDS = "class C:\n    inputs = ['x']\n    outputs = ['u']\n"
 STEP = "    def step(self, t, h, inputs):\n        "
 
 
-@pytest.mark.parametrize(
-    ("text", "name", "message", "code"),
-    [
-        ("class C:\n    inputs = [\n", "", r"code\.py, line 2: '\[' was never closed", 2),
-        ("import nonsense_\n", "", r"code\.py, line 1: ModuleNotFoundError: .*nonsense_", 1),
-        ("x = 1\n", "", r"code\.py: expected a class with step\(self, t, h, inputs\), or", 2),
-        (PID + PID.replace("Pid", "Pi"), "", r"write code\.py:Pid or code\.py:Pi$", 2),
-        (PID, ":Pdi", r"has no class 'Pdi', did you mean 'Pid'\?", 2),
-        (ENDS, ":C", r"class 'C' has no step\(self, t, h, inputs\)", 2),
-        (ENDS.replace("['x']", "'x'") + STEP + "pass", "", r"inputs: expected a list of", 2),
-        (ENDS.replace("'u'", "'x'") + STEP + "pass", "", r"'x' is both an input and an out", 2),
-        (ENDS + STEP + "return {'u': 1 / 0}", "", r"^c: .*code\.py, line 5: ZeroDivisionError", 1),
-        (ENDS + STEP + "raise SystemExit(0)", "", r"^c: .*code\.py, line 5: SystemExit: 0", 1),
-        (ENDS + STEP + "return {'u': inputs['xx']}", "", r"line 5: .*'xx', did you mean 'x'\?", 1),
-        (ENDS + STEP + "return {}", "", r"line 4: step: returned no 'u' in the step from t = 0", 1),
-        (ENDS + STEP + "return {'u': 1, 'w': 2}", "", r"line 4: step: 'w' is no output", 1),
-        (ENDS + STEP + "return 1", "", r"line 4: step: expected a dict of outputs, got 1", 1),
-        (ENDS + STEP + "return {'u': float('nan')}", "", r"line 4: u is nan: expected a finite", 1),
-        (ENDS + STEP + "return {'u': 'much'}", "", r"line 4: u: expected a number, got", 1),
-        (ENDS + "    start = {'uu': 1}\n" + STEP + "pass", "", r"start: 'uu' is no output", 1),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("text", "name", "message", "code"), MISTAKES["python_components"]["rows"])
 def test_mistakes_in_python_are_named_in_one_line(
     tmp_path: Path, text: str, name: str, message: str, code: int
 ) -> None:
+    other = PID.replace("Pid", "Pi")
+    for word, meant in {"ENDS": ENDS, "STEP": STEP, "PID": PID, "OTHER": other}.items():
+        text = text.replace(word, meant)
+
     def run() -> None:
         with Master({"c": python(tmp_path, text, name)}, []) as master:
             master.initialize(0.0)
