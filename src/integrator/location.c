@@ -15,44 +15,36 @@ bool location_create(const struct ode *ode, const struct integrator_settings *se
     if (count == 0) {
         return true;
     }
-    location->rows = calloc(states, sizeof *location->rows);
-    location->step.indicator_row = calloc(count, sizeof *location->step.indicator_row);
-    location->used = calloc(count, sizeof *location->used);
-    location->first = calloc(count, sizeof *location->first);
+    location->rows = calloc(states + count, sizeof *location->rows);
     location->samples = calloc(count, sizeof *location->samples);
-    location->x = calloc(3 * states, sizeof *location->x);
-    location->z = calloc(count, sizeof *location->z);
-    location->has_row = calloc(count, sizeof *location->has_row);
-    location->is_armed = calloc(2 * count, sizeof *location->is_armed);
-    location->noise = calloc(5 * count, sizeof *location->noise);
-    location->triggered = calloc(count, sizeof *location->triggered);
-    if (location->rows == NULL || location->step.indicator_row == NULL || location->used == NULL ||
-        location->first == NULL || location->samples == NULL || location->x == NULL ||
-        location->z == NULL || location->has_row == NULL || location->is_armed == NULL ||
-        location->noise == NULL || location->triggered == NULL) {
+    location->x = calloc(3 * states + 5 * count, sizeof *location->x);
+    location->used = calloc(count, sizeof *location->used);
+    location->is_armed = calloc(3 * count, sizeof *location->is_armed);
+    location->kept = calloc(count, sizeof *location->kept);
+    if (location->rows == NULL || location->samples == NULL || location->x == NULL ||
+        location->used == NULL || location->is_armed == NULL || location->kept == NULL) {
         location_destroy(location);
         return false;
     }
-    location->touch = location->noise + count;
-    location->rounding = location->touch + count;
-    location->kept = location->rounding + count;
-    location->kept_armed = location->is_armed + count;
+    location->step.indicator_row = location->rows + states;
     location->dx = location->x + states;
     location->restart_x = location->dx + states;
+    location->z = location->restart_x + states;
+    location->first = location->z + count;
+    location->noise = location->first + count;
+    location->touch = location->noise + count;
+    location->rounding = location->touch + count;
+    location->has_row = location->is_armed + count;
+    location->triggered = location->has_row + count;
     return true;
 }
 
 void location_destroy(struct location *location) {
-    free(location->triggered);
-    free(location->noise);
+    free(location->kept);
     free(location->is_armed);
-    free(location->has_row);
-    free(location->z);
+    free(location->used);
     free(location->x);
     free(location->samples);
-    free(location->first);
-    free(location->used);
-    free(location->step.indicator_row);
     free(location->rows);
     *location = (struct location){.time = INFINITY};
 }
@@ -161,15 +153,16 @@ enum status location_restart(struct location *location, const struct indicator *
 
 /* ---- Indicators of states ------------------------------------------------------------------- */
 
-/* Returns fall_first of indicator i; given: the fields of struct fall that do not follow from
- * location. */
+/* Returns fall_first of indicator i, whose polynomial is p. */
 static double first_fall(const struct location *location, size_t i,
-                         const struct roots_polynomial *p, const struct fall *given) {
-    struct fall fall = *given;
-    fall.touch = location->touch[i];
-    fall.is_armed = &location->is_armed[i];
-    fall.noise = &location->noise[i];
-    return fall_first(p, &fall);
+                         const struct roots_polynomial *p, double error, double latest,
+                         bool is_restart) {
+    return fall_first(p, &(struct fall){.error = error,
+                                        .touch = location->touch[i],
+                                        .latest = latest,
+                                        .is_restart = is_restart,
+                                        .is_armed = &location->is_armed[i],
+                                        .noise = &location->noise[i]});
 }
 
 /* Replaces c(s) by c(s - 1). */
@@ -220,8 +213,7 @@ static double first_of_state(struct location *location, size_t i, double latest)
         shift(c, step->degree);
     }
     const struct roots_polynomial p = {c, step->degree, -1.0};
-    return first_fall(location, i, &p,
-                      &(struct fall){.latest = latest, .is_restart = step->begin == 0.0});
+    return first_fall(location, i, &p, 0.0, latest, step->begin == 0.0);
 }
 
 /* ---- Steps of states ------------------------------------------------------------------------ */
@@ -286,9 +278,7 @@ static double first_of_model(struct location *location, size_t i, double latest)
         size += fabs(p.c[k]);
     }
     const double error = representation * size;
-    const double s = first_fall(
-        location, i, &p,
-        &(struct fall){.error = error, .latest = latest, .is_restart = step->begin == 0.0});
+    const double s = first_fall(location, i, &p, error, latest, step->begin == 0.0);
     return s < 1.0 ? corrected(location, i, &p, error, s) : s;
 }
 
@@ -418,9 +408,7 @@ static bool search_piece(struct location *location, const struct piece *piece, s
     }
     const struct roots_polynomial p = {c, degree, -1.0};
     const bool is_restart = location->step.begin == 0.0 && piece->begin == 0.0;
-    const double s =
-        first_fall(location, i, &p,
-                   &(struct fall){.error = noise, .latest = INFINITY, .is_restart = is_restart});
+    const double s = first_fall(location, i, &p, noise, INFINITY, is_restart);
     location->first[i] = fmin(location->first[i], piece->begin + piece->length * s);
     return true;
 }
@@ -537,25 +525,20 @@ enum status location_search(struct location *location) {
 }
 
 enum status location_try(struct location *location) {
-    const size_t count = location->ode->indicator_count;
-    const double calm = location->calm;
-    const double calm_end = location->calm_end;
-    memcpy(location->kept_armed, location->is_armed, count * sizeof *location->is_armed);
-    memcpy(location->kept, location->noise, count * sizeof *location->noise);
-    for (size_t i = 0; location->needs_model && i < count; i++) {
-        location->kept[count + i] = location->samples[i][0];
+    const struct location before = *location;
+    for (size_t i = 0; i < location->ode->indicator_count; i++) {
+        location->kept[i] = (struct location_kept){location->is_armed[i], location->noise[i],
+                                                   location->samples[i][0]};
     }
     const enum status status = location_search(location);
-    if (status == STATUS_OK && location->time < INFINITY) {
-        return STATUS_OK;
+    if (status != STATUS_OK || location->time == INFINITY) {
+        *location = before;
+        for (size_t i = 0; i < location->ode->indicator_count; i++) {
+            location->is_armed[i] = location->kept[i].is_armed;
+            location->noise[i] = location->kept[i].noise;
+            location->samples[i][0] = location->kept[i].sample;
+        }
     }
-    memcpy(location->is_armed, location->kept_armed, count * sizeof *location->is_armed);
-    memcpy(location->noise, location->kept, count * sizeof *location->noise);
-    for (size_t i = 0; location->needs_model && i < count; i++) {
-        location->samples[i][0] = location->kept[count + i];
-    }
-    location->calm = calm;
-    location->calm_end = calm_end;
     return status;
 }
 

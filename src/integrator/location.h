@@ -22,6 +22,13 @@ struct step_polynomial {
                                                location, over the same s */
 };
 
+/* Values of an indicator that a search writes, before location_try. */
+struct location_kept {
+    bool is_armed;
+    double noise;
+    double sample; /* the first of the samples */
+};
+
 struct location {
     /* Time of the event, s since the restart; INFINITY if there is none. A step without events
      * reads only this and the indicators. */
@@ -45,14 +52,13 @@ struct location {
     double *x;                     /* states at one point */
     double *dx;                    /* room for states at another point */
     double *restart_x;             /* states at the restart */
-    double *z;       /* indicators at one point */
+    double *z;                     /* indicators at one point */
     double calm;     /* length of the last step if interpolated indicators hardly moved in it, s;
                         otherwise 0 */
     double calm_end; /* its end, or 0 at a restart: samples[][0] are the indicators there */
     double *first;   /* by indicator: s of its first root in the step */
     double (*samples)[CHEBYSHEV_LENGTH]; /* by indicator */
-    bool *kept_armed;                    /* room of location_try: is_armed */
-    double *kept;                        /* and noise, then the first of the samples */
+    struct location_kept *kept;          /* by indicator */
 };
 
 /* Allocates all memory. Returns false if memory is short: then nothing has to be freed.
