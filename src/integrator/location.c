@@ -230,17 +230,6 @@ void location_write_states(const struct location *location, double s, double x[]
     }
 }
 
-void location_lead_from_restart(struct location *location) {
-    const struct step_polynomial *step = &location->step;
-    for (size_t i = 0; i < location->ode->state_count; i++) {
-        double value = 0.0; // value at s = -1
-        for (int k = step->degree; k >= 0; k--) {
-            value = step->row[i][k] - value;
-        }
-        step->row[i][1] -= location->restart_x[i] - value;
-    }
-}
-
 /* ---- Indicators of the model ---------------------------------------------------------------- */
 
 /* Largest error of a polynomial that represents an indicator, relative to the values' scale. */
@@ -553,27 +542,6 @@ enum status location_search_at_rest(struct location *location, const double x[],
         step->row[i][0] = x[i];
     }
     return location_search(location);
-}
-
-void location_write_cubic(struct location *location, double begin, const double begin_x[],
-                          const double begin_dx[], double end, const double x[],
-                          const double dx[]) {
-    struct step_polynomial *step = &location->step;
-    const double h = end - begin;
-    step->begin = begin;
-    step->end = end;
-    step->is_from_end = false;
-    step->degree = 3;
-    step->row = location->rows;
-    for (size_t i = 0; i < location->ode->state_count; i++) {
-        const double change = x[i] - begin_x[i];
-        const double first = h * begin_dx[i];
-        const double last = h * dx[i];
-        step->row[i][0] = begin_x[i];
-        step->row[i][1] = first;
-        step->row[i][2] = 3.0 * change - 2.0 * first - last;
-        step->row[i][3] = first + last - 2.0 * change;
-    }
 }
 
 bool location_falls_between(const struct location *location, const double x[],

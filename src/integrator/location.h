@@ -95,12 +95,6 @@ MUST_CHECK NONNULL enum status location_try(struct location *location);
 MUST_CHECK NONNULL enum status location_search_at_rest(struct location *location, const double x[],
                                                        double t);
 
-/* Writes the cubic polynomial through the states and their derivatives at the begin and at the end
- * of a step to location->step. */
-NONNULL void location_write_cubic(struct location *location, double begin, const double begin_x[],
-                                  const double begin_dx[], double end, const double x[],
-                                  const double dx[]);
-
 /* True if an indicator of a state is above 0 at the state x, and not at the state `next`. */
 MUST_CHECK NONNULL bool location_falls_between(const struct location *location, const double x[],
                                                const double next[]);
@@ -110,11 +104,6 @@ MUST_CHECK NONNULL bool location_falls_between(const struct location *location, 
  * there is no correction. */
 MUST_CHECK NONNULL bool location_correction(struct location *location, double t, const double x[],
                                             const double dx[], double *z, double *correction);
-
-/* Leads location->step, which begins at the restart and goes back from its end, through the state
- * at the restart. CVODE's polynomial misses it by about its tolerance, and flights that are lower
- * would begin below their limits. */
-NONNULL void location_lead_from_restart(struct location *location);
 
 /* Returns a bound of how far a state moves over a step: the sum of |row[k]|, 0 < k <= degree. */
 static inline double location_way(const double row[], int degree) {
