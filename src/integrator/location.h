@@ -39,8 +39,7 @@ struct location {
     size_t used_count;
     bool needs_model; /* true if a used indicator is an INDICATOR_OF_MODEL */
     const struct integrator_settings *settings; /* at each restart */
-    bool *
-        has_row; /* by indicator: true if step.indicator_row has it; otherwise it is interpolated */
+    bool *has_row;  /* by indicator: true if step.indicator_row has it, else interpolated */
     bool *is_armed; /* by indicator: true if it has been above 0 since the restart */
     double *noise; /* by indicator: how far from 0 it may be, with either sign, without having risen
                       since the restart */
@@ -87,8 +86,7 @@ NONNULL void location_check_rows(struct location *location, const double x[],
  * triggered. */
 MUST_CHECK NONNULL enum status location_search(struct location *location);
 
-/* Does the same if the step has an event. If not, or on failure, it leaves no trace, so that a
- * better step can be searched. */
+/* Does the same if the step has an event; if not, or on failure, it leaves no trace. */
 MUST_CHECK NONNULL enum status location_try(struct location *location);
 
 /* Searches the time from 0 to t, over which the states stay at x. */
