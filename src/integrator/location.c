@@ -58,17 +58,6 @@ static double at_state(const struct indicator *indicator, const double x[]) {
     return indicator->offset + indicator->factor * x[indicator->state];
 }
 
-static enum status evaluate_one(struct location *location, size_t i, double t, const double x[],
-                                double *z) {
-    if (location->indicators[i].kind == INDICATOR_OF_STATE) {
-        *z = at_state(&location->indicators[i], x);
-        return STATUS_OK;
-    }
-    const enum status status = evaluate(location, t, x);
-    *z = location->z[i];
-    return status;
-}
-
 /* Returns the error of a state that no event follows from, in its unit: the tolerance, or the
  * rounding of all steps so far. However small the state is at a restart, it has the error of its
  * usual size: absolute tolerances are relative ones of a hundredth of it. */
@@ -216,7 +205,7 @@ static double first_of_state(struct location *location, size_t i, double latest)
     return first_fall(location, i, &p, 0.0, latest, step->begin == 0.0);
 }
 
-/* ---- Steps of states ------------------------------------------------------------------------ */
+/* ---- States within a step ------------------------------------------------------------------- */
 
 void location_write_states(const struct location *location, double s, double x[]) {
     const struct step_polynomial *step = &location->step;
@@ -553,6 +542,17 @@ bool location_falls_between(const struct location *location, const double x[],
                  at_state(indicator, next) <= 0.0;
     }
     return falls;
+}
+
+static enum status evaluate_one(struct location *location, size_t i, double t, const double x[],
+                                double *z) {
+    if (location->indicators[i].kind == INDICATOR_OF_STATE) {
+        *z = at_state(&location->indicators[i], x);
+        return STATUS_OK;
+    }
+    const enum status status = evaluate(location, t, x);
+    *z = location->z[i];
+    return status;
 }
 
 bool location_correction(struct location *location, double t, const double x[], const double dx[],
