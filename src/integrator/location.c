@@ -15,45 +15,37 @@ bool location_create(const struct ode *ode, const struct integrator_settings *se
     if (count == 0) {
         return true;
     }
-    location->rows = calloc(states, sizeof *location->rows);
-    location->step.indicator_row = calloc(count, sizeof *location->step.indicator_row);
-    location->used = calloc(count, sizeof *location->used);
-    location->first = calloc(count, sizeof *location->first);
+    location->rows = calloc(states + count, sizeof *location->rows);
     location->samples = calloc(count, sizeof *location->samples);
-    location->x = calloc(3 * states, sizeof *location->x);
-    location->z = calloc(count, sizeof *location->z);
-    location->has_row = calloc(count, sizeof *location->has_row);
-    location->is_armed = calloc(2 * count, sizeof *location->is_armed);
-    location->noise = calloc(6 * count, sizeof *location->noise);
-    location->triggered = calloc(count, sizeof *location->triggered);
-    if (location->rows == NULL || location->step.indicator_row == NULL || location->used == NULL ||
-        location->first == NULL || location->samples == NULL || location->x == NULL ||
-        location->z == NULL || location->has_row == NULL || location->is_armed == NULL ||
-        location->noise == NULL || location->triggered == NULL) {
+    location->x = calloc(3 * states + 6 * count, sizeof *location->x);
+    location->used = calloc(count, sizeof *location->used);
+    location->is_armed = calloc(3 * count, sizeof *location->is_armed);
+    location->kept = calloc(count, sizeof *location->kept);
+    if (location->rows == NULL || location->samples == NULL || location->x == NULL ||
+        location->used == NULL || location->is_armed == NULL || location->kept == NULL) {
         location_destroy(location);
         return false;
     }
+    location->step.indicator_row = location->rows + states;
+    location->dx = location->x + states;
+    location->restart_x = location->dx + states;
+    location->z = location->restart_x + states;
+    location->first = location->z + count;
+    location->noise = location->first + count;
     location->touch = location->noise + count;
     location->rounding = location->touch + count;
     location->error = location->rounding + count;
-    location->kept = location->error + count;
-    location->kept_armed = location->is_armed + count;
-    location->dx = location->x + states;
-    location->restart_x = location->dx + states;
+    location->has_row = location->is_armed + count;
+    location->triggered = location->has_row + count;
     return true;
 }
 
 void location_destroy(struct location *location) {
-    free(location->triggered);
-    free(location->noise);
+    free(location->kept);
     free(location->is_armed);
-    free(location->has_row);
-    free(location->z);
+    free(location->used);
     free(location->x);
     free(location->samples);
-    free(location->first);
-    free(location->used);
-    free(location->step.indicator_row);
     free(location->rows);
     *location = (struct location){.time = INFINITY};
 }
@@ -65,17 +57,6 @@ static enum status evaluate(struct location *location, double t, const double x[
 /* Returns the value of an INDICATOR_OF_STATE. */
 static double at_state(const struct indicator *indicator, const double x[]) {
     return indicator->offset + indicator->factor * x[indicator->state];
-}
-
-static enum status evaluate_one(struct location *location, size_t i, double t, const double x[],
-                                double *z) {
-    if (location->indicators[i].kind == INDICATOR_OF_STATE) {
-        *z = at_state(&location->indicators[i], x);
-        return STATUS_OK;
-    }
-    const enum status status = evaluate(location, t, x);
-    *z = location->z[i];
-    return status;
 }
 
 /* Returns the error of a state that no event follows from, in its unit: the tolerance, or the
@@ -168,17 +149,19 @@ enum status location_restart(struct location *location, const struct indicator *
 
 /* ---- Indicators of states ------------------------------------------------------------------- */
 
-/* Returns fall_first of indicator i; given: the fields of struct fall that do not follow from
- * location. */
+/* Returns fall_first of indicator i, whose polynomial is p. */
 static double first_fall(const struct location *location, size_t i,
-                         const struct roots_polynomial *p, const struct fall *given) {
-    struct fall fall = *given;
+                         const struct roots_polynomial *p, double error, double latest,
+                         bool is_restart) {
     const bool is_near =
         location->indicators[i].kind == INDICATOR_OF_MODEL && p->c[0] <= location->error[i];
-    fall.touch = larger(location->touch[i], is_near ? location->error[i] : 0.0);
-    fall.is_armed = &location->is_armed[i];
-    fall.noise = &location->noise[i];
-    return fall_first(p, &fall);
+    const double touch = larger(location->touch[i], is_near ? location->error[i] : 0.0);
+    return fall_first(p, &(struct fall){.error = error,
+                                        .touch = touch,
+                                        .latest = latest,
+                                        .is_restart = is_restart,
+                                        .is_armed = &location->is_armed[i],
+                                        .noise = &location->noise[i]});
 }
 
 /* Replaces c(s) by c(s - 1). */
@@ -229,11 +212,10 @@ static double first_of_state(struct location *location, size_t i, double latest)
         shift(c, step->degree);
     }
     const struct roots_polynomial p = {c, step->degree, -1.0};
-    return first_fall(location, i, &p,
-                      &(struct fall){.latest = latest, .is_restart = step->begin == 0.0});
+    return first_fall(location, i, &p, 0.0, latest, step->begin == 0.0);
 }
 
-/* ---- Steps of states ------------------------------------------------------------------------ */
+/* ---- States within a step ------------------------------------------------------------------- */
 
 void location_write_states(const struct location *location, double s, double x[]) {
     const struct step_polynomial *step = &location->step;
@@ -244,17 +226,6 @@ void location_write_states(const struct location *location, double s, double x[]
             sum = sum * at + step->row[i][k];
         }
         x[i] = sum;
-    }
-}
-
-void location_lead_from_restart(struct location *location) {
-    const struct step_polynomial *step = &location->step;
-    for (size_t i = 0; i < location->ode->state_count; i++) {
-        double value = 0.0; // value at s = -1
-        for (int k = step->degree; k >= 0; k--) {
-            value = step->row[i][k] - value;
-        }
-        step->row[i][1] -= location->restart_x[i] - value;
     }
 }
 
@@ -295,9 +266,7 @@ static double first_of_model(struct location *location, size_t i, double latest)
         size += fabs(p.c[k]);
     }
     const double error = representation * size;
-    const double s = first_fall(
-        location, i, &p,
-        &(struct fall){.error = error, .latest = latest, .is_restart = step->begin == 0.0});
+    const double s = first_fall(location, i, &p, error, latest, step->begin == 0.0);
     return s < 1.0 ? corrected(location, i, &p, error, s) : s;
 }
 
@@ -427,9 +396,7 @@ static bool search_piece(struct location *location, const struct piece *piece, s
     }
     const struct roots_polynomial p = {c, degree, -1.0};
     const bool is_restart = location->step.begin == 0.0 && piece->begin == 0.0;
-    const double s =
-        first_fall(location, i, &p,
-                   &(struct fall){.error = noise, .latest = INFINITY, .is_restart = is_restart});
+    const double s = first_fall(location, i, &p, noise, INFINITY, is_restart);
     location->first[i] = fmin(location->first[i], piece->begin + piece->length * s);
     return true;
 }
@@ -601,25 +568,20 @@ enum status location_search(struct location *location) {
 }
 
 enum status location_try(struct location *location) {
-    const size_t count = location->ode->indicator_count;
-    const double calm = location->calm;
-    const double calm_end = location->calm_end;
-    memcpy(location->kept_armed, location->is_armed, count * sizeof *location->is_armed);
-    memcpy(location->kept, location->noise, count * sizeof *location->noise);
-    for (size_t i = 0; location->needs_model && i < count; i++) {
-        location->kept[count + i] = location->samples[i][0];
+    const struct location before = *location;
+    for (size_t i = 0; i < location->ode->indicator_count; i++) {
+        location->kept[i] = (struct location_kept){location->is_armed[i], location->noise[i],
+                                                   location->samples[i][0]};
     }
     const enum status status = location_search(location);
-    if (status == STATUS_OK && location->time < INFINITY) {
-        return STATUS_OK;
+    if (status != STATUS_OK || location->time == INFINITY) {
+        *location = before;
+        for (size_t i = 0; i < location->ode->indicator_count; i++) {
+            location->is_armed[i] = location->kept[i].is_armed;
+            location->noise[i] = location->kept[i].noise;
+            location->samples[i][0] = location->kept[i].sample;
+        }
     }
-    memcpy(location->is_armed, location->kept_armed, count * sizeof *location->is_armed);
-    memcpy(location->noise, location->kept, count * sizeof *location->noise);
-    for (size_t i = 0; location->needs_model && i < count; i++) {
-        location->samples[i][0] = location->kept[count + i];
-    }
-    location->calm = calm;
-    location->calm_end = calm_end;
     return status;
 }
 
@@ -636,27 +598,6 @@ enum status location_search_at_rest(struct location *location, const double x[],
     return location_search(location);
 }
 
-void location_write_cubic(struct location *location, double begin, const double begin_x[],
-                          const double begin_dx[], double end, const double x[],
-                          const double dx[]) {
-    struct step_polynomial *step = &location->step;
-    const double h = end - begin;
-    step->begin = begin;
-    step->end = end;
-    step->is_from_end = false;
-    step->degree = 3;
-    step->row = location->rows;
-    for (size_t i = 0; i < location->ode->state_count; i++) {
-        const double change = x[i] - begin_x[i];
-        const double first = h * begin_dx[i];
-        const double last = h * dx[i];
-        step->row[i][0] = begin_x[i];
-        step->row[i][1] = first;
-        step->row[i][2] = 3.0 * change - 2.0 * first - last;
-        step->row[i][3] = first + last - 2.0 * change;
-    }
-}
-
 bool location_falls_between(const struct location *location, const double x[],
                             const double next[]) {
     bool falls = false;
@@ -666,6 +607,17 @@ bool location_falls_between(const struct location *location, const double x[],
                  at_state(indicator, next) <= 0.0;
     }
     return falls;
+}
+
+static enum status evaluate_one(struct location *location, size_t i, double t, const double x[],
+                                double *z) {
+    if (location->indicators[i].kind == INDICATOR_OF_STATE) {
+        *z = at_state(&location->indicators[i], x);
+        return STATUS_OK;
+    }
+    const enum status status = evaluate(location, t, x);
+    *z = location->z[i];
+    return status;
 }
 
 bool location_correction(struct location *location, double t, const double x[], const double dx[],

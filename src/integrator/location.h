@@ -22,6 +22,13 @@ struct step_polynomial {
                                                location, over the same s */
 };
 
+/* Values of an indicator that a search writes, before location_try. */
+struct location_kept {
+    bool is_armed;
+    double noise;
+    double sample; /* the first of the samples */
+};
+
 struct location {
     /* Time of the event, s since the restart; INFINITY if there is none. A step without events
      * reads only this and the indicators. */
@@ -32,8 +39,7 @@ struct location {
     size_t used_count;
     bool needs_model; /* true if a used indicator is an INDICATOR_OF_MODEL */
     const struct integrator_settings *settings; /* at each restart */
-    bool *
-        has_row; /* by indicator: true if step.indicator_row has it; otherwise it is interpolated */
+    bool *has_row;  /* by indicator: true if step.indicator_row has it, else interpolated */
     bool *is_armed; /* by indicator: true if it has been above 0 since the restart */
     double *noise; /* by indicator: how far from 0 it may be, with either sign, without having risen
                       since the restart */
@@ -46,14 +52,13 @@ struct location {
     double *x;                     /* states at one point */
     double *dx;                    /* room for states at another point */
     double *restart_x;             /* states at the restart */
-    double *z;       /* indicators at one point */
+    double *z;                     /* indicators at one point */
     double calm;     /* length of the last step if interpolated indicators hardly moved in it, s;
                         otherwise 0 */
     double calm_end; /* its end, or 0 at a restart: samples[][0] are the indicators there */
     double *first;   /* by indicator: s of its first root in the step */
     double (*samples)[CHEBYSHEV_LENGTH]; /* by indicator */
-    bool *kept_armed;                    /* room of location_try: is_armed */
-    double *kept;                        /* and noise, then the first of the samples */
+    struct location_kept *kept;          /* by indicator */
 };
 
 /* Allocates all memory. Returns false if memory is short: then nothing has to be freed.
@@ -82,19 +87,12 @@ NONNULL void location_check_rows(struct location *location, const double x[],
  * triggered. */
 MUST_CHECK NONNULL enum status location_search(struct location *location);
 
-/* Does the same if the step has an event. If not, or on failure, it leaves no trace, so that a
- * better step can be searched. */
+/* Does the same if the step has an event; if not, or on failure, it leaves no trace. */
 MUST_CHECK NONNULL enum status location_try(struct location *location);
 
 /* Searches the time from 0 to t, over which the states stay at x. */
 MUST_CHECK NONNULL enum status location_search_at_rest(struct location *location, const double x[],
                                                        double t);
-
-/* Writes the cubic polynomial through the states and their derivatives at the begin and at the end
- * of a step to location->step. */
-NONNULL void location_write_cubic(struct location *location, double begin, const double begin_x[],
-                                  const double begin_dx[], double end, const double x[],
-                                  const double dx[]);
 
 /* True if an indicator of a state is above 0 at the state x, and not at the state `next`. */
 MUST_CHECK NONNULL bool location_falls_between(const struct location *location, const double x[],
@@ -105,11 +103,6 @@ MUST_CHECK NONNULL bool location_falls_between(const struct location *location, 
  * there is no correction. */
 MUST_CHECK NONNULL bool location_correction(struct location *location, double t, const double x[],
                                             const double dx[], double *z, double *correction);
-
-/* Leads location->step, which begins at the restart and goes back from its end, through the state
- * at the restart. CVODE's polynomial misses it by about its tolerance, and flights that are lower
- * would begin below their limits. */
-NONNULL void location_lead_from_restart(struct location *location);
 
 /* Returns a bound of how far a state moves over a step: the sum of |row[k]|, 0 < k <= degree. */
 static inline double location_way(const double row[], int degree) {

@@ -282,6 +282,19 @@ static bool interpolate(void *memory, double t, double x[]) {
     return true;
 }
 
+/* Leads location->step, which begins at the restart, through the state there: CVODE's polynomial
+ * misses it by about its tolerance, and flights that are lower would begin below their limits. */
+static void lead_from_restart(struct location *location) {
+    const struct step_polynomial *step = &location->step;
+    for (size_t i = 0; i < location->ode->state_count; i++) {
+        double value = 0.0; // value at s = -1
+        for (int k = step->degree; k >= 0; k--) {
+            value = step->row[i][k] - value;
+        }
+        step->row[i][1] -= location->restart_x[i] - value;
+    }
+}
+
 /* Searches the last internal step for an event. */
 static enum status search(struct cvode *cvode, double begin, double end) {
     struct problem *problem = cvode->base.problem;
@@ -305,7 +318,7 @@ static enum status search(struct cvode *cvode, double begin, double end) {
     }
     cvode->is_led = begin == 0.0 && problem->ode.rounding != NULL && step->degree > 0;
     if (cvode->is_led) {
-        location_lead_from_restart(&problem->location);
+        lead_from_restart(&problem->location);
     }
     return location_search(&problem->location);
 }

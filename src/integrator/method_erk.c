@@ -52,13 +52,35 @@ struct erk {
 
 /* ---- Observation ---------------------------------------------------------------------------- */
 
+/* Writes the cubic polynomial through the states and right-hand sides at the begin of the step and
+ * at its end t, where they are x and erk->dx. */
+static void write_cubic(const struct erk *erk, double t, const double x[],
+                        struct location *location) {
+    struct step_polynomial *step = &location->step;
+    const double h = t - erk->step_begin;
+    step->begin = erk->step_begin;
+    step->end = t;
+    step->is_from_end = false;
+    step->degree = 3;
+    step->row = location->rows;
+    for (size_t i = 0; i < location->ode->state_count; i++) {
+        const double change = x[i] - erk->step_x[i];
+        const double first = h * erk->step_dx[i];
+        const double last = h * erk->dx[i];
+        step->row[i][0] = erk->step_x[i];
+        step->row[i][1] = first;
+        step->row[i][2] = 3.0 * change - 2.0 * first - last;
+        step->row[i][3] = first + last - 2.0 * change;
+    }
+}
+
 /* Searches the step that has ended at t with the state x and the right-hand side erk->dx.
  * search_step: location_search or location_try. */
 static void search(struct erk *erk, double t, const double x[],
                    enum status search_step(struct location *location)) {
     struct location *location = &erk->base.problem->location;
     if (erk->search_status == STATUS_OK) {
-        location_write_cubic(location, erk->step_begin, erk->step_x, erk->step_dx, t, x, erk->dx);
+        write_cubic(erk, t, x, location);
         erk->search_status = search_step(location);
     }
     erk->is_cut_short = erk->search_status != STATUS_OK || location->time <= erk->end;

@@ -215,10 +215,10 @@ EACH_METHOD static void test_an_event_that_does_not_come_changes_no_bit(void) {
             .kind = INDICATOR_OF_STATE, .factor = 1.0, .offset = 1.0 + distance};
         struct integrator_start on = {.horizon = INFINITY, .first_step = 1.0};
         double x[2][3][2];
-        double reached;
         for (int watched = 0; watched < 2; watched++) {
             ASSERT_OK(integrator_restart(integrator, from, &on));
             for (int k = 0; k < 3; k++) {
+                double reached;
                 ASSERT_OK(advance((1.0 + 0.5 * k) * before, 100000, &reached, x[watched][k]));
                 TEST_ASSERT_NULL(integrator_event(integrator));
             }
