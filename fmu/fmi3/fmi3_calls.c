@@ -25,14 +25,11 @@ const struct call_rule fmi3_call_rules[FMI3_CALL_COUNT] = {FMI3_FUNCTION_LIST(FM
 
 /* ---- Checks --------------------------------------------------------------------------------- */
 
-bool fmi3_check_count(struct component *component, enum fmi3_call call, size_t count,
-                      size_t expected) {
-    if (component != NULL && count != expected) {
-        component_fail(component, "%s: an array has %zu values: %zu are expected",
-                       fmi3_call_rules[call].name, count, expected);
-        return false;
-    }
-    return true;
+bool fmi3_refuse_count(struct component *component, enum fmi3_call call, size_t count,
+                       size_t expected) {
+    component_fail(component, "%s: an array has %zu values: %zu are expected",
+                   fmi3_call_rules[call].name, count, expected);
+    return false;
 }
 
 bool fmi3_check_access(struct component *component, unsigned call, bool setting,

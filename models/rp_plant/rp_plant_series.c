@@ -267,8 +267,7 @@ static void begin_motion(const struct series_origin *origin, double row[][SERIES
     const struct rp_plant_values *values = origin->values;
     m->origin = origin;
     m->p = &values->parameters;
-    m->modes = values->modes;
-    if (values->modes.payload == RP_PLANT_UNDECIDED) {
+    if (!rp_plant_modes_are_decided(values, &m->modes)) {
         const double(*u)[SERIES_INPUT_LENGTH] = origin->inputs;
         const struct rp_plant_inputs inputs = {
             .tau = {u[0][0], u[1][0]},
@@ -276,8 +275,6 @@ static void begin_motion(const struct series_origin *origin, double row[][SERIES
         };
         rp_plant_first_modes(values, (const double[]){row[Q1][0], row[Q2][0]},
                              (const double[]){row[W][0], row[V][0]}, &inputs, &m->modes);
-    } else {
-        rp_plant_correct_modes(m->p, &m->modes);
     }
     m->has_wrench = has_wrench(origin);
     for (int i = 0; i < 2; i++) {
@@ -316,7 +313,7 @@ static inline struct products products_of_order(double row[][SERIES_LENGTH], dou
 
 /* What follows from the orders up to n: coefficients of order n + 1, and terms of order n. */
 struct next {
-    double L, s, c, w, v, P;
+    double q1, L, s, c, w, v, P;
     double effort[2];
     double P_w, weight; /* weight: g c1 (m1 lc1 + m2 L) */
 };
@@ -325,6 +322,7 @@ static inline struct next next_order(const struct series_motion *m, int n,
                                      double row[][SERIES_LENGTH]) {
     const double h = m->origin->time_scale / (n + 1);
     struct next next = {
+        .q1 = h * row[W][n],
         .L = h * row[V][n],
         .effort = {series_effort(m, 0, n, row), series_effort(m, 1, n, row)},
     };
@@ -358,7 +356,7 @@ static inline struct next next_order(const struct series_motion *m, int n,
 
 static inline void write_order(const struct series_motion *m, int k, const struct next *next,
                                double row[][SERIES_LENGTH]) {
-    row[Q1][k] = jet_integral(row[W], m->origin->time_scale, k);
+    row[Q1][k] = next->q1;
     row[Q2][k] = next->L;
     row[L][k] = next->L;
     row[W][k] = next->w;

@@ -24,11 +24,15 @@ static void evaluate_inputs(const struct instance *instance, double t) {
  * moves: some inputs are not constant. */
 static void prepare_inputs(struct instance *instance, bool moves) {
     const bool had_moved = instance->inputs_move;
+    const size_t count = count_of(instance->model->inputs);
+    const struct polynomial *inputs = instance->memory.active_inputs;
+    double *u = instance->u;
+    double(*all)[SERIES_INPUT_LENGTH] = instance->input_series;
     instance->inputs_move = moves;
-    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        const struct polynomial *input = &instance->memory.active_inputs[i];
-        double *series = instance->input_series[i];
-        instance->u[i] = input->d[0];
+    for (size_t i = 0; i < count; i++) {
+        const struct polynomial *input = &inputs[i];
+        double *series = all[i];
+        u[i] = input->d[0];
         series[0] = input->d[0]; // the only coefficient, unless inputs move
         for (int k = 1; had_moved && k <= POLYNOMIAL_DEGREE; k++) {
             series[k] = 0.0;
@@ -175,17 +179,8 @@ static struct integrator_start start_of(struct instance *instance) {
         .indicators = instance->model->events != NULL ? describe_indicators(instance) : NULL};
 }
 
-/* Makes the integrator run with the inputs or states that are set now. A loop, because they are
- * few. */
+/* Makes the integrator run with the values that are set now; range: of a value structure. */
 static void activate(struct instance *instance, struct range range) {
-    const double *from = doubles_of(instance->memory.values, range);
-    double *to = doubles_of(instance->memory.restart_values, range);
-    for (size_t i = 0; i < count_of(range); i++) {
-        to[i] = from[i];
-    }
-}
-
-static void activate_bytes(struct instance *instance, struct range range) {
     memcpy(instance->memory.restart_values + range.offset, instance->memory.values + range.offset,
            range.size);
 }
@@ -216,17 +211,11 @@ static inline void activate_values(struct instance *instance, struct clock_time 
     struct instance_state *state = &instance->state;
     const struct model *model = instance->model;
     if (has_new_parameters) {
-        activate_bytes(instance, model->parameters);
+        activate(instance, model->parameters);
     }
-    if (model->events != NULL) {
-        activate_bytes(instance, model->events->discrete_inputs);
-        activate_bytes(instance, model->events->modes);
-        activate_bytes(instance, model->events->discrete_states);
-    }
+    activate(instance, memory->written);
     instance->parameters_are_active = true;
     instance_note_inputs(instance);
-    activate(instance, model->inputs);
-    activate(instance, model->states);
     const size_t input_count = count_of(model->inputs);
     memcpy(memory->active_inputs, inputs, input_count * sizeof *inputs);
     prepare_inputs(instance, !instance->inputs_are_held &&

@@ -120,10 +120,15 @@ static enum status update(struct instance *instance, const bool *triggered, doub
 }
 
 enum status instance_update_modes(struct instance *instance, const bool *triggered) {
-    if (instance->model->events == NULL) {
+    const struct model_events *events = instance->model->events;
+    if (events == NULL) {
         return STATUS_OK;
     }
     instance->outputs_are_valid = false;
+    if (triggered == NULL && events->moves_on != NULL &&
+        events->moves_on(instance->memory.values)) {
+        return STATUS_OK;
+    }
     return update(instance, triggered, INFINITY);
 }
 

@@ -111,8 +111,9 @@ static void copy_written(const struct instance_memory *memory, bool inputs_are_h
     const struct range restart = memory->written_at_restart;
     const size_t begin = inputs_are_held ? restart.offset : 0;
     const size_t end = restart.offset + restart.size;
+    const size_t values = (size_t)(memory->values - memory->block) + memory->written.offset;
     memcpy(to + begin, from + begin, end - begin);
-    memcpy(to + memory->written.offset, from + memory->written.offset, memory->written.size);
+    memcpy(to + values, from + values, memory->written.size);
 }
 
 void instance_keep(struct instance *instance, struct instance_snapshot *snapshot) {

@@ -70,7 +70,7 @@ struct instance_memory {
     size_t size; /* bytes */
     /* Parts of the block that a step writes, besides the first two and calculated values. */
     struct range written_at_restart; /* active_inputs to restart_values */
-    struct range written;            /* part of values */
+    struct range written;            /* of a value structure */
 };
 
 /* Place and kind of the value of a reference. */

@@ -37,7 +37,7 @@ struct location {
     bool *is_armed; /* by indicator: true if it has been above 0 since the restart */
     double *noise; /* by indicator: how far from 0 it may be, with either sign, without having risen
                       since the restart */
-    double *touch; /* by indicator, as in struct fall */
+    double *touch; /* by indicator, as in struct fall; below 0 if it and noise are not known yet */
     double *rounding;              /* by indicator, at the restart; 0 if not known */
     bool *triggered;               /* by indicator: true if it is at 0 at `time` */
     struct step_polynomial step;   /* last internal step; methods write it */
