@@ -119,6 +119,7 @@ static bool is_searched(const struct instance *instance) {
 
 /* Returns the indicators of the current modes, for the integrator; NULL if no event is possible. */
 static const struct indicator *describe_indicators(struct instance *instance) {
+    instance->indicators_are_active = false;
     if (!is_searched(instance)) {
         return NULL;
     }
@@ -168,15 +169,22 @@ void instance_update_next_step(struct instance *instance) {
     }
 }
 
-static struct integrator_start start_of(struct instance *instance) {
+/* moves_on: the modes are those of the last restart (moves_on of struct model_events). */
+static struct integrator_start start_of(struct instance *instance, bool moves_on) {
     const struct instance_state *state = &instance->state;
-    return (struct integrator_start){
-        .origin = state->restart_time.s,
-        .horizon = state->horizon,
-        .first_step = state->restart_step,
-        .continues = state->restart_continues,
-        .is_after_event = state->restart_after_event,
-        .indicators = instance->model->events != NULL ? describe_indicators(instance) : NULL};
+    const bool keeps = moves_on && instance->indicators_are_active;
+    const struct indicator *indicators = instance->indicators;
+    if (!keeps) {
+        indicators = instance->model->events != NULL ? describe_indicators(instance) : NULL;
+        instance->indicators_are_active = indicators != NULL;
+    }
+    return (struct integrator_start){.origin = state->restart_time.s,
+                                     .horizon = state->horizon,
+                                     .first_step = state->restart_step,
+                                     .continues = state->restart_continues,
+                                     .is_after_event = state->restart_after_event,
+                                     .indicators = indicators,
+                                     .keeps_indicators = keeps};
 }
 
 /* Makes the integrator run with the values that are set now; range: of a value structure. */
@@ -247,7 +255,9 @@ static enum status restart(struct instance *instance, struct clock_time end,
     state->restart_step = state->next_step;
     state->restart_continues = continuation != CONTINUE_AFTER_CHANGE;
     state->restart_after_event = is_event;
-    const struct integrator_start start = start_of(instance);
+    // after a change, no update since the last restart means that the model moves on
+    const struct integrator_start start =
+        start_of(instance, continuation == CONTINUE_AFTER_CHANGE && !has_new_parameters);
     return integrator_restart(instance->integrator,
                               doubles_of(memory->restart_values, instance->model->states), &start);
 }
@@ -261,7 +271,7 @@ enum status instance_replay_history(struct instance *instance) {
     double reached;
     prepare_inputs(instance, polynomials_move(instance->memory.active_inputs,
                                               count_of(instance->model->inputs)));
-    const struct integrator_start start = start_of(instance);
+    const struct integrator_start start = start_of(instance, false);
     enum status status = integrator_restart(
         instance->integrator, doubles_of(instance->memory.restart_values, states), &start);
     if (status == STATUS_OK) {

@@ -77,6 +77,7 @@ static enum status check_next_time(const struct instance *instance, double passe
 
 static enum status update(struct instance *instance, const bool *triggered, double since) {
     const struct model_events *events = instance->model->events;
+    instance->indicators_are_active = false;
     write_tolerances(instance, since);
     const struct polynomial *inputs = instance->memory.current_inputs;
     const size_t input_count = count_of(instance->model->inputs);

@@ -72,6 +72,7 @@ static enum status resume(struct instance *instance) {
     instance->outputs_are_valid = false;
     instance->parameters_are_valid = false;
     instance->parameters_are_active = false;
+    instance->indicators_are_active = false;
     instance->inputs_are_held = false;
     instance->history_is_lost = true;
     instance_update_tolerance(instance);

@@ -138,8 +138,26 @@ static enum status restart_model(struct location *location, const double x[]) {
     return status;
 }
 
+/* Writes which indicators are used. */
+static void find_used(struct location *location) {
+    const size_t count = location->ode->indicator_count;
+    size_t used_count = 0;
+    location->needs_model = false;
+    for (size_t i = 0; i < count; i++) {
+        const struct indicator *indicator = &location->indicators[i];
+        if (indicator->kind == INDICATOR_UNUSED ||
+            (indicator->kind == INDICATOR_OF_STATE && indicator->factor == 0.0)) {
+            continue;
+        }
+        location->used[used_count] = i;
+        used_count++;
+        location->needs_model |= indicator->kind == INDICATOR_OF_MODEL;
+    }
+    location->used_count = used_count;
+}
+
 enum status location_restart(struct location *location, const struct indicator *indicators,
-                             const double x[]) {
+                             bool keeps, const double x[]) {
     location->indicators = indicators;
     location->time = INFINITY;
     location->calm = 0.0;
@@ -147,22 +165,16 @@ enum status location_restart(struct location *location, const struct indicator *
     if (indicators == NULL) {
         return STATUS_OK;
     }
-    location->needs_model = false;
+    if (!keeps) {
+        find_used(location);
+    }
     memcpy(location->restart_x, x, location->ode->state_count * sizeof *x);
-    const size_t count = location->ode->indicator_count;
-    size_t used_count = 0;
-    for (size_t i = 0; i < count; i++) {
+    for (size_t k = 0; k < location->used_count; k++) {
+        const size_t i = location->used[k];
         const struct indicator *indicator = &indicators[i];
-        if (indicator->kind == INDICATOR_UNUSED ||
-            (indicator->kind == INDICATOR_OF_STATE && indicator->factor == 0.0)) {
-            continue;
-        }
-        location->has_row[i] = false;
-        location->used[used_count] = i;
-        used_count++;
         const double rounding = rounding_of(indicator);
+        location->has_row[i] = false;
         if (indicator->kind == INDICATOR_OF_MODEL) {
-            location->needs_model = true;
             location->noise[i] = larger(2.0 * rounding, DBL_MIN);
             location->touch[i] = 2.0 * rounding;
         } else {
@@ -172,7 +184,6 @@ enum status location_restart(struct location *location, const struct indicator *
             location->touch[i] = -1.0;
         }
     }
-    location->used_count = used_count;
     return location->needs_model ? restart_model(location, x) : STATUS_OK;
 }
 

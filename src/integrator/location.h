@@ -64,9 +64,10 @@ MUST_CHECK NONNULL bool location_create(const struct ode *ode,
                                         struct location *location);
 NONNULL void location_destroy(struct location *location);
 
-/* Restarts the search from the state x, with the indicators that are in force from now on. */
-MUST_CHECK NONNULL_ARGUMENTS(1, 3) enum status
-    location_restart(struct location *location, const struct indicator *indicators,
+/* Restarts the search from the state x, with the indicators that are in force from now on. keeps:
+ * they are those of the last restart. */
+MUST_CHECK NONNULL_ARGUMENTS(1, 4) enum status
+    location_restart(struct location *location, const struct indicator *indicators, bool keeps,
                      const double x[]);
 
 static inline bool location_is_active(const struct location *location) {

@@ -102,6 +102,7 @@ struct integrator_start {
     bool is_after_event; /* true if it continues after an event: the next one may be near */
     const struct indicator *indicators; /* indicators of the ode until the next restart; they must
                                            stay. NULL to search no events */
+    bool keeps_indicators;              /* true if they are as at the last restart */
 };
 
 /* Observes each internal step that ends before the t of an advance; x: the state at its end t (s
