@@ -61,7 +61,6 @@ struct series_motion {
     const struct rp_plant_parameters *p;
     struct rp_plant_modes modes;
     bool has_wrench;
-    bool stuck[2];
     bool depends_on_velocity[2]; /* true if the joint slides with such friction */
     double direction[2];         /* of a joint that slides: 1 or -1; else 0 */
     double per_vs[2];
@@ -185,7 +184,7 @@ static bool has_wrench(const struct series_origin *origin) {
 }
 
 static bool is_stuck(const struct series_motion *m, int joint) {
-    return m->stuck[joint];
+    return m->modes.joint[joint] == RP_PLANT_STUCK;
 }
 
 /* Joint 1 does not turn: w and P are 0 in all orders. */
@@ -279,7 +278,6 @@ static void begin_motion(const struct series_origin *origin, double row[][SERIES
     }
     m->has_wrench = has_wrench(origin);
     for (int i = 0; i < 2; i++) {
-        m->stuck[i] = m->modes.joint[i] == RP_PLANT_STUCK;
         m->depends_on_velocity[i] = plant_slides(m->modes.joint[i]) && has_breakaway(m->p, i) &&
                                     fabs(row[W + i][0]) < (fast + 1.0) * m->p->stribeck_velocity[i];
     }
@@ -294,7 +292,7 @@ struct products {
     double ahead_L_w, ahead_L_P;
 };
 
-ALWAYS_INLINE struct products products_of_order(double row[][SERIES_LENGTH], double next_L, int n) {
+static inline struct products products_of_order(double row[][SERIES_LENGTH], double next_L, int n) {
     struct products sum = {0};
     for (ptrdiff_t i = 0, j = n; i < n; i++, j--) {
         sum.P_w += row[P][i] * row[W][j];
@@ -320,7 +318,7 @@ struct next {
     double P_w, weight; /* weight: g c1 (m1 lc1 + m2 L) */
 };
 
-ALWAYS_INLINE struct next next_order(const struct series_motion *m, int n,
+static inline struct next next_order(const struct series_motion *m, int n,
                                      double row[][SERIES_LENGTH]) {
     const double h = m->origin->time_scale / (n + 1);
     struct next next = {
@@ -356,7 +354,7 @@ ALWAYS_INLINE struct next next_order(const struct series_motion *m, int n,
     return next;
 }
 
-ALWAYS_INLINE void write_order(const struct series_motion *m, int k, const struct next *next,
+static inline void write_order(const struct series_motion *m, int k, const struct next *next,
                                double row[][SERIES_LENGTH]) {
     row[Q1][k] = next->q1;
     row[Q2][k] = next->L;
@@ -402,41 +400,23 @@ static void begin_rows(const struct series_motion *m, double row[][SERIES_LENGTH
 }
 
 /* Extends the series of any motion. */
-ALWAYS_INLINE void extend_with(const struct series_motion *motion, bool glides, int first, int last,
-                               double row[][SERIES_LENGTH]) {
-    struct series_motion m = *motion; // a copy, which no coefficient overwrites
-    if (glides) {
-        m.stuck[0] = false;
-        m.stuck[1] = false;
-        m.has_wrench = false;
-        m.modes.contact[0] = RP_PLANT_APART;
-        m.modes.contact[1] = RP_PLANT_APART;
-    }
-    if (first == 0) {
-        begin_rows(&m, row);
-    }
-    // indicators of an order take what follows from it
-    const bool sticks = is_stuck(&m, 0) || is_stuck(&m, 1);
-    const int end = sticks ? last + 1 : last;
-    for (int n = first > 0 ? first - 1 : 0; n < end; n++) {
-        const struct next next = next_order(&m, n, row);
-        if (sticks && n >= first) {
-            write_indicators(&m, n, &next, row);
-        }
-        if (n < last) {
-            write_order(&m, n + 1, &next, row);
-        }
-    }
-}
-
 static NOINLINE void extend_any(struct series_motion *m, int first, int last,
                                 double row[][SERIES_LENGTH]) {
     set_bodies(m, row[Q2][0]);
-    if (is_stuck(m, 0) || is_stuck(m, 1) || m->has_wrench ||
-        m->modes.contact[0] != RP_PLANT_APART || m->modes.contact[1] != RP_PLANT_APART) {
-        extend_with(m, false, first, last, row);
-    } else {
-        extend_with(m, true, first, last, row);
+    if (first == 0) {
+        begin_rows(m, row);
+    }
+    // indicators of an order take what follows from it
+    const bool sticks = is_stuck(m, 0) || is_stuck(m, 1);
+    const int end = sticks ? last + 1 : last;
+    for (int n = first > 0 ? first - 1 : 0; n < end; n++) {
+        const struct next next = next_order(m, n, row);
+        if (sticks && n >= first) {
+            write_indicators(m, n, &next, row);
+        }
+        if (n < last) {
+            write_order(m, n + 1, &next, row);
+        }
     }
 }
 

@@ -142,7 +142,7 @@ static enum status restart_model(struct location *location, const double x[]) {
 static void find_used(struct location *location) {
     const size_t count = location->ode->indicator_count;
     size_t used_count = 0;
-    location->needs_model = false;
+    bool needs_model = false;
     for (size_t i = 0; i < count; i++) {
         const struct indicator *indicator = &location->indicators[i];
         if (indicator->kind == INDICATOR_UNUSED ||
@@ -151,9 +151,10 @@ static void find_used(struct location *location) {
         }
         location->used[used_count] = i;
         used_count++;
-        location->needs_model |= indicator->kind == INDICATOR_OF_MODEL;
+        needs_model |= indicator->kind == INDICATOR_OF_MODEL;
     }
     location->used_count = used_count;
+    location->needs_model = needs_model;
 }
 
 enum status location_restart(struct location *location, const struct indicator *indicators,
