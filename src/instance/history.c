@@ -24,15 +24,11 @@ static void evaluate_inputs(const struct instance *instance, double t) {
  * moves: some inputs are not constant. */
 static void prepare_inputs(struct instance *instance, bool moves) {
     const bool had_moved = instance->inputs_move;
-    const size_t count = count_of(instance->model->inputs);
-    const struct polynomial *inputs = instance->memory.active_inputs;
-    double *u = instance->u;
-    double(*all)[SERIES_INPUT_LENGTH] = instance->input_series;
     instance->inputs_move = moves;
-    for (size_t i = 0; i < count; i++) {
-        const struct polynomial *input = &inputs[i];
-        double *series = all[i];
-        u[i] = input->d[0];
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        const struct polynomial *input = &instance->memory.active_inputs[i];
+        double *series = instance->input_series[i];
+        instance->u[i] = input->d[0];
         series[0] = input->d[0]; // the only coefficient, unless inputs move
         for (int k = 1; had_moved && k <= POLYNOMIAL_DEGREE; k++) {
             series[k] = 0.0;
@@ -119,11 +115,14 @@ static bool is_searched(const struct instance *instance) {
 
 /* Returns the indicators of the current modes, for the integrator; NULL if no event is possible. */
 static const struct indicator *describe_indicators(struct instance *instance) {
-    instance->indicators_are_active = false;
+    if (instance->indicators_are_active) {
+        return instance->indicators;
+    }
     if (!is_searched(instance)) {
         return NULL;
     }
     instance->model->events->describe(instance->memory.restart_values, instance->indicators);
+    instance->indicators_are_active = true;
     return instance->indicators;
 }
 
@@ -169,22 +168,18 @@ void instance_update_next_step(struct instance *instance) {
     }
 }
 
-/* moves_on: the modes are those of the last restart (moves_on of struct model_events). */
-static struct integrator_start start_of(struct instance *instance, bool moves_on) {
+static struct integrator_start start_of(struct instance *instance) {
     const struct instance_state *state = &instance->state;
-    const bool keeps = moves_on && instance->indicators_are_active;
-    const struct indicator *indicators = instance->indicators;
-    if (!keeps) {
-        indicators = instance->model->events != NULL ? describe_indicators(instance) : NULL;
-        instance->indicators_are_active = indicators != NULL;
-    }
-    return (struct integrator_start){.origin = state->restart_time.s,
-                                     .horizon = state->horizon,
-                                     .first_step = state->restart_step,
-                                     .continues = state->restart_continues,
-                                     .is_after_event = state->restart_after_event,
-                                     .indicators = indicators,
-                                     .keeps_indicators = keeps};
+    const bool keeps_indicators = instance->indicators_are_active;
+    return (struct integrator_start){
+        .origin = state->restart_time.s,
+        .horizon = state->horizon,
+        .first_step = state->restart_step,
+        .continues = state->restart_continues,
+        .is_after_event = state->restart_after_event,
+        .keeps_indicators = keeps_indicators,
+        .indicators = describe_indicators(instance),
+    };
 }
 
 /* Makes the integrator run with the values that are set now; range: of a value structure. */
@@ -256,8 +251,8 @@ static enum status restart(struct instance *instance, struct clock_time end,
     state->restart_continues = continuation != CONTINUE_AFTER_CHANGE;
     state->restart_after_event = is_event;
     // after a change, no update since the last restart means that the model moves on
-    const struct integrator_start start =
-        start_of(instance, continuation == CONTINUE_AFTER_CHANGE && !has_new_parameters);
+    instance->indicators_are_active &= continuation == CONTINUE_AFTER_CHANGE && !has_new_parameters;
+    const struct integrator_start start = start_of(instance);
     return integrator_restart(instance->integrator,
                               doubles_of(memory->restart_values, instance->model->states), &start);
 }
@@ -271,7 +266,7 @@ enum status instance_replay_history(struct instance *instance) {
     double reached;
     prepare_inputs(instance, polynomials_move(instance->memory.active_inputs,
                                               count_of(instance->model->inputs)));
-    const struct integrator_start start = start_of(instance, false);
+    const struct integrator_start start = start_of(instance);
     enum status status = integrator_restart(
         instance->integrator, doubles_of(instance->memory.restart_values, states), &start);
     if (status == STATUS_OK) {
@@ -338,6 +333,7 @@ enum status instance_rest(struct instance *instance, struct clock_time end, stru
     } else {
         end_history(instance);
     }
+    instance->indicators_are_active = false;
     const struct integrator_start start = {
         .indicators = searches ? describe_indicators(instance) : NULL,
     };

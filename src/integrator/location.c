@@ -86,28 +86,6 @@ static double error_of(const struct location *location, size_t state, double x) 
     return larger(tolerance, 2.0 * falls_roundings * DBL_EPSILON * larger(fabs(x), usual));
 }
 
-/* Returns twice the rounding of an indicator's limit. */
-static double rounding_of(const struct indicator *indicator) {
-    return 2.0 * DBL_EPSILON * fabs(indicator->offset);
-}
-
-/* Writes noise and touch of an indicator of a state at the restart, unless they are known: most
- * stay so far above 0 that neither is needed. */
-static void measure_noise(struct location *location, size_t i) {
-    if (!(location->touch[i] < 0.0)) {
-        return;
-    }
-    const struct indicator *indicator = &location->indicators[i];
-    const size_t state = indicator->state;
-    const double rounding = rounding_of(indicator);
-    const double factor = fabs(indicator->factor);
-    const double miss = factor * location->settings->absolute_tolerances[state];
-    const bool is_sure = indicator->rises || at_state(indicator, location->restart_x) > 0.0;
-    location->noise[i] = is_sure ? rounding : larger(rounding, miss);
-    location->touch[i] = factor * error_of(location, state, location->restart_x[state]) +
-                         8.0 * DBL_EPSILON * fabs(indicator->offset);
-}
-
 /* Restarts the indicators of the model, whose noise follows from their limits so far. */
 static enum status restart_model(struct location *location, const double x[]) {
     const struct ode *ode = location->ode;
@@ -140,25 +118,22 @@ static enum status restart_model(struct location *location, const double x[]) {
 
 /* Writes which indicators are used. */
 static void find_used(struct location *location) {
-    const size_t count = location->ode->indicator_count;
-    size_t used_count = 0;
-    bool needs_model = false;
-    for (size_t i = 0; i < count; i++) {
+    location->needs_model = false;
+    location->used_count = 0;
+    for (size_t i = 0; i < location->ode->indicator_count; i++) {
         const struct indicator *indicator = &location->indicators[i];
-        if (indicator->kind == INDICATOR_UNUSED ||
-            (indicator->kind == INDICATOR_OF_STATE && indicator->factor == 0.0)) {
-            continue;
+        if (indicator->kind == INDICATOR_OF_MODEL ||
+            (indicator->kind == INDICATOR_OF_STATE && indicator->factor != 0.0)) {
+            location->used[location->used_count] = i;
+            location->used_count++;
+            location->needs_model |= indicator->kind == INDICATOR_OF_MODEL;
         }
-        location->used[used_count] = i;
-        used_count++;
-        needs_model |= indicator->kind == INDICATOR_OF_MODEL;
     }
-    location->used_count = used_count;
-    location->needs_model = needs_model;
 }
 
-enum status location_restart(struct location *location, const struct indicator *indicators,
-                             bool keeps, const double x[]) {
+enum status location_restart(struct location *location, const struct integrator_start *start,
+                             const double x[]) {
+    const struct indicator *indicators = start->indicators;
     location->indicators = indicators;
     location->time = INFINITY;
     location->calm = 0.0;
@@ -166,23 +141,27 @@ enum status location_restart(struct location *location, const struct indicator *
     if (indicators == NULL) {
         return STATUS_OK;
     }
-    if (!keeps) {
+    if (!start->keeps_indicators) {
         find_used(location);
     }
     memcpy(location->restart_x, x, location->ode->state_count * sizeof *x);
     for (size_t k = 0; k < location->used_count; k++) {
         const size_t i = location->used[k];
         const struct indicator *indicator = &indicators[i];
-        const double rounding = rounding_of(indicator);
+        const double rounding = 2.0 * DBL_EPSILON * fabs(indicator->offset);
         location->has_row[i] = false;
         if (indicator->kind == INDICATOR_OF_MODEL) {
             location->noise[i] = larger(2.0 * rounding, DBL_MIN);
             location->touch[i] = 2.0 * rounding;
         } else {
+            const double factor = fabs(indicator->factor);
             const double z = at_state(indicator, x);
-            location->is_armed[i] =
-                (indicator->rises || z > 0.0) && (z > rounding || (rounding == 0.0 && z >= 0.0));
-            location->touch[i] = -1.0;
+            const bool is_sure = indicator->rises || z > 0.0;
+            location->is_armed[i] = is_sure && (z > rounding || (rounding == 0.0 && z >= 0.0));
+            const double miss = factor * location->settings->absolute_tolerances[indicator->state];
+            location->noise[i] = is_sure ? rounding : larger(rounding, miss);
+            location->touch[i] =
+                factor * error_of(location, indicator->state, x[indicator->state]) + 4.0 * rounding;
         }
     }
     return location->needs_model ? restart_model(location, x) : STATUS_OK;
@@ -535,14 +514,10 @@ enum status location_search(struct location *location) {
         const struct indicator *indicator = &location->indicators[i];
         location->first[i] = INFINITY;
         if (indicator->kind == INDICATOR_OF_STATE) {
-            if (!location->is_armed[i]) {
-                measure_noise(location, i);
-            }
             if (is_far_above(location, i)) {
                 location->is_armed[i] = true;
                 continue;
             }
-            measure_noise(location, i);
             location->first[i] = first_of_state(location, i, s + same_time);
         } else if (location->has_row[i]) {
             location->first[i] = first_of_model(location, i, s + largest_correction);

@@ -37,7 +37,7 @@ struct location {
     bool *is_armed; /* by indicator: true if it has been above 0 since the restart */
     double *noise; /* by indicator: how far from 0 it may be, with either sign, without having risen
                       since the restart */
-    double *touch; /* by indicator, as in struct fall; below 0 if it and noise are not known yet */
+    double *touch; /* by indicator, as in struct fall */
     double *rounding;              /* by indicator, at the restart; 0 if not known */
     bool *triggered;               /* by indicator: true if it is at 0 at `time` */
     struct step_polynomial step;   /* last internal step; methods write it */
@@ -64,11 +64,9 @@ MUST_CHECK NONNULL bool location_create(const struct ode *ode,
                                         struct location *location);
 NONNULL void location_destroy(struct location *location);
 
-/* Restarts the search from the state x, with the indicators that are in force from now on. keeps:
- * they are those of the last restart. */
-MUST_CHECK NONNULL_ARGUMENTS(1, 4) enum status
-    location_restart(struct location *location, const struct indicator *indicators, bool keeps,
-                     const double x[]);
+/* Restarts the search from the state x, with the indicators that are in force from now on. */
+MUST_CHECK NONNULL enum status
+location_restart(struct location *location, const struct integrator_start *start, const double x[]);
 
 static inline bool location_is_active(const struct location *location) {
     return location->indicators != NULL;
