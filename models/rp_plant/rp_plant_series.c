@@ -269,10 +269,7 @@ static void begin_motion(const struct series_origin *origin, double row[][SERIES
     m->p = &values->parameters;
     if (!rp_plant_modes_are_decided(values, &m->modes)) {
         const double(*u)[SERIES_INPUT_LENGTH] = origin->inputs;
-        const struct rp_plant_inputs inputs = {
-            .tau = {u[0][0], u[1][0]},
-            .wrench = {u[FX][0], u[FY][0], u[MZ][0]},
-        };
+        const struct rp_plant_inputs inputs = {{u[0][0], u[1][0]}, {u[FX][0], u[FY][0], u[MZ][0]}};
         rp_plant_first_modes(values, (const double[]){row[Q1][0], row[Q2][0]},
                              (const double[]){row[W][0], row[V][0]}, &inputs, &m->modes);
     }

@@ -13,9 +13,9 @@
 _Static_assert((int)SERIES_INPUT_LENGTH == (int)POLYNOMIAL_DEGREE + 1,
                "the series of an input is its polynomial");
 
-static void evaluate_inputs(const struct instance *instance, double t) {
-    const size_t input_count = count_of(instance->model->inputs);
-    for (size_t i = 0; i < input_count; i++) {
+/* Writes the inputs at the time t, if they move. */
+static inline void evaluate_inputs(const struct instance *instance, double t) {
+    for (size_t i = 0; instance->inputs_move && i < count_of(instance->model->inputs); i++) {
         instance->u[i] = polynomial_value(&instance->memory.active_inputs[i], t);
     }
 }
@@ -38,27 +38,21 @@ static void prepare_inputs(struct instance *instance, bool moves) {
 
 enum status instance_rhs(double t, const double x[], double dx[], void *instance_pointer) {
     const struct instance *instance = instance_pointer;
-    if (instance->inputs_move) {
-        evaluate_inputs(instance, t);
-    }
+    evaluate_inputs(instance, t);
     return instance->model->right_hand_side(instance->memory.restart_values,
                                             instance->state.restart_time.s + t, x, instance->u, dx);
 }
 
 enum status instance_jacobian(double t, const double x[], double J[], void *instance_pointer) {
     const struct instance *instance = instance_pointer;
-    if (instance->inputs_move) {
-        evaluate_inputs(instance, t);
-    }
+    evaluate_inputs(instance, t);
     return instance->model->jacobian(instance->memory.restart_values,
                                      instance->state.restart_time.s + t, x, instance->u, J);
 }
 
 enum status instance_indicators(double t, const double x[], double z[], void *instance_pointer) {
     const struct instance *instance = instance_pointer;
-    if (instance->inputs_move) {
-        evaluate_inputs(instance, t);
-    }
+    evaluate_inputs(instance, t);
     return instance->model->events->indicators(
         instance->memory.restart_values, instance->state.restart_time.s + t, x, instance->u, z);
 }

@@ -15,10 +15,9 @@ struct fall {
     double touch; /* depth below 0 that a fall leads to at least before the indicator rises again */
     double latest;   /* s; later falls need not be located */
     bool is_restart; /* true if p begins at a restart */
-    bool
-        *is_armed; /* true if the indicator has been above 0 since the restart; set when it rises */
-    double *noise; /* how far from 0 the indicator may be without having risen; grows if it is
-                      farther below 0 at the restart */
+    bool *is_armed;  /* true if it has been above 0 since the restart; set when it rises */
+    double *noise;   /* how far from 0 the indicator may be without having risen; grows if it is
+                        farther below 0 at the restart */
 };
 
 /* Returns the first s in (0, 1] at which an indicator falls to 0; INFINITY if it does not fall, or

@@ -18,23 +18,22 @@ bool location_create(const struct ode *ode, const struct integrator_settings *se
     location->rows = calloc(states, sizeof *location->rows);
     location->step.indicator_row = calloc(count, sizeof *location->step.indicator_row);
     location->used = calloc(count, sizeof *location->used);
-    location->first = calloc(count, sizeof *location->first);
     location->samples = calloc(count, sizeof *location->samples);
     location->x = calloc(4 * states, sizeof *location->x);
-    location->z = calloc(count, sizeof *location->z);
-    location->has_row = calloc(count, sizeof *location->has_row);
-    location->is_armed = calloc(count, sizeof *location->is_armed);
-    location->noise = calloc(3 * count, sizeof *location->noise);
-    location->triggered = calloc(count, sizeof *location->triggered);
+    location->has_row = calloc(3 * count, sizeof *location->has_row);
+    location->noise = calloc(5 * count, sizeof *location->noise);
     if (location->rows == NULL || location->step.indicator_row == NULL || location->used == NULL ||
-        location->first == NULL || location->samples == NULL || location->x == NULL ||
-        location->z == NULL || location->has_row == NULL || location->is_armed == NULL ||
-        location->noise == NULL || location->triggered == NULL) {
+        location->samples == NULL || location->x == NULL || location->has_row == NULL ||
+        location->noise == NULL) {
         location_destroy(location);
         return false;
     }
+    location->is_armed = location->has_row + count;
+    location->triggered = location->is_armed + count;
     location->touch = location->noise + count;
     location->rounding = location->touch + count;
+    location->z = location->rounding + count;
+    location->first = location->z + count;
     location->dx = location->x + states;
     location->restart_x = location->dx + states;
     location->way = location->restart_x + states;
@@ -42,14 +41,10 @@ bool location_create(const struct ode *ode, const struct integrator_settings *se
 }
 
 void location_destroy(struct location *location) {
-    free(location->triggered);
     free(location->noise);
-    free(location->is_armed);
     free(location->has_row);
-    free(location->z);
     free(location->x);
     free(location->samples);
-    free(location->first);
     free(location->used);
     free(location->step.indicator_row);
     free(location->rows);

@@ -32,8 +32,7 @@ struct location {
     size_t used_count;
     bool needs_model; /* true if a used indicator is an INDICATOR_OF_MODEL */
     const struct integrator_settings *settings; /* at each restart */
-    bool *
-        has_row; /* by indicator: true if step.indicator_row has it; otherwise it is interpolated */
+    bool *has_row;  /* by indicator: true if step.indicator_row has it; else it is interpolated */
     bool *is_armed; /* by indicator: true if it has been above 0 since the restart */
     double *noise; /* by indicator: how far from 0 it may be, with either sign, without having risen
                       since the restart */
