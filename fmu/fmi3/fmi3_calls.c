@@ -25,14 +25,11 @@ const struct call_rule fmi3_call_rules[FMI3_CALL_COUNT] = {FMI3_FUNCTION_LIST(FM
 
 /* ---- Checks --------------------------------------------------------------------------------- */
 
-bool fmi3_check_count(struct component *component, enum fmi3_call call, size_t count,
-                      size_t expected) {
-    if (component != NULL && count != expected) {
-        component_fail(component, "%s: an array has %zu values: %zu are expected",
-                       fmi3_call_rules[call].name, count, expected);
-        return false;
-    }
-    return true;
+bool fmi3_refuse_count(struct component *component, enum fmi3_call call, size_t count,
+                       size_t expected) {
+    component_fail(component, "%s: an array has %zu values: %zu are expected",
+                   fmi3_call_rules[call].name, count, expected);
+    return false;
 }
 
 bool fmi3_check_access(struct component *component, unsigned call, bool setting,
@@ -80,67 +77,34 @@ static const char no_structure[] = "the model has no structural parameters";
 static const char no_dependencies[] =
     "the dependencies of variables are those in modelDescription.xml";
 
-fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                        size_t nValueReferences, fmi3Clock values[]) {
-    return unsupported(instance, CALL_fmi3GetClock, no_clocks);
-}
-
-fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                        size_t nValueReferences, const fmi3Clock values[]) {
-    return unsupported(instance, CALL_fmi3SetClock, no_clocks);
-}
-
-fmi3Status fmi3GetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                  size_t nValueReferences, fmi3Float64 intervals[],
-                                  fmi3IntervalQualifier qualifiers[]) {
-    return unsupported(instance, CALL_fmi3GetIntervalDecimal, no_clocks);
-}
-
-fmi3Status fmi3GetIntervalFraction(fmi3Instance instance,
-                                   const fmi3ValueReference valueReferences[],
-                                   size_t nValueReferences, fmi3UInt64 counters[],
-                                   fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[]) {
-    return unsupported(instance, CALL_fmi3GetIntervalFraction, no_clocks);
-}
-
-fmi3Status fmi3GetShiftDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                               size_t nValueReferences, fmi3Float64 shifts[]) {
-    return unsupported(instance, CALL_fmi3GetShiftDecimal, no_clocks);
-}
-
-fmi3Status fmi3GetShiftFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                size_t nValueReferences, fmi3UInt64 counters[],
-                                fmi3UInt64 resolutions[]) {
-    return unsupported(instance, CALL_fmi3GetShiftFraction, no_clocks);
-}
-
-fmi3Status fmi3SetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                  size_t nValueReferences, const fmi3Float64 intervals[]) {
-    return unsupported(instance, CALL_fmi3SetIntervalDecimal, no_clocks);
-}
-
-fmi3Status fmi3SetIntervalFraction(fmi3Instance instance,
-                                   const fmi3ValueReference valueReferences[],
-                                   size_t nValueReferences, const fmi3UInt64 counters[],
-                                   const fmi3UInt64 resolutions[]) {
-    return unsupported(instance, CALL_fmi3SetIntervalFraction, no_clocks);
-}
-
-fmi3Status fmi3SetShiftDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                               size_t nValueReferences, const fmi3Float64 shifts[]) {
-    return unsupported(instance, CALL_fmi3SetShiftDecimal, no_clocks);
-}
-
-fmi3Status fmi3SetShiftFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                size_t nValueReferences, const fmi3UInt64 counters[],
-                                const fmi3UInt64 resolutions[]) {
-    return unsupported(instance, CALL_fmi3SetShiftFraction, no_clocks);
-}
-
-fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference clockReference,
-                                      fmi3Float64 activationTime) {
-    return unsupported(instance, CALL_fmi3ActivateModelPartition, no_clocks);
-}
+/* Defines a function with these arguments after the instance. */
+#define UNSUPPORTED(name, reason, ...)                                                             \
+    fmi3Status fmi3##name(fmi3Instance instance, __VA_ARGS__) {                                    \
+        return unsupported(instance, CALL_fmi3##name, reason);                                     \
+    }
+UNSUPPORTED(GetClock, no_clocks, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, fmi3Clock values[])
+UNSUPPORTED(SetClock, no_clocks, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, const fmi3Clock values[])
+UNSUPPORTED(GetIntervalDecimal, no_clocks, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
+UNSUPPORTED(GetIntervalFraction, no_clocks, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, fmi3UInt64 counters[], fmi3UInt64 resolutions[],
+            fmi3IntervalQualifier qualifiers[])
+UNSUPPORTED(GetShiftDecimal, no_clocks, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, fmi3Float64 shifts[])
+UNSUPPORTED(GetShiftFraction, no_clocks, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, fmi3UInt64 counters[], fmi3UInt64 resolutions[])
+UNSUPPORTED(SetIntervalDecimal, no_clocks, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, const fmi3Float64 intervals[])
+UNSUPPORTED(SetIntervalFraction, no_clocks, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+UNSUPPORTED(SetShiftDecimal, no_clocks, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, const fmi3Float64 shifts[])
+UNSUPPORTED(SetShiftFraction, no_clocks, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+UNSUPPORTED(ActivateModelPartition, no_clocks, fmi3ValueReference clockReference,
+            fmi3Float64 activationTime)
 
 /* ---- Discrete states, structure ------------------------------------------------------------- */
 
@@ -157,16 +121,9 @@ fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance) {
     return unsupported(instance, CALL_fmi3ExitConfigurationMode, no_structure);
 }
 
-fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance instance,
-                                               fmi3ValueReference valueReference,
-                                               size_t *nDependencies) {
-    return unsupported(instance, CALL_fmi3GetNumberOfVariableDependencies, no_dependencies);
-}
-
-fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference dependent,
-                                       size_t elementIndicesOfDependent[],
-                                       fmi3ValueReference independents[],
-                                       size_t elementIndicesOfIndependents[],
-                                       fmi3DependencyKind dependencyKinds[], size_t nDependencies) {
-    return unsupported(instance, CALL_fmi3GetVariableDependencies, no_dependencies);
-}
+UNSUPPORTED(GetNumberOfVariableDependencies, no_dependencies, fmi3ValueReference valueReference,
+            size_t *nDependencies)
+UNSUPPORTED(GetVariableDependencies, no_dependencies, fmi3ValueReference dependent,
+            size_t elementIndicesOfDependent[], fmi3ValueReference independents[],
+            size_t elementIndicesOfIndependents[], fmi3DependencyKind dependencyKinds[],
+            size_t nDependencies)

@@ -42,9 +42,16 @@ static inline fmi3Status fmi3_status(enum component_status status) {
     return (fmi3Status)status;
 }
 
+/* Reports a wrong number of values as component_fail does. Returns false. */
+NONNULL bool fmi3_refuse_count(struct component *component, enum fmi3_call call, size_t count,
+                               size_t expected);
+
 /* Returns true if the number of values is right; otherwise fails as component_fail. */
-bool fmi3_check_count(struct component *component, enum fmi3_call call, size_t count,
-                      size_t expected);
+static inline bool fmi3_check_count(struct component *component, enum fmi3_call call, size_t count,
+                                    size_t expected) {
+    return count == expected || component == NULL ||
+           fmi3_refuse_count(component, call, count, expected);
+}
 
 /* Returns true if the variables may be read or set in intermediate update mode; otherwise fails as
  * component_fail. Other modes are not checked here. */

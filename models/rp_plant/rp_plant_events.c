@@ -229,8 +229,9 @@ static bool modes_are_possible(const void *values_pointer, bool is_held) {
            (!is_held || (fits(values, 0) && fits(values, 1)));
 }
 
-/* True if no mode changes because the joints, without stops, move as they did. */
-static bool moves_on(const struct rp_plant_values *values) {
+/* True if no mode changes because the joints, without stops, move as they did, or stay held. */
+static bool moves_on(const void *values_pointer) {
+    const struct rp_plant_values *values = values_pointer;
     const struct rp_plant_parameters *p = &values->parameters;
     const struct rp_plant_modes *modes = &values->modes;
     bool is_same =
@@ -240,15 +241,12 @@ static bool moves_on(const struct rp_plant_values *values) {
                   values->dq[i] * modes->joint[i] > 0.0 && plant_breakaway(p, i) > 0.0 &&
                   plant_slides(modes->joint[i]);
     }
-    return is_same;
+    return is_same || rp_plant_surely_holds(values);
 }
 
 static enum status update(void *values_pointer, const struct event *event) {
     static const int none[2] = {0, 0};
     struct rp_plant_values *values = values_pointer;
-    if (event->triggered == NULL && (moves_on(values) || rp_plant_surely_holds(values))) {
-        return STATUS_OK;
-    }
     struct triggered triggered;
     read_triggered(values, event->triggered, &triggered);
 
@@ -403,6 +401,7 @@ const struct model_events rp_plant_events = {
     .discrete_inputs = {offsetof(struct rp_plant_values, payload_attached), sizeof(int)},
     .are_possible = are_possible,
     .modes_are_possible = modes_are_possible,
+    .moves_on = moves_on,
     .is_at_rest = is_at_rest,
     .describe = describe,
     .indicators = indicators,

@@ -96,17 +96,22 @@ static inline void rp_plant_correct_modes(const struct rp_plant_parameters *p,
     }
 }
 
-/* Writes the modes in effect: those of the last event, or during initialization, when none has
- * been, the first ones. Inline, as each evaluation asks for them; a modified copy that is returned
- * stalls the processor, which cannot load parts together that were stored apart. */
+/* Writes the modes of the last event. Returns false during initialization, when none has been: then
+ * the first ones are in effect. Inline, as each evaluation asks for them; a modified copy that is
+ * returned stalls the processor, which cannot load parts together that were stored apart. */
+static inline bool rp_plant_modes_are_decided(const struct rp_plant_values *values,
+                                              struct rp_plant_modes *modes) {
+    *modes = values->modes;
+    rp_plant_correct_modes(&values->parameters, modes);
+    return modes->payload != RP_PLANT_UNDECIDED;
+}
+
+/* Writes the modes in effect. */
 static inline void rp_plant_modes_in_effect(const struct rp_plant_values *values, const double q[2],
                                             const double dq[2],
                                             const struct rp_plant_inputs *inputs,
                                             struct rp_plant_modes *modes) {
-    *modes = values->modes;
-    if (modes->payload == RP_PLANT_UNDECIDED) {
+    if (!rp_plant_modes_are_decided(values, modes)) {
         rp_plant_first_modes(values, q, dq, inputs, modes);
-    } else {
-        rp_plant_correct_modes(&values->parameters, modes);
     }
 }

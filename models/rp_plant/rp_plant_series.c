@@ -129,7 +129,7 @@ ALWAYS_INLINE double series_exponential(const struct series_motion *m, int i, in
     return e[k];
 }
 
-/* Returns order k of plant_friction. Above order 0 the law has Fb - Fc and 0 for Fb and Fc. */
+/* Returns order k of plant_friction. */
 ALWAYS_INLINE double series_friction(const struct series_motion *m, int i, int k,
                                      double row[][SERIES_LENGTH]) {
     if (!plant_slides(m->modes.joint[i])) {
@@ -141,8 +141,8 @@ ALWAYS_INLINE double series_friction(const struct series_motion *m, int i, int k
     }
     const double breakaway = m->p->breakaway_friction[i];
     const double e = series_exponential(m, i, k, row);
-    return m->direction[i] * (k == 0 ? plant_stribeck(breakaway, coulomb, e)
-                                     : plant_stribeck(breakaway - coulomb, 0.0, e));
+    return m->direction[i] *
+           (k == 0 ? plant_stribeck(breakaway, coulomb, e) : (breakaway - coulomb) * e);
 }
 
 /* Returns order k of plant_compliant_force. */
@@ -267,17 +267,11 @@ static void begin_motion(const struct series_origin *origin, double row[][SERIES
     const struct rp_plant_values *values = origin->values;
     m->origin = origin;
     m->p = &values->parameters;
-    m->modes = values->modes;
-    if (values->modes.payload == RP_PLANT_UNDECIDED) {
+    if (!rp_plant_modes_are_decided(values, &m->modes)) {
         const double(*u)[SERIES_INPUT_LENGTH] = origin->inputs;
-        const struct rp_plant_inputs inputs = {
-            .tau = {u[0][0], u[1][0]},
-            .wrench = {u[FX][0], u[FY][0], u[MZ][0]},
-        };
+        const struct rp_plant_inputs inputs = {{u[0][0], u[1][0]}, {u[FX][0], u[FY][0], u[MZ][0]}};
         rp_plant_first_modes(values, (const double[]){row[Q1][0], row[Q2][0]},
                              (const double[]){row[W][0], row[V][0]}, &inputs, &m->modes);
-    } else {
-        rp_plant_correct_modes(m->p, &m->modes);
     }
     m->has_wrench = has_wrench(origin);
     for (int i = 0; i < 2; i++) {
@@ -316,7 +310,7 @@ static inline struct products products_of_order(double row[][SERIES_LENGTH], dou
 
 /* What follows from the orders up to n: coefficients of order n + 1, and terms of order n. */
 struct next {
-    double L, s, c, w, v, P;
+    double q1, L, s, c, w, v, P;
     double effort[2];
     double P_w, weight; /* weight: g c1 (m1 lc1 + m2 L) */
 };
@@ -325,6 +319,7 @@ static inline struct next next_order(const struct series_motion *m, int n,
                                      double row[][SERIES_LENGTH]) {
     const double h = m->origin->time_scale / (n + 1);
     struct next next = {
+        .q1 = h * row[W][n],
         .L = h * row[V][n],
         .effort = {series_effort(m, 0, n, row), series_effort(m, 1, n, row)},
     };
@@ -358,7 +353,7 @@ static inline struct next next_order(const struct series_motion *m, int n,
 
 static inline void write_order(const struct series_motion *m, int k, const struct next *next,
                                double row[][SERIES_LENGTH]) {
-    row[Q1][k] = jet_integral(row[W], m->origin->time_scale, k);
+    row[Q1][k] = next->q1;
     row[Q2][k] = next->L;
     row[L][k] = next->L;
     row[W][k] = next->w;

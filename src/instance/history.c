@@ -13,9 +13,9 @@
 _Static_assert((int)SERIES_INPUT_LENGTH == (int)POLYNOMIAL_DEGREE + 1,
                "the series of an input is its polynomial");
 
-static void evaluate_inputs(const struct instance *instance, double t) {
-    const size_t input_count = count_of(instance->model->inputs);
-    for (size_t i = 0; i < input_count; i++) {
+/* Writes the inputs at the time t, if they move. */
+static inline void evaluate_inputs(const struct instance *instance, double t) {
+    for (size_t i = 0; instance->inputs_move && i < count_of(instance->model->inputs); i++) {
         instance->u[i] = polynomial_value(&instance->memory.active_inputs[i], t);
     }
 }
@@ -38,27 +38,21 @@ static void prepare_inputs(struct instance *instance, bool moves) {
 
 enum status instance_rhs(double t, const double x[], double dx[], void *instance_pointer) {
     const struct instance *instance = instance_pointer;
-    if (instance->inputs_move) {
-        evaluate_inputs(instance, t);
-    }
+    evaluate_inputs(instance, t);
     return instance->model->right_hand_side(instance->memory.restart_values,
                                             instance->state.restart_time.s + t, x, instance->u, dx);
 }
 
 enum status instance_jacobian(double t, const double x[], double J[], void *instance_pointer) {
     const struct instance *instance = instance_pointer;
-    if (instance->inputs_move) {
-        evaluate_inputs(instance, t);
-    }
+    evaluate_inputs(instance, t);
     return instance->model->jacobian(instance->memory.restart_values,
                                      instance->state.restart_time.s + t, x, instance->u, J);
 }
 
 enum status instance_indicators(double t, const double x[], double z[], void *instance_pointer) {
     const struct instance *instance = instance_pointer;
-    if (instance->inputs_move) {
-        evaluate_inputs(instance, t);
-    }
+    evaluate_inputs(instance, t);
     return instance->model->events->indicators(
         instance->memory.restart_values, instance->state.restart_time.s + t, x, instance->u, z);
 }
@@ -115,10 +109,14 @@ static bool is_searched(const struct instance *instance) {
 
 /* Returns the indicators of the current modes, for the integrator; NULL if no event is possible. */
 static const struct indicator *describe_indicators(struct instance *instance) {
+    if (instance->indicators_are_active) {
+        return instance->indicators;
+    }
     if (!is_searched(instance)) {
         return NULL;
     }
     instance->model->events->describe(instance->memory.restart_values, instance->indicators);
+    instance->indicators_are_active = true;
     return instance->indicators;
 }
 
@@ -166,26 +164,20 @@ void instance_update_next_step(struct instance *instance) {
 
 static struct integrator_start start_of(struct instance *instance) {
     const struct instance_state *state = &instance->state;
+    const bool keeps_indicators = instance->indicators_are_active;
     return (struct integrator_start){
         .origin = state->restart_time.s,
         .horizon = state->horizon,
         .first_step = state->restart_step,
         .continues = state->restart_continues,
         .is_after_event = state->restart_after_event,
-        .indicators = instance->model->events != NULL ? describe_indicators(instance) : NULL};
+        .keeps_indicators = keeps_indicators,
+        .indicators = describe_indicators(instance),
+    };
 }
 
-/* Makes the integrator run with the inputs or states that are set now. A loop, because they are
- * few. */
+/* Makes the integrator run with the values that are set now; range: of a value structure. */
 static void activate(struct instance *instance, struct range range) {
-    const double *from = doubles_of(instance->memory.values, range);
-    double *to = doubles_of(instance->memory.restart_values, range);
-    for (size_t i = 0; i < count_of(range); i++) {
-        to[i] = from[i];
-    }
-}
-
-static void activate_bytes(struct instance *instance, struct range range) {
     memcpy(instance->memory.restart_values + range.offset, instance->memory.values + range.offset,
            range.size);
 }
@@ -216,17 +208,11 @@ static inline void activate_values(struct instance *instance, struct clock_time 
     struct instance_state *state = &instance->state;
     const struct model *model = instance->model;
     if (has_new_parameters) {
-        activate_bytes(instance, model->parameters);
+        activate(instance, model->parameters);
     }
-    if (model->events != NULL) {
-        activate_bytes(instance, model->events->discrete_inputs);
-        activate_bytes(instance, model->events->modes);
-        activate_bytes(instance, model->events->discrete_states);
-    }
+    activate(instance, memory->written);
     instance->parameters_are_active = true;
     instance_note_inputs(instance);
-    activate(instance, model->inputs);
-    activate(instance, model->states);
     const size_t input_count = count_of(model->inputs);
     memcpy(memory->active_inputs, inputs, input_count * sizeof *inputs);
     prepare_inputs(instance, !instance->inputs_are_held &&
@@ -258,6 +244,8 @@ static enum status restart(struct instance *instance, struct clock_time end,
     state->restart_step = state->next_step;
     state->restart_continues = continuation != CONTINUE_AFTER_CHANGE;
     state->restart_after_event = is_event;
+    // after a change, no update since the last restart means that the model moves on
+    instance->indicators_are_active &= continuation == CONTINUE_AFTER_CHANGE && !has_new_parameters;
     const struct integrator_start start = start_of(instance);
     return integrator_restart(instance->integrator,
                               doubles_of(memory->restart_values, instance->model->states), &start);
@@ -339,6 +327,7 @@ enum status instance_rest(struct instance *instance, struct clock_time end, stru
     } else {
         end_history(instance);
     }
+    instance->indicators_are_active = false;
     const struct integrator_start start = {
         .indicators = searches ? describe_indicators(instance) : NULL,
     };

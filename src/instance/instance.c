@@ -31,9 +31,8 @@ static void locate_written(const struct model *model, struct instance_memory *me
     }
     const size_t first = (size_t)((char *)memory->active_inputs - memory->block);
     const size_t restart = (size_t)(memory->restart_values - memory->block);
-    const size_t values = (size_t)(memory->values - memory->block);
     memory->written_at_restart = (struct range){first, restart + end - first};
-    memory->written = (struct range){values + begin, end > begin ? end - begin : 0};
+    memory->written = (struct range){begin, end > begin ? end - begin : 0};
 }
 
 static bool lies_in(struct range range, const struct variable *variable) {

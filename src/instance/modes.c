@@ -77,6 +77,7 @@ static enum status check_next_time(const struct instance *instance, double passe
 
 static enum status update(struct instance *instance, const bool *triggered, double since) {
     const struct model_events *events = instance->model->events;
+    instance->indicators_are_active = false;
     write_tolerances(instance, since);
     const struct polynomial *inputs = instance->memory.current_inputs;
     const size_t input_count = count_of(instance->model->inputs);
@@ -120,10 +121,15 @@ static enum status update(struct instance *instance, const bool *triggered, doub
 }
 
 enum status instance_update_modes(struct instance *instance, const bool *triggered) {
-    if (instance->model->events == NULL) {
+    const struct model_events *events = instance->model->events;
+    if (events == NULL) {
         return STATUS_OK;
     }
     instance->outputs_are_valid = false;
+    if (triggered == NULL && events->moves_on != NULL &&
+        events->moves_on(instance->memory.values)) {
+        return STATUS_OK;
+    }
     return update(instance, triggered, INFINITY);
 }
 

@@ -72,6 +72,7 @@ static enum status resume(struct instance *instance) {
     instance->outputs_are_valid = false;
     instance->parameters_are_valid = false;
     instance->parameters_are_active = false;
+    instance->indicators_are_active = false;
     instance->inputs_are_held = false;
     instance->history_is_lost = true;
     instance_update_tolerance(instance);
@@ -111,8 +112,9 @@ static void copy_written(const struct instance_memory *memory, bool inputs_are_h
     const struct range restart = memory->written_at_restart;
     const size_t begin = inputs_are_held ? restart.offset : 0;
     const size_t end = restart.offset + restart.size;
+    const size_t values = (size_t)(memory->values - memory->block) + memory->written.offset;
     memcpy(to + begin, from + begin, end - begin);
-    memcpy(to + memory->written.offset, from + memory->written.offset, memory->written.size);
+    memcpy(to + values, from + values, memory->written.size);
 }
 
 void instance_keep(struct instance *instance, struct instance_snapshot *snapshot) {

@@ -70,7 +70,7 @@ struct instance_memory {
     size_t size; /* bytes */
     /* Parts of the block that a step writes, besides the first two and calculated values. */
     struct range written_at_restart; /* active_inputs to restart_values */
-    struct range written;            /* part of values */
+    struct range written;            /* of a value structure */
 };
 
 /* Place and kind of the value of a reference. */
@@ -96,6 +96,8 @@ struct instance {
     bool outputs_are_valid;     /* true if the calculated values belong to the others */
     bool parameters_are_valid;  /* true if they are consistent, false if not known */
     bool parameters_are_active; /* true if instance_parameters_are_active, false if not known */
+    bool indicators_are_active; /* true if no update has been since the integrator was restarted
+                                   with the indicators, false if not known */
     bool history_is_lost;       /* true if the integrator is not where state says: replay first */
     bool inputs_are_held;       /* true if the inputs of the next step are constant and equal to
                                    current_inputs, false if not known */

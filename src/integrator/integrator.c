@@ -152,7 +152,7 @@ enum status integrator_restart(struct integrator *integrator, const double x[],
     memcpy(integrator->reached_x, x, problem->ode.state_count * sizeof(double));
     enum status status = STATUS_OK;
     if (start->indicators != NULL || location_is_active(&problem->location)) {
-        status = location_restart(&problem->location, start->indicators, x);
+        status = location_restart(&problem->location, start, x);
     }
     return status == STATUS_OK ? integrator->method->restart(integrator->memory, x) : status;
 }
@@ -254,7 +254,7 @@ enum status integrator_advance(struct integrator *integrator, double t, int64_t 
 enum status integrator_rest(struct integrator *integrator, const double x[],
                             const struct integrator_start *start, double t, double *reached) {
     struct problem *problem = &integrator->problem;
-    enum status status = location_restart(&problem->location, start->indicators, x);
+    enum status status = location_restart(&problem->location, start, x);
     if (status == STATUS_OK && start->indicators != NULL) {
         status = location_search_at_rest(&problem->location, x, t);
     }

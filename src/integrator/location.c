@@ -105,8 +105,24 @@ static enum status restart_model(struct location *location, const double x[]) {
     return status;
 }
 
-enum status location_restart(struct location *location, const struct indicator *indicators,
+/* Writes which indicators are used. */
+static void find_used(struct location *location) {
+    location->needs_model = false;
+    location->used_count = 0;
+    for (size_t i = 0; i < location->ode->indicator_count; i++) {
+        const struct indicator *indicator = &location->indicators[i];
+        if (indicator->kind == INDICATOR_OF_MODEL ||
+            (indicator->kind == INDICATOR_OF_STATE && indicator->factor != 0.0)) {
+            location->used[location->used_count] = i;
+            location->used_count++;
+            location->needs_model |= indicator->kind == INDICATOR_OF_MODEL;
+        }
+    }
+}
+
+enum status location_restart(struct location *location, const struct integrator_start *start,
                              const double x[]) {
+    const struct indicator *indicators = start->indicators;
     location->indicators = indicators;
     location->time = INFINITY;
     location->calm = 0.0;
@@ -114,34 +130,27 @@ enum status location_restart(struct location *location, const struct indicator *
     if (indicators == NULL) {
         return STATUS_OK;
     }
-    location->needs_model = false;
-    location->used_count = 0;
+    if (!start->keeps_indicators) {
+        find_used(location);
+    }
     memcpy(location->restart_x, x, location->ode->state_count * sizeof *x);
-    const struct indicator *const end = indicators + location->ode->indicator_count;
-    for (const struct indicator *indicator = indicators; indicator < end; indicator++) {
-        if (indicator->kind == INDICATOR_UNUSED ||
-            (indicator->kind == INDICATOR_OF_STATE && indicator->factor == 0.0)) {
-            continue;
-        }
-        const size_t i = (size_t)(indicator - indicators);
-        location->has_row[i] = false;
-        location->used[location->used_count] = i;
-        location->used_count++;
+    for (size_t k = 0; k < location->used_count; k++) {
+        const size_t i = location->used[k];
+        const struct indicator *indicator = &indicators[i];
         const double rounding = 2.0 * DBL_EPSILON * fabs(indicator->offset);
+        location->has_row[i] = false;
         if (indicator->kind == INDICATOR_OF_MODEL) {
-            location->needs_model = true;
             location->noise[i] = larger(2.0 * rounding, DBL_MIN);
             location->touch[i] = 2.0 * rounding;
         } else {
+            const double factor = fabs(indicator->factor);
             const double z = at_state(indicator, x);
             const bool is_sure = indicator->rises || z > 0.0;
             location->is_armed[i] = is_sure && (z > rounding || (rounding == 0.0 && z >= 0.0));
-            const double miss =
-                fabs(indicator->factor) * location->settings->absolute_tolerances[indicator->state];
+            const double miss = factor * location->settings->absolute_tolerances[indicator->state];
             location->noise[i] = is_sure ? rounding : larger(rounding, miss);
-            location->touch[i] = fabs(indicator->factor) *
-                                     error_of(location, indicator->state, x[indicator->state]) +
-                                 8.0 * DBL_EPSILON * fabs(indicator->offset);
+            location->touch[i] =
+                factor * error_of(location, indicator->state, x[indicator->state]) + 4.0 * rounding;
         }
     }
     return location->needs_model ? restart_model(location, x) : STATUS_OK;

@@ -69,9 +69,8 @@ MUST_CHECK NONNULL bool location_create(const struct ode *ode,
 NONNULL void location_destroy(struct location *location);
 
 /* Restarts the search from the state x, with the indicators that are in force from now on. */
-MUST_CHECK NONNULL_ARGUMENTS(1, 3) enum status
-    location_restart(struct location *location, const struct indicator *indicators,
-                     const double x[]);
+MUST_CHECK NONNULL enum status
+location_restart(struct location *location, const struct integrator_start *start, const double x[]);
 
 static inline bool location_is_active(const struct location *location) {
     return location->indicators != NULL;

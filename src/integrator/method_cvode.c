@@ -295,14 +295,26 @@ static void lead_from_restart(struct location *location) {
     }
 }
 
+ALWAYS_INLINE void write_rows(const struct small_vector_terms *columns, size_t n,
+                              double row[][SERIES_LENGTH]) {
+    for (int k = 0; k < columns->count; k++) {
+        const double *column = columns->data[columns->count - 1 - k];
+        for (size_t i = 0; i < n; i++) {
+            row[i][k] = column[i];
+        }
+    }
+}
+
 /* Searches the last internal step for an event. */
 static enum status search(struct cvode *cvode, double begin, double end) {
     struct problem *problem = cvode->base.problem;
     struct step_polynomial *step = &problem->location.step;
     struct small_vector_terms *columns = &cvode->columns;
+    columns->replace_sum = true;
     small_vector_note_terms(cvode->base.work, columns);
     const int flag = CVodeGetDky(cvode->solver, end, 0, cvode->base.work);
     small_vector_note_terms(cvode->base.work, NULL);
+    columns->replace_sum = false;
     if (flag != CV_SUCCESS) {
         return sundials_status(problem, flag);
     }
@@ -311,10 +323,10 @@ static enum status search(struct cvode *cvode, double begin, double end) {
     step->is_from_end = true;
     step->degree = columns->count - 1;
     step->row = problem->location.rows;
-    for (size_t i = 0; i < problem->ode.state_count; i++) {
-        for (int k = 0; k < columns->count; k++) {
-            step->row[i][k] = columns->data[columns->count - 1 - k][i];
-        }
+    if (problem->ode.state_count == 4) {
+        write_rows(columns, 4, step->row); // the compiler leaves the inner loop out
+    } else {
+        write_rows(columns, problem->ode.state_count, step->row);
     }
     cvode->is_led = begin == 0.0 && problem->ode.rounding != NULL && step->degree > 0;
     if (cvode->is_led) {

@@ -92,16 +92,16 @@ struct integrator_statistics {
 
 /* Start of an integration. Times in s since the restart. */
 struct integrator_start {
-    double origin;  /* time of the simulation at the restart, s: for messages only */
-    double horizon; /* > 0: neither the right-hand side is evaluated beyond it, nor may
-                       integrator_advance go there; INFINITY without limit */
-    double
-        first_step; /* result of integrator_next_step for a solution like this one; 0 if unknown */
-    bool continues; /* true if the solution is the one that was integrated up to here: further
-                       advances are likely */
+    double origin;       /* time of the simulation at the restart, s: for messages only */
+    double horizon;      /* > 0: neither the right-hand side is evaluated beyond it, nor may
+                            integrator_advance go there; INFINITY without limit */
+    double first_step;   /* integrator_next_step of a solution like this one; 0 if unknown */
+    bool continues;      /* true if the solution is the one that was integrated up to here: further
+                            advances are likely */
     bool is_after_event; /* true if it continues after an event: the next one may be near */
     const struct indicator *indicators; /* indicators of the ode until the next restart; they must
                                            stay. NULL to search no events */
+    bool keeps_indicators;              /* true if they are as at the last restart */
 };
 
 /* Observes each internal step that ends before the t of an advance; x: the state at its end t (s

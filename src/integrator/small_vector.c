@@ -280,9 +280,12 @@ ALWAYS_INLINE sunindextype four(N_Vector x) {
         return weighted_norm(length(x), small_vector_data(x), small_vector_data(w));               \
     }                                                                                              \
     static int name##_linear_combination(int count, sunrealtype *c, N_Vector *X, N_Vector x) {     \
-        linear_combination(length(x), count, c, X, small_vector_data(x));                          \
-        if (terms_of(x) != NULL) {                                                                 \
-            note(terms_of(x), count, X);                                                           \
+        struct small_vector_terms *terms = terms_of(x);                                            \
+        if (terms == NULL || !terms->replace_sum) {                                                \
+            linear_combination(length(x), count, c, X, small_vector_data(x));                      \
+        }                                                                                          \
+        if (terms != NULL) {                                                                       \
+            note(terms, count, X);                                                                 \
         }                                                                                          \
         return 0;                                                                                  \
     }                                                                                              \

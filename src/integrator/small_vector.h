@@ -6,12 +6,15 @@
  * ARKODE; sums are formed in the same order as in N_Vector_Serial. Private to the integrator. */
 #pragma once
 
+#include <stdbool.h>
+
 #include <sundials/sundials_nvector.h>
 
 /* Terms of a linear combination: see small_vector_note_terms. */
 enum { SMALL_VECTOR_MOST_TERMS = 16 };
 struct small_vector_terms {
-    int count; /* 0 if there are none, or more than there is room for */
+    bool replace_sum; /* true if x need not be written */
+    int count;        /* 0 if there are none, or more than there is room for */
     const double *data[SMALL_VECTOR_MOST_TERMS];
 };
 

@@ -88,6 +88,10 @@ struct model_events {
      * is_held: parameters and states have not been set since the update. */
     bool (*modes_are_possible)(const void *values, bool is_held);
 
+    /* True if update would change nothing, since no event has come, and describe would write the
+     * same as after the last update. False or NULL if not known. */
+    bool (*moves_on)(const void *values);
+
     /* True if every state's derivative is 0 in these modes, whatever the inputs are. NULL if the
      * model has no states. */
     bool (*is_at_rest)(const void *values);

@@ -105,13 +105,35 @@ static void test_after_an_update_all_modes_are_valid(void) {
 }
 
 static void test_a_second_update_changes_nothing(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+    int moved = 0;
+    for (int n = 0; n < 20 * RP_TEST_SAMPLES; n++) {
+        struct indicator first[RP_PLANT_INDICATORS] = {0};
+        struct indicator second[RP_PLANT_INDICATORS] = {0};
         next_sample();
         plant_test_update(&v, -1);
+        events->describe(&v, first);
+        if (n % 2 == 0) { // a step later
+            v.q[1] += v.modes.joint[1] == RP_PLANT_STUCK ? 0.0 : 0.125;
+            v.dq[0] *= 0.5;
+            v.dq[1] *= n % 4 == 0 ? 2.0 : -0.5;
+            v.inputs.tau[0] *= -1.0;
+            if (!events->moves_on(&v)) {
+                continue;
+            }
+            moved++;
+        }
         const struct rp_plant_values once = v;
         plant_test_update(&v, -1);
         TEST_ASSERT_EQUAL_MEMORY(&once, &v, sizeof v);
+        events->describe(&v, second);
+        for (int k = 0; k < RP_PLANT_INDICATORS; k++) {
+            TEST_ASSERT_TRUE(first[k].kind == second[k].kind && first[k].state == second[k].state &&
+                             first[k].factor == second[k].factor &&
+                             first[k].offset == second[k].offset &&
+                             first[k].rises == second[k].rises);
+        }
     }
+    TEST_ASSERT_TRUE(moved > 0);
 }
 
 static void test_description_gives_the_indicators(void) {
