@@ -228,7 +228,7 @@ static void switch_fallen(const struct call *call) {
         const double slope = signed_slope(&after[k], call->holds[k]);
         const bool falls = slope < 0.0 && slope < signed_slope(&before[k], call->holds[k]);
         const bool may_turn = !model->relation[k].is_timed && is_near(&after[k]);
-        const bool is_set = (!before[k].used || before[k].slope == 0.0) &&
+        const bool is_set = slope != 0.0 && (!before[k].used || before[k].slope == 0.0) &&
                             fabs(slope) * flat_time <= after[k].noise;
         const bool turns = is_set ? call->holds[k] != model->relation[k].includes_zero : falls;
         call->room.turned[k] = may_turn && turns;
