@@ -44,9 +44,10 @@ struct location {
     double *noise; /* by indicator: how far from 0 it may be, with either sign, without having risen
                       since the restart */
     double *touch; /* by indicator, as in struct fall */
-    double *rounding;              /* by indicator, at the restart; 0 if not known */
-    double *error;                 /* by indicator */
-    bool *triggered;               /* by indicator: true if it is at 0 at `time` */
+    double *rounding; /* by indicator, at the restart; 0 if not known */
+    double *error;   /* by indicator of the model: its error by the tolerances of the states, within
+                        which modes do not follow it; 0 if not known */
+    bool *triggered; /* by indicator: true if it is at 0 at `time` */
     struct step_polynomial step;   /* last internal step; methods write it */
     double (*rows)[SERIES_LENGTH]; /* room for the rows of the states */
     double *x;                     /* states at one point */
