@@ -82,7 +82,8 @@ def test_a_digital_filter_has_no_states(folder: Path) -> None:
     signal = np.array(
         [(0.0, 1.0), (0.45, 1.0), (0.45, 3.0), (2.0, 3.0)], [("time", "f8"), ("u", "f8")]
     )
-    run = simulated(fmu, 2.0, 0.1, {}, input=signal)
+    run = simulated(fmu, 2.0, 0.1, {}, input=signal, also=["event_count"])
+    assert run["event_count"][-1] == 20  # ticks after the one at the start
     y, before = 1.0, 0.0
     for k, row in enumerate(run):
         y, before = y + 0.2 * ((1.0 if k <= 5 else 3.0) - y), y
