@@ -67,8 +67,7 @@ struct adapter {
     const struct call_rule *rules; /* by the version's own numbers of calls */
     unsigned states;               /* states of the version, as bits of enum fmi_state */
     enum fmi_state after_error;    /* state after an error */
-    unsigned
-        always_logged; /* categories that an instance sends although it was made with logging off */
+    unsigned always_logged;  /* categories sent although an instance was made with logging off */
     unsigned never_silent;   /* categories that component_set_logging cannot switch off */
     enum known_kinds knowns; /* knowns of directional and adjoint derivatives */
     const char *doubled;     /* characters that must be doubled to stand for themselves in a text */

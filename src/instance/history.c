@@ -15,7 +15,8 @@ _Static_assert((int)SERIES_INPUT_LENGTH == (int)POLYNOMIAL_DEGREE + 1,
 
 /* Writes the inputs at the time t, if they move. */
 static inline void evaluate_inputs(const struct instance *instance, double t) {
-    for (size_t i = 0; instance->inputs_move && i < count_of(instance->model->inputs); i++) {
+    const size_t moving_count = instance->inputs_move ? count_of(instance->model->inputs) : 0;
+    for (size_t i = 0; i < moving_count; i++) {
         instance->u[i] = polynomial_value(&instance->memory.active_inputs[i], t);
     }
 }
