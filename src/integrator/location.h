@@ -77,6 +77,11 @@ static inline bool location_is_active(const struct location *location) {
     return location->indicators != NULL;
 }
 
+/* Returns the value of an INDICATOR_OF_STATE at the states x. */
+static inline double indicator_at_state(const struct indicator *indicator, const double x[]) {
+    return indicator->offset + indicator->factor * x[indicator->state];
+}
+
 /* Drops the rows of location->step that neither represent their indicators up to the relative
  * tolerance nor show the first fall nearly: the series may end before an indicator of fast motion
  * has converged. x: the states at the end of the step. */
