@@ -271,8 +271,10 @@ static inline void instance_write_field(struct instance *instance, const struct 
     void *field = instance_field(instance, variable);
     if (variable->causality == CAUSALITY_INPUT && variable->type == VARIABLE_FLOAT64) {
         const size_t i = instance_input_index(instance, variable);
-        instance->memory.next_inputs[i].d[0] = value;
-        instance->memory.current_inputs[i] = instance->memory.next_inputs[i];
+        struct polynomial next = instance->memory.next_inputs[i];
+        next.d[0] = value; // not in memory, from where a copy would have to wait for it
+        instance->memory.next_inputs[i] = next;
+        instance->memory.current_inputs[i] = next;
         *(double *)field = value;
         return;
     }
