@@ -176,6 +176,7 @@ def _series(series: Series, has_domains: bool) -> dict[str, object]:
         "row_count": series.row_count + has_domains,
         "storage_of_extend": "ALWAYS_INLINE" if series.is_wide else "static",
         "extend": "extend_orders" if series.is_wide else "extend",
+        "asks_for_avx2": str(series.is_wide).lower(),
         "extend_by_avx2": BY_AVX2.splitlines() if series.is_wide else [],
         "row_of_indicator": ", ".join(rows or ["0"]),
     }

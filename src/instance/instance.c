@@ -161,7 +161,8 @@ static enum status setup(struct instance *instance) {
     instance->second_derivatives = instance->first_derivatives + values_size;
     instance->u = instance->nodes + POLYNOMIAL_NODES * input_count;
     instance->input_series = (double(*)[SERIES_INPUT_LENGTH])(instance->u + input_count);
-    instance->has_avx2 = processor_has_avx2();
+    instance->has_avx2 =
+        model->series != NULL && model->series->asks_for_avx2 && processor_has_avx2();
     memory->block = (char *)instance->nodes + before_block;
     memory->next_inputs = (struct polynomial *)(void *)memory->block;
     memory->current_inputs = memory->next_inputs + input_count;

@@ -104,7 +104,7 @@ struct instance {
     bool inputs_move; /* true if inputs move since the last restart; if not, u has their values */
     double *u;        /* one value per input, as the right-hand side sees them */
     double (*input_series)[SERIES_INPUT_LENGTH]; /* coefficients of each input */
-    bool has_avx2;                               /* the processor has it */
+    bool has_avx2;                               /* the processor has it, and the series asks */
     struct integrator *integrator;               /* NULL if the model has no states */
     struct integrator_settings
         configured; /* last settings of the integrator, without the tolerances of the states */
