@@ -77,7 +77,7 @@ static void write_cubic(const struct erk *erk, double t, const double x[],
 /* Searches the step that has ended at t with the state x and the right-hand side erk->dx.
  * search_step: location_search or location_try. */
 static void search(struct erk *erk, double t, const double x[],
-                   enum status search_step(struct location *location)) {
+                   enum status (*search_step)(struct location *)) {
     struct location *location = &erk->base.problem->location;
     if (erk->search_status == STATUS_OK) {
         write_cubic(erk, t, x, location);
