@@ -450,7 +450,7 @@ void rp_plant_reach(const void *values_pointer, const double x[], double reach[]
     }
 }
 
-/* 0: never an indicator of the model. */
+/* 0 where the indicator is never of the model. */
 static const size_t row_of_indicator[RP_PLANT_INDICATORS] = {
     FORWARD, BACKWARD, 0, 0, FORWARD + 1, BACKWARD + 1, 0, 0, 0, 0,
 };

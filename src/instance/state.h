@@ -272,7 +272,7 @@ static inline void instance_write_field(struct instance *instance, const struct 
     if (variable->causality == CAUSALITY_INPUT && variable->type == VARIABLE_FLOAT64) {
         const size_t i = instance_input_index(instance, variable);
         struct polynomial next = instance->memory.next_inputs[i];
-        next.d[0] = value; // not in memory, from where a copy would have to wait for it
+        next.d[0] = value; // a copy of memory that was just written would wait
         instance->memory.next_inputs[i] = next;
         instance->memory.current_inputs[i] = next;
         *(double *)field = value;

@@ -153,7 +153,7 @@ struct series {
      * indicators. */
     const size_t *row_of_indicator;
 
-    /* True if extend reads has_avx2: a virtual machine takes 30 us to say what processor it has. */
+    /* True if extend reads has_avx2: a virtual machine takes tens of microseconds to answer. */
     bool asks_for_avx2;
 
     /* Writes the coefficients of the orders first to last (< SERIES_LENGTH) of all rows, from lower

@@ -8,8 +8,7 @@
 /* Relative distance of a state from its limit where its event may be located; and of the time. */
 static const double location_error = 1e-11;
 static const double time_error = 1e-12;
-static const double rest_time = 1e-3; // s: a relation at rest stays within its noise so long
-static const double flat_time = 1.0;  // s: a slope that leaves the noise later may be an error
+static const double rest_time = 1e-3;        // s: a relation at rest stays within its noise so long
 static const double shortest_period = 1e-12; // s, of samplers
 
 /* Arguments of all functions during one event: a model, its values, and memory. */
@@ -214,9 +213,8 @@ static double signed_slope(const struct compared *compared, int holds) {
 
 /* Switches relations after an event has changed values: a relation at its limit that now falls
  * switches, or its next event would be due at once; a relation that the event has placed at its
- * limit, at rest, or that was at rest there and has no sure slope, holds if it includes zero, as
- * does one that nothing has read before. The motion of inputs may not be known, but it is part of
- * the slopes before and after the change.
+ * limit, at rest, holds if it includes zero, as does one that nothing has read before. The motion
+ * of inputs may not be known, but it is part of the slopes before and after the change.
  *
  * call->room.before: the relations before the change. */
 static void switch_fallen(const struct call *call) {
@@ -228,11 +226,8 @@ static void switch_fallen(const struct call *call) {
         const double slope = signed_slope(&after[k], call->holds[k]);
         const bool falls = slope < 0.0 && slope < signed_slope(&before[k], call->holds[k]);
         const bool may_turn = !model->relation[k].is_timed && is_near(&after[k]);
-        const bool is_set = slope != 0.0 && (!before[k].used || before[k].slope == 0.0) &&
-                            fabs(slope) * flat_time <= after[k].noise;
-        const bool turns = is_set ? call->holds[k] != model->relation[k].includes_zero : falls;
-        call->room.turned[k] = may_turn && turns;
-        call->holds[k] ^= may_turn && turns;
+        call->room.turned[k] = may_turn && falls;
+        call->holds[k] ^= may_turn && falls;
     }
     compare(call, call->room.zeros, after);
     for (int k = 0; k < model->relation_count; k++) {

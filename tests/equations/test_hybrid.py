@@ -230,6 +230,18 @@ def test_what_leaves_its_limit_at_rest_leaves_it_once(
             assert np.sum(events < t - 1e-5) <= count <= np.sum(events < t + 1e-5), (step, t)
 
 
+@pytest.mark.parametrize("limit, rate", [("x > 1", "1e-11"), ("x * y > 2", "1e-8")])
+@pytest.mark.parametrize("kind", METHODS)
+def test_what_creeps_off_its_limit_has_left_it(
+    unit: Callable, kind: str, limit: str, rate: str
+) -> None:
+    """However slow it is: the slope is exact."""
+    text = TEXTS["CREEPS"].replace("RATE", rate).replace("LIMIT", limit)
+    run = run_of(unit(text), kind, 1.0, 20, tolerance=1e-4)
+    assert not run.failure
+    assert run.x[-1][1] == pytest.approx(19.0, abs=1e-9)
+
+
 @EACH_KIND
 def test_an_integrator_leaves_its_limit_where_its_rate_turns(unit: Callable, kind: str) -> None:
     """There rounding decides whether x' = cos t is above 0; x = sin t, less 1 / 2 after 1 / 2."""
