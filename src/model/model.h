@@ -153,15 +153,15 @@ struct series {
      * indicators. */
     const size_t *row_of_indicator;
 
-    /* True if extend reads has_avx2: a virtual machine takes tens of microseconds to answer. */
-    bool asks_for_avx2;
-
     /* Writes the coefficients of the orders first to last (< SERIES_LENGTH) of all rows, from lower
      * orders. first is 0, with the states' coefficients of order 0 given, or follows the last of
      * the call before, or is 1 after a call for another time scale that began with 0. The
      * coefficients do not depend, to the bit, on how many a call adds. */
     enum status (*extend)(const struct series_origin *origin, int first, int last,
                           double rows[][SERIES_LENGTH]);
+
+    /* True if extend reads has_avx2: a virtual machine takes tens of microseconds to answer. */
+    bool asks_for_avx2;
 };
 
 /* ---- Jacobian ------------------------------------------------------------------------------- */
