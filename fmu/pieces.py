@@ -1,7 +1,7 @@
 """The archives of a release as an installed package has them: in pieces, each once.
 
-FMUs share most of their sources, and systems contain FMUs: archives are cut where the files in them
-and their contents begin, and those of stored archives in them. `rparm.shipped` joins them again.
+FMUs share most of their sources, and systems contain FMUs. Archives are cut at the begin of each
+entry and of its content, also within stored archives. `rparm.shipped` joins the pieces again.
 """
 
 import hashlib

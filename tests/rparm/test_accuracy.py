@@ -42,7 +42,7 @@ def sweeps(runs: Runs) -> dict[str, Sweep]:
 
 
 def changed(fmu: Fmu, name: str, **parameters: float) -> tuple[Runs, Scenario]:
-    """A scenario of the arm with further parameters, and runs of its own: they go by names."""
+    """Return a scenario with more parameters, and runs of it alone: others share its name."""
     found = load(name)
     return Runs({found.model: fmu}), replace(found, parameters=found.parameters | parameters)
 
