@@ -106,7 +106,7 @@ def test_it_is_as_it_must_be(binary: Path) -> None:
 
 def test_the_readme_states_the_glibc_that_it_needs(binary: Path) -> None:
     text = (ROOT / "README.md").read_text()
-    stated = re.search(r"The binary needs glibc (\d+)\.(\d+)\s+or later", text)
+    stated = re.search(r"the binary needs glibc (\d+)\.(\d+)\s+or later", text)
     versions = re.findall(rb"GLIBC_(\d+)\.(\d+)", binary.read_bytes())
     newest = max((int(major), int(minor)) for major, minor in versions)
     assert newest == tuple(map(int, stated.groups())) <= GLIBC
