@@ -1,6 +1,6 @@
-"""Statements that repeat with rising indexes as loops in C: compilers need more than linear time.
+"""Statements that repeat with other indexes as loops in C: compilers need more than linear time.
 
-Lines repeat if they are the same but for some numbers, which rise by the same steps from turn to
+Lines repeat if they are the same but for some numbers, which change by the same steps from turn to
 turn: the number of a constant (n12), the first one in a bracket, and that of a state. A constant
 that another turn reads is kept in an array.
 """
@@ -100,8 +100,7 @@ class Loop:
         turn, used = f"r{depth}", 0
         yield f"for (size_t {turn} = 0; {turn} < {self.turns}; {turn}++) {{"
         own = [
-            term + ("" if not step else f" + {turn}" if step == 1 else f" + {step} * {turn}")
-            for term, step in zip(terms, self.steps, strict=True)
+            f"{term}{_moved(step, turn)}" for term, step in zip(terms, self.steps, strict=True)
         ]
         for line in self.lines:
             count = len(line.numbers)
@@ -109,6 +108,12 @@ class Loop:
                 yield f"    {text}"
             used += count
         yield "}"
+
+
+def _moved(step: int, turn: str) -> str:
+    """Return what a turn adds to a number; none falls below 0, so that they may be unsigned."""
+    sign, by = "+-"[step < 0], abs(step)
+    return f" {sign} {turn}" if by == 1 else f" {sign} {by} * {turn}" if by else ""
 
 
 def rolled(*sections: list[str]) -> list[list[str]]:
@@ -201,7 +206,7 @@ def _loop_at(
             for b in range(begin + turns * length, len(items), length):
                 if (
                     forms[b : b + length] != turn
-                    or _rise(items, b - length, length, length) != steps
+                    or _change(items, b - length, length, length) != steps
                 ):
                     break
                 turns += 1
@@ -213,21 +218,21 @@ def _loop_at(
 def _steps(
     items: list[Line | Loop], forms: list[int], a: int, length: int
 ) -> tuple[int, ...] | None:
-    """Return by how much numbers rise from turn to turn; None if these are not enough turns."""
+    """Return by how much numbers change from turn to turn; None if these are not enough turns."""
     if forms[a : a + FEWEST_TURNS * length : length].count(forms[a]) < FEWEST_TURNS:
         return None
     begins, steps = range(a, a + (FEWEST_TURNS - 1) * length, length), ()
     for count in (1, length):  # most differ in the first line
         if any(forms[b : b + count] != forms[b + length : b + length + count] for b in begins):
             return None
-        steps, *others = [_rise(items, b, count, length) for b in begins]
-        if min(steps, default=0) < 0 or any(other != steps for other in others):
+        steps, *others = [_change(items, b, count, length) for b in begins]
+        if any(other != steps for other in others):
             return None
     return steps
 
 
-def _rise(items: list[Line | Loop], a: int, count: int, distance: int) -> tuple[int, ...]:
-    """Return by how much the numbers of `count` items rise over a distance."""
+def _change(items: list[Line | Loop], a: int, count: int, distance: int) -> tuple[int, ...]:
+    """Return by how much the numbers of `count` items change over a distance."""
     pairs = (map(NUMBERS, items[b : b + count]) for b in (a + distance, a))
     return tuple(map(sub, *map(chain.from_iterable, pairs)))
 
