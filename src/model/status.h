@@ -21,7 +21,8 @@ enum severity {
     X(STATUS_COARSE_TOLERANCE, SEVERITY_NOTICE, "a tolerance is too coarse")                       \
     X(STATUS_NOT_FINITE, SEVERITY_DISCARD, "a value is not finite")                                \
     X(STATUS_OUT_OF_RANGE, SEVERITY_DISCARD, "a value is out of its range")                        \
-    X(STATUS_TOO_MANY_STEPS, SEVERITY_DISCARD, "the integrator took all internal steps allowed")   \
+    X(STATUS_TOO_MANY_STEPS, SEVERITY_DISCARD,                                                     \
+      "the integrator took all internal steps allowed by max_internal_steps")                      \
     X(STATUS_TOO_MANY_EVENTS, SEVERITY_DISCARD, "there were too many events")                      \
     X(STATUS_NO_CONVERGENCE, SEVERITY_DISCARD, "the integrator cannot reach its tolerance")        \
     X(STATUS_INVALID_ARGUMENT, SEVERITY_ERROR, "an argument is not valid")                         \
