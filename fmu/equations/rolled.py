@@ -99,9 +99,7 @@ class Loop:
         """Yield the lines of C."""
         turn, used = f"r{depth}", 0
         yield f"for (size_t {turn} = 0; {turn} < {self.turns}; {turn}++) {{"
-        own = [
-            f"{term}{_moved(step, turn)}" for term, step in zip(terms, self.steps, strict=True)
-        ]
+        own = [f"{term}{_moved(step, turn)}" for term, step in zip(terms, self.steps, strict=True)]
         for line in self.lines:
             count = len(line.numbers)
             for text in line.text(own[used : used + count], depth + 1):
