@@ -13,7 +13,7 @@ IN_PAGE = Path(__file__).with_name("in_page.js").read_text(encoding="utf-8")
 
 
 class OpenedPage:
-    """The page in a browser; its Playground is window.tested."""
+    """The page in a browser, paused at its start; its Playground is window.tested."""
 
     def __init__(self, browser: Browser, path: Path, **view: Any) -> None:
         self.browser = browser
@@ -23,6 +23,7 @@ class OpenedPage:
               window.tested = it;
               const {isRunning} = it;
               it.play(false);
+              it.reset();
               return isRunning;
             });
         """)

@@ -179,7 +179,7 @@ def opened() -> Iterator[Browser]:
         options.add_argument(option)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
-    driver.set_script_timeout(600)
+    driver.set_script_timeout(60)
     driver.set_page_load_timeout(60)
     try:
         yield Browser(driver)
