@@ -111,7 +111,6 @@ function again(values, outputs, way) {
 /** Changes one after the other, 20 steps after each; where a step fails, as the page goes back. */
 function torture(changes) {
   const counts = {accepted: 0, refused: 0, failed: 0};
-  window.tested.reset();
   simulation.change('plant', 'max_internal_steps', 1000);  // a stiff joint fails, in milliseconds
   simulation.isControlled = true;
   for (const [fmu, name, value] of changes) {
@@ -175,7 +174,6 @@ function stepped(count, names) {
 
 /** Start, and keep what the last chart gets in window.rows. */
 function recorded() {
-  window.tested.reset();
   window.rows = [];
   const chart = window.tested.charts.at(-1), add = chart.add.bind(chart);
   chart.add = time => {
@@ -202,7 +200,6 @@ function leaksOfBenchmark() {
 
 /** A second, its q1 in window.q1, then the slider of the history. */
 function backInHistory(time) {
-  window.tested.reset();
   window.q1 = [];
   for (let n = 0; n <= 1000; n++) {
     window.q1.push(plant.get('q1'));
