@@ -87,7 +87,7 @@ def test_one_that_waits_for_others_can_be_stopped(
     here = federation(start, "--listen", network.free_address(), "--elsewhere", "arm")
     children = components(here, 2)
     here.send_signal(number)
-    here.communicate(timeout=15.0)  # HELICS would wait without end
+    here.communicate(timeout=LIMIT)  # HELICS would wait without end
     assert here.returncode == code
     assert gone(children)
     assert not list((tmp_path / "temporary").iterdir())

@@ -102,7 +102,7 @@ def test_a_component_may_be_stepped_elsewhere(short: OpenedSystem, start: Start)
     other = start(*arguments)
     time.sleep(8.0)  # longer than HELICS itself would wait, 4 s
     record = federation.run(short, "nominal", address, elsewhere=["arm"])
-    text, _ = other.communicate(timeout=30)
+    text, _ = other.communicate(timeout=120)
     assert other.returncode == 0
     assert text == f"waiting for a federation at {address}\n"
     together = federation.run(short, "nominal", network.free_address())

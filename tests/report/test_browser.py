@@ -32,6 +32,20 @@ def test_a_complaint_is_noticed(shown, script: str) -> None:
         browser.check_quiet()
 
 
+@pytest.mark.parametrize(("then", "is_quiet"), [("<mn>1</mn>", True), ("", False)])
+def test_a_formula_without_a_part_is_noticed_once_the_page_is_there(
+    firefox: Browser, tmp_path: Path, then: str, is_quiet: bool
+) -> None:
+    page = tmp_path / "page.html"
+    late = (
+        "<script>document.write('<math><msub><mi>x</mi>'); document.body.offsetWidth;"
+        f"document.write('{then}</msub></math>')</script>"
+    )
+    page.write_text(PAGE.format(late), encoding="utf-8")
+    firefox.open(page)
+    assert (firefox.errors == []) == is_quiet
+
+
 @pytest.mark.parametrize(
     "body",
     ["<img alt='' src='https://example.org/a.png'>", "<script>fetch('http://a.test/')</script>"],

@@ -209,7 +209,7 @@ def test_stopped_in_the_middle(
         process.stdout.readline()  # the head of the table: an FMU is unpacked
         time.sleep(0.3)
         process.send_signal(stop)
-        out, err = process.communicate(timeout=20)
+        out, err = process.communicate(timeout=100)
     if "open it: " not in out:  # else it had ended before
         assert (process.returncode, err) == (code, said)
     place.assert_clean()

@@ -200,6 +200,11 @@ SETTINGS = {
     "network.proxy.http_port": 9,
 }
 SETTINGS |= {"network.proxy.ssl": "127.0.0.1", "network.proxy.ssl_port": 9}
+INVALID = "Invalid markup: Incorrect number of children"
+LAY_OUT = """
+const {style} = document.documentElement;
+for (style.display of ['none', '']) document.documentElement.getBoundingClientRect();
+"""
 # of the browser, not of the page
 PREFERENCES = """
 Services.prefs.setIntPref('layout.css.prefers-color-scheme.content-override', arguments[0] ? 0 : 1);
@@ -242,6 +247,11 @@ class Firefox(Browser):
         self._command(
             "browsingContext.navigate", {"context": self._tab, "url": address, "wait": "complete"}
         )
+        # On a busy machine Firefox lays a formula out before it has read it as a whole, and says
+        # that parts are missing: ask again now.
+        self.run("return 0")
+        self._events = [(name, of) for name, of in self._events if INVALID not in str(of)]
+        self.run(LAY_OUT)
 
     def update(self) -> None:
         self.run("return 0")  # events of what was done before have arrived
