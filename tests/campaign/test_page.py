@@ -63,7 +63,7 @@ def failing(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def shown(browser: Browser, folder: Path, **view) -> str:
     """Text of the page, a row of a table a line."""
     browser.open(folder / "campaign.html", **view)
-    browser.wait("document.documentElement.dataset.ready === 'yes'", 60)
+    browser.wait("document.documentElement.dataset.ready === 'yes'")
     return browser.run("return document.body.innerText").replace("\N{MINUS SIGN}", "-")
 
 
@@ -86,7 +86,7 @@ def test_a_clicked_point_is_a_run_and_its_command_repeats_it(
     shown(browser, folder)
     assert browser.run("return document.getElementById('result').value") == name  # as in `worst`
     browser.run(CLICK)
-    browser.wait("document.getElementById('chosen').dataset.run", 30)
+    browser.wait("document.getElementById('chosen').dataset.run")
     browser.check_quiet()
     rows = browser.run(
         "return [...document.querySelectorAll('#chosen dl div')].map("
@@ -110,7 +110,7 @@ def test_parameters_come_in_the_order_of_their_correlation(browser: Browser, fol
     table = pq.read_table(folder / "blocks").to_pandas()
     for name in ("maximum(dq1)", "final(q1)"):
         browser.run(CHOOSE, name)
-        browser.wait(f"document.getElementById('scatter').dataset.result === '{name}'", 30)
+        browser.wait(f"document.getElementById('scatter').dataset.result === '{name}'")
         captions = browser.run("return document.getElementById('scatter').innerText")
         found = re.findall("(m2|q1): rank correlation (.[\\d.]+)", captions)
         ranks = table[["m2", "q1"]].corrwith(table[name], method="spearman")

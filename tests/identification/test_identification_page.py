@@ -35,7 +35,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def shown(browser: Browser, folder: Path, **view) -> None:
     browser.open(folder / "index.html", **view)
     for name in ("ready", "charts"):
-        browser.wait(f"document.documentElement.dataset.{name} === 'yes'", 60)
+        browser.wait(f"document.documentElement.dataset.{name} === 'yes'")
 
 
 @pytest.mark.parametrize("dark", [False, True])

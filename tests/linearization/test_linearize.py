@@ -181,7 +181,7 @@ def test_margins_stand_in_the_charts_and_the_page_fits(
     for text in ("Margins", "76.345", "32.3705 ms", "Held: controller.integral1", "--break"):
         assert text in page
     browser.open(Path(found["page"]), width=width, dark=dark)
-    browser.wait("document.documentElement.dataset.ready === 'yes'", 60)
+    browser.wait("document.documentElement.dataset.ready === 'yes'")
     browser.check_quiet()
     assert browser.overflow() == 0 and browser.violations() == []
     bode, nyquist, step, poles, _ = browser.run(

@@ -142,7 +142,7 @@ async function dropped(name, encodedBytes) {
   notice.hidden = true;
   data.items.add(new File([Uint8Array.from(atob(encodedBytes), (sign) => sign.charCodeAt(0))], name));
   document.dispatchEvent(new DragEvent('drop', {dataTransfer: data, bubbles: true, cancelable: true}));
-  for (let i = 0; i < 500 && notice.hidden && window.tested.own === own; i++) {
+  for (let i = 0; i < 6000 && notice.hidden && window.tested.own === own; i++) {
     await new Promise(next => setTimeout(next, 10));
   }
   if (window.tested.own !== own) window.tested.own.play(false);

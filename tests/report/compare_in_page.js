@@ -5,7 +5,7 @@ async function drop(name, text) {
   const data = new DataTransfer();
   data.items.add(new File([text], name));
   document.dispatchEvent(new DragEvent('drop', { dataTransfer: data, bubbles: true, cancelable: true }));
-  for (let i = 0; i < 200 && !page.notice.textContent; i++) await new Promise((next) => { setTimeout(next, 10); });
+  for (let i = 0; i < 6000 && !page.notice.textContent; i++) await new Promise((next) => { setTimeout(next, 10); });
   const said = page.notice.textContent;
   page.notice.textContent = '';
   return said;

@@ -34,4 +34,4 @@ def show(browser: Browser, page: Path, **view) -> None:
     """Open a page and wait for its plots."""
     browser.open(page, **view)
     if page.name != "index.html":
-        browser.wait("document.documentElement.dataset.ready === 'yes'", 60)
+        browser.wait("document.documentElement.dataset.ready === 'yes'")

@@ -16,6 +16,7 @@ from typing import Any
 from tests.support.missing import missing
 
 PROGRAMS = ("chromium", "chromedriver")
+TIMEOUT = 60  # s, for a page or a browser on a busy machine
 # what a page may load: files beside it and what it holds itself
 LOCAL = ("file:", "data:", "blob:", "about:")
 OPTIONS = (
@@ -119,12 +120,12 @@ class Browser:
         for key in keys:
             element.send_keys(key)
 
-    def wait(self, condition: str, seconds: float = 10.0) -> Any:
+    def wait(self, condition: str) -> Any:
         """Wait until an expression in JavaScript is true; its value."""
         from selenium.webdriver.support.ui import WebDriverWait
 
-        message = f"not within {seconds:g} s: {condition}"
-        wait = WebDriverWait(self.driver, seconds, poll_frequency=0.02)
+        message = f"not within {TIMEOUT} s: {condition}"
+        wait = WebDriverWait(self.driver, TIMEOUT, poll_frequency=0.02)
         return wait.until(lambda _: self.run(f"return {condition}"), message)
 
     def overflow(self) -> int:
@@ -179,8 +180,8 @@ def opened() -> Iterator[Browser]:
         options.add_argument(option)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
-    driver.set_script_timeout(60)
-    driver.set_page_load_timeout(60)
+    driver.set_script_timeout(TIMEOUT)
+    driver.set_page_load_timeout(TIMEOUT)
     try:
         yield Browser(driver)
     finally:
@@ -192,7 +193,6 @@ def opened() -> Iterator[Browser]:
 # connection, the browser listens on a port of this machine.
 
 FIREFOX = "firefox-esr"
-TIMEOUT = 60  # s
 # nothing leaves this machine: a proxy that does not exist, for other machines
 SETTINGS = {
     "network.proxy.type": 1,
