@@ -1,5 +1,6 @@
 """The browser of the tests notices what pages must not do."""
 
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -13,15 +14,14 @@ PAGE = """<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>Page
 
 @pytest.fixture
 def shown(each_browser: Browser, tmp_path: Path):
-    browser = each_browser
+    return partial(show, each_browser, tmp_path)
 
-    def show(body: str, **view) -> Browser:
-        page = tmp_path / "page.html"
-        page.write_text(PAGE.format(body), encoding="utf-8")
-        browser.open(page, **view)
-        return browser
 
-    return show
+def show(browser: Browser, folder: Path, body: str, **view) -> Browser:
+    page = folder / "page.html"
+    page.write_text(PAGE.format(body), encoding="utf-8")
+    browser.open(page, **view)
+    return browser
 
 
 @pytest.mark.parametrize("script", ["console.error('wrong')", "console.warn('odd')", "nothing()"])
@@ -36,14 +36,11 @@ def test_a_complaint_is_noticed(shown, script: str) -> None:
 def test_a_formula_without_a_part_is_noticed_once_the_page_is_there(
     firefox: Browser, tmp_path: Path, then: str, is_quiet: bool
 ) -> None:
-    page = tmp_path / "page.html"
     late = (
         "<script>document.write('<math><msub><mi>x</mi>'); document.body.offsetWidth;"
         f"document.write('{then}</msub></math>')</script>"
     )
-    page.write_text(PAGE.format(late), encoding="utf-8")
-    firefox.open(page)
-    assert (firefox.errors == []) == is_quiet
+    assert (show(firefox, tmp_path, late).errors == []) == is_quiet
 
 
 @pytest.mark.parametrize(

@@ -249,8 +249,8 @@ class Firefox(Browser):
         )
         # On a busy machine Firefox lays a formula out before it has read it as a whole, and says
         # that parts are missing: ask again now.
-        self.run("return 0")
-        self._events = [(name, of) for name, of in self._events if INVALID not in str(of)]
+        self.update()
+        self.errors = [text for text in self.errors if INVALID not in text]
         self.run(LAY_OUT)
 
     def update(self) -> None:
