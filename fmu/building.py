@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -170,8 +171,10 @@ class Runtime:
         if ended.returncode:
             lines = [line for line in ended.stderr.splitlines() if "error" in line]
             reason = (lines or ended.stderr.splitlines() or ["no message"])[0]
-            # the C is right: what fails is the compiler
+            # mostly the C is right: what fails is the compiler
             way_out = f"gcc and clang need binutils, {INSTALL}"
+            if re.search(r"\.c:\d+:\d+: error: ", reason):
+                way_out = "the C that rparm wrote is wrong: please report this with the file"
             raise ModelFileError(f"{command[0]}: {reason:.300}; {way_out}")
 
     def sources(self, version: str, own: Library, root: Path) -> Manifest:

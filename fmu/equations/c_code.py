@@ -18,7 +18,7 @@ from rparm.expressions.expression import RELATIONS, in_order, written
 # operations as C writes them; a function is written as its call
 FORMULAS = {op: f"{{}} {op} {{}}" for op in ("+", "-", "*", "/", "==", *RELATIONS)}
 FORMULAS |= {"and": "{} && {}", "or": "{} || {}", "not": "!{}"}
-FORMULAS |= {"negative": "-{}", "if": "{} ? {} : {}"}
+FORMULAS |= {"negative": "-{}", "if": "{} ? {} : {}", "hypot": "slopes_hypot({}, {})"}
 
 LONGEST = 200  # characters of a text with indexes
 Leaves = Mapping[tuple[str, str], str]  # where C has a leaf, by its operation and name
@@ -67,7 +67,8 @@ def declared(c_type: str, fields: Iterable[str]) -> list[str]:
 def number(value: float) -> str:
     """Return a double that reads back as the same."""
     if not math.isfinite(value):
-        return "NAN" if math.isnan(value) else "INFINITY" if value > 0.0 else "(-INFINITY)"
+        infinity = "(double)INFINITY" if value > 0.0 else "(-(double)INFINITY)"
+        return "(double)NAN" if math.isnan(value) else infinity  # the macros are floats
     return f"({value!r})" if math.copysign(1.0, value) < 0 else repr(value)
 
 

@@ -288,7 +288,7 @@ class Events:
             size = f"fmax(fabs({value}), given->largest[{i}])"
             error = f"given->inputs * {size} + {given['time', '']} * fabs({rate})"
             given["input", u.name] = f"({error})"
-        errors = Errors(code, given)
+        errors = Errors(graph, code, given)
         for k, relation in enumerate(self.relations):
             distance, used = relation.distance, self.used[relation.name]
             error = errors.of(distance) if relation.time is None else NONE
@@ -365,7 +365,9 @@ class Events:
         states = [state.name for state in self.file.of("states")]
         code = Code(leaves(self.file))
         lines = self._assigned(code, {name: e.value for name, e in change.given.items()})
-        errors = Errors(code, {("state", name): f"tolerance[{i}]" for i, name in enumerate(states)})
+        errors = Errors(
+            self.graph, code, {("state", name): f"tolerance[{i}]" for i, name in enumerate(states)}
+        )
         jumped = {name: errors.of(e.value) for name, e in change.reinit.items()}
         lines += [f"tolerance[{states.index(name)}] = {e};" for name, e in jumped.items()]
         if isinstance(change, Sampler) and change.during is not None:

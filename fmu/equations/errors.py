@@ -4,27 +4,34 @@ Running error analysis: Higham, Accuracy and Stability of Numerical Algorithms, 
 derivatives are 0 or infinite, a function is evaluated at the ends of what its arguments may be.
 """
 
+from collections.abc import Sequence
 from itertools import product
 
+from equations_tables import Table
+
 from equations.c_code import Code, Leaves, formula
-from equations.graph import CONDITIONS, Value
+from equations.graph import CONDITIONS, Graph, Value
 from rparm.expressions.expression import in_order
 
 NONE = "0.0"
 ROUNDING = "DBL_EPSILON"  # of an operation and of a function, over its result
-NEVER_STEEPER_THAN_1 = ("sin", "cos", "atan", "tanh")
+NEVER_STEEPER_THAN_1 = ("sin", "cos", "atan", "tanh", "hypot")
 
 
 class Errors:
     """C expressions of errors, as constants of a code; leaves without `given` errors are exact."""
 
-    def __init__(self, code: Code, given: Leaves) -> None:
-        self.code, self.given = code, given
+    def __init__(self, graph: Graph, code: Code, given: Leaves) -> None:
+        self.graph, self.code, self.given = graph, code, given
         self.known: dict[Value, str] = {}
+
+    def _arguments(self, value: Value) -> Sequence[Value]:
+        """Return what it follows from; of a table what is looked up."""
+        return self.graph.looked_up.get(value, (None, value.arguments))[1]
 
     def of(self, root: Value) -> str:
         """Return the error of a value, >= 0 in its unit."""
-        for value in in_order([root], self.known):
+        for value in in_order([root], self.known, self._arguments):
             error = self._error(value)
             is_name = error == NONE or error.isidentifier()
             self.known[value] = error if is_name else self.code.constant(error)
@@ -35,9 +42,10 @@ class Errors:
             return NONE
         if (value.op, value.name) in self.given:
             return self.given[value.op, value.name]
-        y, errors = self.code.of(value), [self.known[argument] for argument in value.arguments]
-        arguments = [self.code.of(argument) for argument in value.arguments]
-        match value.op:
+        y, read = self.code.of(value), self._arguments(value)
+        errors = [self.known[argument] for argument in read]
+        arguments = [self.code.of(argument) for argument in read]
+        match "table" if value in self.graph.looked_up else value.op:
             case "negative":
                 return errors[0]
             case "if":
@@ -66,12 +74,22 @@ class Errors:
                     [f"{a} - {e}", f"{a} + {e}"] if e != NONE else [a]
                     for a, e in zip(arguments, errors, strict=True)
                 ]
-                corners = [formula(op, *corner) for corner in product(*ends)]
+                table = self.graph.looked_up[value][0] if op == "table" else None
+                corners = [
+                    self._in_table(table, corner) if table else formula(op, *corner)
+                    for corner in product(*ends)
+                ]
                 pairs = zip(corners[::2], corners[1::2], strict=True)
                 spreads = [f"relations_spread({y}, {low}, {high})" for low, high in pairs]
                 parts = [" + ".join(spreads)]
         parts = [part for part in parts if part != NONE]
         return " + ".join([*parts, f"{ROUNDING} * fabs({y})"])
+
+    def _in_table(self, table: Table, corner: Sequence[str]) -> str:
+        """Return the value of a table for arguments in C."""
+        given = [self.graph.value("parameter", name=f"({at})") for at in corner]
+        self.code.known |= {x: x.name for x in given}  # in brackets no name of the file
+        return self.code.of(self.graph.polynomial(table, given, True))
 
 
 def _product(error: str, factor: str) -> str:

@@ -49,13 +49,15 @@ DERIVATIVES = {
     "exp": ["y"],
     "log": ["1 / x"],
     "sqrt": ["0.5 / y"],
+    "hypot": ["x / y", "z / y"],
     "pow": ["z * (y / x)", "y * log(x)"],
 }
 # of finite arguments, some results are not finite
 FALLIBLE = ("/", "sqrt", "log", "asin", "acos", "pow", "exp", "sinh", "cosh")
 UNDEFINED = ("/", "sqrt", "log", "asin", "acos", "pow")  # some are not a number
 GROWING = ("exp", "sinh", "cosh")  # results overflow
-STEEP = ("sqrt", "log", "asin", "acos", "pow", "atan2")  # slopes may be infinite or undefined
+# slopes may be infinite or undefined
+STEEP = ("sqrt", "log", "asin", "acos", "pow", "atan2", "hypot")
 NOTED = frozenset((*FALLIBLE, *STEEP))
 RULES = {function: [parse(rule) for rule in rules] for function, rules in DERIVATIVES.items()}
 
@@ -127,6 +129,7 @@ class Graph:
     unknowns: dict[Value, Value | None] = field(default_factory=dict)  # by condition
     nodes: list[Node] = field(default_factory=list)  # of a text, for each relation
     segments: dict[str, Segment] = field(default_factory=dict)  # by the names of their leaves
+    looked_up: dict[Value, tuple[Table, list[Value]]] = field(default_factory=dict)  # at instants
     has_switches: bool = True  # else relations are evaluated with the values
     is_guarded: bool = True  # else an infinite slope makes derivatives infinite, as in C
 
@@ -181,7 +184,7 @@ class Graph:
                 case "!=":
                     value = self.value("not", self.value("==", *given))
                 case "table":
-                    value = self._looked_up(self.tables[node.name], given, is_instant)
+                    value = self.in_table(self.tables[node.name], given, is_instant)
                 case "call":
                     value = self.functions[node.name](given, is_instant)
                 case "unit":
@@ -192,8 +195,15 @@ class Graph:
             self.nodes += [node] * (len(self.relations) - len(self.nodes))
         return found[root]
 
-    def _looked_up(self, table: Table, given: list[Value], is_instant: bool) -> Value:
-        """The value of a table: a polynomial of the distance from its segment's origin."""
+    def in_table(self, table: Table, given: list[Value], is_instant: bool) -> Value:
+        """The value of a table, which `looked_up` knows at an instant."""
+        value = self.polynomial(table, given, is_instant)
+        if is_instant:
+            self.looked_up[value] = table, given
+        return value
+
+    def polynomial(self, table: Table, given: list[Value], is_instant: bool) -> Value:
+        """The value of a table, by the distance from its segment's origin."""
         places = [self._segment(table, i, x, is_instant) for i, x in enumerate(given)]
         distances = [
             self.value("-", x, self.value("entry", k, name=table.array("origins", i)))
@@ -465,6 +475,9 @@ class Graph:
             return self.partials(y)
         if y.op in GROWING:
             return [self.value("slopes_bounded", *self.partials(y))]
+        if y.op == "hypot":  # at 0 it has a corner, as abs
+            is_corner, zero = self.value("==", y, self.number(0.0)), self.number(0.0)
+            return [self.value("if", is_corner, zero, slope) for slope in self.partials(y)]
         if y.op == "pow":
             x, z = y.arguments
             lower = self._lower_power(y) or self.value("slopes_reduced", y, x, z)

@@ -31,7 +31,7 @@ from rparm.expressions.expression import RELATIONS, in_order
 
 BUILT_IN = ("fabs", "abs", "value_of", "moving_as")
 ROUNDING = ("ceil", "floor", "trunc", "round")  # of what has no derivatives
-ARGUMENTS = {name: len(rules) for name, rules in DERIVATIVES.items()}
+ARGUMENTS = {name: len(rules) for name, rules in DERIVATIVES.items() if name != "hypot"}
 ARGUMENTS |= {"fabs": 1, "abs": 1, "value_of": 1, "moving_as": 2}
 ARGUMENTS |= dict.fromkeys(ROUNDING, 1)
 
@@ -491,7 +491,7 @@ class Expressions(Memory):
             return self.built_in(name, given, state, node)
         function = self.program.functions.get(name)
         if function is None:
-            known = ", ".join(sorted({*DERIVATIVES, *self.known} - {*BUILT_IN, *ROUNDING}))
+            known = ", ".join(sorted(self.known))
             has = "has no body here" if name in self.program.declared else "is not known"
             raise refused(node, f"{name} {has}: besides functions of the text there are {known}")
         parameters = self.parameters(function)

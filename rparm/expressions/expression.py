@@ -11,6 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cached_property, reduce
+from operator import attrgetter
 from typing import Any, TypeVar
 
 # functions, with the number of their arguments; None: two or more
@@ -75,8 +76,20 @@ OPERATIONS: dict[str, Callable[..., float]] = {
     "not": operator.not_,
     "unit": lambda a: a,
 }
-BUILT_IN = {"abs": abs, "min": min, "max": max, "floor": math.floor}
-OPERATIONS |= {name: BUILT_IN.get(name) or getattr(math, name) for name in (*FUNCTIONS, "floor")}
+
+
+def hypot(x: float, y: float) -> float:
+    """Return the root of x**2 + y**2 with the bits of slopes_hypot (src/model/slopes.h)."""
+    largest = max(abs(x), abs(y))
+    scale = 2.0**600 if largest > 2.0**500 else 2.0**-600 if largest < 2.0**-500 else 1.0
+    a, b = x / scale, y / scale
+    return math.sqrt(a * a + b * b) * scale
+
+
+BUILT_IN = {"abs": abs, "min": min, "max": max, "floor": math.floor, "hypot": hypot}
+OPERATIONS |= {
+    name: BUILT_IN.get(name) or getattr(math, name) for name in (*FUNCTIONS, "floor", "hypot")
+}
 
 
 # ---- The tree ------------------------------------------------------------------------------------
@@ -95,8 +108,8 @@ class Node:
     (then `name`), "text" (`name`, an item of an enumeration), "table" (a look-up in the table
     `name`), "call" (of the function `name`), "unit" (its argument, in the unit `name`), an operator
     of `RELATIONS` or `EQUALITIES`, + - * / **, "negative", "and", "or", "not", "if" (arguments:
-    condition, value if true, otherwise), "floor", or a name of `FUNCTIONS`. min and max have two
-    arguments here.
+    condition, value if true, otherwise), "floor", "hypot", or a name of `FUNCTIONS`. min and max
+    have two arguments here.
     Until `at_indexes` has replaced them: "element" of an array (arguments: its indexes; `name` has
     {} where they come), "sum" of the `body` over the index `name` (arguments: first and last).
     `function`: of `FURTHER`, which it stands for.
@@ -111,12 +124,16 @@ class Node:
     function: str = ""
 
 
-def in_order(roots: Iterable[Item], known: Container[Item] = ()) -> list[Item]:
-    """List all below and with `roots` that are not `known`, each once, arguments first."""
+def in_order(
+    roots: Iterable[Item],
+    known: Container[Item] = (),
+    read: Callable[[Item], Iterable[Item]] = attrgetter("arguments"),
+) -> list[Item]:
+    """List all below and with `roots` that are not `known`, each once after what it reads."""
     done: dict[Item, None] = {}
     todo = [root for root in roots if root not in known][::-1]
     while todo:
-        left = [a for a in todo[-1].arguments if a not in done and a not in known]
+        left = [a for a in read(todo[-1]) if a not in done and a not in known]
         if left:
             todo += left[::-1]
         else:
@@ -336,7 +353,7 @@ class Range:
 
 @dataclass(frozen=True)
 class Lookup:
-    """A table, a function of a C file or floor: an operation of its own."""
+    """A table, a function of a C file, floor or hypot: an operation of its own."""
 
     name: str
     arguments: tuple[str, ...]
@@ -559,7 +576,6 @@ FURTHER: dict[str, Function | Lookup] = {}
 _WHOLE = {"whole": Lookup("floor", ("x",), "floor")}
 for _name, _arguments, _body in (
     ("sign", "x", "1 if x > 0 else -1 if x < 0 else 0"),
-    ("hypot", "x y", "sqrt(x**2 + y**2)"),
     ("log10", "x", f"log(x) / {math.log(10)!r}"),
     ("cbrt", "x", f"x**{1 / 3!r} if x >= 0 else -(-x)**{1 / 3!r}"),
     ("ceil", "x", "-whole(-x)"),
@@ -567,7 +583,7 @@ for _name, _arguments, _body in (
     ("mod", "x y", "x - y * whole(x / y)"),
 ):
     FURTHER[_name] = Function(tuple(_arguments.split()), parse(_body, _WHOLE), _name == "sign")
-FURTHER["floor"] = _WHOLE["whole"]
+FURTHER |= {"floor": _WHOLE["whole"], "hypot": Lookup("hypot", ("x", "y"), "hypot")}
 
 
 # ---- Indexes -------------------------------------------------------------------------------------

@@ -175,7 +175,7 @@ def _unit(node: Node, given: list[Unit | None], units: Mapping[str, Unit]) -> Un
         if given == [None, None]:
             return None
         return times(given[0] or ONE, given[1] or ONE, power)
-    if node.op in ("+", "-", "min", "max"):
+    if node.op in ("+", "-", "min", "max", "hypot"):
         return _same(node, given)
     if node.op in ("table", "call"):
         return _of_table(node, given, units)

@@ -5,6 +5,15 @@
 
 #include <math.h>
 
+/* Returns the root of x^2 + y^2, scaled where squares would overflow or vanish. */
+static inline double slopes_hypot(double x, double y) {
+    const double largest = fmax(fabs(x), fabs(y));
+    const double scale = largest > 0x1p500 ? 0x1p600 : largest < 0x1p-500 ? 0x1p-600 : 1.0;
+    const double a = x / scale;
+    const double b = y / scale;
+    return sqrt(a * a + b * b) * scale;
+}
+
 /* Returns the derivative of f(x) from f'(x) and the derivative d of x. If x does not move, f(x)
  * does not move either, however steep it is. */
 static inline double slopes_scaled(double slope, double d) {

@@ -5,9 +5,13 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
+from scipy.interpolate import PchipInterpolator
 
-from tests.equations.compiled import Model
+from rparm.expressions import expression
+from tests.equations.compiled import BUILD, Model
 from tests.equations.examples import METHODS, MODELS, made, simulated
+from tests.support.paths import ROOT
+from tests.support.programs import python
 
 TEXTS = MODELS["functions"]
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
@@ -42,6 +46,32 @@ def test_functions_have_their_values_and_derivatives(tmp_path: Path) -> None:
     assert slopes["decades"] == pytest.approx(1 / (a * np.log(10)), rel=1e-15)
     assert slopes["root"] == pytest.approx(a ** (-2 / 3) / 3, rel=1e-14)
     assert slopes["both"] == pytest.approx(4 * a / (1 + a * a) ** 2, rel=1e-14)
+
+
+@pytest.fixture(scope="module")
+def length(tmp_path_factory: pytest.TempPathFactory) -> Model:
+    return Model(tmp_path_factory.mktemp("length"), TEXTS["LENGTH"])
+
+
+@pytest.mark.parametrize("power", [-1074, -1030, -664, -501, 0, 500, 664, 1021])
+def test_a_length_has_no_square_that_overflows_or_vanishes(length: Model, power: int) -> None:
+    """Along x = 3 s + 2 s t, y = 4 s - 3 s t with the size s; x is a state, y an input."""
+    s = 2.0**power
+    values, first, second = length.values(x=3 * s, y=4 * s), length.values(), length.values()
+    first[length.names.index("x")], first[length.names.index("y")] = 2 * s, -3 * s
+    length.outputs(values, 0.0)
+    length.propagate(values, 0.0, 0.0, first, second)
+    found = [dict(zip(length.names, v, strict=False))["length"] for v in (values, first, second)]
+    own = mpmath.taylor(lambda t: mpmath.hypot(3 + 2 * t, 4 - 3 * t), 0, 12)
+    assert found[0] == 5 * s == expression.hypot(3 * s, 4 * s)
+    assert found[1:] == pytest.approx([-1.2 * s, 2 * float(own[2]) * s], rel=1e-14, abs=5e-324)
+    inputs = np.zeros((1, 4))
+    inputs[0, :2] = 4 * s, -3 * s
+    values[length.names.index("rate")] = 2 * s
+    (_, z), exact = length.series(values, 0.0, 1.0, inputs, 11), [float(c) for c in own]
+    assert z[1:] == pytest.approx(
+        [c * s / (k + 1) for k, c in enumerate(exact[:11])], rel=1e-12, abs=1e-322
+    )
 
 
 @EACH_METHOD
@@ -136,3 +166,68 @@ def test_a_clutch_locks_slips_and_opens(folder: Path, version: str, method: int)
     is_locked = ((t > met + 1e-9) & (t < 3)) | ((t > again) & (t < 8))
     is_inside = np.min(np.abs(t[:, None] - times), axis=1) > 1e-6
     assert np.array_equal((run["locked"] != 0)[is_inside], is_locked[is_inside])
+
+
+# calls of X = 0.6 and Y = -0.25, with their values
+OF_ONE = "sin cos tan asin acos atan sinh cosh tanh exp log log10 sqrt cbrt sign"
+CALLS = {f"{name}(X)": getattr(mpmath, name)(0.6) for name in OF_ONE.split()}
+CALLS |= {"abs(Y)": 0.25, "min(X, Y)": -0.25, "max(Y, X)": 0.6, "floor(Y)": -1, "ceil(X)": 1}
+CALLS |= {"round(X)": 1, "mod(Y, X)": 0.35, "hypot(X, Y)": 0.65, "X**3": 0.216, "X / Y": -2.4}
+CALLS |= {"atan2(Y, X)": mpmath.atan2(-0.25, 0.6), "X**Y": mpmath.mpf(0.6) ** -0.25, "-X": -0.6}
+CALLS |= {"sum(i = 1..n, i * X)": 3.6, "1 if X > 0 and not Y > 0 else 2": 1, "own(X)": 0.375}
+CALLS |= {"line(X)": 3 - 0.2 / 0.6, "steps(X)": 3, "inside(X)": 3 - 0.2 / 0.6, "in_c(X, Y)": 3.85}
+CALLS |= {"curve(X)": PchipInterpolator([0, 0.4, 1], [1, 3, 2])(0.6), "plane(X, Y)": 3.025}
+CALLS |= {"floor(1e8 * X - 0.5)": 59999999}  # no float has it
+SECTIONS = "functions parameters states discrete where outputs check"
+
+
+def test_every_function_stands_in_every_place(tmp_path: Path) -> None:
+    """Each call has one value wherever it stands; a condition on it gives the number 1."""
+    (tmp_path / "Places.c").write_text(TEXTS["PLACES_C"])
+    new: dict[str, list[str]] = {section: [] for section in SECTIONS.split()}
+    new["functions"] += ["own = { arguments = ['X'], value = 'X / (1 + abs(X))' }"]
+    changes, exact = [], {}
+    for i, (call, value) in enumerate(CALLS.items()):
+        own, fixed = (call.replace("X", x).replace("Y", y) for x, y in ("xy", "pq"))
+        size, whole = abs(float(value)), int(np.floor(float(value)))
+        near = f"abs(({{}}) - ({float(value)!r})) < 1e-12".format
+        new["functions"] += [f"F{i} = {{ arguments = ['X', 'Y'], value = '{call}' }}"]
+        new["parameters"] += [f"k{i} = {{ value = '{fixed}' }}"]
+        new["states"] += [f"s{i} = {{ start = '{fixed}', derivative = '{own}' }}"]
+        new["states"] += [f"{name}{i} = {{ derivative = '0' }}" for name in ("a", "b")]
+        new["discrete"] += [f"c{i} = {{ start = '{fixed}' }}"]
+        new["discrete"] += [f"{name}{i} = {{}}" for name in "defg"]
+        new["discrete"] += [f"j{i} = {{ type = 'Integer' }}"]
+        new["where"] += [f"m{i} = '{own}'"]
+        new["outputs"] += [f"o{i} = {{ value = '{own}' }}", f"r{i} = {{ value = 'm{i} + k{i}' }}"]
+        new["outputs"] += [f"t{i} = {{ value = 'F{i}(x, y)' }}"]
+        new["check"] += [f"'c{i}' = '{near(fixed)}'"]
+        changes += [
+            f"[events.E{i}]\nwhen = '{near(own)}'\nwhile = '{near(own)}'\n"
+            f"reinit = {{ a{i} = '{own}' }}\nset = {{ d{i} = '{own}', j{i} = 'floor({own})' }}\n"
+            f"[sampled.S{i}]\nevery = '9 + abs({fixed})'\n"
+            f"offset = '4 * abs({fixed}) / (1 + abs({fixed}))'\n"
+            f"while = '{near(own)}'\nreinit = {{ b{i} = '{own}' }}\n"
+            f"set = {{ e{i} = '{own}', f{i} = '1 if {near(own)} else 0', g{i} = 'time' }}\n"
+        ]
+        exact |= {f"{name}{i}": value for name in "abcdeot"}
+        exact |= {
+            f"s{i}": 6 * value,
+            f"f{i}": 1,
+            f"g{i}": 4 * size / (1 + size),
+            f"j{i}": whole,
+            f"r{i}": 2 * value,
+        }
+    text = TEXTS["PLACES"]
+    for section, lines in new.items():
+        text = text.replace(f"[{section}]\n", "\n".join([f"[{section}]", *lines, ""]))
+    (tmp_path / "Places.toml").write_text(text + "\n" + "\n".join(changes))
+    runtime = (BUILD / "runtime" / "runtime.json").read_text().replace('"-O3"', '"-O0"')
+    (tmp_path / "runtime.json").write_text(runtime)
+    (tmp_path / "fmi3").mkdir()
+    options = ("--output", tmp_path, "--runtime", tmp_path / "runtime.json")
+    ended = python(ROOT / "fmu" / "equations_to_fmu.py", tmp_path / "Places.toml", *options)
+    assert ended.returncode == 0, ended.stderr
+    run = simulated(tmp_path / "Places.fmu", 5.0, 1.0, {})
+    for name, value in exact.items():
+        assert run[name][-1] == pytest.approx(float(value), rel=1e-12, abs=1e-12), name
