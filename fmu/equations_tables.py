@@ -6,16 +6,19 @@ ValueError, in one line.
 
 import csv
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from rparm.expressions.expression import finite_number
 from rparm.expressions.units import Measure
 
 LARGEST_FILE = 50_000_000  # bytes
+SEPARATORS = ",;\t"  # of columns; between others than commas, a comma may be a decimal point
 FAR = 1e300  # beyond every value: the bound where there is none
 INTERPOLATIONS = ("linear", "previous", "pchip")
 OUTSIDE = ("hold", "extend", "error")
@@ -124,7 +127,8 @@ def _columns(given: dict[str, Any], folder: Path) -> dict[str, list[float]]:
         if path.stat().st_size > LARGEST_FILE:
             raise ValueError(f"file: {path.name}: has more than {LARGEST_FILE} bytes")
         with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = csv.reader(file, strict=True)
+            separator, above = _separator(file, [*names.values()])
+            rows = _rows(file, separator, above)
             head = [column.strip() for column in next(rows, [])]
             places = {}
             for key, column in names.items():
@@ -132,30 +136,57 @@ def _columns(given: dict[str, Any], folder: Path) -> dict[str, list[float]]:
                     known = ", ".join(head[:10])
                     raise ValueError(f"{key}: {path.name} has no column {column!r} (has: {known})")
                 places[key] = head.index(column)
-            found: dict[str, list[float]] = {"x": [], "y": []}
+            found: dict[str, list[tuple[str, str]]] = {"x": [], "y": []}  # places and texts
             for row in rows:
+                line = rows.line_num + above
                 if any(map(str.strip, row[len(head) :])):
-                    where = f"file: {path.name}: line {rows.line_num}"
+                    where = f"file: {path.name}: line {line}"
                     raise ValueError(f"{where}: has {len(row)} cells, expected {len(head)}")
                 for key, place in places.items() if row else ():
-                    where = f"{key}: {path.name}: line {rows.line_num}"
-                    found[key].append(_cell(row, place, where))
-                begin = rows.line_num + 1
+                    where = f"{key}: {path.name}: line {line}"
+                    found[key].append((where, row[place].strip() if place < len(row) else ""))
+                begin = line + 1
     except csv.Error as error:
         reason = str(error)
-        if "end of data" in reason or ("limit" in reason and rows.line_num > begin):
+        if "end of data" in reason or ("limit" in reason and rows.line_num + above > begin):
             reason = "a quote opens that is not closed"
         raise ValueError(f"file: {path.name}: line {begin}: {reason}") from None
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "is no text in UTF-8"
         raise ValueError(f"file: {path.name}: {reason}") from None
-    return found
+    has_points = any("." in text for cells in found.values() for _, text in cells)
+    mark = "." if has_points or separator == "," else ","
+    return {key: [_cell(*cell, mark) for cell in cells] for key, cells in found.items()}
 
 
-def _cell(row: Sequence[str], place: int, where: str) -> float:
-    text = row[place].strip() if place < len(row) else ""
+def _separator(file: TextIO, names: Sequence[str]) -> tuple[str, int]:
+    """Return what separates columns, by which there are these names, and how many lines say so.
+
+    Spreadsheets say so by a line such as sep=; above the names.
+    """
+    said = re.fullmatch("sep=(.)", file.readline().strip("\r\n"))
+    above = 1 if said else 0
+
+    def fits(separator: str) -> tuple[bool, int]:
+        with suppress(csv.Error):
+            head = [column.strip() for column in next(_rows(file, separator, above), [])]
+            return all(head.count(name) == 1 for name in names), len(head)
+        return False, 0
+
+    return max(said[1] if said else SEPARATORS, key=fits), above
+
+
+def _rows(file: TextIO, separator: str, above: int) -> "csv._reader":
+    """Return all rows below so many lines."""
+    file.seek(0)
+    for _ in range(above):
+        file.readline()
+    return csv.reader(file, strict=True, delimiter=separator)
+
+
+def _cell(where: str, text: str, mark: str) -> float:
     try:
-        number = float(text.replace("_", "?"))
+        number = float(text.replace("_", "?").replace(mark, "."))
     except ValueError:
         number = math.nan
     if not math.isfinite(number):

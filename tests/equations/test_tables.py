@@ -148,11 +148,26 @@ def test_a_hundred_thousand_rows_of_a_file(tmp_path: Path) -> None:
     assert abs(run["event_count"][-1] - np.floor(s[-1] / 0.001)) <= 1
 
 
+@pytest.mark.parametrize("content", [
+    "n, T,eta\n0, 3,1\n10.5,2.25,1e-1\n", "n;T;eta\n0;3;1\n10,5;2,25;1e-1\n",
+    "\ufeffn\tT\teta\r\n0\t3\t1\r\n10.5\t2.25\t0.1\r\n", "sep=;\nn;T;eta\n0;3;\n10,5;2,25;1\n",
+    'sep=,\n"n","T"\n0,3\n10.5,2.25\n', "sep=|\nn|T\n0|3\n10,5|2,25\n", "n (1,2);n;T\nx;0;3\n;10,5;2,25\n",
+])  # fmt: skip
+def test_columns_are_separated_as_spreadsheets_write_them(tmp_path: Path, content: str) -> None:
+    (tmp_path / "f.csv").write_bytes(content.encode())
+    text = 'name = "M"\n[tables.t]\nfile = "f.csv"\nx = "n"\ny = "T"\n[inputs]\nu = {}\n'
+    table = read_text(tmp_path, text).tables["t"]
+    assert table.axes[0].origins == (0.0, 0.0, 10.5)
+    assert table.coefficients[0] == (3.0, 3.0, 2.25)
+
+
 @pytest.mark.parametrize("name", MISTAKES["tables"])
 def test_a_mistake_in_a_table_is_one_line(name: str, tmp_path: Path) -> None:
     (tmp_path / "f.csv").write_text("a,b,b\n1,2,3\n")
     (tmp_path / "g.csv").write_text("a,d\n1,2\n2,inf\n")
     (tmp_path / "i.csv").write_text("a,d\n1,2,\n2,3,5\n")
+    (tmp_path / "l.csv").write_text("sep=;\na;d\n0.5;1\n1,234;2\n")  # a thousand, or not
+    (tmp_path / "m.csv").write_text('a,d\n0,1\n"1,234",2\n')
     (tmp_path / "h.csv").write_bytes(b"a,d\n\xff\xfe\n")
     for file, rows in (("j", 5), ("k", 99_999)):  # so many below the quote
         (tmp_path / f"{file}.csv").write_text('a,d\n1,2\n2,"3\n' + "4,5\n" * rows)
