@@ -1,6 +1,7 @@
 """The elements of entries with indexes: "x[i]" = { for = "i = 1..n", ... }."""
 
 from collections.abc import Iterator, Mapping
+from itertools import groupby
 
 from declaration.load import shown
 from equations_content import Element, ModelFile, ModelFileError, placed
@@ -14,7 +15,7 @@ MOST_ELEMENTS = 20_000
 def elements(file: ModelFile, key: str, entry: object) -> Iterator[Element]:
     """Yield the entry with each value of its indexes; without `for` the entry itself.
 
-    A start value may be a list, of one number for each.
+    A start value may be a list, of one number for each, or of such lists by the first index.
     """
     own = dict(entry) if isinstance(entry, dict) else entry
     over = own.pop(FOR, None) if isinstance(own, dict) else None
@@ -27,11 +28,30 @@ def elements(file: ModelFile, key: str, entry: object) -> Iterator[Element]:
         tree = _name_with_indexes(key)
         found = [(name_of(tree, file.sizes | at), at) for at in every(file, over)]
         starts = own.get("start") if isinstance(own, dict) else None
-        if isinstance(starts, list) and len(starts) != len(found):
-            raise ModelFileError(f"start: expected {len(found)} values, got {len(starts)}")
+        if isinstance(starts, list):
+            starts = _flat(starts, [at for _, at in found])
     for number, (name, at) in enumerate(found):
         given = own | {"start": starts[number]} if isinstance(starts, list) else own
         yield Element(name, key if not at else f"{key} at {_shown(at)}", given, at)
+
+
+def _flat(starts: list[object], indexes: list[dict[str, int]]) -> list[object]:
+    """Return one start value for each element; lists in the list are by the first index."""
+    rows = [[*same] for _, same in groupby(indexes, lambda at: [*at.values()][:1])]
+    is_nested = len(indexes[0]) > 1 and any(isinstance(start, list) for start in starts)
+    count = len(rows) if is_nested else len(indexes)
+    if len(starts) != count:
+        what = "lists, one for each first index" if is_nested else "values"
+        raise ModelFileError(f"start: expected {count} {what}, got {len(starts)}")
+    if not is_nested:
+        return starts
+    found = []
+    for start, row in zip(starts, rows, strict=True):
+        if not isinstance(start, list):
+            raise ModelFileError(f"start: expected {count} lists or only values, got both")
+        inner = [dict([*at.items()][1:]) for at in row]
+        found += _flat(start, inner)
+    return found
 
 
 def name_of(tree: Node, indexes: Mapping[str, int]) -> str:

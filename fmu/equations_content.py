@@ -261,7 +261,7 @@ class ModelFile:
     @property
     def assigned(self) -> list[Expression]:
         """All expressions that may read everything."""
-        found = [variable.expression for variable in self.of("states", "where", "outputs")]
+        found = [variable.expression for variable in self.of("where", "states", "outputs")]
         return found + [expression for change in self.changes for expression in change.expressions]
 
     @property

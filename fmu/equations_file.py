@@ -227,7 +227,10 @@ def _function(
     """Return a function, whose arguments and value have units in the file, or take any."""
     _check_function_name(name, file)
     taken = (*keys.RESERVED, *file.sizes)
-    if not arguments or not all(keys.NAME.fullmatch(a) and a not in taken for a in arguments):
+    if not arguments:
+        wanted = "expected one name at least: what has no arguments is an entry of [where]"
+        raise ModelFileError(f"arguments: {wanted}, or of [parameters] with a value")
+    if not all(keys.NAME.fullmatch(a) and a not in taken for a in arguments):
         raise ModelFileError("arguments: expected names, each once and none reserved")
     value = file.expression(Element(name, name, text), ("value",), text)
     for node in in_order([value.tree]):
@@ -356,7 +359,8 @@ def _check_name(name: str, file: ModelFile) -> None:
     if not keys.NAME.fullmatch(base):
         raise ModelFileError("expected a name: a letter, then letters, digits, _")
     if base in file.reserved or name.startswith("der_"):
-        raise ModelFileError("this name is reserved, choose another one")
+        why = keys.reason(base, name.startswith("der_"))
+        raise ModelFileError(f"this name is reserved ({why}), choose another one")
     _check_dimensions(name, base, file)
     if name in file.variables:
         raise ModelFileError(f"this name is in {file.variables[name].place} already")
@@ -436,7 +440,8 @@ def _given(
             variable = file.variables.get(name)
             is_mode = key == "set" and name in file.modes
             if not is_mode and (variable is None or variable.section not in sections):
-                raise ModelFileError(f"{place}: {key}: expected {what}, got {shown(name)}")
+                hint = _hint(variable, name in file.modes)
+                raise ModelFileError(f"{place}: {key}: expected {what}, got {shown(name)}{hint}")
             kind = CONDITION if is_mode else variable.kind
             found[key][name] = file.expression(element, whole, text, kind, name, event="then")
     during = None
@@ -444,6 +449,17 @@ def _given(
         whole = (place, "while")
         during = file.expression(element, whole, given["while"], CONDITION, event=event)
     return during, found["reinit"], found["set"]
+
+
+def _hint(variable: Variable | None, is_mode: bool) -> str:
+    """Say where or how what stands in the wrong one of `set` and `reinit` gets a new value."""
+    if is_mode or (variable is not None and variable.section in ("discrete", COUNTS)):
+        return ": write it in set"
+    if variable is None:
+        return ""
+    if variable.section == "states":
+        return ", a state: write it in reinit"
+    return f", of {variable.place}: what keeps its value until an event is one of [discrete]"
 
 
 def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:

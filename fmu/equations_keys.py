@@ -84,6 +84,17 @@ def _expect(what: str, kind: type, fits: Callable[[Any], object]) -> Callable[[A
     return read
 
 
+def reason(name: str, is_rate: bool) -> str:
+    """Say what has a reserved name."""
+    if is_rate:
+        return "derivatives of states begin with der_"
+    if name in FUNCTIONS:
+        return "it is a function"
+    if name in ("pi", "time", *NO_NAMES):
+        return "expressions use it"
+    return "the C code uses it" if name in RESERVED else "the FMU has a variable of this name"
+
+
 def plain_text(value: object) -> str:
     """Return a text in one line."""
     TEXT(value)

@@ -13,10 +13,10 @@ from rparm.expressions.expression import (
     derivative_of,
     evaluated,
     in_order,
-    meant,
     names,
     with_kinds,
 )
+from rparm.expressions.hints import meant
 from rparm.expressions.units import BASE, Unit, times, unit_of, unit_of_exponents
 from rparm.expressions.units import shown as unit_shown
 

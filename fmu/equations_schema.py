@@ -128,8 +128,8 @@ def _by_name(entry: Schema, named: Schema, has_indexes: bool = True) -> Schema:
 
 
 def _start(*values: Schema) -> Schema:
-    """Return the schema of a start value, or of one for each index."""
-    return {"anyOf": [*values, {"type": "array", "items": {"anyOf": values}}]}
+    """Return the schema of a start value, or of one for each index, or of lists by an index."""
+    return {"anyOf": [*values, {"type": "array", "items": {"anyOf": [*values, {"type": "array"}]}}]}
 
 
 def _entry(section: str) -> Schema:

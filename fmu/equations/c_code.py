@@ -87,7 +87,8 @@ def shortened(name: str, expression: Expression, tables: Mapping[str, Table]) ->
     limits = {}
     for node in in_order([expression.tree]):
         if node.op == "floor":
-            limits["floor"] = f"up to 2^{MOST_COUNTED.bit_length() - 1}"
+            of = " of its quotient" if node.function == "mod" else ""
+            limits[node.function] = f"up to 2^{MOST_COUNTED.bit_length() - 1}{of}"
         elif node.op == "table" and (ends := tables[node.name].ends):
             limits[f"table {node.name}"] = "{:.6g}..{:.6g}".format(*ends)
     shown = "; ".join(f"{what}: {limit}" for what, limit in limits.items())

@@ -17,7 +17,7 @@ from equations_content import (
 
 from equations.c_code import Fields
 from equations.graph import Graph
-from rparm.expressions.expression import CONDITION, RELATIONS, derivative_of, written
+from rparm.expressions.expression import CONDITION, RELATIONS, Node, derivative_of, written
 
 __all__ = ["ModelFile", "ModelFileError", "read"]
 LEAVES = {
@@ -67,9 +67,18 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
             known.setdefault(expression.target, expression.value)
     places = [source.place for source in sources]
     file.relation_texts = [
-        f"{place[0].strip('[]').replace('events.', 'event ')} ({written(node)})"
+        f"{place[0].strip('[]').replace('events.', 'event ')} ({_written(node)})"
         if place[-1] == "when"
-        else f"{written(node)} of {' '.join(place[:2])}"
+        else f"{_written(node)} of {' '.join(place[:2])}"
         for node, place in zip(graph.nodes, places, strict=True)
     ]
     return file
+
+
+def _written(switch: Node) -> str:
+    """Return the text of a relation, or of the function that rounds."""
+    if switch.op != "floor" or switch.function == "floor":
+        return written(switch)
+    count = 1 if switch.function == "round" else 2  # round(x) adds 0.5
+    given = switch.arguments[0].arguments[:count]
+    return f"{switch.function}({', '.join(map(written, given))})"

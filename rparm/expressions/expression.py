@@ -9,10 +9,11 @@ import re
 from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from functools import cached_property, reduce
 from operator import attrgetter
 from typing import Any, TypeVar
+
+from rparm.expressions.hints import SIGNS, meant
 
 # functions, with the number of their arguments; None: two or more
 FUNCTIONS: dict[str, int | None] = dict.fromkeys(
@@ -27,17 +28,6 @@ LITERALS = {"true": 1.0, "false": 0.0}
 # not to be used as names: operators, and words that other languages execute or give a value
 WORDS = ("and", "or", "not", "if", "else")
 NO_NAMES = (*WORDS, *LITERALS, "True", "False", "None", "lambda")
-# what other languages have for what is here
-HERE = "t=time e=exp(1) ln=log lg=log10 log2=log(x)/log(2) pow=x**y power=x**y square=x**2 sqr=x**2"
-HERE += " absolute=abs fabs=abs fmin=min fmax=max minimum=min maximum=max sgn=sign signum=sign"
-HERE += (
-    " clip=min(max(x,a),b) step=A_if_C_else_B heaviside=A_if_C_else_B int=floor fmod=mod rem=mod"
-)
-HERE += " derivative=der ddt=der diff=der arcsin=asin arccos=acos arctan=atan arctan2=atan2"
-INSTEAD = dict(pair.replace("_", " ").split("=") for pair in HERE.split())
-SIGNS = {"^": "powers are written **", "?": "write A if C else B", "%": "write mod(x, y)"}
-SIGNS |= {"&": "write and", "|": "write or", "!": "write not"}
-SIGNS |= dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212", "no minus sign of ASCII, write -")
 Item = TypeVar("Item", bound=Any)  # hashable, with `arguments` of its own kind
 LOGIC = ("and", "or", "not")
 DEEPEST = 100  # levels of brackets and other nesting
@@ -112,7 +102,7 @@ class Node:
     have two arguments here.
     Until `at_indexes` has replaced them: "element" of an array (arguments: its indexes; `name` has
     {} where they come), "sum" of the `body` over the index `name` (arguments: first and last).
-    `function`: of `FURTHER`, which it stands for.
+    `function`: of `FURTHER`, of whose expression it is.
     """
 
     op: str
@@ -139,15 +129,6 @@ def in_order(
         else:
             done.setdefault(todo.pop())
     return list(done)
-
-
-def meant(name: str, known: Iterable[str]) -> str:
-    """Say what may have been meant by an unknown name."""
-    plain = {other.casefold(): other for other in known}
-    last = name.rpartition(".")[2]
-    wanted = last if last in plain else name.casefold()
-    guess = INSTEAD.get(last) or "".join(plain[x] for x in get_close_matches(wanted, plain, n=1))
-    return f", did you mean {guess!r}?" if guess else ""
 
 
 def names(root: Node) -> frozenset[str]:
@@ -205,6 +186,10 @@ def finite_number(given: Any) -> float:
 NUMBER, WHOLE, CONDITION, TEXT = "a number", "a whole number", "a condition", "a text"
 KEEP_WHOLE = ("+", "-", "*", "negative", "abs", "min", "max", "if")  # of whole numbers
 Kind = str | tuple[str, ...]  # the items of an enumeration
+KIND_HINTS = {  # by what is expected and what is given
+    (WHOLE, NUMBER): ": write floor(...), which rounds down",
+    (NUMBER, CONDITION): ": write 1 if ... else 0",
+}
 
 
 def with_kinds(
@@ -273,12 +258,13 @@ def _check(node: Node, found: Kind, needed: Kind) -> None:
         return
     constants = {"number": "the number", "literal": "true" if node.value else "false"}
     what = shown_text(node.name) if node.op == "text" else node.name
-    what = what or constants.get(node.op, repr(node.op))
+    what = what or constants.get(node.op, repr(node.function or node.op))
     wanted, given = (
         kind if isinstance(kind, str) else f"one of {', '.join(map(shown_text, kind))}"
         for kind in (needed, found)
     )
-    raise ExpressionError(node.column, f"expected {wanted}, {what} gives {given}")
+    hint = KIND_HINTS.get((wanted, given), "")
+    raise ExpressionError(node.column, f"expected {wanted}, {what} gives {given}{hint}")
 
 
 def shown_text(text: str) -> str:
@@ -309,6 +295,7 @@ class Function:
     body: Node
     has_unit_one: bool = False  # its value takes no other unit, although it is made of numbers
     name: str = ""  # by which `table_unit` has units of its arguments and its value
+    function: str = ""  # of `FURTHER`
 
     def of(self, given: Sequence[Node], column: int) -> Node:
         """Return its expression for these arguments; mistakes in it are at this column."""
@@ -326,7 +313,8 @@ class Function:
                 found[node] = known[node.name]
             else:
                 arguments = tuple(found[argument] for argument in node.arguments)
-                found[node] = replace(node, column=column, arguments=arguments)
+                function = self.function or node.function
+                found[node] = replace(node, column=column, arguments=arguments, function=function)
         return replace(found[self.body], name=UNIT_ONE) if self.has_unit_one else found[self.body]
 
 
@@ -361,7 +349,8 @@ class Lookup:
 
     def of(self, given: Sequence[Node], column: int) -> Node:
         """Return the operation on these arguments."""
-        return Node(self.op, column, tuple(given), name=self.name)
+        function = self.name if self.op == self.name else ""
+        return Node(self.op, column, tuple(given), name=self.name, function=function)
 
 
 def parse(text: str, functions: Mapping[str, Function | Lookup] | None = None) -> Node:
@@ -504,6 +493,8 @@ class _Parser:
         over = self.range()
         self.expect(",")
         body = self.expression(CONDITIONAL)
+        if self.token.text in ("=", ","):
+            raise self.unexpected("')', as in sum(i = 1..n, sum(j = 1..m, ...))")
         self.expect(")")
         return Node("sum", column, (over.first, over.last), name=over.index, body=body)
 
@@ -551,9 +542,7 @@ class _Parser:
             self._operations += len(in_order([function.body]))
         if self._operations > MOST_OPERATIONS:
             raise ExpressionError(column, TOO_LARGE)
-        found = function.of(arguments, column)
-        name = next((name for name, known in FURTHER.items() if known is function), "")
-        return replace(found, function=name) if name else found
+        return function.of(arguments, column)
 
     def derivative(self) -> Node:
         """Parse the state whose derivative is meant."""
@@ -582,7 +571,8 @@ for _name, _arguments, _body in (
     ("round", "x", "whole(x + 0.5)"),
     ("mod", "x y", "x - y * whole(x / y)"),
 ):
-    FURTHER[_name] = Function(tuple(_arguments.split()), parse(_body, _WHOLE), _name == "sign")
+    _parts = (tuple(_arguments.split()), parse(_body, _WHOLE), _name == "sign")
+    FURTHER[_name] = Function(*_parts, function=_name)
 FURTHER |= {"floor": _WHOLE["whole"], "hypot": Lookup("hypot", ("x", "y"), "hypot")}
 
 

@@ -56,6 +56,7 @@ SCALED = {
     "g": (Fraction(1, 1000), "kg"), "t": (Fraction(1000), "kg"), "l": (Fraction(1, 1000), "m3"),
 }  # fmt: skip
 CELSIUS, ZERO_CELSIUS = "degC", Fraction("273.15")
+FRACTION = re.compile(r"\d\.\d|\^")
 FACTOR = re.compile(r"([A-Za-z]+)(-?[1-9])?", re.ASCII)
 PRODUCT = re.compile(r"([^/()]+)(?:/(?:([^./()]+)|\(([^/()]+)\)))?")  # a.b, a/b or a/(b.c)
 
@@ -97,6 +98,8 @@ def measured(text: str) -> Measure:
             known = _scaled(symbol[1]) if symbol else None
             if known is None:
                 expected = "SI symbol with an exponent, such as s2"
+                if FRACTION.search(text):
+                    expected += ": exponents are whole, from -9 to 9, and a point multiplies"
                 raise ValueError(f"unit {text!r}: {factor!r} is no {expected}")
             power = sign * int(symbol[2] or 1)
             scale, base = known
@@ -195,7 +198,9 @@ def _unit(node: Node, given: list[Unit | None], units: Mapping[str, Unit]) -> Un
         return given[0]
     for unit in given:  # conditions have unit 1
         if unit not in (None, ONE):
-            what = f"{node.op} takes a number of unit 1"
+            what = f"{node.function or node.op} takes a number of unit 1"
+            if node.function == "mod":
+                what = "mod takes two numbers of one unit: their quotient has unit 1"
             raise ExpressionError(node.column, f"{what}, got {shown(unit)}")
     return ONE
 

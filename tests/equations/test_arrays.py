@@ -44,6 +44,26 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("arrays")
 
 
+@pytest.mark.parametrize("ranges, flat, rows", [
+    ("i = 1..2, j = 1..3", [1, 2, 3, 4, 5, 6], [[1, 2, 3], [4, 5, 6]]),
+    ("i = 1..3, j = 1..i", ["p", 2, 3, 4, 5, 6], [["p"], [2, 3], [4, 5, 6]]),
+    ("i = 1..2, j = 1..2, k = 1..2", [*range(8)], [[[0, 1], [2, 3]], [[4, 5], [6, 7]]]),
+    ("i = 1..1, j = 1..1", [7], [[7]]),
+])  # fmt: skip
+def test_starts_of_two_indexes_are_rows_or_one_list(
+    tmp_path: Path, ranges: str, flat: list, rows: list
+) -> None:
+    """The last index is the fastest."""
+    name = f"x[{','.join(part.split()[0] for part in ranges.split(', '))}]"
+    text = f'name = "M"\n[parameters]\np = {{ start = 1 }}\n[states]\n"{name}" = '
+    text += f'{{ for = "{ranges}", derivative = "1", start = %s }}'
+    found = []
+    for starts in (flat, rows):
+        states = read_text(tmp_path, text % starts).of("states")
+        found.append({x.name: x.start if x.initial is None else x.initial.text for x in states})
+    assert found[0] == found[1] and [*found[0].values()] == flat
+
+
 def test_loops_have_the_bits_of_statements_written_out(folder: Path) -> None:
     """All functions of a model: right side, Jacobian, series, outputs, derivatives of outputs."""
     loops, plain = made(folder, chain(COUNT)), made(folder, written_out(COUNT))

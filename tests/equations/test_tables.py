@@ -151,7 +151,8 @@ def test_a_hundred_thousand_rows_of_a_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize("content", [
     "n, T,eta\n0, 3,1\n10.5,2.25,1e-1\n", "n;T;eta\n0;3;1\n10,5;2,25;1e-1\n",
     "\ufeffn\tT\teta\r\n0\t3\t1\r\n10.5\t2.25\t0.1\r\n", "sep=;\nn;T;eta\n0;3;\n10,5;2,25;1\n",
-    'sep=,\n"n","T"\n0,3\n10.5,2.25\n', "sep=|\nn|T\n0|3\n10,5|2,25\n", "n (1,2);n;T\nx;0;3\n;10,5;2,25\n",
+    'sep=,\n"n","T"\n0,3\n10.5,2.25\n', "sep=|\nn|T\n0|3\n10,5|2,25\n",
+    "n (1,2);n;T\nx;0;3\n;10,5;2,25\n",
 ])  # fmt: skip
 def test_columns_are_separated_as_spreadsheets_write_them(tmp_path: Path, content: str) -> None:
     (tmp_path / "f.csv").write_bytes(content.encode())
