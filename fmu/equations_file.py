@@ -194,7 +194,12 @@ def _read_table(file: ModelFile, name: str, entry: object) -> None:
 
 
 def _check_function_name(name: str, file: ModelFile) -> None:
-    if not keys.NAME.fullmatch(name) or name in (*keys.TAKEN, *file.functions):
+    if not keys.NAME.fullmatch(name):
+        raise ModelFileError("expected a name: a letter, then letters, digits, _")
+    if name in keys.RESERVED - keys.FUNCTIONS.keys():
+        why = keys.reason(name, False)
+        raise ModelFileError(f"this name is reserved ({why}), choose another one")
+    if name in (*keys.TAKEN, *file.functions):
         raise ModelFileError("expected a name that is no function already")
 
 

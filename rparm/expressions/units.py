@@ -56,7 +56,7 @@ SCALED = {
     "g": (Fraction(1, 1000), "kg"), "t": (Fraction(1000), "kg"), "l": (Fraction(1, 1000), "m3"),
 }  # fmt: skip
 CELSIUS, ZERO_CELSIUS = "degC", Fraction("273.15")
-FRACTION = re.compile(r"\d\.\d|\^")
+FRACTION = re.compile(r"\d\.\d|[\^*·]")
 FACTOR = re.compile(r"([A-Za-z]+)(-?[1-9])?", re.ASCII)
 PRODUCT = re.compile(r"([^/()]+)(?:/(?:([^./()]+)|\(([^/()]+)\)))?")  # a.b, a/b or a/(b.c)
 
