@@ -96,6 +96,25 @@ def test_a_table_of_an_input_follows_at_once(folder: Path) -> None:
     assert np.max(np.abs(run["now"][rows] - exact[rows])) < 1e-12
 
 
+@EACH_METHOD
+def test_a_ball_bounces_by_a_table_of_its_speed(folder: Path, method: int) -> None:
+    """Parabolas from impact to impact; the speed after one is e(speed) times that before."""
+    run = simulated(
+        made(folder, TEXTS["BOUNCING"]),
+        3.0,
+        0.1,
+        {"solver_method": method},
+        relative_tolerance=1e-10,
+    )
+    speed, begin = np.sqrt(2 * 9.81), -np.sqrt(2 / 9.81)  # as if thrown up before
+    for t, h in zip(run["time"], run["h"], strict=True):
+        while t > begin + 2 * speed / 9.81:
+            begin += 2 * speed / 9.81
+            speed *= np.interp(speed, [0.0, 2.0, 5.0], [0.9, 0.8, 0.5])
+        s = t - begin
+        assert h == pytest.approx(speed * s - 9.81 * s * s / 2, abs=1e-9)
+
+
 @pytest.mark.parametrize("kind", ["linear", "previous", "pchip"])
 @pytest.mark.parametrize("outside", ["hold", "extend", "error"])
 def test_values_without_states_are_scipys(tmp_path: Path, kind: str, outside: str) -> None:
