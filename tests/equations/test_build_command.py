@@ -88,13 +88,17 @@ def test_what_to_install_is_said_where_no_compiler_is(
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs scripts")
-def test_a_compiler_that_fails_is_named(tmp_path: Path) -> None:
+@pytest.mark.parametrize("error, way_out", [
+    ("cc: error: no assembler", "install"), ("equations.c:1:10: fatal error: no math.h", "install"),
+    ("equations.c:7:3: error: no entry", "the C that rparm wrote is wrong: please report"),
+])  # fmt: skip
+def test_a_compiler_that_fails_is_named(tmp_path: Path, error: str, way_out: str) -> None:
     compiler = tmp_path / "cc"
-    compiler.write_text("#!/bin/sh\necho cc: error: no assembler >&2\nexit 1\n")
+    compiler.write_text(f"#!/bin/sh\necho '{error}' >&2\nexit 1\n")
     compiler.chmod(0o755)
     (tmp_path / "runtime.json").write_text(json.dumps({"compiler": [str(compiler)]}))
     found = building.Runtime.load(tmp_path / "runtime.json", of_this_machine=True)
-    with pytest.raises(ModelFileError, match=r"^.*/cc: cc: error: no assembler; [^\n]*install"):
+    with pytest.raises(ModelFileError, match=f"^.*/cc: {error}; [^\n]*{way_out}"):
         found.run(tmp_path)
 
 
