@@ -56,7 +56,7 @@ SCALED = {
     "g": (Fraction(1, 1000), "kg"), "t": (Fraction(1000), "kg"), "l": (Fraction(1, 1000), "m3"),
 }  # fmt: skip
 CELSIUS, ZERO_CELSIUS = "degC", Fraction("273.15")
-FRACTION = re.compile(r"\d\.\d|[\^*·]")
+OTHER_SIGN = re.compile(r"\d\.?\d|[\^*·]")
 FACTOR = re.compile(r"([A-Za-z]+)(-?[1-9])?", re.ASCII)
 PRODUCT = re.compile(r"([^/()]+)(?:/(?:([^./()]+)|\(([^/()]+)\)))?")  # a.b, a/b or a/(b.c)
 
@@ -87,9 +87,11 @@ def measured(text: str) -> Measure:
     """Read a product of symbols; ValueError if it is none."""
     if text == CELSIUS:
         return Measure({"K": 1}, offset=ZERO_CELSIUS, base="K")
+    hint = ": exponents are whole, from -9 to 9, and a point multiplies"
+    hint = hint if OTHER_SIGN.search(text) else ""
     product = PRODUCT.fullmatch(text)
     if product is None or (text.startswith("1") and text != "1" and not text.startswith("1/")):
-        raise ValueError(f"unit {text!r} is no product of SI symbols such as kg.m/s2")
+        raise ValueError(f"unit {text!r} is no product of SI symbols such as kg.m/s2{hint}")
     found: dict[str, int] = {}
     total, bases = Fraction(1), text
     for part, sign in ((product[1], 1), (product[2] or product[3], -1)):
@@ -97,9 +99,7 @@ def measured(text: str) -> Measure:
             symbol = FACTOR.fullmatch(factor)
             known = _scaled(symbol[1]) if symbol else None
             if known is None:
-                expected = "SI symbol with an exponent, such as s2"
-                if FRACTION.search(text):
-                    expected += ": exponents are whole, from -9 to 9, and a point multiplies"
+                expected = f"SI symbol with an exponent, such as s2{hint}"
                 raise ValueError(f"unit {text!r}: {factor!r} is no {expected}")
             power = sign * int(symbol[2] or 1)
             scale, base = known
