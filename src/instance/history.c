@@ -320,9 +320,11 @@ enum status instance_rest(struct instance *instance, struct clock_time end, stru
     const struct polynomial *inputs = continuation == CONTINUE_AFTER_EVENT
                                           ? instance->memory.current_inputs
                                           : instance->memory.next_inputs;
-    // constant inputs end no mode; the active values matter only after an event
-    const bool searches =
+    // without states the time may end a mode; with states at rest, only inputs that move. The active
+    // values matter only after an event
+    const bool inputs_move =
         !instance->inputs_are_held && polynomials_move(inputs, count_of(instance->model->inputs));
+    const bool searches = inputs_move || instance->model->states.size == 0;
     if (searches || meets_time_event) {
         activate_values(instance, end, inputs, !instance_parameters_are_active(instance));
     } else {

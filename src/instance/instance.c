@@ -177,7 +177,7 @@ static enum status setup(struct instance *instance) {
         return STATUS_OUT_OF_MEMORY;
     }
 
-    if (model->states.size == 0) {
+    if (model->states.size == 0 && instance->ode.indicator_count == 0) {
         return STATUS_OK;
     }
     instance->ode.state_count = count_of(model->states);

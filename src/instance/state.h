@@ -105,7 +105,7 @@ struct instance {
     double *u;        /* one value per input, as the right-hand side sees them */
     double (*input_series)[SERIES_INPUT_LENGTH]; /* coefficients of each input */
     bool has_avx2;                               /* the processor has it, and the series asks */
-    struct integrator *integrator;               /* NULL if the model has no states */
+    struct integrator *integrator;               /* NULL if the model has neither states nor indicators */
     struct integrator_settings
         configured; /* last settings of the integrator, without the tolerances of the states */
     struct instance_memory memory;
@@ -144,7 +144,7 @@ static inline size_t count_of(struct range range) {
 
 /* True if the instance integrates the states of its model itself. */
 static inline bool instance_has_integrator(const struct instance *instance) {
-    return instance->integrator != NULL && !instance->is_integrated_outside;
+    return instance->model->states.size > 0 && !instance->is_integrated_outside;
 }
 
 /* Returns the largest magnitude (s) among the start time and t: times are rounded like numbers of

@@ -360,11 +360,12 @@ static enum status begin_modes(struct step *step, enum continuation *continuatio
     return status;
 }
 
-/* True if every state's derivative is 0 in the current modes. */
+/* True if every state's derivative is 0 in the current modes, or there are no states. */
 static bool is_at_rest(const struct instance *instance) {
     const struct model_events *events = instance->model->events;
-    return events != NULL && events->is_at_rest != NULL &&
-           events->is_at_rest(instance->memory.values);
+    return instance->model->states.size == 0 ||
+           (events != NULL && events->is_at_rest != NULL &&
+            events->is_at_rest(instance->memory.values));
 }
 
 /* Advances to the end of the current part of the step, or to an earlier state event. */
@@ -507,7 +508,7 @@ static enum status do_step(struct step *step, double communication_point, double
     }
     status = check_inputs(step);
     if (status == STATUS_OK) {
-        status = instance->integrator == NULL ? pass_time(step) : integrate(step);
+        status = instance->model->states.size == 0 ? pass_time(step) : integrate(step);
     }
     if (status != STATUS_OK) {
         explain(step, communication_point, status);
