@@ -44,6 +44,7 @@ NEXT_TIME = [
 def leaves(file: ModelFile) -> Leaves:
     """Where functions of value structures have the leaves, and their derivatives along a curve."""
     found = {("time", ""): "t", ("first", ""): "dt"}
+    found["later", ""] = "relations_later(t, RELATIONS_TIME_ROUNDING * fabs(t))"
     for v in file.of("parameters", "inputs", "states", "discrete"):
         for op, structure in ((v.leaf.op, "values"), ("first", "d"), ("second", "dd")):
             found[op, v.name] = f"{structure}->{file.fields.value(v.name)}"
@@ -212,7 +213,7 @@ class Events:
         table = [
             # at its time a timed one is past
             f"{{{int(r.rises if r.time else r.includes_zero)}, {int(r.time is not None)}, "
-            f"{int(r.rises)}, {int(r.is_of_inputs)}, "
+            f"{int(r.rises)}, {int(r.is_of_inputs)}, {int(r.is_of_time)}, "
             f"{self.located.index(r) if r.time is None else 0}}},"
             for r in self.relations
         ]
@@ -282,7 +283,7 @@ class Events:
         motion = {x.leaf: x.value for x in states} | {graph.value("time"): graph.number(1.0)}
         motion |= {u.leaf: graph.value("first", name=u.name) for u in inputs}
         given = {("state", x.name): f"given->state_errors[{i}]" for i, x in enumerate(states)}
-        given["time", ""] = "given->time * fabs(t)"
+        given["time", ""] = "given->time"
         for i, u in enumerate(inputs):
             value, rate = code.leaves["input", u.name], moving["first", u.name]
             size = f"fmax(fabs({value}), given->largest[{i}])"
@@ -363,7 +364,7 @@ class Events:
     def _change(self, index: int, change: Change) -> list[str]:
         """What an event or a sampler of the file does."""
         states = [state.name for state in self.file.of("states")]
-        code = Code(leaves(self.file))
+        code = Code({**leaves(self.file), ("later", ""): "later"})
         lines = self._assigned(code, {name: e.value for name, e in change.given.items()})
         errors = Errors(
             self.graph, code, {("state", name): f"tolerance[{i}]" for i, name in enumerate(states)}

@@ -24,12 +24,14 @@ ENDS = ("bounds", "ends")  # arrays of a table: where segments begin and end
 # along a curve, "first" and "second" are the derivatives of the other leaves
 LEAVES = (
     *("parameter", "input", "state", "discrete", "time", "mode", "integer"),
+    "later",  # time, of what has switched by the time at an instant
     *("first", "second"),
 )
-MOVING = ("input", "state", "time")
+MOVING = ("input", "state", "time", "later")
 RUNTIME = ("first", "second")  # derivatives that may be 0 in one call and not in another
 CONDITIONS = ("mode", "and", "or", "not", "isnan", "isfinite", "==", *RELATIONS)
 OPPOSITE = {"<": ">=", ">=": "<", ">": "<=", "<=": ">"}
+SWITCHING = ("floor", "locate", *RELATIONS)  # results jump
 STILL = (*CONDITIONS, "value_of", "entry", "locate", "floor")  # derivatives are 0
 PRODUCTS_UP_TO = 8  # whole exponents that are repeated multiplication
 MOST_COUNTED = 2**30  # by floor of what moves
@@ -94,6 +96,11 @@ class Relation:
     def is_of_inputs(self) -> bool:
         """It follows from inputs and parameters only."""
         return not {op for op, _ in self.distance.leaves} & {"state", "time", "mode"}
+
+    @property
+    def is_of_time(self) -> bool:
+        """It moves by the time only."""
+        return is_of_time(self.distance)
 
     @property
     def rises(self) -> bool:
@@ -317,6 +324,23 @@ class Graph:
             return value
         return self.value("or" if "=" in op else "and", value, self.value("not", turned))
 
+    def passed(self, root: Value) -> Value:
+        """The value at an instant, where what the time switches has switched."""
+        if "time" not in {op for op, _ in root.leaves}:
+            return root
+        now: dict[Value, Value] = {}
+        later: dict[Value, Value] = {}
+        for v in in_order([root]):
+            later[v] = self.value("later") if v.op == "time" else self._with(v, later)
+            has_passed = v.op in SWITCHING and is_of_time(v)
+            now[v] = later[v] if has_passed else self._with(v, now)
+        return now[root]
+
+    def _with(self, value: Value, found: Mapping[Value, Value]) -> Value:
+        """The same operation on what has been found for its arguments."""
+        arguments = [found[argument] for argument in value.arguments]
+        return self.value(value.op, *arguments, name=value.name, number=value.number)
+
     def switch(self, op: str, left: Value, right: Value) -> Value:
         """The mode of a comparison: its result, which changes at events only."""
         relation = self._switch(op, left, right)
@@ -493,6 +517,12 @@ class Graph:
             by_base = self.value("+", self.value("*", lower, self.value("*", z, log)), lower)
             return [self.number(0.0), by_base, self.value("*", y, log)]
         return self.partials(y)
+
+
+def is_of_time(value: Value) -> bool:
+    """Return whether, between events, it moves by the time only."""
+    ops = {op for op, _ in value.leaves}
+    return "time" in ops and not ops & {"input", "state"}
 
 
 def is_runtime(value: Value) -> bool:

@@ -59,7 +59,9 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
                 expression.value = graph.switch(tree.op, *sides)
                 graph.nodes += [tree] * (len(graph.relations) - len(graph.nodes))
             else:
-                expression.value = graph.of_tree(tree, known, expression.event == "then")
+                is_instant = expression.event == "then"
+                value = graph.of_tree(tree, known, is_instant)
+                expression.value = graph.passed(value) if is_instant else value
         sources += [expression] * (len(graph.relations) - len(sources))
         if expression.is_rate:
             known[derivative_of(expression.target)] = expression.value

@@ -117,13 +117,14 @@ void sundials_text(int error_code, const char *module, const char *function, cha
     const struct sundials *sundials = sundials_pointer;
     const struct problem *problem = sundials->problem;
     const char *explanation = explained(text);
-    if (error_code == CV_BAD_T && explanation == text) {
-        return; // it follows from a failure before
+    const enum status status = sundials_status(problem, error_code);
+    const bool is_named = status == STATUS_NOT_FINITE && problem->failed_at > -INFINITY;
+    if (explanation == text && (error_code == CV_BAD_T || is_named)) {
+        return; // it follows from a failure before, or the step's message names what is not finite
     }
     char with_times[400]; // SUNDIALS writes 255 characters at most
     write_times(explanation, problem->origin, with_times, sizeof with_times);
-    message_write(&problem->sink, sundials_status(problem, error_code), "%s: %s",
-                  sundials->method->name, with_times);
+    message_write(&problem->sink, status, "%s: %s", sundials->method->name, with_times);
 }
 
 void *sundials_create(size_t size, struct problem *problem, const struct method *method) {

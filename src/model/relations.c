@@ -10,6 +10,7 @@ static const double location_error = 1e-11;
 static const double time_error = 1e-12;
 static const double rest_time = 1e-3;        // s: a relation at rest stays within its noise so long
 static const double shortest_period = 1e-12; // s, of samplers
+static const double part_of_period = 0x1p-40; // that counts as rounding
 
 /* Arguments of all functions during one event: a model, its values, and memory. */
 struct call {
@@ -18,6 +19,7 @@ struct call {
     void *values;
     int *is_begun, *holds, *active, *segments; /* parts of its modes */
     double t;                                  /* s */
+    double error;                 /* of t, s */
     double passed;                /* s: earlier time events, and those at this time, are past */
     const double *du;             /* derivative of each input by the time */
     const double *largest_inputs; /* as in struct event */
@@ -33,8 +35,8 @@ static struct call call_of(const struct relations *model, struct relations_room 
     int *holds = modes + 1;
     int *active = holds + model->relation_count;
     return (struct call){
-        model, room, values, modes,         holds, active, active + model->event_count + 1,
-        t,     t,    du,     largest_inputs};
+        model, room, values, modes, holds,         active, active + model->event_count + 1,
+        t,     0.0,  t,      du,    largest_inputs};
 }
 
 /* Compares all relations. state_errors: how far from its limit each state may have been located, in
@@ -44,7 +46,7 @@ static void compare(const struct call *call, const double state_errors[],
     const bool inputs_move = call->largest_inputs != NULL; // those that do not are exact
     const double *largest = inputs_move ? call->largest_inputs : call->room.zeros;
     const double inputs = inputs_move ? time_error : 0.0;
-    const struct given given = {state_errors, time_error, inputs, largest, call->du};
+    const struct given given = {state_errors, call->error, inputs, largest, call->du};
     call->model->compare(call->values, call->t, &given, compared);
 }
 
@@ -131,6 +133,31 @@ static bool update_modes(const struct call *call, bool is_exact) {
 static void update_modes_until_stable(const struct call *call, bool is_exact) {
     for (int count = 0; count < call->model->relation_count && update_modes(call, is_exact);
          count++) {
+    }
+}
+
+/* Puts relations that the time takes over their limits on their later sides. Returns true if some
+ * have changed. */
+static bool pass_by_time(const struct call *call) {
+    const struct relation *relation = call->model->relation;
+    const struct compared *compared = call->room.compared;
+    bool changes = false;
+    compare(call, call->room.zeros, call->room.compared);
+    for (int k = 0; k < call->model->relation_count; k++) {
+        const bool passes = relation[k].is_of_time && !relation[k].is_timed &&
+                            is_near(&compared[k]) && compared[k].slope != 0.0;
+        const int holds = compared[k].slope > 0.0;
+        changes |= passes && call->holds[k] != holds;
+        call->holds[k] = passes ? holds : call->holds[k];
+    }
+    return changes;
+}
+
+/* Updates all modes at an event. Where one value jumps, others may come to their limits. */
+static void settle(const struct call *call) {
+    update_modes_until_stable(call, false);
+    for (int count = 0; count < call->model->relation_count && pass_by_time(call); count++) {
+        update_modes_until_stable(call, false);
     }
 }
 
@@ -291,7 +318,8 @@ static enum status assign(const struct call *call, int number, const struct even
         call->room.assigned[i] = *(double *)(void *)((char *)call->values + own->offset);
     }
     if (number >= 0) {
-        model->change(call->values, call->t, number, call->room.tolerance);
+        model->change(call->values, call->t, relations_later(call->t, call->error), number,
+                      call->room.tolerance);
     } else if (model->start != NULL) {
         model->start(call->values);
     }
@@ -329,27 +357,59 @@ static enum status perform(const struct call *call, int number, const struct eve
         return status;
     }
     update_timed_modes(call);
-    update_modes_until_stable(call, false);
+    settle(call);
     allow_rounding(call, true);
     switch_fallen(call);
     allow_rounding(call, false);
-    update_modes_until_stable(call, false);
+    settle(call);
     memset(call->room.turned, 0, (size_t)model->relation_count * sizeof *call->room.turned);
     return STATUS_OK;
 }
 
-/* Runs the samplers whose time has come, in their order. Ticks whose times differ only by rounding,
- * such as 3 0.1 and 1 0.3, are at one instant. */
+/* True if the next tick of a sampler, at the time *tick, is at the time t (s) or before. Times that
+ * differ only by rounding, such as 3 0.1 and 1 0.3, are one instant. */
+static bool is_due(const struct call *call, int sampler, double t, double *tick) {
+    const double *discrete = discrete_of(call);
+    /* of the sum that is the time of the tick: its parts may cancel */
+    const double size = fabs(discrete[0]) + fabs(call->room.offset[sampler]) +
+                        discrete[1 + sampler] * call->room.every[sampler];
+    *tick = tick_time(call->model, call->room, call->values, sampler);
+    return *tick <= t + 4.0 * DBL_EPSILON * size;
+}
+
+/* Writes the time of the event. A tick's time is exact: an event that was located beside it happens
+ * there, and so do other time events that differ from it by rounding. */
+static void set_time(struct call *call, const struct event *event) {
+    const struct relations *model = call->model;
+    const double start = model->sampler_count > 0 ? discrete_of(call)[0] : call->t;
+    if (event->is_timed) {
+        call->t = fmax(call->t, relations_next_time(model, call->room, call->values));
+    }
+    double period = 0.0; // of a tick that happens now
+    const double now = call->t;
+    model->write_periods(call->values, call->room.every, call->room.offset);
+    for (int i = 0; i < model->sampler_count; i++) {
+        double tick;
+        if (is_due(call, i, now, &tick)) {
+            call->t = fmax(call->t, tick);
+            period = call->room.every[i];
+        }
+    }
+    const bool is_at_tick = period > 0.0;
+    const double size = fmax(fabs(call->t), fabs(start));
+    call->error = (is_at_tick || event->is_timed ? RELATIONS_TIME_ROUNDING : time_error) * size;
+    call->error = fmax(call->error, part_of_period * period); // at t = 0, too
+    call->passed = is_at_tick ? call->t + call->error : call->t;
+}
+
+/* Runs the samplers whose time has come, in their order. */
 static enum status run_samplers(const struct call *call, const struct event *event) {
     const struct relations *model = call->model;
     double *discrete = discrete_of(call);
     model->write_periods(call->values, call->room.every, call->room.offset);
     for (int i = 0; i < model->sampler_count; i++) {
-        /* of the sum that is the time of the tick: its parts may cancel */
-        const double size =
-            fabs(discrete[0]) + fabs(call->room.offset[i]) + discrete[1 + i] * call->room.every[i];
-        const double rounding = 4.0 * DBL_EPSILON * size;
-        if (tick_time(model, call->room, call->values, i) <= call->passed + rounding) {
+        double tick;
+        if (is_due(call, i, call->t, &tick)) {
             const enum status status = perform(call, model->event_count + i, event);
             if (status != STATUS_OK) {
                 return status;
@@ -369,27 +429,32 @@ static void add_name(const struct event *event, const char *name) {
     }
 }
 
+/* Finds the events whose conditions hold; the others may fire again. */
+static void look_at_conditions(const struct call *call) {
+    const int *due = call->room.due;
+    call->model->find_due(call->values, call->t, call->room.due);
+    for (int k = 0; k < call->model->event_count; k++) {
+        call->active[k] = call->active[k] && due[k];
+    }
+}
+
 /* Runs the events that have become due, in their order. *fires: false if there was none. is_last:
  * the reason gets their names. */
 static enum status run_due_events(const struct call *call, const struct event *event, bool is_last,
                                   bool *fires) {
     const struct relations *model = call->model;
-    int *due = call->room.due;
     enum status status = STATUS_OK;
     *fires = false;
+    look_at_conditions(call);
     for (int i = 0; status == STATUS_OK && i < model->event_count; i++) {
-        model->find_due(call->values, call->t, due);
-        if (due[i] && !call->active[i]) {
+        if (call->room.due[i] && !call->active[i]) {
             status = perform(call, i, event);
             call->active[i] = 1;
             *fires = true;
             if (status == STATUS_OK && is_last) {
                 add_name(event, model->change_names[i]);
             }
-        }
-        model->find_due(call->values, call->t, due);
-        for (int k = 0; k < model->event_count; k++) {
-            call->active[k] = call->active[k] && due[k];
+            look_at_conditions(call);
         }
     }
     return status;
@@ -416,7 +481,11 @@ static void pass(const struct call *call, const struct event *event) {
             call->holds[k] ^= falls || joins(&room.compared[k], call->holds[k]);
         }
     }
-    update_modes_until_stable(call, false);
+    if (event->triggered != NULL) {
+        settle(call);
+    } else {
+        update_modes_until_stable(call, false);
+    }
 }
 
 /* Returns true if a sampler with this period and offset (s) can tick from the time t (s) on;
@@ -472,15 +541,15 @@ enum status relations_update(const struct relations *model, struct relations_roo
         set_modes_from_values(&call, false);
         *call.is_begun = 1;
     }
-    if (event->is_timed) {
-        call.passed = fmax(event->t, relations_next_time(model, room, values));
-    }
+    set_time(&call, event);
     for (int i = 0; i < model->state_count; i++) {
         const double located = location_error * (model->nominal[i] + fabs(x[i]));
         tolerance[i] = fmax(event->tolerance[i], located);
     }
     if (was_begun) {
         pass(&call, event);
+    } else if (model->sampler_count > 0) {
+        settle(&call);
     }
     enum status status = run_samplers(&call, event);
     bool fires = true;
@@ -500,7 +569,8 @@ enum status relations_update(const struct relations *model, struct relations_roo
 void relations_errors(const struct relations *model, struct relations_room room, const void *values,
                       double t, const double state_errors[], const double largest_inputs[],
                       double relative, double errors[]) {
-    const struct given given = {state_errors, relative, relative, largest_inputs, room.zeros};
+    const struct given given = {state_errors, relative * fabs(t), relative, largest_inputs,
+                                room.zeros};
     model->compare(values, t, &given, room.compared);
     for (int k = 0; k < model->relation_count; k++) {
         if (!model->relation[k].is_timed) {

@@ -8,6 +8,7 @@
 
 #include "model.h"
 
+#include <float.h>
 #include <limits.h>
 #include <math.h>
 
@@ -17,6 +18,7 @@ struct relation {
     bool is_timed;      /* true if its time is known in advance */
     bool rises;         /* of a timed relation: true if it holds after its time */
     bool is_of_inputs;  /* true if it depends on inputs and parameters only */
+    bool is_of_time;    /* true if, between events, it moves by the time only */
     size_t indicator;   /* of a relation that is not timed */
 };
 
@@ -52,7 +54,7 @@ struct assignment {
 /* Errors of the values that distances depend on, and motion of the inputs. */
 struct given {
     const double *state_errors; /* of each state, in its unit */
-    double time;                /* relative error of the time */
+    double time;                /* error of the time, s */
     double inputs;              /* relative error of all inputs */
     const double *largest;      /* of each input so far: its error is relative to it, too */
     const double *du;           /* derivative of each input by the time */
@@ -90,8 +92,9 @@ struct relations {
     void (*locate)(const void *values, double t, int segment[]);
     void (*find_due)(const void *values, double t, int due[]);
     /* Performs an event or, with event_count added to its number, a sampler: right sides use the
-     * values before it; a state that jumps gets the tolerance of its right side. */
-    void (*change)(void *values, double t, int event, double tolerance[]);
+     * values before it; a state that jumps gets the tolerance of its right side. later: time at
+     * which right sides see what switches by the time, s. */
+    void (*change)(void *values, double t, double later, int event, double tolerance[]);
 };
 
 /* Memory for one call. */
@@ -141,6 +144,14 @@ static inline int relations_whole(double x) {
 /* Returns the largest whole number up to x, within +-RELATIONS_MOST_COUNTED. */
 static inline int relations_floor(double x) {
     return (int)floor(fmax(-RELATIONS_MOST_COUNTED, fmin(x, RELATIONS_MOST_COUNTED)));
+}
+
+/* Error of the time of a time event, over its size. */
+#define RELATIONS_TIME_ROUNDING (16.0 * DBL_EPSILON)
+
+/* Returns a time at which what switches at t (s), which may be wrong by `error` (s), has switched. */
+static inline double relations_later(double t, double error) {
+    return t + fmax(error, DBL_MIN);
 }
 
 /* Returns a bound of the error of y, a function of an argument with an error, from y's values at

@@ -1,6 +1,14 @@
-"""Files with samplers: their ticks, and models that only sampling makes possible."""
+"""Files with samplers: their ticks, and models that only sampling makes possible.
+
+SAMPLERS in the environment: how many random models.
+"""
 
 import ctypes
+import os
+import random
+from fractions import Fraction
+from itertools import product
+from math import ceil, floor
 from pathlib import Path
 
 import fmpy
@@ -13,6 +21,7 @@ from tests.equations.compiled import Model
 from tests.equations.examples import METHODS, MODELS, axis, example, initializing, made, simulated
 
 TEXTS = MODELS["sampled"]
+SEEDS = range(int(os.environ.get("SAMPLERS", "2")))
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 
 
@@ -60,6 +69,77 @@ def test_a_sampled_pid_controller_moves_an_axis(folder: Path, method: int, step:
     found = np.stack([run[name] for name in "xvywu"], axis=1)[at_ticks]
     differences = np.abs(found - on_axis(1.0)[rows[at_ticks].astype(int)]).max(axis=0)
     assert np.all(differences < [1e-9, 1e-9, 1e-9, 1e-9, 1e-6])
+
+
+PERIODS = (  # s; doubles have the first ones exactly
+    [Fraction(n, 16) for n in (1, 4, 5, 6, 12)],
+    [Fraction(*ratio) for ratio in ((1, 10), (3, 10), (7, 10), (1, 3), (11, 100))],
+)
+# what jumps by the time, and its value at s = {t} / {T}
+JUMPS = {
+    "floor({t} / {T})": floor,
+    "floor(-{t} / {T})": lambda s: floor(-s),
+    "ceil({t} / {T})": ceil,
+    "round({t} / {T})": lambda s: floor(s + Fraction(1, 2)),
+    "(1 if mod({t}, {T}) > 0.9 * {T} else 0)": lambda s: s % 1 > Fraction(9, 10),
+    "(1 if mod({t}, {T}) >= {T} / 2 else 0)": lambda s: s % 1 >= Fraction(1, 2),
+    "(1 if {t} > 4 * {T} else 0)": lambda s: s > 4,
+    "(1 if sin(2 * pi * {t} / {T}) > 0 else 0)": lambda s: s % 1 < Fraction(1, 2),
+    "(floor({t} / {T}) if mod({t}, 2 * {T}) < {T} else 0)": lambda s: floor(s) * (s % 2 < 1),
+    "quarters(mod({t}, {T}) / {T})": lambda s: floor(4 * (s % 1)),
+}
+QUARTERS = """[tables.quarters]
+x = [-0.25, 0, 0.25, 0.5, 0.75, 1]
+y = [-1, 0, 1, 2, 3, 4]
+interpolation = "previous"
+"""
+
+
+def written(number: Fraction) -> str:
+    """As files have it, with as many digits as a double."""
+    is_short = Fraction(repr(float(number))) == number
+    return repr(float(number)) if is_short else f"({number.numerator} / {number.denominator})"
+
+
+@pytest.mark.parametrize("has_state", [True, False])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_tick_sees_what_switches_at_its_time_switched(
+    tmp_path: Path, seed: int, has_state: bool
+) -> None:
+    """Directly and through [where], with each method, in one step or many."""
+    chance, periods = random.Random(seed), PERIODS[seed % 2]
+    every = chance.choice(periods) / chance.choice([1, 2])
+    offset, start = chance.choice([0, every / 2, every]), chance.choice([0, 0, -3 * every, 10])
+    multiples = [every * n for n in (1, 2, 3, 4, 5, Fraction(1, 2), Fraction(3, 2))]
+    expressions = []
+    for text, value in JUMPS.items():
+        T, since = chance.choice([*periods, *multiples]), chance.choice([0, offset, every, 10])
+        t = f"(time - {written(since)})" if since else "time"
+        expressions.append((text.format(t=t, T=written(T)), value, T, since))
+    numbers = range(len(expressions))
+    where = "".join(f'w{i} = "{expressions[i][0]}"\n' for i in numbers)
+    new = [f'd{i} = "d{i} + (n + 1) * {expressions[i][0]}"' for i in numbers]
+    new += [f'v{i} = "v{i} + (n + 1) * w{i}"' for i in numbers]
+    held = "".join(f"{kind}{i} = {{}}\n" for kind in "dv" for i in numbers)
+    state = '[states]\ny = { derivative = "w4 - y" }\n' if has_state else ""
+    fmu = made(
+        tmp_path,
+        f'name = "Jumps"\n{state}{QUARTERS}[where]\n{where}[discrete]\nn = {{}}\n{held}'
+        f'[sampled.s]\nevery = "{written(every)}"\noffset = "{written(Fraction(offset))}"\n'
+        f'set = {{ n = "n + 1", {", ".join(new)} }}\n',
+    )
+    later = Fraction(1, 10**9)
+    ticks = [start + offset + k * every for k in range(25)]
+    stops = (ticks[-1], 24), (ticks[-1] + every * Fraction(3, 10), 1), (ticks[-1] + every / 3, 61)
+    for (stop, steps), method in product(stops, METHODS.values() if has_state else [None]):
+        options = {"solver_method": method} if method else {}
+        last = simulated(
+            fmu, float(stop), float((stop - start) / steps), options, start_time=float(start)
+        )[-1]
+        assert last["n"] == len(ticks)
+        for i, (text, value, T, since) in enumerate(expressions):
+            expected = sum((k + 1) * value((t + later - since) / T) for k, t in enumerate(ticks))
+            assert (last[f"d{i}"], last[f"v{i}"]) == (expected, expected), (text, every, method)
 
 
 @EACH_METHOD
