@@ -232,6 +232,37 @@ def test_a_model_without_states_has_modes(folder: Path) -> None:
     assert found == [0.0, 4.0, 6.0, 2.0, 0.0, 0.0]
 
 
+@pytest.mark.parametrize("version", ["", "fmi3"])
+@pytest.mark.parametrize("steps", [1, 18, 40])
+def test_events_of_a_model_without_states_are_located(
+    folder: Path, version: str, steps: int
+) -> None:
+    fmu = named(folder, TEXTS["SAW"])
+    run = simulated(fmu.parent / version / fmu.name, 1.26, 1.26 / steps, {})
+    t = run["time"][1:]
+    np.testing.assert_array_equal(run["n"][1:], np.floor(10 * t) + 1)
+    np.testing.assert_allclose(run["saw"], np.mod(run["time"], 0.5), rtol=0, atol=1e-14)
+
+
+def test_an_input_that_moves_is_located_without_states(folder: Path) -> None:
+    with initializing(named(folder, TEXTS["SAW"])) as unit:
+        unit.fmi.exitInitializationMode()
+        reference = [unit.loaded.references["u"]]
+        unit.fmi.setRealInputDerivatives(reference, [1], [3.0])
+        unit.step(0.0, 1.0)
+        assert unit.get("stamp") == pytest.approx([1 / 3], abs=1e-12)
+
+
+def test_events_that_contradict_each_other_are_named(folder: Path) -> None:
+    fmu = named(folder, TEXTS["CONTRADICTION"])
+    with Instance(loaded(fmu), logging_on=True) as unit:
+        unit.initialize(0.0, None, 1e-9).step(0.0, 0.9)
+        with pytest.raises(fmpy.fmi1.FMICallException):
+            unit.step(0.9, 0.2)
+        last = unit.messages[-1].text
+        assert "the step ended at t = 1.0" in last and "event up (b > 0), the same" in last
+
+
 def test_a_step_that_is_tried_again_and_succeeds_sends_no_message(folder: Path) -> None:
     """Long steps of `erk` go where the tank is emptier than empty."""
     with Instance(loaded(named(folder, TEXTS["SIPHON"])), logging_on=True) as unit:
