@@ -320,8 +320,8 @@ enum status instance_rest(struct instance *instance, struct clock_time end, stru
     const struct polynomial *inputs = continuation == CONTINUE_AFTER_EVENT
                                           ? instance->memory.current_inputs
                                           : instance->memory.next_inputs;
-    // without states the time may end a mode; with states at rest, only inputs that move. The active
-    // values matter only after an event
+    // without states the time may end a mode; with states at rest, only inputs that move. The
+    // active values matter only after an event
     const bool inputs_move =
         !instance->inputs_are_held && polynomials_move(inputs, count_of(instance->model->inputs));
     const bool searches = inputs_move || instance->model->states.size == 0;

@@ -19,7 +19,7 @@ struct call {
     void *values;
     int *is_begun, *holds, *active, *segments; /* parts of its modes */
     double t;                                  /* s */
-    double error;                 /* of t, s */
+    double error;                              /* of t, s */
     double passed;                /* s: earlier time events, and those at this time, are past */
     const double *du;             /* derivative of each input by the time */
     const double *largest_inputs; /* as in struct event */

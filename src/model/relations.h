@@ -149,7 +149,8 @@ static inline int relations_floor(double x) {
 /* Error of the time of a time event, over its size. */
 #define RELATIONS_TIME_ROUNDING (16.0 * DBL_EPSILON)
 
-/* Returns a time at which what switches at t (s), which may be wrong by `error` (s), has switched. */
+/* Returns a time at which what switches at t (s), which may be wrong by `error` (s), has switched.
+ */
 static inline double relations_later(double t, double error) {
     return t + fmax(error, DBL_MIN);
 }

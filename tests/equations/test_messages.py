@@ -10,7 +10,8 @@ from fmpy.fmi2 import FMU2Model
 
 import rparm
 from rparm.errors import UserError
-from tests.equations.examples import METHODS, MISTAKES, MODELS, initializing, made
+from tests.equations.examples import METHODS, MISTAKES, MODELS, initializing, loaded, made
+from tests.support.instances import OK, Instance
 
 START, STEP = 10.0, 0.3  # s
 NUMBER = r"(-?[0-9.]+(?:e-?[0-9]+)?)"
@@ -47,6 +48,19 @@ def test_a_message_names_what_the_file_names(
     numbers = [float(number) for number in found.groups()]
     assert numbers == pytest.approx(CASES[case]["numbers"], abs=1e-5)
     assert "\n" not in message
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_what_is_not_finite_is_the_only_message(fmu: Path, method: int) -> None:
+    """The integrator's own text would blame the number of its steps."""
+    with Instance(loaded(fmu), logging_on=True) as unit:
+        unit.fmi.setInteger([unit.loaded.references["solver_method"]], [method])
+        unit.set(sway=2.0)
+        unit.initialize(START, None, 1e-8)
+        with pytest.raises(FMICallException):
+            unit.step(START, STEP)
+        (message,) = [m.text for m in unit.messages if m.status != OK]
+        assert "derivative of m: sqrt(1 - sway) - 1 + 0 * m is not finite" in message
 
 
 @pytest.mark.parametrize("method", METHODS)
