@@ -105,7 +105,7 @@ struct instance {
     double *u;        /* one value per input, as the right-hand side sees them */
     double (*input_series)[SERIES_INPUT_LENGTH]; /* coefficients of each input */
     bool has_avx2;                               /* the processor has it, and the series asks */
-    struct integrator *integrator;               /* NULL if the model has neither states nor indicators */
+    struct integrator *integrator;               /* NULL without states and indicators */
     struct integrator_settings
         configured; /* last settings of the integrator, without the tolerances of the states */
     struct instance_memory memory;
