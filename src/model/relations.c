@@ -142,6 +142,13 @@ static bool pass_by_time(const struct call *call) {
     const struct relation *relation = call->model->relation;
     const struct compared *compared = call->room.compared;
     bool changes = false;
+    bool is_any = false;
+    for (int k = 0; k < call->model->relation_count; k++) {
+        is_any |= relation[k].is_of_time && !relation[k].is_timed;
+    }
+    if (!is_any) {
+        return false;
+    }
     compare(call, call->room.zeros, call->room.compared);
     for (int k = 0; k < call->model->relation_count; k++) {
         const bool passes = relation[k].is_of_time && !relation[k].is_timed &&
