@@ -363,9 +363,8 @@ static enum status begin_modes(struct step *step, enum continuation *continuatio
 /* True if every state's derivative is 0 in the current modes, or there are no states. */
 static bool is_at_rest(const struct instance *instance) {
     const struct model_events *events = instance->model->events;
-    return instance->model->states.size == 0 ||
-           (events != NULL && events->is_at_rest != NULL &&
-            events->is_at_rest(instance->memory.values));
+    return instance->model->states.size == 0 || (events != NULL && events->is_at_rest != NULL &&
+                                                 events->is_at_rest(instance->memory.values));
 }
 
 /* Advances to the end of the current part of the step, or to an earlier state event. */
