@@ -375,7 +375,8 @@ class System:
             with placed("step"):
                 step = quantity(step, SECONDS)
             times = changed.system.start, changed.system.stop, step
-            simulation.communication_points(*times)  # checks them
+            with placed(self.path):
+                simulation.communication_points(*times)  # checks them
             changed = replace(changed, system=replace(changed.system, step=step))
         names = comparison.kept(changed)
         run = engines[engine](changed, variant, names)

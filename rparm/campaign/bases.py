@@ -8,6 +8,7 @@ import hashlib
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar, cast
 
@@ -21,12 +22,13 @@ from rparm.fmi.compiled_loop import Part
 from rparm.fmi.fmu_file import describe, read_model
 from rparm.fmi.model import INPUTS, Model, Value, Variable
 from rparm.runs import scenario
-from rparm.runs.scenario import MAX_STEPS, Scenario
+from rparm.runs.scenario import Scenario
 from rparm.systems.master import start_value
 from rparm.systems.opened import opened as open_system
 from rparm.systems.opened import system_file
 from rparm.systems.python_component import PythonComponent
 from rparm.systems.structure import Connection, OpenedSystem
+from rparm.systems.structure import times as chosen_times
 from rparm.units import quantity
 
 
@@ -298,15 +300,10 @@ def _said_of(where: object) -> Iterator[None]:
 
 def _system_times(opened: OpenedSystem, given: Mapping[str, float]) -> np.ndarray:
     """Return the communication points (n + 1,) of a system in s, each computed from its number."""
-    system = opened.system
-    start = given.get("start", system.start)
-    stop, step = given.get("stop", system.stop), given.get("step", system.step)
-    if not start < stop or step > stop - start or (stop - start) / step > MAX_STEPS:
-        raise UserError(
-            f"[time]: start {start!r} s, stop {stop!r} s and step {step!r} s make no run of "
-            f"1 to {MAX_STEPS} steps"
-        )
-    return start + np.arange(round((stop - start) / step) + 1) * step
+    system = replace(opened.system, **given)
+    with placed("[time]"):
+        chosen_times(system.start, system.stop, system.step, opened.models)  # checks them
+    return system.times
 
 
 # ---- Values with units ---------------------------------------------------------------------------

@@ -108,10 +108,13 @@ class Runner(AbstractContextManager["Runner"]):
             self._set_target(target, float(value))
         for instance in self._instances:
             instance.enter_initialization()
-        self._propagate()
+        self._propagate("in initialization")
         for instance in self._instances:
             instance.exit_initialization()
-        self._stepper.read_outputs(f"at the start, t = {job.start!r} s,")
+        start = f"at the start, t = {job.start!r} s,"
+        if job.propagates:  # samplers that tick at the start have ticked
+            self._propagate(start)
+        self._stepper.read_outputs(start)
         self._record[0] = self._stepper.reals.values[job.columns]
         self._tangent.deviation[:] = 1 / np.sqrt(max(len(self._tangent.deviation), 1))
 
@@ -125,17 +128,16 @@ class Runner(AbstractContextManager["Runner"]):
         kind = instance.fmu.model.variables[target.variable].type
         instance.set(target.variable, int(value) if kind == "Integer" else value)
 
-    def _propagate(self) -> None:
-        """Set inputs in initialization mode until no output follows any more."""
+    def _propagate(self, when: str) -> None:
+        """Set inputs at the start until no output follows any more."""
         stepper, reals, switches = self._stepper, self._stepper.reals, self._stepper.switches
         reals.values[: self._held.shape[1]] = self._held[0]
         switches.values[: self._job.switches.values.shape[1]] = self._job.switches.values[0]
-        when = "in initialization"
         if not self._job.propagates:
             stepper.set_inputs(when)
             return
         before = None
-        for _ in range(len(self._instances) + 2):
+        for _ in range(len(reals.to_set) + len(switches.to_set) + 2):
             stepper.read_outputs(when)
             found = np.concatenate([reals.values, switches.values])
             if before is not None and np.array_equal(before, found):

@@ -9,6 +9,7 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, wait
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from threading import Event, Thread
 from typing import TypeVar
@@ -47,7 +48,8 @@ class Part:
     published: tuple[str, ...]  # Real outputs, in the order of the FMU
     inputs: tuple[str, ...]  # connected Real inputs
     sources: tuple[Source, ...]  # of each of `inputs`
-    constant: tuple[str, ...]  # outputs that feed an input which is no Real: they must not change
+    # outputs that feed an input which is no Real, with its start value, which they must keep
+    constant: tuple[tuple[str, Value], ...]
     rounds: int  # exchanges in initialization after which no output changes any more
     times: np.ndarray  # s, communication points
     system: str  # variant and SHA-256 of the system's file, the same in all processes
@@ -84,15 +86,19 @@ def parts(ssp: OpenedSystem, variant: str) -> dict[str, Part]:
         name = component.name
         incoming = [c for c in real_connections(ssp) if c.end_component == name]
         others = [c for c in system.connections if c not in real_connections(ssp)]
-        constant = [c.start_connector for c in others if c.start_component == name]
+        constant = [
+            (c.start_connector, ssp.variable(c.end).start or 0)
+            for c in others
+            if c.start_component == name
+        ]
         made[name] = Part(
             component=name,
             parameters=system.parameter_sets[variant].get(name, {}),
             published=tuple(published[name]),
             inputs=tuple(c.end_connector for c in incoming),
             sources=tuple(map(source, incoming)),
-            constant=tuple(dict.fromkeys(constant)),
-            rounds=len(system.components) + 1,
+            constant=tuple(constant),
+            rounds=len(real_connections(ssp)) + 1,
             times=system.times,
             system=whole,
             moved={
@@ -154,7 +160,7 @@ class _Stepper:
 
     def run(self) -> None:
         self._initialize()
-        constant = self._constants()
+        self._check_constants(float(self._part.times[0]))
         times = self._part.times.tolist()
         for point, (start, end) in enumerate(zip(times[:-1], times[1:], strict=True), start=1):
             with self._instance.explained(f"in the step from t = {start!r} s"):
@@ -162,29 +168,31 @@ class _Stepper:
                 self._instance.do_step(start, end - start)
             with self._instance.explained(f"at t = {end!r} s"):
                 self._give(f"at t = {end!r} s")
-            if constant and self._constants() != constant:
-                names = ", ".join(self._part.constant)
-                raise UserError(
-                    f"{self._part.component}: {names} changed by t = {end!r} s; only Real values "
-                    "are exchanged in the steps"
-                )
+            self._check_constants(end)
             self._federate.go_to(point)
 
     def _initialize(self) -> None:
         part, instance = self._part, self._instance
         begin_instance(instance, part.times[0], part.times[-1], part.parameters)
         self._federate.enter_initialization()
-        self._give_early()
-        for _ in range(part.rounds):
+        self._settle(instance.explained_early, "in initialization")
+        instance.exit_initialization()
+        start = f"at t = {float(part.times[0])!r} s"
+        self._settle(lambda: instance.explained(start), start)  # samplers have ticked
+        self._federate.begin()
+
+    def _settle(self, explained: Callable[[], AbstractContextManager], when: str) -> None:
+        """Exchange values at the start until no output follows any more."""
+        with explained():
+            self._give(when)
+        for _ in range(self._part.rounds):
             before = self._outputs.view.copy()
             self._federate.exchange()
-            with instance.explained("in initialization"):
+            with explained():
                 self._take(0)
-            self._give_early()
+                self._give(when)
         if not np.array_equal(before, self._outputs.view):
-            raise UserError(f"{part.component}: the connections form an algebraic loop")
-        self._federate.begin()
-        instance.exit_initialization()
+            raise UserError(f"{self._part.component}: the connections form an algebraic loop")
 
     def _take(self, point: int) -> None:
         """Set the inputs to what their sources have published, or to their values at a time."""
@@ -196,18 +204,20 @@ class _Stepper:
             self._inputs.view[:] = [values[s.component][s.index] for s in self._part.sources]
             self._inputs.set()
 
-    def _give_early(self) -> None:
-        with self._instance.explained_early():
-            self._give("in initialization")
-
     def _give(self, when: str) -> None:
         """Read the outputs and publish them."""
         self._outputs.get()
         check_finite(self._part.component, self._outputs, when)
         self._federate.publish(self._outputs.view)
 
-    def _constants(self) -> list[object]:
-        return [self._instance.discrete(name) for name in self._part.constant]
+    def _check_constants(self, now: float) -> None:
+        """Refuse an output that is no Real and not as the input begins that it feeds."""
+        for name, start in self._part.constant:
+            if self._instance.discrete(name) != start:
+                raise UserError(
+                    f"{self._part.component}: {name} changed by t = {now!r} s; only Real values "
+                    "are exchanged"
+                )
 
 
 # ---- Watching ------------------------------------------------------------------------------------

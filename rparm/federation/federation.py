@@ -138,7 +138,7 @@ def _recorded(
         rows[point] = [value for component in made for value in published[component]]
 
     recorder.enter_initialization()
-    for _ in range(first.rounds):
+    for _ in range(2 * first.rounds):  # before and after the end of initialization
         recorder.exchange()
     recorder.begin()
     read(0)

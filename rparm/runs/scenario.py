@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from rparm import project
-from rparm.errors import UserError, did_you_mean
+from rparm.errors import UserError, WrongValueError, did_you_mean
 from rparm.files import difference, is_file, missing, read_toml, show
 from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, TOLERANCE, Model, Value, Variable
 from rparm.project import PROGRAM
@@ -30,6 +30,7 @@ OPTIONAL = (MODEL, FMU, "reference_every", "panels", PARAMETERS, INITIAL, INPUTS
 TIMES = ("start", "stop", "step")
 MAX_STEPS = 10_000_000
 MAX_PATTERN = 1000  # step lengths in a pattern
+ROUNDED = 4  # last digits of times and of their quotient
 SLIVER = 1e-9  # a last step shorter than this fraction of its full length joins the one before
 TEMPLATE_WIDTH = 100
 USUAL_STOP, USUAL_TOLERANCE = 2.0, 1e-8  # s; relative
@@ -307,6 +308,25 @@ class _Reader(Reader):
         times.setflags(write=False)
         elapsed.setflags(write=False)
         return times, elapsed
+
+
+def count_steps(start: float, stop: float, step: float) -> int:
+    """Return the number of steps in s from start to stop; WrongValueError if it is not whole."""
+    span = difference(stop, start)
+    if span / step > MAX_STEPS:
+        raise WrongValueError(f"step {step!r} s makes more than {MAX_STEPS} steps")
+    if not are_whole(start, stop, step):
+        given = f"{number(span)} s, got {number(step)} s"
+        raise WrongValueError(f"step: expected a whole number of steps in {given}")
+    return round(span / step)
+
+
+def are_whole(start: float, stop: float, step: float) -> bool:
+    """Return whether one step in s or several lead from start to stop, but for rounding."""
+    count = difference(stop, start) / step
+    of_times = math.ulp(max(abs(start), abs(stop))) / step
+    distance = abs(count - max(round(count), 1))
+    return distance <= ROUNDED * (of_times + math.ulp(count))
 
 
 # ---- A scenario to start from --------------------------------------------------------------------

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rparm import project
-from rparm.errors import StoppedError, UserError, one_line
+from rparm.errors import StoppedError, UserError, WrongValueError, one_line
 from rparm.interruption import run_group, temporary_folder
 
 if TYPE_CHECKING:
@@ -86,13 +86,19 @@ def unsuited(ssp: "OpenedSystem") -> str:
         return f"{next(iter(ssp.python))} is Python"
     if system.inputs:
         return f"{next(iter(system.inputs))} moves"
-    if system.start < 0.0:
-        return "Ecos starts at 0 s or later"
+    if system.start != 0.0:
+        return "Ecos starts at 0 s"
     if odd:
         return f"there are connections of type {odd[0]}"
     for c, name in settings:
         if ssp.models[c].variables[name].type == "Enumeration":  # left out, with a warning in a log
             return f"component {c!r}: {name!r} is an Enumeration, which Ecos does not set"
+    try:
+        chain = ssp.longest_chain
+    except WrongValueError:
+        return "its FMUs do not exclude an algebraic loop, which Ecos does not find"
+    if chain > len(system.components):  # as often Ecos passes values on at the start
+        return "values pass a component more than once at the start, which Ecos does not follow"
     return absent()
 
 

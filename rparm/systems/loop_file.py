@@ -10,7 +10,6 @@ import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
 
@@ -34,10 +33,9 @@ from rparm.systems.structure import (
     System,
     causality,
     check,
-    is_whole,
     times,
 )
-from rparm.units import SECONDS, number
+from rparm.units import SECONDS
 
 COMPONENTS, CONNECTIONS, VARIANTS, KEEP = "components", "connections", "variants", "keep"
 TIMES = ("start", "stop", "step")
@@ -105,7 +103,6 @@ class LoopReader(Reader):
             parameters=parameters, descriptions=descriptions, description=description,
         )  # fmt: skip
         check(self.path, system, self.models)
-        self.check_delays()
         system = self.with_inputs(system, self.moved)
         keep = None
         if KEEP in content:
@@ -250,20 +247,6 @@ class LoopReader(Reader):
             *self.parts(start, where, components), *self.parts(end, where, components)
         )
 
-    def check_delays(self) -> None:
-        """Refuse connections by which an output follows from itself at once, as FMUs declare."""
-        causes = {c.end: {c.start} for c in self.connections}
-        for component, model in self.models.items():
-            for output, known in model.dependencies.items():
-                inputs = {f"{component}.{x}" for x in known if model.variables[x].is_a(INPUTS)}
-                causes[f"{component}.{output}"] = inputs
-        try:
-            TopologicalSorter(causes).prepare()
-        except CycleError as error:
-            loop = " -> ".join(name for name in error.args[1])
-            way_out = "a state or a sampler must be in between"
-            self.fail(f"[{CONNECTIONS}]: algebraic loop, {loop}: {way_out}")
-
     # ---- Times -----------------------------------------------------------------------------------
 
     def times(self, content: Mapping[str, Any], step: float | None) -> tuple[float, float, float]:
@@ -277,9 +260,6 @@ class LoopReader(Reader):
         with self.placed("times"):
             start, stop, step, notes = times(begin, given.get("stop"), step, self.models)
         self.notes += notes
-        if not is_whole((stop - start) / step):
-            span = f"{number(stop - start)} s"
-            self.fail(f"step: expected a whole number of steps in {span}, got {number(step)} s")
         return start, stop, step
 
     # ---- Parameters ------------------------------------------------------------------------------

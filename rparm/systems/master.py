@@ -204,6 +204,7 @@ class Master(AbstractContextManager["Master"]):
         self.time, self.do_steps = 0.0, 0
         connections, signals = list(connections), signals or {}
         self._switches, real = _split(fmus, connections, self.extrapolates)
+        self._links = len(connections) + len(signals)  # values pass each once
         for name in signals:
             if name in {c.end for c in connections}:
                 raise UserError(f"{name}: is connected, and cannot follow a signal, too")
@@ -293,8 +294,7 @@ class Master(AbstractContextManager["Master"]):
         self._propagate(self._read_early, "in initialization")
         for component in self.components.values():
             component.instance.exit_initialization()
-        if self.extrapolates:
-            self._propagate_slopes()
+        self._follow()  # samplers that tick at the start have ticked
 
     def _drive(self) -> None:
         """Take the values that signals have now."""
@@ -305,7 +305,7 @@ class Master(AbstractContextManager["Master"]):
     def _propagate(self, read: Callable[[ConnectedInstance], object], when: str) -> None:
         """Set inputs until no output follows any more: along direct feedthrough, once each."""
         before = np.full(len(self.names), np.nan)
-        for _ in range(len(self.components) + 2):
+        for _ in range(self._links + 2):
             switched = self._transfer_switches()
             for component in self.components.values():
                 read(component)
@@ -318,6 +318,13 @@ class Master(AbstractContextManager["Master"]):
                     component.set_inputs(self.values[component.sources])
         names = ", ".join([*(self.names[i] for i in changing), *switched])
         raise UserError(f"the connections form an algebraic loop: {names}")
+
+    def _follow(self) -> None:
+        """Compute all outputs at this time from inputs that follow them at once."""
+        when = f"at t = {self.time!r} s"
+        self._propagate(lambda component: self._read(component, self.time), when)
+        if self.extrapolates:
+            self._propagate_slopes()
 
     def _transfer_switches(self) -> list[str]:
         """Set the discrete inputs whose sources have another value, and return their names."""
@@ -376,9 +383,7 @@ class Master(AbstractContextManager["Master"]):
         self.time = end
         self._drive()
         if self._transfer_switches():
-            self._propagate(lambda component: self._read(component, end), f"at t = {end!r} s")
-            if self.extrapolates:
-                self._propagate_slopes()
+            self._follow()
 
     def _set_inputs(self, component: ConnectedInstance, length: float) -> None:
         """Set inputs at the beginning of the step, of sources ahead and of others."""

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -15,7 +16,7 @@ from rparm.fmi.fmu_file import LARGEST_SYSTEM, Fmu, describe
 from rparm.fmi.model import INPUTS, TOLERANCE, Model, Value, Variable
 from rparm.project import VERSIONS
 from rparm.runs.inputs import Signal
-from rparm.runs.scenario import MAX_STEPS
+from rparm.runs.scenario import are_whole, count_steps
 from rparm.systems.python_component import ANY
 from rparm.units import number
 
@@ -176,6 +177,11 @@ class OpenedSystem:
     def is_ssp(self) -> bool:
         return not self.files and not self.python
 
+    @property
+    def longest_chain(self) -> int:
+        """Through how many connections values may pass at once; WrongValueError for a loop."""
+        return longest_chain(self.system, self.models, is_assumed=True)
+
     def fmu(self, component: str) -> Path:
         return self.folder / self.system.component(component).source
 
@@ -261,32 +267,27 @@ def times(
         stop = later[longest]
         notes.append(f"stop time {number(stop)} s: the largest of its FMUs ({longest})")
     if step is None and math.isfinite(stop - start):
-        step, reason = _chosen_step(difference(stop, start), models)
+        step, reason = _chosen_step(start, stop, models)
         notes.append(f"communication step {number(step)} s: {reason}")
     if step is None or not start < stop or not math.isfinite(stop - start):
         raise WrongValueError(f"start {start!r} s, stop {stop!r} s: expected a later stop")
-    if not 0 < step <= stop - start:
+    if not 0 < step <= difference(stop, start):
         span = f"stop - start = {number(difference(stop, start))} s"
         raise WrongValueError(f"expected a step from 0 s to {span}, got {step!r} s")
-    if (stop - start) / step > MAX_STEPS:
-        raise WrongValueError(f"step {step!r} s makes more than {MAX_STEPS} steps")
+    count_steps(start, stop, step)
     return start, stop, step, notes
 
 
-def _chosen_step(span: float, models: Mapping[str, Model]) -> tuple[float, str]:
+def _chosen_step(start: float, stop: float, models: Mapping[str, Model]) -> tuple[float, str]:
     """Choose a step of which a whole number lead to the stop time; say why."""
     given = {name: model.experiment.step for name, model in models.items()}
     steps = {name: step for name, step in given.items() if step is not None and step > 0}
     shortest = min(steps, key=lambda name: steps[name], default=None)
+    span = difference(stop, start)
     step = span / STEPS if shortest is None else min(steps[shortest], span)
-    if not is_whole(span / step):
+    if not are_whole(start, stop, step):
         step = span / math.ceil(span / step)
     return step, f"the smallest of its FMUs ({shortest})" if shortest else f"1/{STEPS} of the run"
-
-
-def is_whole(steps: float) -> bool:
-    """Return whether a number of steps, from 1, is whole but for rounding."""
-    return abs(max(round(steps), 1) - steps) <= 1e-6
 
 
 # ---- Checks against the FMUs ---------------------------------------------------------------------
@@ -318,6 +319,32 @@ def check(path: Path, system: System, models: Mapping[str, Model]) -> None:
     _Checker(path, system, models).check()
 
 
+def longest_chain(system: System, models: Mapping[str, Model], is_assumed: bool = False) -> int:
+    """Return through how many connections in a row values pass at once; not in a circle.
+
+    Outputs whose FMU does not declare dependencies follow from nothing, or `is_assumed`: from all
+    inputs. WrongValueError for an algebraic loop.
+    """
+    causes = {c.end: {c.start} for c in system.connections}
+    for component, model in models.items():
+        ends = {v.name for v in model.variables.values() if v.is_a(INPUTS)}
+        for variable in model.variables.values():
+            known = model.dependencies.get(variable.name, ends if is_assumed else ())
+            if variable.causality == "output":
+                inputs = {f"{component}.{x}" for x in ends.intersection(known)}
+                causes[f"{component}.{variable.name}"] = inputs
+    fed, length = {c.end for c in system.connections}, dict[str, int]()
+    try:
+        for name in TopologicalSorter(causes).static_order():
+            before = (length[cause] for cause in causes.get(name, ()))
+            length[name] = max(before, default=0) + (name in fed)
+    except CycleError as error:
+        way_out = "a state or a sampler must be in between"
+        loop = " -> ".join(error.args[1])
+        raise WrongValueError(f"algebraic loop, {loop}: {way_out}") from error
+    return max(length.values(), default=0)
+
+
 class _Checker:
     def __init__(self, path: Path, system: System, models: Mapping[str, Model]) -> None:
         self.path = path
@@ -332,6 +359,8 @@ class _Checker:
             for connector in component.connectors.values():
                 self.connector(component, connector)
         self.connections()
+        with placed(f"{self.path}: [connections]"):
+            longest_chain(self.system, self.models)
         for variant, components in self.system.parameters.items():
             for component, values in components.items():
                 for name, parameter in values.items():

@@ -12,11 +12,16 @@ import pytest
 from lxml import etree
 from scipy.integrate import solve_ivp
 
+from rparm import building
+from rparm.errors import UserError
+from rparm.federation import federation, network
 from rparm.report import block_diagram
 from rparm.systems import comparison, ecos
-from rparm.systems.master import run_in_master
+from rparm.systems.master import Master, run_in_master
 from rparm.systems.opened import opened
 from rparm.systems.structure import OpenedSystem
+from tests.campaign.files import HEAD, campaign
+from tests.campaign.runners import rows, runner
 from tests.support.programs import python
 from tests.support.rparm_project import BUILD, Console, repacked
 from tests.support.tables import tables
@@ -150,6 +155,79 @@ def test_integers_go_from_component_to_component(tmp_path: Path) -> None:
         assert ecos.unsuited(system) == "there are connections of type Integer"
         run = run_in_master(system, "default", comparison.kept(system))
     assert run.values.tolist() == [[i, i] for i in range(11)]
+
+
+# ---- The start ----------------------------------------------------------------------------------
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with an FMU of FMI 2.0 with a sampler, and one of FMI 3.0 in its folder fmi3."""
+    found = tmp_path_factory.mktemp("start")
+    (found / "part.toml").write_text(TABLES["start"]["part.toml"], encoding="utf-8")
+    building.build(found / "part.toml", output=found, lock=False)
+    return found
+
+
+def joined(folder: Path, connections: str, more: str = "") -> Path:
+    """A loop file of three parts."""
+    (folder / "loop.toml").write_text(f"{TABLES['start']['head']}{connections}\n{more}")
+    return folder / "loop.toml"
+
+
+@pytest.mark.parametrize(("connections", "u", "why_not"), TABLES["start"]["ways"])
+@pytest.mark.parametrize("version", ["", "fmi3"])
+def test_the_first_step_has_what_samplers_set_at_the_start(
+    parts: Path, version: str, connections: str, u: float, why_not: str
+) -> None:
+    """x' = u - x from 0, whose input is constant from the start on, in all masters."""
+    with opened(joined(parts / version, connections)) as system:
+        times, names = system.system.times, ["p.x"]
+        exact = u * (1 - np.exp(-times))
+        assert ecos.unsuited(system) == why_not
+        found = [run_in_master(system, "default", names).values[:, 0]]
+        with system.unpacked_fmus() as fmus:
+            ways = [("jacobi", "held"), ("gauss_seidel", "held"), ("gauss_seidel", "extrapolated")]
+            for way in ways:
+                with Master(fmus, system.system.connections, *way) as master:
+                    master.initialize(0.0, 1.0)
+                    found.append(master.run(times)[:, master.names.index("p.x")])
+        if "twice" not in connections:  # else Ecos is a step late
+            found.append(ecos.run(system, "default", names).values[:, 0])
+        text = (
+            f'{HEAD}system = "loop.toml"\nsampling = "grid"\n[parameters."p.more"]\n'
+            'values = [1.0]\n[keep]\nfinal = ["p.x"]\ntrajectories = [0]\n'
+        )
+        with runner(campaign(parts, text), parts, fmu=system.path) as (runs, job, points):
+            record = rows(runs, job, points, [0]).trajectories[0]
+            found.append(record[:, job.watched.index("p.x")])
+    for values in found:
+        np.testing.assert_allclose(values, exact, rtol=0, atol=1e-8)
+
+
+def test_a_federation_has_what_samplers_set_at_the_start(parts: Path) -> None:
+    connections, u, _ = TABLES["start"]["ways"][3]
+    with opened(joined(parts, connections)) as system:
+        record = federation.run(system, "default", network.free_address())
+        values = record.values[:, record.names.index("p.x")]
+        np.testing.assert_allclose(values, u * (1 - np.exp(-record.times)), rtol=0, atol=1e-8)
+    with (
+        opened(joined(parts, TABLES["start"]["ways"][2][0])) as system,
+        pytest.raises(UserError, match=r"^s: hot changed by t = 0\.0 s; only Real values"),
+    ):
+        federation.run(system, "default", network.free_address())
+
+
+def test_the_master_finds_a_loop_that_fmus_do_not_declare(parts: Path) -> None:
+    """x = x + 2, through both."""
+    repacked(
+        parts / "Part.fmu", parts / "Open.fmu",
+        lambda text: re.sub(r' dependencies(Kind)?="[^"]*"', "", text),
+    )  # fmt: skip
+    file = joined(parts, '"a.u" = "s.more_by_1"\n"s.u" = "a.more_by_1"')
+    file.write_text(file.read_text().replace("Part.fmu", "Open.fmu"))
+    with opened(file) as system:
+        assert ecos.unsuited(system).startswith("its FMUs do not exclude an algebraic loop")
+        with pytest.raises(UserError, match="the connections form an algebraic loop: "):
+            run_in_master(system, "default", ["p.x"])
 
 
 # ---- The command ---------------------------------------------------------------------------------
