@@ -9,6 +9,7 @@ import pytest
 
 from rparm.campaign import bases
 from rparm.campaign.job import LYAPUNOV
+from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import simulate
@@ -289,6 +290,10 @@ def test_a_system_without_parameter_sets_varies_inputs_that_nothing_feeds(tmp_pa
     with runner(given, tmp_path, fmu=bare) as (runs, job, points):
         found = rows(runs, job, points, [0, 1]).measures[:, 0]
     assert found == pytest.approx([0.1, 0.2], rel=1e-6)
+    wrong = campaign(tmp_path, text.replace("stop = 1.0", "stop = 1.0, step = 0.3"))
+    said = r"test: \[time\]: step: expected a whole number of steps in 1 s, got 0\.3 s$"
+    with pytest.raises(UserError, match=said), bases.opened(wrong, bare, Path("test")):
+        pass
 
 
 LAW = """

@@ -151,6 +151,22 @@ def test_a_system_of_a_file_runs_with_other_values_and_steps(tmp_path: Path) -> 
     assert system.variants == ("default", "light")
 
 
+@pytest.mark.parametrize("start", [-1.0, 5.0])
+def test_a_run_may_start_at_any_time(arm: Path, tmp_path: Path, start: float) -> None:
+    file = tmp_path / "pushed.toml"
+    file.write_text(LOOP.replace("stop = 1.0", f"start = {start}\nstop = {start + 1}"))
+    values = {"g": 0.0, "a": 0.0, "m2": 2.0}
+    times = {"start_time": start, "stop_time": start + 1, "step": 0.05}
+    alone = rparm.simulate(arm, **times, start_values=values, inputs={"f2": 3.0})
+    system = rparm.System(file)
+    joined = system.run(step=0.05)
+    for time, q2 in [(alone["time"], alone["q2"]), (joined["time"], joined["arm.q2"])]:
+        assert (time[0], time[-1]) == (start, start + 1)
+        assert q2 == pytest.approx(0.75 * (time - start) ** 2, abs=1e-9)
+    with pytest.raises(UserError, match=r"pushed\.toml: Ecos starts at 0 s$"):
+        system.run(engine="ecos")
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [

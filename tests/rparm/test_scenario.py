@@ -120,6 +120,21 @@ def test_no_sliver_from_rounding_late_in_time(write) -> None:
     assert np.diff(times) == pytest.approx(0.1, abs=1e-9)
 
 
+WHOLE = [
+    (0.0, 1.05, 0.05), (0.0, 0.3, 0.1), (0.2, 0.3, 0.1), (0.0, 1.0, 1 / 3), (-5.0, -4.0, 0.05),
+    (0.0, 1e6, 1e-3), (1e6, 1e6 + 1, 1e-3), (1.7e9, 1.7e9 + 0.3, 1e-3), (0.0, 0.1, 0.1),
+]  # fmt: skip
+BROKEN = [
+    (0.0, 1.0, 0.3), (0.0, 1.05, 0.1), (0.0, 0.4, 1.0), (0.0, 1.0, 0.3333333333),
+    (0.0, 1.0, 1 - 1e-12), (0.0, 1e4, 1e-3 + 1e-13), (1e6, 1e6 + 1.0005, 1e-3),
+]  # fmt: skip
+
+
+def test_steps_are_whole_but_for_rounding() -> None:
+    assert [x for x in WHOLE if not scenario.are_whole(*x)] == []
+    assert [x for x in BROKEN if scenario.are_whole(*x)] == []
+
+
 # inputs
 
 
