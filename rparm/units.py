@@ -55,6 +55,19 @@ class Unit:
         return float(exact) if exact else math.copysign(0.0, float(number))
 
 
+@dataclass(frozen=True)
+class Scale:
+    """What the numbers of a column mean: values are factor * number + offset."""
+
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def values(self, numbers: Any) -> Any:
+        """Return the values (rows,) of numbers (rows,)."""
+        scaled = numbers * self.factor
+        return scaled + self.offset if self.offset else scaled  # a sum would lose the sign of -0.0
+
+
 Units = Mapping[str, Unit]  # by name, the variable's own first
 Displays = Mapping[str, Units]  # display units, by the unit that they belong to
 
@@ -110,6 +123,14 @@ def quantity(given: Any, known: Units, is_difference: bool = False) -> float:
             f"got {show(given)}"
         )
     return _value(given, number, unit, known, is_difference)
+
+
+def scale(given: Any, known: Units) -> Scale:
+    """Return the scale of a column whose 1 is `given`, as `quantity`; 1 degC has its offset."""
+    factor = quantity(given, known, True)
+    if not isinstance(given, str):
+        return Scale(factor)
+    return Scale(factor, _value(given, "0", _parts(given, known)[1], known))
 
 
 def typed_quantity(text: str, known: Units) -> float:

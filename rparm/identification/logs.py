@@ -8,6 +8,7 @@ import numpy as np
 
 from rparm.errors import UserError
 from rparm.runs import inputs
+from rparm.units import Scale
 
 LENGTH = 0.4  # s, of a segment
 FEWEST_ROWS = 20  # of a segment
@@ -18,10 +19,11 @@ MOST_ROWS = 2_000_000
 
 @dataclass(frozen=True)
 class Column:
-    """Column of a variable's values: its name in the log, and the value of a 1 in it."""
+    """Column of a variable's values: its name in the log, and what a 1 in it means."""
 
     name: str
-    scale: float = 1.0
+    scale: Scale = Scale()
+    one: str = ""  # its value with a unit, where that is another one
 
 
 @dataclass(frozen=True, eq=False)

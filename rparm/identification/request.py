@@ -20,7 +20,7 @@ from rparm.errors import UserError, WrongValueError, hint, placed
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import INITIAL, INPUTS, METHOD, PARAMETERS, Model, Value, Variable
 from rparm.identification.logs import LENGTH, Column
-from rparm.units import quantity
+from rparm.units import scale
 
 CLOSEST = np.log(1e-6)  # of the distance from a limit at the start: nearer, a parameter is at it
 LARGEST = 700.0  # whose exponential is a double: ends of very long intervals
@@ -323,11 +323,13 @@ def _continuous(fmu: Fmu) -> list[str]:
 
 
 def _column(request: Request, variable: Variable) -> Column:
-    name, scale = variable.name, 1.0
-    if name in request.units:
-        with placed(f"units: {name}"):
-            scale = quantity(f"1 {request.units[name]}", variable.units, True)
-    return Column(request.columns.get(name, name), scale)
+    name = variable.name
+    column = request.columns.get(name, name)
+    if name not in request.units:
+        return Column(column)
+    one = f"1 {request.units[name]}"
+    with placed(f"units: {name}"):
+        return Column(column, scale(one, variable.units), one)
 
 
 # ---- The demo ------------------------------------------------------------------------------------

@@ -167,8 +167,8 @@ def _scenario(
                 yield f"begin = {difference(log.first, -start)!r}"
             if section == "inputs":
                 yield "hold = true"
-            if column.scale != 1.0:
-                yield f"scale = {column.scale!r}"
+            if column.one:
+                yield f"scale = {_toml(column.one)}"
     yield ""
 
 

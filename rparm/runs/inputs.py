@@ -22,7 +22,7 @@ import numpy as np
 from rparm.errors import UserError, did_you_mean, hint, placed
 from rparm.files import decoded, number_in, read_bytes, show
 from rparm.fmi.model import INPUTS, Model, Variable
-from rparm.units import HERTZ, RADIANS, SECONDS, Units, finite_number, quantity
+from rparm.units import HERTZ, RADIANS, SECONDS, Units, finite_number, quantity, scale
 
 EARLY = 1e-9  # s; a communication point that rounding puts this little before a switch is at it
 LARGEST_LOG = 50_000_000  # bytes
@@ -491,11 +491,12 @@ class InputReader:
         if variable.type == "Boolean":
             numbers = self._on_or_off(table, numbers, where)
         elif "scale" in table:
-            scale = reader.quantity(table["scale"], f"{where} scale", variable.units, True)
-            if scale == 0:
+            with reader.placed(f"{where} scale"):
+                known = scale(table["scale"], variable.units)
+            if known.factor == 0:
                 reader.fail(f"{where} scale: expected another number than 0, it loses the log")
             with np.errstate(over="ignore"):  # is looked for later
-                numbers = numbers * scale
+                numbers = known.values(numbers)
         return Logged(found.times, numbers, is_held, f"{file}, column {column}")
 
     def _log(self, file: str) -> Log:
