@@ -56,7 +56,7 @@ def lay(
     if not names or not len(inside):
         missed = "time of this run" if names else "variable that a plot of this run shows"
         raise UserError(f"--with: {log.path}: has no {missed}")
-    columns = dict(zip(names, found.values.T, strict=True))
+    columns = {name: found.only(k) for k, name in enumerate(names)}
     after = np.minimum(np.searchsorted(found.times, elapsed - EARLY), len(found.times) - 1)
     both = np.flatnonzero(np.abs(found.times[after] - elapsed) <= EARLY)
     is_thinned = 2 * len(both) >= min(len(found.times), len(inside))  # some rows of such a run
@@ -64,7 +64,8 @@ def lay(
     def laid(curve: Curve) -> Curve:
         if curve.name not in columns:
             return curve
-        signal = Logged(found.times, columns[curve.name], False, "")
+        column = columns[curve.name]
+        signal = Logged(column.times, column.values[:, 0], False, "")
         other = np.where(signal.covers(elapsed), signal.values(elapsed), np.nan)
         left = curve.values - other
         if is_thinned:  # between its rows the other result is not known

@@ -8,6 +8,7 @@ import csv
 import hashlib
 import io
 import math
+import re
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
@@ -27,6 +28,9 @@ from rparm.units import HERTZ, RADIANS, SECONDS, Units, finite_number, quantity,
 EARLY = 1e-9  # s; a communication point that rounding puts this little before a switch is at it
 LARGEST_LOG = 50_000_000  # bytes
 DELIMITERS = ",;\t"
+SEPARATOR = re.compile(r'"?sep=([^\w\s"]|\t)"?(?:\r\n?|\n)', re.IGNORECASE | re.ASCII)  # first line
+DECIMAL_COMMA = re.compile(r"[+-]?(?:\d+,\d*|,\d+)(?:e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
+EMPTY = {"na", "n/a", "#n/a", "null"}  # cells without a number, beside NaN and nothing
 MOST_SHOWN = 20  # columns in a message
 MOST_TRIED = 100  # rows, to choose the delimiter by
 LONGEST_STEP = 10 * (1 + 1e-9)  # usual steps: a longer one is a gap
@@ -168,8 +172,11 @@ class Logged:
         return np.interp(elapsed, self.times, self.numbers)
 
     def covers(self, elapsed: np.ndarray) -> np.ndarray:
-        """Return which of the times are within the log, (n,)."""
-        return (self.times[0] - EARLY <= elapsed) & (elapsed <= self.times[-1] + EARLY)
+        """Return which of the times are within the log, and in none of its gaps, (n,)."""
+        inside = (self.times[0] - EARLY <= elapsed) & (elapsed <= self.times[-1] + EARLY)
+        before = np.searchsorted(self.times, elapsed + EARLY, side="right") - 1
+        is_between = np.searchsorted(self.times, elapsed - EARLY) > before
+        return inside & ~(is_between & np.append(_gaps(self.times), False)[before])
 
 
 Signal = Constant | Sines | Table | Switches | Logged
@@ -182,9 +189,16 @@ class Columns:
 
     first: float  # s, time of the first row
     times: np.ndarray  # (rows,) s since the requested time, increasing
-    values: np.ndarray  # (rows, columns), finite
+    values: np.ndarray  # (rows, columns), finite; NaN where a cell is empty
     lines: np.ndarray  # (rows,) of the file, each where a row ends
     joined: Sequence[tuple[int, int]]  # lines that are one row: first and last
+
+    def only(self, column: int) -> "Columns":
+        """Return a column by itself, with the rows that have a value of it."""
+        rows = np.isfinite(self.values[:, column])
+        times, lines, values = self.times[rows], self.lines[rows], self.values[rows, column]
+        first = self.first + float(times[0] - self.times[0])
+        return Columns(first, times, values[:, None], lines, self.joined)
 
     def warnings(self, begin: float = -math.inf, end: float = math.inf) -> list[str]:
         """Warn of what looks damaged from `begin` to `end`, in the rows' time; a line each."""
@@ -194,17 +208,21 @@ class Columns:
             for first, last in self.joined
         ]
         steps = np.diff(self.times)
-        usual = float(np.median(steps)) if len(steps) else 0.0
-        is_gap = steps > LONGEST_STEP * usual
-        gaps = np.flatnonzero(is_gap & (self.times[1:] > begin) & (self.times[:-1] < end))
+        gaps = np.flatnonzero(_gaps(self.times) & (self.times[1:] > begin) & (self.times[:-1] < end))
         if len(gaps):
             longest = int(gaps[np.argmax(steps[gaps])])
             found = "a gap" if len(gaps) == 1 else f"{len(gaps)} gaps, the longest"
             texts.append(
                 f"line {self.lines[longest + 1]}: {found} of {steps[longest]:.4g} s before it, "
-                f"where rows are {usual:.4g} s apart"
+                f"where rows are {np.median(steps):.4g} s apart"
             )
         return texts
+
+
+def _gaps(times: np.ndarray) -> np.ndarray:
+    """Return after which rows there is a gap, (rows - 1,)."""
+    steps = np.diff(times)
+    return steps > LONGEST_STEP * np.median(steps) if len(steps) else steps > 0
 
 
 @dataclass(frozen=True)
@@ -216,27 +234,38 @@ class Log:
     sha256: str
     delimiter: str
     names: tuple[str, ...]  # of the columns
+    head: int = 1  # their line; above it spreadsheets name the delimiter
 
     def columns(self, time: str, names: Sequence[str], since: float | None = None) -> Columns:
-        """Read columns over times since `since` (s) or the first row; UserError names the line."""
+        """Read columns over times since `since` (s) or the first row; UserError names the line.
+
+        A number has a decimal point, or all have a decimal comma. Cells may be empty.
+        """
         indices = [self._index(name) for name in (time, *names)]
         origin = None if since is None else Decimal(repr(since))
         found, lines, joined = array("d"), array("q"), list[tuple[int, int]]()
         first, before, last = 0.0, -math.inf, -math.inf
+        marks: dict[str, int] = {}  # decimal points and commas, by the line that first has one
         for begin, line, row in self._rows():
             if begin < line:
                 joined.append((begin, line))
-            if begin == 1:  # the names
+            if begin == self.head:  # the names
                 continue
             if len(row) != len(self.names):
                 raise self._wrong(f"expected {len(self.names)} values, found {len(row)}", line)
+            cells = [_number_text(row[i]) for i in indices]
             try:
-                clock, *values = [number_in(row[i]) for i in indices]
+                clock, *values = map(number_in, cells)
             except ValueError:
                 raise self._no_number(row, indices, line) from None
-            if not all(map(math.isfinite, (clock, *values))):
+            if not math.isfinite(clock) or any(map(math.isinf, values)):
                 raise self._no_number(row, indices, line)
-            exact = Decimal(row[indices[0]])
+            for mark in {*"".join([row[i] for i in indices])} & {*".,"}:
+                marks.setdefault(mark, line)
+            if len(marks) > 1:
+                other = min(marks.values())
+                raise self._wrong(f"has another sign of decimals, . or , than line {other}", line)
+            exact = Decimal(cells[0])
             if origin is None:
                 origin = exact
             elapsed = float(exact - origin) if origin else clock
@@ -248,6 +277,9 @@ class Log:
         if not lines:
             raise UserError(f"{self.path}: has no rows below the names of its columns")
         table = np.array(found).reshape(len(lines), -1)
+        for name, values in zip(names, table.T[1:], strict=True):
+            if not np.isfinite(values).any():
+                raise UserError(f"{self.path}: column {show(name)} has no numbers")
         return Columns(first, table[:, 0], table[:, 1:], np.array(lines), joined)
 
     def _index(self, name: str) -> int:
@@ -259,14 +291,15 @@ class Log:
 
     def _rows(self) -> Iterator[tuple[int, int, list[str]]]:
         """Yield names and rows that are not blank, after the lines of their begin and end."""
-        rows, begin = _csv_reader(self.text, self.delimiter), 1
+        rows, begin, above = _csv_reader(self.text, self.delimiter), self.head, self.head - 1
         try:
             for row in rows:
-                if row:
-                    yield begin, rows.line_num, row
-                begin = rows.line_num + 1
+                line = rows.line_num + above
+                if any(map(str.strip, row)):
+                    yield begin, line, row
+                begin = line + 1
         except csv.Error as error:
-            is_open = ": a quote opens that is not closed" if begin < rows.line_num else ""
+            is_open = ": a quote opens that is not closed" if begin < rows.line_num + above else ""
             raise self._wrong(f"{error}{is_open}", begin) from None
 
     def _no_number(self, row: Sequence[str], columns: Sequence[int], line: int) -> UserError:
@@ -274,7 +307,8 @@ class Log:
         for column in columns:
             expected = "a finite number"
             try:
-                if math.isfinite(number_in(row[column])):
+                value = number_in(_number_text(row[column]))
+                if math.isfinite(value) or (math.isnan(value) and column != columns[0]):
                     continue
             except ValueError:
                 expected = "a number with a decimal point"
@@ -287,20 +321,36 @@ class Log:
 
 
 def read_log(path: Path) -> Log:
-    """Read a log with , ; or tabs between its columns; UserError if it has none, or is no text."""
+    """Read a log with , ; or tabs between its columns; UserError if it has none, or is no text.
+
+    Spreadsheets write `sep=;` above the names, or another delimiter.
+    """
     try:
         with placed(path):
             content = read_bytes(path, LARGEST_LOG)
         text = decoded(content)
     except UnicodeDecodeError as error:
         raise UserError(f"{path}: not UTF-8 text, at byte {error.start}") from None
-    headers = {delimiter: _header(path, text, delimiter) for delimiter in DELIMITERS}
-    possible = [delimiter for delimiter in DELIMITERS if len(headers[delimiter]) > 1]
+    named = SEPARATOR.match(text)
+    text = text[named.end() :] if named else text
+    delimiters = named[1] if named else DELIMITERS
+    headers = {delimiter: _header(path, text, delimiter) for delimiter in delimiters}
+    possible = [delimiter for delimiter in delimiters if len(headers[delimiter]) > 1]
     if not possible:
-        raise UserError(f"{path}: expected names of columns in its first line, with , ; or tabs")
+        known = show(named[1]) if named else ", ; or tabs"
+        raise UserError(f"{path}: expected names of columns in its first line, with {known}")
     delimiter = max(possible, key=lambda x: (_fitting(text, x, len(headers[x])), len(headers[x])))
     names = tuple(name.strip() for name in headers[delimiter])
-    return Log(path, text, hashlib.sha256(content).hexdigest(), delimiter, names)
+    head = 2 if named else 1
+    return Log(path, text, hashlib.sha256(content).hexdigest(), delimiter, names, head)
+
+
+def _number_text(cell: str) -> str:
+    """Return a cell with a decimal point for a comma, and "nan" for an empty one."""
+    text = cell.strip()
+    if not text or text.lower() in EMPTY:
+        return "nan"
+    return text.replace(",", ".") if DECIMAL_COMMA.fullmatch(text) else text
 
 
 def _fitting(text: str, delimiter: str, count: int) -> int:
@@ -481,7 +531,7 @@ class InputReader:
         if not isinstance(is_held, bool):
             reader.fail(f"{where} hold: expected true or false, got {show(is_held)}")
         try:
-            found = self._log(file).columns(time, [column], begin)
+            found = self._log(file).columns(time, [column], begin).only(0)
         except UserError as error:
             reader.fail(f"{where}: {error}")
         path = self._logs[file].path
