@@ -26,6 +26,7 @@ from scipy import stats
 from scipy.interpolate import CubicSpline
 
 from rparm.errors import UserError
+from rparm.identification import logs
 from rparm.identification.logs import Segment
 from rparm.identification.request import DELAY, Parameters
 from rparm.identification.simulator import Simulator
@@ -38,6 +39,7 @@ FIRST_RIDGE, LEAST_RIDGE, MOST_RIDGE = 1e-3, 1e-10, 1e8
 NEGLIGIBLE = 1e-3  # gain that a step may still have, in standard deviations squared
 ROUGH = 0.01  # of the cost: gain of a step at which the first steps end
 FLAT = 0.05  # of the cost: a smaller gain of a step ends the fit
+SHARES = (1 / 16, 1 / 8, 1 / 4, 1 / 2)  # of a run, that are fitted before all of it
 UNKNOWN = 1e-6  # singular value of a direction that the fit cannot know
 SMALLEST = 1e-3  # of the largest effect of a state: its weight in the ridge where it has none
 LEVEL = 0.95
@@ -58,7 +60,8 @@ REJECTED = 0.01  # probability below which residuals are not taken for noise
 class Linear:
     """Residuals of a segment, (rows,), linear in the changes, at one point."""
 
-    residuals: np.ndarray  # (rows,)
+    segment: Segment
+    residuals: np.ndarray  # (rows,), one of each measured value that counts
     by_states: np.ndarray  # (rows, states), of their scales
     by_parameters: np.ndarray  # (rows, parameters)
 
@@ -79,31 +82,38 @@ class Problem:
     scales: np.ndarray  # (states,)
     delay: float = 0.0  # s, if it is not among the parameters
 
+    def values(self, z: np.ndarray) -> tuple[np.ndarray, float]:
+        """Return the values of the FMU's parameters, and the delay."""
+        values = self.parameters.values(z)
+        if DELAY not in self.parameters.names:
+            return values, self.delay
+        index = self.parameters.names.index(DELAY)
+        return np.delete(values, index), float(values[index])
+
     def predicted(self, segment: Segment, z: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Predict the measured outputs (rows, outputs); UserError if the FMU fails."""
-        values, delay = self.parameters.values(z), self.delay
-        if DELAY in self.parameters.names:
-            index = self.parameters.names.index(DELAY)
-            values, delay = np.delete(values, index), values[index]
+        values, delay = self.values(z)
         outputs = self.simulator.run(segment, np.append(values, x * self.scales))
         seen = CubicSpline(segment.times, outputs, axis=0) if delay else None  # late by it
         return outputs if seen is None else seen(segment.times - delay)
 
     def residuals(self, segment: Segment, z: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Return predicted minus measured in `noise`, (rows that count * outputs,), by rows."""
-        rows = segment.counts
-        difference = self.predicted(segment, z, x)[rows] - segment.measured[rows]
-        return (difference / self.noise).ravel()
+        """Return predicted minus measured in `noise`, (values that count,), by rows."""
+        difference = self.predicted(segment, z, x) - segment.measured
+        return (difference / self.noise)[segment.counts]
 
     def misfit(self, z: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Return the RMS (outputs,) of predicted minus measured, in the outputs' units."""
 
         def of(i: int) -> np.ndarray:
-            left = self.residuals(self.segments[i], z, x[i]).reshape(-1, len(self.noise))
-            return np.mean(left**2, axis=0)
+            counts = self.segments[i].counts
+            squares = np.zeros(counts.shape)
+            squares[counts] = self.residuals(self.segments[i], z, x[i]) ** 2
+            return squares.sum(axis=0)
 
-        squares = self.simulator.map(of, range(len(self.segments)))
-        return self.noise * np.sqrt(np.mean(squares, axis=0))
+        squares = sum(self.simulator.map(of, range(len(self.segments))))
+        counts = sum(segment.counts.sum(axis=0) for segment in self.segments)
+        return self.noise * np.sqrt(squares / np.maximum(counts, 1))
 
     def tried(self, z: np.ndarray, x: np.ndarray, before: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the cost of a point, and the start states there, (segments, states).
@@ -124,8 +134,9 @@ class Problem:
 
     def rounding(self) -> float:
         """Return the length of a column of central differences where there is no effect."""
-        largest = np.abs(self.segments[0].measured[self.segments[0].counts]).max(axis=0)
-        rows = sum(int(segment.counts.sum()) for segment in self.segments)
+        sizes = [np.where(s.counts, np.abs(s.measured), 0.0).max(axis=0) for s in self.segments]
+        largest = np.max(sizes, axis=0)
+        rows = sum(segment.rows for segment in self.segments)
         digits = ROUNDING * np.linalg.norm(largest / self.noise)
         return float(digits * np.sqrt(rows) / CENTRAL_STEP)
 
@@ -156,7 +167,7 @@ class Problem:
             if not found:
                 raise UserError(f"{self.simulator.fmu.path}: runs on neither side of the solution")
             table[:, k] = np.mean(found, axis=0)
-        return Linear(base, table[:, : len(x)], table[:, len(x) :])
+        return Linear(segment, base, table[:, : len(x)], table[:, len(x) :])
 
 
 def _shortened(new: np.ndarray, old: np.ndarray) -> Iterator[np.ndarray]:
@@ -179,24 +190,37 @@ class Solution:
     has_converged: bool
 
 
-def fit(problem: Problem, x: np.ndarray) -> Solution:
-    """Fit from the parameters' starts and the states `x` (segments, states).
+def fit(problem: Problem, x: np.ndarray, z: np.ndarray) -> Solution:
+    """Fit from the parameters `z` (parameters,) and the states `x` (segments, states).
 
     An output that is measured much more exactly than others would lead the first steps astray: at
     first each is weighted by how far it is off.
     """
-    z = np.zeros(len(problem.parameters))
     rough = replace(problem, noise=np.maximum(problem.noise, problem.misfit(z, x)))
     near = _descended(rough, z, x, ROUGH)
     found = _descended(problem, near.z, near.x)
     return replace(found, steps=near.steps + found.steps)
 
 
+def fit_growing(problem: Problem, x: np.ndarray, z: np.ndarray) -> Solution:
+    """Fit as `fit`, from the begin of the segments on: what a long run shows has many solutions.
+
+    An oscillation that is a cycle ahead at its end looks right there.
+    """
+    steps = 0
+    for share in SHARES:
+        shorter = [logs.begin(segment, share) for segment in problem.segments]
+        found = fit(replace(problem, segments=shorter), x, z)
+        x, z, steps = found.x, found.z, steps + found.steps
+    found = fit(problem, x, z)
+    return replace(found, steps=steps + found.steps)
+
+
 def _descended(problem: Problem, z: np.ndarray, x: np.ndarray, enough: float = 0.0) -> Solution:
     """Step from a point until steps gain no more; or less than a share `enough` of the cost."""
     (cost, x), ridge = problem.tried(z, x, x), FIRST_RIDGE
     refused = np.zeros(x.shape)  # direction in which the FMU refuses a step of a state, or 0
-    rows = max(sum(int(s.counts.sum()) for s in problem.segments) * len(problem.noise), 1)
+    rows = max(sum(int(s.counts.sum()) for s in problem.segments), 1)
     for step in range(MOST_STEPS):
         arrow = _Arrow(problem.linear(z, x), refused)
         if arrow.gain() <= NEGLIGIBLE * cost / rows:
@@ -270,21 +294,24 @@ class _Arrow:
 # ---- Intervals -----------------------------------------------------------------------------------
 @dataclass(frozen=True, eq=False)
 class Reduced:
-    """A segment whose start state is as good as can be, whatever the parameters."""
+    """A piece of a segment whose start state is as good as can be, whatever the parameters."""
 
     by_parameters: np.ndarray  # (rows, parameters)
     residuals: np.ndarray  # (rows,)
-    basis: np.ndarray  # (rows, n) orthonormal: residuals that the states can explain
+    basis: np.ndarray  # (rows, n): residuals that the states can explain, orthonormal in a segment
+    outputs: np.ndarray  # (rows,): which output each residual is of
 
 
-def reduced(linear: Linear) -> Reduced:
-    """Take the start state out of a segment's equations."""
+def reduced(linear: Linear) -> list[Reduced]:
+    """Take the start state out of a segment's equations, and cut it into its pieces."""
     left, values, _ = np.linalg.svd(linear.by_states, full_matrices=False)
     basis = left[:, values > SMALL * max(values.max(initial=0.0), 1e-300)]
     rest, residuals = linear.by_parameters, linear.residuals
-    return Reduced(
-        rest - basis @ (basis.T @ rest), residuals - basis @ (basis.T @ residuals), basis
-    )
+    rows, outputs = np.nonzero(linear.segment.counts)
+    whole = rest - basis @ (basis.T @ rest), residuals - basis @ (basis.T @ residuals)
+    cuts = np.searchsorted(rows, linear.segment.cuts)
+    pieces = zip(*(np.split(each, cuts) for each in (*whole, basis, outputs)), strict=True)
+    return [Reduced(*piece) for piece in pieces if len(piece[0])]
 
 
 @dataclass(frozen=True, eq=False)
@@ -324,7 +351,7 @@ def covariances(segments: Sequence[Reduced], known: np.ndarray) -> Covariances:
     n = len(known)
     tables = [segment.by_parameters[:, known] for segment in segments]
     inverse = np.linalg.inv(sum(table.T @ table for table in tables)) if n else np.empty((0, 0))
-    rows = sum(len(s.residuals) - s.basis.shape[1] for s in segments) - n
+    rows = sum(len(s.residuals) - float(np.sum(s.basis**2)) for s in segments) - n
     variance = sum(float(s.residuals @ s.residuals) for s in segments) / max(rows, 1)
     classical = variance * inverse
     if len(segments) < 2:
@@ -497,24 +524,24 @@ class Whiteness:
 
 def whiteness(segments: Sequence[Reduced], outputs: int) -> list[Whiteness]:
     """Test the residuals of each output in segments, without what start states correlate."""
-    return [_of_output(segments, outputs, k) for k in range(outputs)]
+    return [_of_output(segments, k) for k in range(outputs)]
 
 
-def _of_output(segments: Sequence[Reduced], outputs: int, k: int) -> Whiteness:
-    residuals = [segment.residuals[k::outputs] for segment in segments]
-    bases = [segment.basis[k::outputs] for segment in segments]
+def _of_output(segments: Sequence[Reduced], k: int) -> Whiteness:
+    residuals = [segment.residuals[segment.outputs == k] for segment in segments]
+    bases = [segment.basis[segment.outputs == k] for segment in segments]
     count = sum(map(len, residuals))
     kept = sum(len(r) - float(np.sum(b**2)) for r, b in zip(residuals, bases, strict=True))
     power = sum(float(r @ r) for r in residuals)
     variance = power / max(kept, 1.0)
-    lags = min(LAGS, min(map(len, residuals)) - 2)
+    lags = min(LAGS, int(np.median([len(r) for r in residuals])) - 2)
     found = np.zeros(max(lags, 0))
     pairs = np.zeros(len(found))
     for lag in range(1, lags + 1):
         for r, b in zip(residuals, bases, strict=True):
             found[lag - 1] += r[lag:] @ r[:-lag] + variance * np.sum(b[lag:] * b[:-lag])
-            pairs[lag - 1] += len(r) - lag
+            pairs[lag - 1] += max(len(r) - lag, 0)
     found /= power or 1.0
     statistic = float(np.sum(found**2 * count**2 / np.maximum(pairs, 1)))
     p = float(stats.chi2.sf(statistic, max(len(found), 1)))
-    return Whiteness(found, 1.96 / np.sqrt(count), statistic, p)
+    return Whiteness(found, 1.96 / np.sqrt(max(count, 1)), statistic, p)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,8 @@ from rparm.identification.simulator import (
     state_names,
 )
 
+SAME = 0.01  # of the noise: a difference that does not matter
+ROUNDING = 1e-5  # of the range of an output: differences of two exact runs of a segment
 AWAY = 0.1  # of the range of the measured values: an error that is no longer followed
 LEAD = 0.1  # of a segment: the longest delay
 WIDEST = np.log(1e6)  # of a distance from a limit: beyond, one end of an interval is not known
@@ -54,39 +57,47 @@ class Validation:
     @property
     def rms(self) -> np.ndarray:
         """Root mean square (outputs,) of predicted minus measured, in the outputs' units."""
-        rows = np.isfinite(self.measured).all(axis=1)
-        return np.sqrt(np.mean((self.predicted[rows] - self.measured[rows]) ** 2, axis=0))
+        there = np.isfinite(self.measured)
+        squares = np.where(there, (self.predicted - self.measured) ** 2, 0.0)
+        return np.sqrt(squares.sum(axis=0) / np.maximum(there.sum(axis=0), 1))
 
     @property
     def follows(self) -> np.ndarray:
         """Time (outputs,) in s until the error is a tenth of the range of what was measured."""
-        allowed = AWAY * np.ptp(self.measured[np.isfinite(self.measured).all(axis=1)], axis=0)
+        allowed = AWAY * (np.nanmax(self.measured, axis=0) - np.nanmin(self.measured, axis=0))
         away = ~(np.abs(self.predicted - self.measured) <= allowed) & np.isfinite(self.measured)
         first = np.where(away.any(axis=0), away.argmax(axis=0), len(self.times) - 1)
         return self.times[first] - self.times[0]
 
 
 def validate(
-    fmu: Fmu, request: Request, known: Checked, values: Mapping[str, float], noise: np.ndarray
+    fmu: Fmu,
+    request: Request,
+    known: Checked,
+    values: Mapping[str, float],
+    noise: np.ndarray,
+    is_one_run: bool,
 ) -> Validation:
     """Run a log with `values`: its first start state is fitted to one run, and each to chi2."""
     assert request.validation is not None
-    time = request.columns.get("time", "time")
-    recording = logs.read(request.validation, known.reals, known.switches, known.outputs, time)
+    recording = _read(request, known, request.validation)
     segments = logs.segments(recording, request.segment)
-    outputs = list(known.outputs)
     settings = {**known.settings, **{n: value for n, value in values.items() if n != DELAY}}
     with _problem(fmu, request, known, segments, noise, Parameters([], {}), settings) as given:
         # the first rows show values from before the start, later by the delay
-        problem = replace(given[0], delay=values.get(DELAY, 0.0))
-        found = fit.fit(problem, given[1])
-        whole = _whole(recording, segments[0])
+        problem, x = replace(given[0], delay=values.get(DELAY, 0.0)), given[1]
+        if is_one_run:
+            whole = logs.joined(recording, segments, request.segment)
+            problem, x = replace(problem, segments=[whole]), x[:1]
+        else:
+            whole = _whole(recording, segments[0])
+        found = fit.fit(problem, x, np.empty(0))
         try:
             predicted = replace(problem, segments=[whole]).predicted(whole, found.z, found.x[0])
         except UserError:  # it has run away, too far for the FMU
             predicted = np.full(whole.measured.shape, np.nan)
-    rows = sum(int(segment.counts.sum()) for segment in segments) * len(outputs)
-    chi2 = found.cost / max(rows - found.x.size, 1)
+    count = sum(int(segment.counts.sum()) for segment in problem.segments)
+    chi2 = found.cost / max(count - found.x.size, 1)
     return Validation(recording, whole.times, predicted, whole.measured, chi2)
 
 
@@ -128,6 +139,8 @@ class Identification:
     at_limit: Sequence[str]
     known: Sequence[str]  # that covariances are of
     covariances: Covariances
+    pieces: int  # whose scatter gives the intervals: segments, or parts of runs
+    notes: Sequence[str]  # about how logs were used
     noise: np.ndarray  # (outputs,) of the measured values, whatever they follow
     whiteness: Mapping[str, Whiteness]
     validation: Validation | None
@@ -169,9 +182,9 @@ class Identification:
             texts.append(f"{self.misfit[0].upper()}{self.misfit[1:]}.")
         if not self.has_converged:
             texts.append(f"The fit has not converged in {self.steps} steps.")
-        if len(self.segments) < FEWEST_SEGMENTS:
+        if self.pieces < FEWEST_SEGMENTS:
             texts.append(
-                f"Too few segments for intervals by scatter ({len(self.segments)}): "
+                f"Too few segments for intervals by scatter ({self.pieces}): "
                 "a longer log, or a shorter segment, gives more."
             )
         if self.covariances.is_suspicious:
@@ -193,25 +206,59 @@ class Identification:
 class _Fitted:
     """Result of a fit, and its residuals."""
 
+    recordings: Sequence[Recording]
+    segments: Sequence[Segment]  # of all recordings
+    of_first: int  # how many of them are of the first recording
+    is_one_run: bool
     solution: fit.Solution
     start_states: np.ndarray  # (segments, states)
     predicted: Sequence[np.ndarray]  # (rows, outputs) of each segment
-    pieces: Sequence[Reduced]  # of each segment
+    pieces: Sequence[Reduced]  # of all segments
     rounding: float  # of the pieces' derivatives
+
+    @property
+    def misfit(self) -> float:
+        """Cost of a measured value."""
+        return self.solution.cost / sum(int(segment.counts.sum()) for segment in self.segments)
+
+    @property
+    def notes(self) -> list[str]:
+        """How the logs were used."""
+        texts = []
+        if self.is_one_run:
+            texts.append(
+                "Each log is one run: a start from its states would lose what else the FMU "
+                "remembers, such as modes and samplers."
+            )
+            ends = [(r, s.times[-1]) for r, s in zip(self.recordings, self.segments, strict=True)]
+            texts += [
+                f"{recording.path}: not used after {end:.6g} s, where a gap in the inputs begins."
+                for recording, end in ends
+                if end < recording.times[-1]
+            ]
+        return texts
+
+
+def _read(request: Request, known: Checked, path: Path) -> Recording:
+    time = request.columns.get("time", "time")
+    return logs.read(path, known.reals, known.switches, known.outputs, time, request.segment)
 
 
 def identify(fmu: Fmu, request: Request) -> Identification:
     """Fit parameters of an FMU to logs; UserError if the request, a log or a run is wrong."""
     known = checked(request, fmu)
-    lead = LEAD * request.segment if request.with_delay else 0.0
-    columns = known.reals, known.switches, known.outputs, request.columns.get("time", "time")
-    recordings = [logs.read(path, *columns) for path in request.logs]
-    cut = [logs.segments(recording, request.segment, lead) for recording in recordings]
-    segments, noise = [segment for each in cut for segment in each], logs.noise(recordings)
-    fitted = _fitted(fmu, request, known, segments, noise)
+    recordings = [_read(request, known, path) for path in request.logs]
+    noise, notes = logs.noise(recordings), []
+    fitted = _fitted(fmu, request, known, recordings, noise)
+    if any(recording.filled for recording in recordings):
+        filled = [recording.filled or recording for recording in recordings]
+        other = _fitted(fmu, request, known, filled, noise)
+        if other.misfit < fitted.misfit:
+            fitted = other
+            notes.append("Missing inputs are taken as linear in between: held, they fit worse.")
     z, parameters = fitted.solution.z, known.parameters
     if request.with_delay:
-        delay = parameters.values(z)[parameters.names.index(DELAY)]
+        delay, lead = parameters.values(z)[parameters.names.index(DELAY)], _lead(request)
         if abs(delay) > lead:
             bound = f"{lead:.4g} s, a tenth of a segment"
             raise UserError(f"{DELAY}: {delay:.4g} s is longer than {bound}")
@@ -230,15 +277,15 @@ def identify(fmu: Fmu, request: Request) -> Identification:
     estimates, sums = _estimates(parameters, z, effects.basis, spread, unknown)
     values = {name: x.value for name, x in estimates.items()}
     tests = whiteness(fitted.pieces, len(noise))
-    second = request.validation and validate(fmu, request, known, values, noise)
+    second = request.validation and validate(fmu, request, known, values, noise, fitted.is_one_run)
     return Identification(
         fmu=fmu.path,
         model=fmu.model.name,
         request=request,
         checked=known,
-        recordings=recordings,
-        segments=segments,
-        of_first=len(cut[0]),
+        recordings=fitted.recordings,
+        segments=fitted.segments,
+        of_first=fitted.of_first,
         states=state_names(fmu),
         start_states=fitted.start_states,
         predicted=fitted.predicted,
@@ -248,6 +295,8 @@ def identify(fmu: Fmu, request: Request) -> Identification:
         at_limit=limits,
         known=[parameters.names[i] for i in effects.basis],
         covariances=spread,
+        pieces=len(fitted.pieces),
+        notes=[*notes, *fitted.notes],
         noise=noise,
         whiteness=dict(zip(known.outputs, tests, strict=True)),
         validation=second,
@@ -256,19 +305,83 @@ def identify(fmu: Fmu, request: Request) -> Identification:
     )
 
 
+def _lead(request: Request) -> float:
+    return LEAD * request.segment if request.with_delay else 0.0
+
+
 def _fitted(
-    fmu: Fmu, request: Request, known: Checked, segments: Sequence[Segment], noise: np.ndarray
+    fmu: Fmu, request: Request, known: Checked, recordings: Sequence[Recording], noise: np.ndarray
 ) -> _Fitted:
-    """Fit parameters and start states."""
-    start = fmu, request, known, segments, noise, known.parameters, known.settings
-    with _problem(*start) as (problem, guessed):
-        found = fit.fit(problem, guessed)
-        pieces = [reduced(each) for each in problem.linear(found.z, found.x, True)]
+    """Fit parameters and start states: of each segment, or of each log as one run."""
+    cut = [logs.segments(recording, request.segment, _lead(request)) for recording in recordings]
+    segments = [segment for each in cut for segment in each]
+    firsts = np.cumsum([0, *map(len, cut)])[:-1]
+    z, given = np.zeros(len(known.parameters)), (known.parameters, known.settings)
+    with _problem(fmu, request, known, segments, noise, *given) as (problem, x):
+        runs = {
+            logs.joined(recording, pieces, request.segment): pieces
+            for recording, pieces in zip(recordings, cut, strict=True)
+        }
+        is_one_run = _remembers(fmu, request, known, problem, runs, z, x[firsts])
+        if not is_one_run:
+            found = fit.fit(problem, x, z)
+            z, start = found.z, found.x[firsts]
+            is_one_run = _remembers(fmu, request, known, problem, runs, z, start)
+        if is_one_run:
+            problem = replace(problem, segments=list(runs))
+            found = fit.fit_growing(problem, x[firsts], z)
+        linear = problem.linear(found.z, found.x, True)
+        pieces = [piece for each in linear for piece in reduced(each)]
         predicted = [
-            problem.predicted(segment, found.z, x)
-            for segment, x in zip(segments, found.x, strict=True)
+            problem.predicted(segment, found.z, state)
+            for segment, state in zip(problem.segments, found.x, strict=True)
         ]
-    return _Fitted(found, found.x * problem.scales, predicted, pieces, problem.rounding())
+        of_first = 1 if is_one_run else len(cut[0])
+        states, rounding = found.x * problem.scales, problem.rounding()
+    return _Fitted(
+        recordings, problem.segments, of_first, is_one_run, found, states, predicted, pieces,
+        rounding,
+    )  # fmt: skip
+
+
+def _remembers(
+    fmu: Fmu,
+    request: Request,
+    known: Checked,
+    problem: Problem,
+    runs: Mapping[Segment, Sequence[Segment]],
+    z: np.ndarray,
+    x: np.ndarray,
+) -> bool:
+    """Return whether pieces of `runs` lead elsewhere from the states that a run has there.
+
+    The runs start from the states `x` (runs, states).
+    """
+    count, states = len(known.outputs), state_names(fmu)
+    names = list(known.reals), list(known.switches), [*known.outputs, *states]
+    values, _ = problem.values(z)
+    given = known.names, states, *names, known.settings, request.tolerance
+    with Simulator(fmu, *given) as simulator:
+
+        def differs(run: Segment, record: np.ndarray, piece: Segment) -> bool:
+            row = int(np.searchsorted(run.times, piece.times[0]))
+            try:
+                again = simulator.run(piece, np.append(values, record[row, count:]))
+            except UserError:
+                return False  # the FMU refuses the start
+            allowed = SAME * problem.noise + ROUNDING * np.ptp(record[:, :count], axis=0)
+            there = record[row : row + len(again), :count]
+            return bool((np.abs(again[1:, :count] - there[1:]) > allowed).any())
+
+        for (run, pieces), state in zip(runs.items(), x * problem.scales, strict=True):
+            try:
+                record = simulator.run(run, np.append(values, state))
+            except UserError:
+                continue  # it has run away
+            inside = [piece for piece in pieces if piece.times[-1] <= run.times[-1]]
+            if any(simulator.map(partial(differs, run, record), inside)):
+                return True
+    return False
 
 
 @contextmanager

@@ -40,7 +40,7 @@ def write(
         status=RAN if found.passed else FAILED,
         facts=[
             ("model", found.model),
-            ("rows", str(sum(int(segment.counts.sum()) for segment in found.segments))),
+            ("rows", str(sum(segment.rows for segment in found.segments))),
             ("segments", f"{len(found.segments)} of {number(found.request.segment)} s"),
             ("chi2", f"{found.chi2:.4g} (1: only noise is left)"),
             ("iterations", str(found.steps)),
@@ -64,11 +64,10 @@ def write(
 def _data(found: Identification, model: Model) -> RunData:
     """Plot residuals and measured over simulated values of the first log, and of the second."""
     shown = found.segments[: found.of_first]
-    times = np.concatenate([segment.times[segment.counts] for segment in shown])
-    measured = np.vstack([segment.measured[segment.counts] for segment in shown])
-    predicted = np.vstack(
-        [values[s.counts] for s, values in zip(shown, found.predicted, strict=False)]
-    )
+    rows = np.concatenate([segment.counts.any(axis=1) for segment in shown])
+    times = np.concatenate([segment.times for segment in shown])[rows]
+    measured = np.vstack([segment.measured for segment in shown])[rows]
+    predicted = np.vstack(found.predicted[: found.of_first])[rows]
     residuals, plots = [], []
     for k, name in enumerate(found.checked.outputs):
         text = unit(model.variables[name].unit)
@@ -127,15 +126,12 @@ def _parameters(found: Identification, true: Mapping[str, float]) -> pages.Table
 def _outputs(found: Identification, model: Model) -> pages.Table:
     head = ["output", "noise", "residuals", "unit", "Ljung-Box", "p", "white"]
     rows = []
-    differences = [
-        (values - segment.measured)[segment.counts]
-        for values, segment in zip(found.predicted, found.segments, strict=True)
-    ]
-    every = np.vstack(differences)
-    for (name, test), noise, values in zip(
-        found.whiteness.items(), found.noise, every.T, strict=True
+    counts = np.vstack([segment.counts for segment in found.segments])
+    differences = np.vstack(found.predicted) - np.vstack([s.measured for s in found.segments])
+    for (name, test), noise, values, there in zip(
+        found.whiteness.items(), found.noise, differences.T, counts.T, strict=True
     ):
-        rms = float(np.sqrt(np.mean(values**2)))
+        rms = float(np.sqrt(np.mean(values[there] ** 2)))
         sizes = exponents(f"{noise:.3g}"), exponents(f"{rms:.3g}"), unit(model.variables[name].unit)
         is_white = "yes" if test.is_white else "no"
         rows.append([name, *sizes, f"{test.statistic:.4g}", exponents(f"{test.p:.2g}"), is_white])

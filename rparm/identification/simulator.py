@@ -171,7 +171,7 @@ def guess_start(
     """Guess states (segments, states): measured ones, their derivatives, else start values."""
     model, of = fmu.model, start_rates(fmu)
     names = state_names(fmu)
-    found = np.empty((len(segments), len(names)))
+    found = np.full((len(segments), len(names)), np.nan)
     for row, segment in zip(found, segments, strict=True):
         smooth = _polynomials(segment)
         for k, name in enumerate(names):
@@ -179,22 +179,32 @@ def guess_start(
                 row[k] = smooth[0, outputs.index(name)]
             elif of.get(name) in outputs:
                 row[k] = smooth[1, outputs.index(of[name])]
-            else:
-                row[k] = given.get(name, model.variables[name].start or 0.0)
+    for name, column in zip(names, found.T, strict=True):
+        known = np.isfinite(column)
+        if known.any():  # elsewhere from the nearest segments in which it was measured
+            column[:] = np.interp(np.arange(len(column)), np.flatnonzero(known), column[known])
+        else:
+            column[:] = given.get(name, model.variables[name].start or 0.0)
     variables = [model.variables[name] for name in names]
     return np.clip(found, [v.least for v in variables], [v.greatest for v in variables])
 
 
 def _polynomials(segment: Segment) -> np.ndarray:
-    """Fit polynomials to the first rows; return value and derivative (2, outputs) at the start."""
-    there = np.flatnonzero(np.isfinite(segment.measured).all(axis=1))
-    rows = there[: max(FEWEST, int(WINDOW * len(there)))]
-    times = segment.times[rows] - segment.times[0]
-    degree = min(DEGREE, len(rows) - 1)
-    span = times[-1]
-    powers = (times / span)[:, None] ** np.arange(degree + 1)
-    found = np.linalg.lstsq(powers, segment.measured[rows], rcond=None)[0]
-    return found[:2] / np.array([1.0, span])[:, None]
+    """Fit polynomials to the first rows; return value and derivative (2, outputs) at the start.
+
+    NaN where an output has less than two values.
+    """
+    outputs = segment.measured.shape[1]
+    found, elapsed = np.full((2, outputs), np.nan), segment.times - segment.times[0]
+    for k, values in enumerate(segment.measured.T):
+        there = np.flatnonzero(np.isfinite(values))
+        rows = there[: max(FEWEST, int(WINDOW * len(there)))]
+        if len(rows) > 1:
+            degree, span = min(DEGREE, len(rows) - 1), elapsed[rows[-1]]
+            powers = (elapsed[rows] / span)[:, None] ** np.arange(degree + 1)
+            fitted = np.linalg.lstsq(powers, values[rows], rcond=None)[0]
+            found[:, k] = fitted[0], fitted[1] / span
+    return found
 
 
 def start_scales(states: np.ndarray) -> np.ndarray:

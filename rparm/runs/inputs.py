@@ -208,7 +208,9 @@ class Columns:
             for first, last in self.joined
         ]
         steps = np.diff(self.times)
-        gaps = np.flatnonzero(_gaps(self.times) & (self.times[1:] > begin) & (self.times[:-1] < end))
+        gaps = np.flatnonzero(
+            _gaps(self.times) & (self.times[1:] > begin) & (self.times[:-1] < end)
+        )
         if len(gaps):
             longest = int(gaps[np.argmax(steps[gaps])])
             found = "a gap" if len(gaps) == 1 else f"{len(gaps)} gaps, the longest"
