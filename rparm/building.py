@@ -5,13 +5,17 @@ import os
 import shutil
 import subprocess
 import sys
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from rparm import project
 from rparm.errors import UserError, one_line
-from rparm.files import whole, written
+from rparm.files import read_toml, whole, written
 from rparm.interruption import run_group, temporary_folder, uninterrupted
+
+EQUATIONS = ".toml"  # suffix of their files
+SYSTEM = {"components", "connections"}  # sections of files of systems only
 
 # packages that the program imports
 NEEDED = ("latex2mathml", "markdown_it", "mdit_py_plugins", "pycparser", "pydantic")
@@ -47,6 +51,8 @@ def build(
     tuple of path
         NAME.fmu of FMI 2.0 and fmi3/NAME.fmu of FMI 3.0.
     """
+    if found := SYSTEM & set(read_toml(Path(file))):
+        raise UserError(f"{file}: is a system, it has [{min(found)}], expected equations")
     project.check_installed(NEEDED, "build")
     runtimes = project.runtimes(platforms, web)
     with temporary_folder() as work:
@@ -55,6 +61,21 @@ def build(
         made = {Path(file).with_name(kept): work / kept} if lock else {}
         _put(made | dict(zip(paths, (work / name for name in fmus), strict=True)))
     return paths
+
+
+def is_equations(file: Path) -> bool:
+    """Return whether a file .toml has equations, and no system; UserError if it cannot be read."""
+    return Path(file).suffix.lower() == EQUATIONS and not SYSTEM & set(read_toml(file))
+
+
+@contextmanager
+def archive(file: Path, version: str = project.VERSIONS[0]) -> Iterator[Path]:
+    """Yield the FMU of a file with equations, in a temporary folder; another file as it is."""
+    if Path(file).suffix.lower() != EQUATIONS:
+        yield Path(file)
+        return
+    with temporary_folder() as folder:
+        yield build(file, output=folder, lock=False)[project.VERSIONS.index(version)]
 
 
 def _made(file: Path, runtimes: list[Path], of_this_machine: bool, work: Path) -> list[str]:

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
-from rparm import project
+from rparm import building, project
 from rparm.campaign.campaign_file import Campaign, checked
 from rparm.campaign.job import Archive, Component, HeldInputs
 from rparm.errors import UserError, WrongValueError, did_you_mean, placed
@@ -274,11 +274,11 @@ def opened(
         with _said_of(where):
             file = project.scenario_file(campaign.scenario, where.parent)
             subject = scenario.subject_of(file)
-        path = given or project.fmu_of(subject, "--fmu")
-        model = read_model(path)
-        with _said_of(where):
-            loaded = scenario.load(file, model, times)
-        yield ScenarioBase(path, loaded, model)
+        with building.archive(given or project.fmu_of(subject, "--fmu")) as path:
+            model = read_model(path)
+            with _said_of(where):
+                loaded = scenario.load(file, model, times)
+            yield ScenarioBase(path, loaded, model)
         return
     assert campaign.system is not None
     with _said_of(where):

@@ -13,7 +13,7 @@ from pathlib import Path
 from zipfile import ZipFile
 
 from rparm import console, project, schemas
-from rparm.building import NEEDED
+from rparm.building import EQUATIONS, NEEDED
 from rparm.command_line import Ended, add_document, add_flag, add_fmi, add_output
 from rparm.errors import UserError, closest, placed
 from rparm.files import check_for_windows, copied, create, from_folder, read_toml, written
@@ -88,7 +88,7 @@ def do_new(options: argparse.Namespace) -> Ended:
     path = _scenario_path(options.name)
     if options.output:
         path = options.output / path
-    if Path(options.model or "").suffix.lower() == ".fmu":
+    if Path(options.model or "").suffix.lower() in (".fmu", EQUATIONS):
         subject = Path(options.model)
         key, name = "fmu", from_folder(subject, path.parent)
     else:
@@ -204,7 +204,7 @@ def _components(given: Sequence[str], folder: Path) -> dict[str, tuple[str, Mode
     found: dict[str, tuple[str, Model]] = {}
     for text in given:
         path = Path(text)
-        if path.suffix.lower() == ".fmu":
+        if path.suffix.lower() in (".fmu", EQUATIONS):
             model, source, stem = _declared(path), from_folder(path, folder), path.stem
         else:
             model = _declared(project.model(text))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rparm import console, project
+from rparm.building import EQUATIONS
 from rparm.command_line import Ended, add_flag, add_report, file_or_name, names, pairs, retyped
 from rparm.errors import UserError, placed
 from rparm.files import check_writable, from_here, number_in, written
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 PART = overview.IDENTIFICATIONS
 SEGMENT = "0.4"  # s
+SUFFIXES = (".fmu", EQUATIONS)
 SEVERAL = "parameters", "inputs", "measured", "set", "start", "columns", "units"
 GIVEN = *SEVERAL, "delay", "validate"
 
@@ -31,7 +33,12 @@ def add_identify_options(parser: argparse.ArgumentParser) -> None:
         "Fits parameters of an FMU to logs of a machine, and says how well they are known: a "
         "table, a page, and the result as a scenario and as parameter files."
     )
-    parser.add_argument("fmu", nargs="?", metavar="FMU", help="a file, or a model of the project")
+    parser.add_argument(
+        "fmu",
+        nargs="?",
+        metavar="FMU",
+        help="a file, also with equations, or a model of the project",
+    )
     parser.add_argument(
         "logs", nargs="*", type=Path, metavar="LOG.csv", help="with a column of times in s"
     )
@@ -143,17 +150,18 @@ def _refuse_others(options: argparse.Namespace) -> None:
 
 
 def _fmu(given: str) -> Path:
-    """Return a file, or the FMU of a model of the project."""
+    """Return a file .fmu or with equations, or the FMU of a model of the project."""
     path = Path(given)
-    if path.suffix.lower() == ".fmu":
+    if path.suffix.lower() in SUFFIXES:
         return path
     if path.suffix:
-        raise UserError(f"{given}: expected an FMU (.fmu), or a model of the project")
+        expected = "an FMU (.fmu), equations (.toml), or a model of the project"
+        raise UserError(f"{given}: expected {expected}")
     return project.built(project.model(given), ".fmu")
 
 
 def _again(options: argparse.Namespace) -> str:
-    files = [file_or_name(options.fmu, (".fmu",)), *options.logs] if options.fmu else []
+    files = [file_or_name(options.fmu, SUFFIXES), *options.logs] if options.fmu else []
     given = {name: getattr(options, name) for name in (*SEVERAL, "validate")}
     given["segment"] = options.segment if options.segment != SEGMENT else None
     return retyped("identify", files, given | {"delay": options.delay, "demo": options.demo})
@@ -185,5 +193,5 @@ def _print(found: "Identification", true: dict[str, float]) -> None:
     second = found.validation
     also = "" if second is None else f", of the second log {second.chi2:.3g}"
     print(f"chi2: {found.chi2:.3g}{also} (1: only noise is left)")
-    for text in found.warnings:
+    for text in [*found.notes, *found.warnings]:
         console.remark(text)

@@ -213,7 +213,7 @@ def _opened(
 ) -> dict[str, Fmu]:
     """Open FMUs by their models: those that scenarios name, else those in build/ of a version."""
     return {
-        name: stack.enter_context(Fmu(project.fmu_of(subject, option, version)))
+        name: stack.enter_context(Fmu(project.fmu_of(subject, option, version), version=version))
         for name, subject in subjects.items()
     }
 

@@ -20,6 +20,7 @@ import fmpy
 from fmpy.model_description import ModelDescription, ValidationError
 from lxml import etree
 
+from rparm import building
 from rparm.errors import UserError, one_line, placed, reason
 from rparm.files import UnreadableError, check_regular, is_file, show
 from rparm.fmi.fmi_instance import Instance
@@ -188,7 +189,7 @@ def _shown(name: str) -> str:
 class Fmu(AbstractContextManager["Fmu"]):
     """FMU unpacked in the folder `within`, a temporary one by default; removed at the end.
 
-    Raises UserError if the file is no FMU of the `kind`, co-simulation or model exchange, of a
+    Of a file with equations it is built, for a `version` of FMI. Raises UserError if the file is no FMU of the `kind`, co-simulation or model exchange, of a
     known version of FMI, that runs on this platform. Messages name it `shown`, if in an archive.
     """
 
@@ -198,19 +199,24 @@ class Fmu(AbstractContextManager["Fmu"]):
         within: Path | None = None,
         shown: Path | None = None,
         kind: str = CO_SIMULATION,
+        version: str = VERSIONS[0],
     ) -> None:
         self.path, self.kind = Path(shown or path), kind  # the path for messages
-        found, platform = _for_this_platform(Path(path), self.path, kind)
+        with building.archive(path, version) as archive:
+            self._unpack(archive, within)
+
+    def _unpack(self, archive: Path, within: Path | None) -> None:
+        found, platform = _for_this_platform(archive, self.path, self.kind)
         description, self.model = found.description, found.model
         self.guid = description.guid  # in FMI 3.0, the instantiationToken
         self.log_categories = [category.name for category in description.logCategories]
-        self.identifier = _interface(description, kind).modelIdentifier  # of the shared object
+        self.identifier = _interface(description, self.kind).modelIdentifier  # of the shared object
         with ExitStack() as unpacked:
             self.folder = unpacked.enter_context(temporary_folder(within))
             library = f"{self.identifier}{LIBRARY_SUFFIX}"
             self.library = self.folder / "binaries" / platform / library
             with placed(self.path):
-                unpack(Path(path), self.folder, "FMU")
+                unpack(archive, self.folder, "FMU")
             try:
                 check_library(self.library)
             except (OSError, UnreadableError) as error:
@@ -236,7 +242,8 @@ class Fmu(AbstractContextManager["Fmu"]):
 
 def read_model(path: Path) -> Model:
     """Read the model that an FMU declares; UserError if it cannot be run here."""
-    return _for_this_platform(Path(path), Path(path))[0].model
+    with building.archive(path) as archive:
+        return _for_this_platform(archive, Path(path))[0].model
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rparm import project
+from rparm import building, project
 from rparm.errors import UserError, did_you_mean, reason
 from rparm.files import whole
 from rparm.fmi.fmu_file import CO_SIMULATION, MODEL_EXCHANGE, Fmu
@@ -69,7 +69,7 @@ class Study:
 def study(request: Request) -> Study:
     """Linearize the FMU or system of a request."""
     path = _path(request)
-    if path.suffix.lower() in SUFFIXES:
+    if path.suffix.lower() in SUFFIXES and not building.is_equations(path):
         with open_system(path, version=request.version) as opened:
             return of_system(opened, request)
     for option, given in (
@@ -78,7 +78,8 @@ def study(request: Request) -> Study:
         if given:
             raise UserError(f"{option}: is for systems, and {path} is an FMU")
     with ExitStack() as stack:
-        fmu = stack.enter_context(_opened(path, request.kind))
+        archive = stack.enter_context(building.archive(path, request.version))
+        fmu = stack.enter_context(_opened(archive, path, request.kind))
         start = fmu.model.experiment.start or 0.0
         time = start if request.time is None else request.time
         subject = stack.enter_context(FmuSubject(fmu, time))
@@ -127,14 +128,14 @@ def _path(request: Request) -> Path:
     raise UserError(f"{name}: {expected}{guess} (known: {', '.join(known)})")
 
 
-def _opened(path: Path, kind: str) -> Fmu:
+def _opened(path: Path, shown: Path, kind: str) -> Fmu:
     """Open an FMU as one of a kind, or as one for model exchange if it can be."""
     if kind:
-        return Fmu(path, kind=kind)
+        return Fmu(path, shown=shown, kind=kind)
     try:
-        return Fmu(path, kind=MODEL_EXCHANGE)
+        return Fmu(path, shown=shown, kind=MODEL_EXCHANGE)
     except UserError:
-        return Fmu(path, kind=CO_SIMULATION)
+        return Fmu(path, shown=shown, kind=CO_SIMULATION)
 
 
 def _point(subject: FmuSubject | SystemSubject, request: Request) -> Trimmed:

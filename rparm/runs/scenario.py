@@ -24,6 +24,7 @@ from rparm.project import PROGRAM
 from rparm.runs.inputs import MEASURED, InputReader, Logged, Reader, Signal
 from rparm.units import SECONDS, number
 
+STATES = "states"  # a section of files with equations
 MODEL, FMU = "model", "fmu"  # keys of a file that is in no model's folder: one of them
 REQUIRED = ("title", "description", "tolerance", "time")
 OPTIONAL = (MODEL, FMU, "reference_every", "panels", PARAMETERS, INITIAL, INPUTS, MEASURED)
@@ -150,6 +151,9 @@ def subject_of(path: Path) -> Path:
     if MODEL not in content:
         if project.is_in_model(path):
             return project.model_folder(path)
+        if STATES in content:
+            way_out = f"{project.PROGRAM} new NAME --model {path} writes a scenario of them"
+            reader.fail(f"has equations and no run of them; {way_out}")
         known = ", ".join(project.models())
         reader.fail(
             f"missing key {MODEL!r}, the name of what the scenario is of (known: {known}), or "
