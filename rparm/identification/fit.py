@@ -39,7 +39,8 @@ FIRST_RIDGE, LEAST_RIDGE, MOST_RIDGE = 1e-3, 1e-10, 1e8
 NEGLIGIBLE = 1e-3  # gain that a step may still have, in standard deviations squared
 ROUGH = 0.01  # of the cost: gain of a step at which the first steps end
 FLAT = 0.05  # of the cost: a smaller gain of a step ends the fit
-SHARES = (1 / 16, 1 / 8, 1 / 4, 1 / 2)  # of a run, that are fitted before all of it
+SPREAD = 0.5  # of the parameters' numbers before all of a run is fitted
+SHARES = tuple((2 / 3) ** k for k in range(12, 0, -1))  # of a run, that are fitted before all of it
 UNKNOWN = 1e-6  # singular value of a direction that the fit cannot know
 SMALLEST = 1e-3  # of the largest effect of a state: its weight in the ridge where it has none
 LEVEL = 0.95
@@ -81,6 +82,7 @@ class Problem:
     noise: np.ndarray  # (outputs,): one of a residual, in the outputs' units
     scales: np.ndarray  # (states,)
     delay: float = 0.0  # s, if it is not among the parameters
+    near: np.ndarray | None = None  # (parameters,): numbers that they stay near to, SPREAD away
 
     def values(self, z: np.ndarray) -> tuple[np.ndarray, float]:
         """Return the values of the FMU's parameters, and the delay."""
@@ -101,6 +103,11 @@ class Problem:
         """Return predicted minus measured in `noise`, (values that count,), by rows."""
         difference = self.predicted(segment, z, x) - segment.measured
         return (difference / self.noise)[segment.counts]
+
+    def _with_near(self, segment: Segment, z: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Return the residuals, and those of the parameters from where they stay near to."""
+        left = self.residuals(segment, z, x)
+        return left if self.near is None else np.append(left, (z - self.near) / SPREAD)
 
     def misfit(self, z: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Return the RMS (outputs,) of predicted minus measured, in the outputs' units."""
@@ -125,7 +132,7 @@ class Problem:
         def of(i: int) -> tuple[float, np.ndarray]:
             for state in _shortened(x[i], before[i]):
                 with suppress(UserError):
-                    return float(np.sum(self.residuals(self.segments[i], z, state) ** 2)), state
+                    return float(np.sum(self._with_near(self.segments[i], z, state) ** 2)), state
             return np.inf, before[i]
 
         costs, states = zip(*self.simulator.map(of, range(len(self.segments))), strict=True)
@@ -149,7 +156,7 @@ class Problem:
         return self.simulator.map(of, range(len(self.segments)))
 
     def _linear(self, segment: Segment, z: np.ndarray, x: np.ndarray, is_exact: bool) -> Linear:
-        base = self.residuals(segment, z, x)
+        base = self._with_near(segment, z, x)
         size = CENTRAL_STEP if is_exact else STEP
         table = np.empty((len(base), len(x) + len(z)))
         for k in range(table.shape[1]):
@@ -158,7 +165,7 @@ class Problem:
                 point = np.append(x, z)
                 point[k] += step
                 try:
-                    moved = self.residuals(segment, point[len(x) :], point[: len(x)])
+                    moved = self._with_near(segment, point[len(x) :], point[: len(x)])
                 except UserError:
                     continue  # a start beyond a limit, for example
                 found.append((moved - base) / step)
@@ -205,12 +212,13 @@ def fit(problem: Problem, x: np.ndarray, z: np.ndarray) -> Solution:
 def fit_growing(problem: Problem, x: np.ndarray, z: np.ndarray) -> Solution:
     """Fit as `fit`, from the begin of the segments on: what a long run shows has many solutions.
 
-    An oscillation that is a cycle ahead at its end looks right there.
+    An oscillation that is a cycle ahead at its end looks right there. As a short run may tell
+    little, parameters stay near their starts at first.
     """
-    steps = 0
+    steps, near = 0, z
     for share in SHARES:
         shorter = [logs.begin(segment, share) for segment in problem.segments]
-        found = fit(replace(problem, segments=shorter), x, z)
+        found = fit(replace(problem, segments=shorter, near=near), x, z)
         x, z, steps = found.x, found.z, steps + found.steps
     found = fit(problem, x, z)
     return replace(found, steps=steps + found.steps)

@@ -34,6 +34,7 @@ from rparm.identification.simulator import (
     state_names,
 )
 
+CLEAR = 10.0  # in deviations of the noise squared: such a gain is no chance
 SAME = 0.01  # of the noise: a difference that does not matter
 ROUNDING = 1e-5  # of the range of an output: differences of two exact runs of a segment
 AWAY = 0.1  # of the range of the measured values: an error that is no longer followed
@@ -87,7 +88,7 @@ def validate(
         # the first rows show values from before the start, later by the delay
         problem, x = replace(given[0], delay=values.get(DELAY, 0.0)), given[1]
         if is_one_run:
-            whole = logs.joined(recording, segments, request.segment)
+            whole = logs.joined(recording, segments)
             problem, x = replace(problem, segments=[whole]), x[:1]
         else:
             whole = _whole(recording, segments[0])
@@ -140,6 +141,7 @@ class Identification:
     known: Sequence[str]  # that covariances are of
     covariances: Covariances
     pieces: int  # whose scatter gives the intervals: segments, or parts of runs
+    is_one_run: bool  # each log, since the FMU remembers more than its states
     notes: Sequence[str]  # about how logs were used
     noise: np.ndarray  # (outputs,) of the measured values, whatever they follow
     whiteness: Mapping[str, Whiteness]
@@ -216,28 +218,6 @@ class _Fitted:
     pieces: Sequence[Reduced]  # of all segments
     rounding: float  # of the pieces' derivatives
 
-    @property
-    def misfit(self) -> float:
-        """Cost of a measured value."""
-        return self.solution.cost / sum(int(segment.counts.sum()) for segment in self.segments)
-
-    @property
-    def notes(self) -> list[str]:
-        """How the logs were used."""
-        texts = []
-        if self.is_one_run:
-            texts.append(
-                "Each log is one run: a start from its states would lose what else the FMU "
-                "remembers, such as modes and samplers."
-            )
-            ends = [(r, s.times[-1]) for r, s in zip(self.recordings, self.segments, strict=True)]
-            texts += [
-                f"{recording.path}: not used after {end:.6g} s, where a gap in the inputs begins."
-                for recording, end in ends
-                if end < recording.times[-1]
-            ]
-        return texts
-
 
 def _read(request: Request, known: Checked, path: Path) -> Recording:
     time = request.columns.get("time", "time")
@@ -253,9 +233,14 @@ def identify(fmu: Fmu, request: Request) -> Identification:
     if any(recording.filled for recording in recordings):
         filled = [recording.filled or recording for recording in recordings]
         other = _fitted(fmu, request, known, filled, noise)
-        if other.misfit < fitted.misfit:
+        if other.solution.cost < fitted.solution.cost - CLEAR:
             fitted = other
             notes.append("Missing inputs are taken as linear in between: held, they fit worse.")
+    if fitted.is_one_run:
+        notes.append(
+            "Each log is one run: a start from its states would lose what else the FMU remembers, "
+            "such as modes and samplers."
+        )
     z, parameters = fitted.solution.z, known.parameters
     if request.with_delay:
         delay, lead = parameters.values(z)[parameters.names.index(DELAY)], _lead(request)
@@ -296,7 +281,8 @@ def identify(fmu: Fmu, request: Request) -> Identification:
         known=[parameters.names[i] for i in effects.basis],
         covariances=spread,
         pieces=len(fitted.pieces),
-        notes=[*notes, *fitted.notes],
+        is_one_run=fitted.is_one_run,
+        notes=notes,
         noise=noise,
         whiteness=dict(zip(known.outputs, tests, strict=True)),
         validation=second,
@@ -319,17 +305,16 @@ def _fitted(
     z, given = np.zeros(len(known.parameters)), (known.parameters, known.settings)
     with _problem(fmu, request, known, segments, noise, *given) as (problem, x):
         runs = {
-            logs.joined(recording, pieces, request.segment): pieces
+            logs.joined(recording, pieces): pieces
             for recording, pieces in zip(recordings, cut, strict=True)
         }
         is_one_run = _remembers(fmu, request, known, problem, runs, z, x[firsts])
         if not is_one_run:
             found = fit.fit(problem, x, z)
-            z, start = found.z, found.x[firsts]
-            is_one_run = _remembers(fmu, request, known, problem, runs, z, start)
+            is_one_run = _remembers(fmu, request, known, problem, runs, found.z, found.x[firsts])
         if is_one_run:
+            found = _of_runs(problem, replace(problem, segments=list(runs)), x, x[firsts], z)
             problem = replace(problem, segments=list(runs))
-            found = fit.fit_growing(problem, x[firsts], z)
         linear = problem.linear(found.z, found.x, True)
         pieces = [piece for each in linear for piece in reduced(each)]
         predicted = [
@@ -342,6 +327,18 @@ def _fitted(
         recordings, problem.segments, of_first, is_one_run, found, states, predicted, pieces,
         rounding,
     )  # fmt: skip
+
+
+def _of_runs(
+    problem: Problem, one_run: Problem, x: np.ndarray, first: np.ndarray, z: np.ndarray
+) -> fit.Solution:
+    """Fit runs, from their states `first`; if that fails, from what their segments show."""
+    found = fit.fit_growing(one_run, first, z)
+    count = sum(int(segment.counts.sum()) for segment in one_run.segments)
+    if found.cost < SUSPICIOUS * count:
+        return found
+    other = fit.fit_growing(one_run, first, fit.fit(problem, x, z).z)
+    return min(found, other, key=lambda solution: solution.cost)
 
 
 def _remembers(
@@ -378,8 +375,7 @@ def _remembers(
                 record = simulator.run(run, np.append(values, state))
             except UserError:
                 continue  # it has run away
-            inside = [piece for piece in pieces if piece.times[-1] <= run.times[-1]]
-            if any(simulator.map(partial(differs, run, record), inside)):
+            if any(simulator.map(partial(differs, run, record), pieces)):
                 return True
     return False
 

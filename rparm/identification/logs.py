@@ -115,12 +115,8 @@ def _held(values: np.ndarray) -> np.ndarray:
     return np.take_along_axis(values, np.maximum.accumulate(rows, axis=0), axis=0)
 
 
-def gaps_of(recording: Recording, length: float) -> np.ndarray:
-    """Return the rows behind gaps: there the inputs are unknown for long to such a segment."""
-    return np.flatnonzero(np.diff(recording.times) > _longest(recording, length)) + 1
-
-
 def _longest(recording: Recording, length: float) -> float:
+    """Return the longest step within segments of a `length`: more is a gap in the inputs."""
     return max(GAP * length, (2 + MISSING) * recording.step)
 
 
@@ -167,7 +163,7 @@ def segments(recording: Recording, length: float, lead: float = 0.0) -> list[Seg
             f"segment: {recording.path} has {FEWEST_ROWS} rows in {least:.4g} s, "
             f"expected at least that, got {length:g} s"
         )
-    gaps = gaps_of(recording, length)
+    gaps = np.flatnonzero(np.diff(times) > _longest(recording, length)) + 1
     found: list[Segment] = []
     for begin, end in zip([0, *gaps], [*gaps, len(times)], strict=True):
         span = times[end - 1] - times[begin] - lead
@@ -203,17 +199,12 @@ def segment_of(recording: Recording, start: int, first: int, last: int) -> Segme
     )
 
 
-def joined(recording: Recording, pieces: Sequence[Segment], length: float) -> Segment:
-    """Return segments of a recording as pieces of one, up to the first gap in its inputs."""
-    starts = [np.searchsorted(recording.times, piece.times[piece.first]) for piece in pieces]
-    start, has_inputs = (
-        int(starts[0]) - pieces[0].first,
-        recording.inputs.size + recording.switches.size,
-    )
-    gaps = gaps_of(recording, length) if has_inputs else []
-    end = next((int(row) for row in gaps if row > start), len(recording.times))
-    cuts = [int(row) - start for row in starts[1:] if row < end]
-    return replace(segment_of(recording, start, int(starts[0]), end), cuts=cuts)
+def joined(recording: Recording, pieces: Sequence[Segment]) -> Segment:
+    """Return segments of a recording as pieces of one, which lasts to its end: inputs hold."""
+    rows = [int(np.searchsorted(recording.times, piece.times[piece.first])) for piece in pieces]
+    start = rows[0] - pieces[0].first
+    whole = segment_of(recording, start, rows[0], len(recording.times))
+    return replace(whole, cuts=[row - start for row in rows[1:]])
 
 
 def begin(segment: Segment, share: float) -> Segment:

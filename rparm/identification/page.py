@@ -41,13 +41,13 @@ def write(
         facts=[
             ("model", found.model),
             ("rows", str(sum(segment.rows for segment in found.segments))),
-            ("segments", f"{len(found.segments)} of {number(found.request.segment)} s"),
+            ("segments", f"{found.pieces} of {number(found.request.segment)} s"),
             ("chi2", f"{found.chi2:.4g} (1: only noise is left)"),
             ("iterations", str(found.steps)),
         ],
         data=_data(found, model),
         tables=[_outputs(found, model), *([_second(found, model)] if found.validation else [])],
-        failures=found.warnings,
+        failures=[*found.notes, *found.warnings],
         again=again,
     )
     known, parameters = found.known, _parameters(found, true)

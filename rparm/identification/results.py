@@ -52,7 +52,8 @@ def document(found: Identification) -> dict[str, object]:
             for name, test in found.whiteness.items()
         },
         "validation": validation,
-        "segments": len(found.segments),
+        "segments": found.pieces,
+        "one_run": found.is_one_run,
         "steps": found.steps,
         "converged": found.has_converged,
         "passed": found.passed,
