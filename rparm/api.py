@@ -490,9 +490,10 @@ def identify(
     Parameters
     ----------
     fmu : path
-        Any FMU for co-simulation whose states can be set; see `fmu` for the project's.
+        Any FMU for co-simulation whose states can be set, or a file with equations; see `fmu` for
+        the project's.
     logs : path or sequence of path
-        CSV files with a row of names; "time" in s.
+        CSV files with a row of names; "time" in s. Cells may be empty.
     parameters : sequence of str
         To be estimated. "name>other" stays above another parameter.
     inputs, measured : sequence of str

@@ -34,9 +34,10 @@ def write(
     """
     folder.mkdir(parents=True, exist_ok=True)
     logs = ", ".join(recording.path.name for recording in found.recordings)
+    part = "log" if found.is_one_run else "segment"
     page = pages.RunPage(
         title=f"{found.model}: identified parameters",
-        description=f"Fitted to {logs}: multiple shooting, with a start state for each segment.",
+        description=f"Fitted to {logs}: with a start state for each {part}.",
         status=RAN if found.passed else FAILED,
         facts=[
             ("model", found.model),

@@ -64,6 +64,42 @@ def test_a_scale_may_have_a_unit(write: Write, scale: str, factor: float) -> Non
     assert scenario.load(path, newtons).inputs["force"].tolist() == [0.5 * factor] * 5
 
 
+@pytest.mark.parametrize(("scale", "kelvins"), [("'1 degC'", 293.15), ("'2 degC'", 313.15),
+                                                ("'1 K'", 20.0), ("1", 20.0)])  # fmt: skip
+def test_a_column_has_the_offset_of_its_unit(write: Write, scale: str, kelvins: float) -> None:
+    path = write(f"{HEAD}{TIME}{FORCE}scale = {scale}\n")
+    (path.parent / "log.csv").write_text("time,force\n1,20\n2,20\n")
+    heat = toy(DESCRIPTION.replace('<Real min="-10.0"', '<Real unit="K"'))
+    values = scenario.load(path, heat).inputs["force"].tolist()
+    assert values == pytest.approx([kelvins] * 5, rel=1e-15)
+
+
+@pytest.mark.parametrize("mark", ["sep=;\n", "SEP=;\r\n", '"sep=;"\n', ""])
+def test_logs_of_spreadsheets_are_read(write: Write, mark: str) -> None:
+    """Of the empty cells in other columns nothing is lost, of those in its own linear ones."""
+    rows = "1;1;;", "1,25;;0,5;", "1,5;n/a;;7", "1,75;4;x;NaN", "2;2,5E0;;", ";;;", ""
+    log = "\n".join([f"{mark}time;force;note;speed", *rows])
+    assert loaded(write, log).inputs["force"].tolist() == [1.0, 2.0, 3.0, 4.0, 2.5]
+    assert loaded(write, log, "hold = true\n").inputs["force"].tolist() == [1.0, 1.0, 1.0, 4.0, 2.5]
+
+
+def test_a_gap_in_what_was_measured_is_no_measurement() -> None:
+    times = np.array([*range(10), *range(40, 50)], float)
+    log = inputs.Logged(times, times, False, "")
+    elapsed = np.array([-1.0, 0.0, 0.5, 9.0, 9.1, 39.9, 40.0, 49.0, 49.5])
+    assert log.covers(elapsed).tolist() == [
+        False,
+        True,
+        True,
+        True,
+        False,
+        False,
+        True,
+        True,
+        False,
+    ]
+
+
 def test_a_boolean_input_is_held(write: Write) -> None:
     head = "[inputs.brake]\nfile = 'log.csv'\n"
     values = loaded(write, "time,brake\n1,0\n1.5,1\n1.9,0\n", head=head).inputs["brake"]
