@@ -16,6 +16,7 @@ from rparm.interruption import run_group, temporary_folder, uninterrupted
 
 EQUATIONS = ".toml"  # suffix of their files
 SYSTEM = {"components", "connections"}  # sections of files of systems only
+OWN = {"states", "outputs", "where", "discrete", "experiment", "modes"}  # of files with equations
 
 # packages that the program imports
 NEEDED = ("latex2mathml", "markdown_it", "mdit_py_plugins", "pycparser", "pydantic")
@@ -65,7 +66,8 @@ def build(
 
 def is_equations(file: Path) -> bool:
     """Return whether a file .toml has equations, and no system; UserError if it cannot be read."""
-    return Path(file).suffix.lower() == EQUATIONS and not SYSTEM & set(read_toml(file))
+    found = set(read_toml(file)) if Path(file).suffix.lower() == EQUATIONS else set()
+    return bool(OWN & found) and not SYSTEM & found
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from rparm import project
+from rparm import building, project
 from rparm.errors import UserError, WrongValueError, did_you_mean
 from rparm.files import difference, is_file, missing, read_toml, show
 from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, TOLERANCE, Model, Value, Variable
@@ -24,7 +24,6 @@ from rparm.project import PROGRAM
 from rparm.runs.inputs import MEASURED, InputReader, Logged, Reader, Signal
 from rparm.units import SECONDS, number
 
-STATES = "states"  # a section of files with equations
 MODEL, FMU = "model", "fmu"  # keys of a file that is in no model's folder: one of them
 REQUIRED = ("title", "description", "tolerance", "time")
 OPTIONAL = (MODEL, FMU, "reference_every", "panels", PARAMETERS, INITIAL, INPUTS, MEASURED)
@@ -151,7 +150,7 @@ def subject_of(path: Path) -> Path:
     if MODEL not in content:
         if project.is_in_model(path):
             return project.model_folder(path)
-        if STATES in content:
+        if building.is_equations(path):
             way_out = f"{project.PROGRAM} new NAME --model {path} writes a scenario of them"
             reader.fail(f"has equations and no run of them; {way_out}")
         known = ", ".join(project.models())

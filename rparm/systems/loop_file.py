@@ -58,6 +58,9 @@ def opened(
     """
     path = Path(path)
     content = read_toml(path)
+    if building.is_equations(path):
+        way_out = f"{project.PROGRAM} new-system NAME {path} writes a system of them"
+        raise UserError(f"{path}: has equations and no [{COMPONENTS}]; {way_out}")
     with temporary_folder() as folder:
         yield LoopReader(path, folder, version, fmus).system(content, step)
 
