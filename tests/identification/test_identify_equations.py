@@ -164,7 +164,7 @@ def test_samplers_are_carried_through_a_log(fmus: Callable[[str], Path], tmp_pat
     """A law with an integral every 0.3 s; 1 s of a segment is no multiple of it."""
     random, h = np.random.default_rng(2), 0.05
     times = h * np.arange(801)
-    target = np.repeat(random.normal(size=9), 100)[:801]
+    target = np.repeat(random.normal(size=9), 100)[1:802]  # moves between ticks
     y, u, total, seen = 0.0, 0.0, 0.0, []
     for row, r in enumerate(target):
         seen.append(y)
@@ -180,7 +180,7 @@ def test_samplers_are_carried_through_a_log(fmus: Callable[[str], Path], tmp_pat
     )  # fmt: skip
     assert found.is_one_run and 0.85 < found.chi2 < 1.15
     assert holds(found, "tau", 3.0) and holds(found, "gain", 2.0)
-    assert found.estimates["tau"].high < 1.01 * found.estimates["tau"].low
+    assert found.estimates["tau"].high < 1.03 * found.estimates["tau"].low
 
 
 # ---- what a log lacks ----------------------------------------------------------------------------
@@ -191,15 +191,16 @@ def test_intervals_hold_where_logs_have_gaps(
     missing: str, fmus: Callable[[str], Path], tmp_path: Path
 ) -> None:
     """18 intervals of 95 % each: fewer than 15 hold by chance once in 100, with these seeds not."""
-    fmu, inside = fmus(OSCILLATOR), 0
+    fmu, inside, noted = fmus(OSCILLATOR), 0, 0
     for seed in range(6):
         log = random_log(tmp_path / "log.csv", seed, **{missing: 0.05})
         found = oscillator(fmu, log, seed)
         assert found.has_converged and found.chi2 < 1.3 and not found.is_one_run
-        assert bool(found.notes) == (missing == "lost")  # inputs of lost rows are better linear
+        noted += bool(found.notes)
         assert found.covariances.ratio < 2  # held ones, taken as linear: 3
         inside += sum(holds(found, name, true) for name, true in TRUE.items())
     assert inside >= 15
+    assert (noted > 0) == (missing == "lost")  # a smooth input is better linear in lost rows
 
 
 def test_a_channel_may_have_fewer_rows(fmus: Callable[[str], Path], tmp_path: Path) -> None:
