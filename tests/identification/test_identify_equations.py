@@ -213,3 +213,13 @@ def test_a_channel_may_have_fewer_rows(fmus: Callable[[str], Path], tmp_path: Pa
     counted = sum(segment.counts.sum(axis=0) for segment in found.segments)
     assert counted.tolist() == [501, 51] and found.chi2 < 1.3
     assert all(holds(found, name, true) for name, true in TRUE.items())
+
+
+def test_other_commands_take_equations_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The room loses 80 W/K of 4e5 J/K: its pole is at -2e-4 1/s."""
+    code, out, _ = call(capsys, "linearize", THERMOSTAT, "--json", "--output", tmp_path)
+    assert code == 0 and json.loads(out)["A"] == [[pytest.approx(-2e-4, rel=1e-9)]]
+    code, _, error = call(capsys, "system", THERMOSTAT, "--output", tmp_path)
+    assert code == 2 and "has equations and no [components]" in error
