@@ -235,9 +235,9 @@ class SystemBase(Base):
                 held = moved[kind]  # is in front of the outputs
                 sources = {c.end: len(held) + known.index(source(c)) for c in fed[kind]}
                 sources |= {end: place for place, end in enumerate(held)}
-                own = {end: x for end, x in sources.items() if end.startswith(f"{name}.")}
+                own = {end: x for end, x in sources.items() if self._variables[end][0] == i}
                 parts[kind] = Part(
-                    tuple(self._reference(i, end.partition(".")[2]) for end in own),
+                    tuple(self._variables[end][1].reference for end in own),
                     tuple(own.values()),
                     tuple(self._reference(i, variable) for j, variable in known if j == i),
                 )

@@ -102,9 +102,9 @@ def parts(ssp: OpenedSystem, variant: str) -> dict[str, Part]:
             times=system.times,
             system=whole,
             moved={
-                end.partition(".")[2]: signal.values(system.elapsed)
+                ssp.split(end)[1]: signal.values(system.elapsed)
                 for end, signal in system.inputs.items()
-                if end.startswith(f"{name}.")
+                if ssp.split(end)[0] == name
             },
         )
     return made

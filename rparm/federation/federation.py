@@ -159,13 +159,13 @@ def _recorded(
 def _processes(
     commands: Mapping[str, list[str]], folder: Path
 ) -> Iterator[dict[str, subprocess.Popen]]:
-    """Start processes by component, texts in `folder`; they end as their input closes."""
+    """Start processes by component, texts in files of `folder`; they end as their input closes."""
     places = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder))
     environment = project.child_environment() | places
     processes: dict[str, subprocess.Popen] = {}
     try:
         for component, command in commands.items():
-            with (folder / component).open("wb") as log, uninterrupted():
+            with (folder / str(len(processes))).open("wb") as log, uninterrupted():
                 streams = {"stdin": subprocess.PIPE, "stdout": log, "stderr": subprocess.STDOUT}
                 whole = [sys.executable, "-P", "-m", "rparm", *command]
                 processes[component] = subprocess.Popen(whole, env=environment, **streams)
@@ -197,10 +197,10 @@ def _failure(processes: Mapping[str, subprocess.Popen], folder: Path) -> UserErr
 def _texts(processes: Mapping[str, subprocess.Popen], folder: Path) -> list[str]:
     """Return the last texts of processes that have failed."""
     texts = []
-    for component, process in processes.items():
+    for number, (component, process) in enumerate(processes.items()):
         if process.poll() in (None, 0):
             continue
-        lines = (folder / component).read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = (folder / str(number)).read_text(encoding="utf-8", errors="replace").splitlines()
         text = lines[-1].removeprefix("error: ") if lines else f"{component}: failed silently"
         if process.returncode < 0:
             text = f"{component}: its process was ended by signal {-process.returncode}"

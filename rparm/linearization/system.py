@@ -69,8 +69,8 @@ class SystemSubject(ExitStack):
 
     def variable(self, name: str) -> Variable:
         """Return the variable ``component.variable``; UserError if there is none of that name."""
-        component, dot, variable = name.partition(".")
-        if not dot or component not in self.names:
+        component, variable = self.ssp.split(name)
+        if not variable or component not in self.names:
             where = f"{self.ssp.path}: {name}: expected COMPONENT.VARIABLE"
             raise UserError(f"{where}{hint(component, self.names, 'components')}")
         where = f"{self.ssp.path}: component {component!r}"
@@ -167,11 +167,11 @@ class SystemSubject(ExitStack):
         merged = {name: dict(self._parameters.get(name, {})) for name in self.names}
         elapsed = np.array([self.time - self.ssp.system.start])
         for name, signal in self.ssp.system.inputs.items():
-            component, _, variable = name.partition(".")
+            component, variable = self.ssp.split(name)
             if component in merged:
                 merged[component][variable] = signal.values(elapsed)[0].item()
         for name, value in values.items():
-            component, _, variable = name.partition(".")
+            component, variable = self.ssp.split(name)
             fed = {c.end for c in self.connections}
             if name in fed and self.variable(name).type == "Real":
                 raise UserError(f"{name}: is connected and cannot be set")

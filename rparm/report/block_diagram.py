@@ -29,7 +29,8 @@ def draw(opened: OpenedSystem) -> str:
     """Return the picture; lines bear the names of outputs, or of inputs from outside."""
     signals: dict[Pair, dict[str, None]] = {}
     for name in opened.system.inputs:
-        signals.setdefault(("", name.split(".")[0]), {})[name.split(".", 1)[1]] = None
+        component, variable = opened.split(name)
+        signals.setdefault(("", component), {})[variable] = None
     for c in opened.system.connections:
         signals.setdefault((c.start_component, c.end_component), {})[c.start_connector] = None
     blocks = {name: model.name for name, model in opened.models.items()}

@@ -175,7 +175,7 @@ def _check_messages(
 
 def _to_read(ssp: "OpenedSystem", names: Sequence[str]) -> list[tuple[str, str]]:
     """Return the names of variables as Ecos has them, each after the name of its reader."""
-    return [(READERS[ssp.variable(name).type], name.replace(".", "::", 1)) for name in names]
+    return [(READERS[ssp.variable(name).type], "::".join(ssp.split(name))) for name in names]
 
 
 def _as_ecos_opens(ssp: "OpenedSystem", variant: str, folder: Path) -> Path:
@@ -264,8 +264,8 @@ def _check_values(
     bad = [name for name, value in zip(names, values[row], strict=True) if not np.isfinite(value)]
     # a component passes on a bad input in the same step
     victims = {c.end_component for c in ssp.system.connections if c.start in bad}
-    sources = [name for name in bad if name.partition(".")[0] not in victims]
-    component, _, variable = (sources or bad)[0].partition(".")
+    sources = [name for name in bad if ssp.split(name)[0] not in victims]
+    component, variable = ssp.split((sources or bad)[0])
     value = values[row, list(names).index(f"{component}.{variable}")]
     where = f"{variant}: component {component!r}"
     raise UserError(f"{where}: {variable!r} is {value} at t = {times[row]:.6g} s")

@@ -32,7 +32,7 @@ from rparm.fmi.model import INPUTS, Model, Value
 from rparm.runs.inputs import Signal
 from rparm.systems.ecos import Run, said_at_end
 from rparm.systems.python_component import is_python
-from rparm.systems.structure import Connection, OpenedSystem
+from rparm.systems.structure import Connection, OpenedSystem, split
 
 ORDERS = ("jacobi", "gauss_seidel")
 INPUT_MODES = ("held", "extrapolated")
@@ -208,9 +208,11 @@ class Master(AbstractContextManager["Master"]):
         for name in signals:
             if name in {c.end for c in connections}:
                 raise UserError(f"{name}: is connected, and cannot follow a signal, too")
-        driven = {name: _driven(fmus, name) for name in signals}
-        self._moved = {name: signals[name] for name, kind in driven.items() if kind == "Real"}
-        self._switched = {n: signals[n] for n, kind in driven.items() if kind in DISCRETE}
+        models = {name: fmu.model for name, fmu in fmus.items()}
+        driven = {split(name, models): signal for name, signal in signals.items()}
+        kinds = {end: _driven(fmus, *end) for end in driven}
+        self._moved = {end: driven[end] for end, kind in kinds.items() if kind == "Real"}
+        self._switched = {end: driven[end] for end, kind in kinds.items() if kind in DISCRETE}
         for component, name in also:
             _find(fmus, component, name, None)
         self._stack = ExitStack()
@@ -244,7 +246,7 @@ class Master(AbstractContextManager["Master"]):
         # where it is among the system's values
         keys = [(name, output) for name, read in outputs.items() for output in read]
         self._first_driven = len(keys)
-        driven = [tuple(name.split(".", 1)) for name in self._moved]
+        driven = list(self._moved)
         keys += driven
         index = {key: i for i, key in enumerate(keys)}
         self.names = tuple(f"{component}.{name}" for component, name in keys)
@@ -329,17 +331,16 @@ class Master(AbstractContextManager["Master"]):
     def _transfer_switches(self) -> list[str]:
         """Set the discrete inputs whose sources have another value, and return their names."""
         elapsed = np.array([self.time - self._start])
-        wanted = {name: int(x.values(elapsed)[0]) for name, x in self._switched.items()}
+        wanted = {end: int(x.values(elapsed)[0]) for end, x in self._switched.items()}
         for c in self._switches:
             source = self.components[c.start_component].instance
-            wanted[c.end] = source.discrete(c.start_connector)
+            wanted[c.end_component, c.end_connector] = source.discrete(c.start_connector)
         changed = []
-        for name, value in wanted.items():
-            component, variable = name.split(".", 1)
+        for (component, variable), value in wanted.items():
             target = self.components[component].instance
             if value != target.discrete(variable):
                 target.set(variable, value)
-                changed.append(name)
+                changed.append(f"{component}.{variable}")
         return changed
 
     def _read_early(self, component: ConnectedInstance) -> None:
@@ -427,9 +428,8 @@ def _find(fmus: Mapping[str, Fmu], component: str, name: str, causality: str | N
         raise UserError(f"{component}: {fmus[component].path} has no {kind} {name!r}")
 
 
-def _driven(fmus: Mapping[str, Fmu], name: str) -> str:
+def _driven(fmus: Mapping[str, Fmu], component: str, variable: str) -> str:
     """Return the type of an input that follows a signal."""
-    component, _, variable = name.partition(".")
     kind = _type(fmus, component, variable, "input")
     if kind not in DISCRETE:
         _find(fmus, component, variable, "input")
@@ -522,8 +522,7 @@ def run_in_master(
         messages = [f"{c.name!r}: {text}" for c in known for text in c.instance.messages]
         said, row = {}, np.empty(1)
         for name in said_at_end(ssp):
-            component, _, _ = name.partition(".")
-            _RowReader(ssp, master.components[component], [name]).read(row)
+            _RowReader(ssp, master.components[ssp.split(name)[0]], [name]).read(row)
             said[name] = float(row[0])
     return Run(tuple(names), times, rows, wall_time, tuple(dict.fromkeys(messages)), said)
 
@@ -538,7 +537,7 @@ class _RowReader:
         instance = component.instance
         own: dict[str, int] = {}
         for column, name in enumerate(names):
-            owner, _, variable = name.partition(".")
+            owner, variable = ssp.split(name)
             if owner == component.name:
                 own[variable] = column
         variables = ssp.models[component.name].variables

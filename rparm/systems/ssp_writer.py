@@ -60,7 +60,7 @@ def write(path: Path, opened: OpenedSystem) -> dict[str, str]:
 class _Writer:
     def __init__(self, opened: OpenedSystem, folder: Path) -> None:
         self.system = opened.system
-        self.inputs = [(name, *name.split(".", 1)) for name in self.system.inputs]
+        self.inputs = [(name, *opened.split(name)) for name in self.system.inputs]
         self.needed: dict[str, str] = {}  # by components in Python, whose FMUs go into the folder
         self.fmus: dict[str, Path] = {}
         self.sources: dict[str, str] = {}

@@ -219,7 +219,7 @@ class OpenedSystem:
         values = {name: dict(own) for name, own in self.system.parameters[variant].items()}
         for name, value in given.items():
             with placed(f"{self.path}: parameters: {name}"):
-                component, _, own = name.partition(".")
+                component, own = self.split(name)
                 if component not in self.models:
                     known = hint(component, self.models)
                     raise WrongValueError(f"no component {component!r}{known}")
@@ -243,10 +243,29 @@ class OpenedSystem:
             raise WrongValueError("is an input that moves")
         return Parameter.of(variable, given)
 
+    def split(self, name: str) -> tuple[str, str]:
+        return split(name, self.models)
+
     def variable(self, name: str) -> Variable:
         """Return the variable ``component.variable`` as the FMU declares it."""
-        component, _, variable = name.partition(".")
+        component, variable = self.split(name)
         return self.models[component].variables[variable]
+
+
+def split(name: str, models: Mapping[str, Model]) -> tuple[str, str]:
+    """Split "component.variable" where both may have dots.
+
+    The longest component that has the variable wins, else the longest, else all before the first
+    dot; `check` refuses names that two components have.
+    """
+    parts = [
+        (component, name[len(component) + 1 :])
+        for component in sorted(models, key=len, reverse=True)
+        if name.startswith(f"{component}.")
+    ]
+    component, _, variable = name.partition(".")
+    known = (part for part in parts if part[1] in models[part[0]].variables)
+    return next(known, parts[0] if parts else (component, variable))
 
 
 # ---- Times ---------------------------------------------------------------------------------------
@@ -355,6 +374,7 @@ class _Checker:
         raise UserError(f"{self.path}: {message}")
 
     def check(self) -> None:
+        self.names()
         for component in self.system.components:
             for connector in component.connectors.values():
                 self.connector(component, connector)
@@ -366,6 +386,17 @@ class _Checker:
                 for name, parameter in values.items():
                     self.parameter(variant, component, name, parameter)
                 self.tolerance(variant, component, values)
+
+    def names(self) -> None:
+        """Refuse two variables of one name, such as "arm.joint.q" of "arm" and of "arm.joint"."""
+        owners: dict[str, str] = {}
+        for component, model in self.models.items():
+            for variable in model.variables:
+                name = f"{component}.{variable}"
+                owner = owners.setdefault(name, component)
+                if owner != component:
+                    both = f"components {owner!r} and {component!r}"
+                    self.fail(f"{name!r} is a variable of {both}: rename one of them")
 
     def connector(self, component: Component, connector: Connector) -> None:
         where = f"component {component.name!r}: connector {connector.name!r}"

@@ -3,6 +3,7 @@
 What holds for every SSP: test_ssp_archives.py.
 """
 
+import re
 from dataclasses import replace as replaced
 from pathlib import Path
 
@@ -34,6 +35,7 @@ FMUS = {"trajectory": "RPTrajectory", "controller": "RPController", "arm": "RPMa
 REFERENCES = ["q1_ref", "q2_ref", "dq1_ref", "dq2_ref", "ddq1_ref", "ddq2_ref"]
 MEASURED = ["q1", "q2", "dq1", "dq2"]
 EFFORTS = ["tau1", "f2"]
+DOTTED = {"trajectory": "wanted.a.b", "controller": "plant", "arm": "plant.1"}
 
 # what each variant changes, of the components' defaults
 HEAVY = {"arm": {"m2": 1.2}}
@@ -205,6 +207,52 @@ def test_the_step_is_the_smallest_of_the_fmus(
         system = opened.system
         assert system.step == pytest.approx(step, rel=1e-12) and said in opened.notes[0]
         assert system.times[-1] == pytest.approx(span, rel=1e-12)
+
+
+def dotted(path: Path, more: dict[str, Edit] | None = None) -> Path:
+    """The closed loop with dots in the names of its components."""
+
+    def edit(content: bytes) -> bytes:
+        for old, new in DOTTED.items():
+            for attribute in ("startElement", "endElement", "Component name"):
+                known = f'{attribute}="{old}"', f'{attribute}="{new}"'
+                content = content.replace(*(text.encode() for text in known))
+        return content
+
+    return edited(SSP, path, {STRUCTURE: edit} | (more or {}))
+
+
+def test_names_of_components_may_have_dots(tmp_path: Path) -> None:
+    """Names change no number, in no engine; of two that fit, the longest has the variable."""
+    path = dotted(tmp_path / "dotted.ssp")
+    plain, named = rparm.System(SSP), rparm.System(path)
+    values = ({"step": "10 ms", "parameters": {f"{arm}.m2": 2.0}} for arm in ("arm", "plant.1"))
+    results = [(plain.run(**next(values)), named.run(**next(values)))]
+    results.append((plain.run(engine="ecos"), named.run(engine="ecos")))
+    for ours, theirs in results:
+        for name in ours.keys() - {"time"}:
+            component, variable = name.split(".")
+            assert ours[name].tobytes() == theirs[f"{DOTTED[component]}.{variable}"].tobytes()
+    poles = [
+        rparm.linearize(file, at={f"{arm}.q1": 0.2}, break_at=f"{arm}.tau1").poles
+        for file, arm in ((SSP, "arm"), (path, "plant.1"))
+    ]
+    assert poles[0].tobytes() == poles[1].tobytes()
+    for name, said in (
+        ("plant.1.m3", "'plant.1' has no variable 'm3'"),
+        ("plant.2.m2", "'plant' has no variable '2.m2', did you mean 'm2'?"),
+        ("plants.m2", "no component 'plants', did you mean 'plant'?"),
+    ):
+        with pytest.raises(UserError, match=re.escape(said)):
+            named.run(parameters={name: 1.0})
+
+
+def test_two_variables_of_one_name_are_refused(tmp_path: Path) -> None:
+    """Component "plant" has a variable "1.m2", and "plant.1" has "m2"."""
+    gain = edited_fmu({"modelDescription.xml": replace('name="Kp1"', 'name="1.m2"')})
+    text = refused(dotted(tmp_path / "same.ssp", {CONTROLLER: gain}))
+    both = "components 'plant' and 'plant.1'"
+    assert text.endswith(f"'plant.1.m2' is a variable of {both}: rename one of them")
 
 
 # ---- what is refused -----------------------------------------------------------------------------
