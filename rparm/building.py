@@ -5,8 +5,9 @@ import os
 import shutil
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from rparm import project
@@ -15,8 +16,6 @@ from rparm.files import read_toml, whole, written
 from rparm.interruption import run_group, temporary_folder, uninterrupted
 
 EQUATIONS = ".toml"  # suffix of their files
-SYSTEM = {"components", "connections"}  # sections of files of systems only
-OWN = {"states", "outputs", "where", "discrete", "experiment", "modes"}  # of files with equations
 
 # packages that the program imports
 NEEDED = ("latex2mathml", "markdown_it", "mdit_py_plugins", "pycparser", "pydantic")
@@ -52,9 +51,9 @@ def build(
     tuple of path
         NAME.fmu of FMI 2.0 and fmi3/NAME.fmu of FMI 3.0.
     """
-    if found := SYSTEM & set(read_toml(Path(file))):
-        raise UserError(f"{file}: is a system, it has [{min(found)}], expected equations")
     project.check_installed(NEEDED, "build")
+    with suppress(OSError, ValueError, RecursionError):  # the program says what is wrong with them
+        project.refuse_other(Path(file), tomllib.loads(Path(file).read_text("utf-8")), "build")
     runtimes = project.runtimes(platforms, web)
     with temporary_folder() as work:
         kept, *fmus = _made(Path(file), runtimes, not (platforms or web), work)
@@ -67,7 +66,7 @@ def build(
 def is_equations(file: Path) -> bool:
     """Return whether a file .toml has equations, and no system; UserError if it cannot be read."""
     found = set(read_toml(file)) if Path(file).suffix.lower() == EQUATIONS else set()
-    return bool(OWN & found) and not SYSTEM & found
+    return project.is_of("build", found) and not project.is_of("system", found)
 
 
 @contextmanager

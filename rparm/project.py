@@ -62,6 +62,18 @@ BUILD_FOLDERS = {"2.0": "build", "3.0": "build/fmi3"}  # by version of FMI
 VERSIONS = tuple(BUILD_FOLDERS)
 
 
+EQUATIONS = {"states", "discrete", "sampled", "where", "outputs", "experiment", "modes"}
+# command -> the files that it takes, and keys that such a file has and others do not
+KINDS = {
+    "system": ("a system", {"components", "connections"}),
+    "campaign": ("a campaign", {"sampling", "runs"}),
+    "build": ("a model of equations", EQUATIONS),
+    "run": ("a scenario", {"model", "fmu", "tolerance", "time"}),
+}
+# what makes such a file of a model of equations
+WRITERS = {"system": "new-system NAME {}", "run": "new NAME --model {}"}
+
+
 def check_current_folder() -> None:
     """Refuse a current folder that has been removed: most paths then lead nowhere."""
     try:
@@ -99,6 +111,22 @@ def scenario_file(given: str | Path, folder: Path = Path()) -> Path:
         guess = did_you_mean(name, found)
         raise UserError(f"no scenario {name!r}{guess} ({PROGRAM} list names them)")
     return found[name]
+
+
+def is_of(command: str, content: Iterable[str]) -> bool:
+    """Return whether a TOML file has keys of the files that a command takes."""
+    return not KINDS[command][1].isdisjoint(content)
+
+
+def refuse_other(path: Path, content: Iterable[str], command: str) -> None:
+    """Refuse a TOML file with keys of another command's files, and none of this one's."""
+    found = [other for other in KINDS if is_of(other, content)]
+    if found and command not in found:
+        other, expected = KINDS[found[0]][0], KINDS[command][0]
+        way_out = f"{found[0]} {path} takes it"
+        if found[0] == "build" and command in WRITERS:
+            way_out = f"{WRITERS[command].format(path)} writes {expected} of it"
+        raise UserError(f"{path}: is {other}, expected {expected}: {PROGRAM} {way_out}")
 
 
 def campaign_files() -> dict[str, Path]:

@@ -21,6 +21,7 @@ from pydantic import (
     model_validator,
 )
 
+from rparm import project
 from rparm.errors import UserError, WrongValueError, hint
 from rparm.expressions.expression import Expression, parsed
 from rparm.files import read_toml, show
@@ -270,7 +271,9 @@ def grid_value(distribution: Distribution, index: int) -> float:
 
 def read(path: Path) -> Campaign:
     """Read and check a campaign; UserError for the first mistake, with its place."""
-    return checked(read_toml(path), path)
+    content = read_toml(path)
+    project.refuse_other(path, content, "campaign")
+    return checked(content, path)
 
 
 def checked(content: Mapping[str, Any], where: object) -> Campaign:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from rparm import building, project
+from rparm import project
 from rparm.errors import UserError, WrongValueError, did_you_mean
 from rparm.files import difference, is_file, missing, read_toml, show
 from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, TOLERANCE, Model, Value, Variable
@@ -140,6 +140,7 @@ def subject_of(path: Path) -> Path:
     cannot be read, or names nothing that is there.
     """
     content, reader = read_toml(path), Reader(path)
+    project.refuse_other(path, content, "run")
     if FMU in content:
         if MODEL in content:
             reader.fail(f"has both {MODEL!r} and {FMU!r}: expected one of them")
@@ -150,9 +151,6 @@ def subject_of(path: Path) -> Path:
     if MODEL not in content:
         if project.is_in_model(path):
             return project.model_folder(path)
-        if building.is_equations(path):
-            way_out = f"{project.PROGRAM} new NAME --model {path} writes a scenario of them"
-            reader.fail(f"has equations and no run of them; {way_out}")
         known = ", ".join(project.models())
         reader.fail(
             f"missing key {MODEL!r}, the name of what the scenario is of (known: {known}), or "

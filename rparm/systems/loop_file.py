@@ -43,7 +43,7 @@ REQUIRED = ("name", COMPONENTS)
 OPTIONAL = ("description", *TIMES, KEEP, CONNECTIONS, INPUTS, PARAMETERS, VARIANTS)
 NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 VARIANT = re.compile(r"\w[\w-]{0,99}", re.ASCII)
-FMU, EQUATIONS = ".fmu", ".toml"
+FMU, EQUATIONS, SSP = ".fmu", ".toml", ".ssp"
 RESOURCES = "resources"  # folder of the FMUs, as in an SSP
 
 
@@ -58,9 +58,7 @@ def opened(
     """
     path = Path(path)
     content = read_toml(path)
-    if building.is_equations(path):
-        way_out = f"{project.PROGRAM} new-system NAME {path} writes a system of them"
-        raise UserError(f"{path}: has equations and no [{COMPONENTS}]; {way_out}")
+    project.refuse_other(path, content, "system")
     with temporary_folder() as folder:
         yield LoopReader(path, folder, version, fmus).system(content, step)
 
@@ -172,12 +170,15 @@ class LoopReader(Reader):
         """Find what a component is made of, and what it declares."""
         file, _ = split(given)
         path, suffix = self.path.parent / file, Path(file).suffix.lower()
-        if suffix in (FMU, EQUATIONS, SUFFIX) and not is_file(path):
+        if suffix in (FMU, EQUATIONS, SUFFIX, SSP) and not is_file(path):
             self.fail(f"{where}: {file}: {missing(path)}")
         try:
             if suffix == SUFFIX:
                 self.code(name, given)
                 return
+            if suffix == SSP or (suffix == EQUATIONS and COMPONENTS in read_toml(path)):
+                way_out = "write its components and connections into this file"
+                raise UserError(f"{file} is a system, expected one component: {way_out}")
             if suffix == EQUATIONS:
                 made = path
                 fmu = self.built(path)
@@ -185,7 +186,7 @@ class LoopReader(Reader):
                 made = fmu = path
             elif not NAME.fullmatch(given):
                 expected = "a file .fmu, .toml with equations or .py, or a name of the project"
-                self.fail(f"{where}: expected {expected}, got {show(given)}")
+                raise UserError(f"expected {expected}, got {show(given)}")
             elif self.fmus:
                 made = fmu = self.fmus / f"{given}{FMU}"
             else:

@@ -8,10 +8,11 @@ from rparm import project
 from rparm.errors import UserError, hint
 from rparm.project import VERSIONS
 from rparm.systems import loop_file, ssp
+from rparm.systems.loop_file import SSP
 from rparm.systems.structure import OpenedSystem
 
-LOOP, SSP = ".toml", ".ssp"  # suffixes of files with systems
-SUFFIXES = (LOOP, SSP)
+LOOP = ".toml"
+SUFFIXES = (LOOP, SSP)  # of files with systems
 
 
 def given_file(first: str | None, ssp: Path | None) -> Path | None:

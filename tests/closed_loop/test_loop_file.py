@@ -45,8 +45,22 @@ def test_a_mistake_is_refused_in_a_line(
     (tmp_path / "law.py").write_text("def law(t, h, inputs): ...", encoding="utf-8")
     (tmp_path / "TEXT.fmu").write_text("no archive", encoding="utf-8")
     repacked(BUILD / "RPManipulator.fmu", tmp_path / "TOY.fmu", str, drop="binaries")
+    (tmp_path / "other.ssp").touch()
     error = console.refused("system", path, "--output", tmp_path / "report")
     assert error.startswith(f"error: {path}: ") and message in error
+    assert error.count(f"{path}: ") == 1
+
+
+@pytest.mark.parametrize("command", TABLES["kinds"])
+def test_a_file_of_another_kind_is_refused_by_name(
+    command: str, tmp_path: Path, console: Console
+) -> None:
+    expected, path = TABLES["kinds"][command][0], tmp_path / "file.toml"
+    for other, (kind, text) in TABLES["kinds"].items():
+        path.write_text(f"name = 'X'\n{text}\n", encoding="utf-8")
+        if other != command:
+            wrong = f"{path}: is {kind}, expected {expected}: ./run.sh {other} {path} takes it"
+            assert console.refused(command, path) == f"error: {wrong}\n"
 
 
 # ---- A loop --------------------------------------------------------------------------------------

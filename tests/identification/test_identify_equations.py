@@ -222,4 +222,4 @@ def test_other_commands_take_equations_too(
     code, out, _ = call(capsys, "linearize", THERMOSTAT, "--json", "--output", tmp_path)
     assert code == 0 and json.loads(out)["A"] == [[pytest.approx(-2e-4, rel=1e-9)]]
     code, _, error = call(capsys, "system", THERMOSTAT, "--output", tmp_path)
-    assert code == 2 and "has equations and no [components]" in error
+    assert code == 2 and "expected a system: ./run.sh new-system" in error
