@@ -34,6 +34,7 @@ NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 QUANTITY = re.compile(rf"({NUMBER})[ \t]*([^\s\d.,+-].*|1/.*)?", re.ASCII)
 TYPED = str.maketrans({"·": ".", "²": "2", "³": "3"})  # as pages write units
 PREFIXABLE = re.compile(r"(m|s|rad|N|J|W|V|A|Hz|Pa|H)(?!\w)")
+TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6}  # s
 SMALLEST = 1e-99  # smaller numbers are shown as ~0
 GAP = ".."  # in a text that is shortened
 
@@ -212,8 +213,11 @@ def seconds(time: float) -> str:
 
 
 def milliseconds(seconds: float) -> str:
-    """Write 2 ms for 0.002."""
-    return f"{1e3 * seconds:.6g} ms"
+    """Write 2 ms for 0.002, and us, ns or s where these fit."""
+    size = abs(float(f"{seconds:.6g}"))  # 0.9999999 s is 1 s
+    fitting = ((name, unit) for name, unit in TIMES.items() if size >= unit)
+    name, unit = next(fitting, ("ns", 1e-9)) if size else ("s", 1.0)
+    return exponents(f"{seconds / unit:.6g} {name}")
 
 
 def ordinal(number: int) -> str:

@@ -330,10 +330,12 @@ def do_ssp(options: argparse.Namespace) -> Ended:
         inputs = list(opened.system.inputs)
     unread = "inputs of the system, which Ecos and libcosim do not load"
     notes = [f"{unread}: {', '.join(inputs)}"] if inputs else []
-    notes += [f"{component} needs {what}" for component, what in needed.items()]
     console.messages(str(path), [*opened.notes, *notes])
     document = {"file": path.absolute(), "inputs": inputs, "needs": needed}
-    verdict = f"{path}: written; run it by {project.PROGRAM} system {shlex.quote(str(path))}"
+    lacks = [f"how {', '.join(inputs)} move{'s' * (len(inputs) == 1)}"] if inputs else []
+    lacks += [f"{what}, which {component} needs" for component, what in needed.items()]
+    written_as = f"{path}: written" + (f" without {', and without '.join(lacks)}" if lacks else "")
+    verdict = f"{written_as}; run it by {project.PROGRAM} system {shlex.quote(str(path))}"
     return Ended(0, verdict, document, page=path)
 
 

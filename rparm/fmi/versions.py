@@ -55,6 +55,10 @@ class Fmi2Instance(Instance):
 
     def _instantiate(self) -> None:
         self.fmi.instantiate(callbacks=self._callbacks, loggingOn=False)
+        logged = [name for name in LOGGED[1:] if name in self.fmu.log_categories]
+        if logged:  # PythonFMU says nothing without
+            with suppress(FMICallException):  # messages are not worth a run
+                self.fmi.setDebugLogging(True, logged)
 
     def _log(
         self, _environment: int, _instance: bytes, status: int, _category: bytes, message: bytes

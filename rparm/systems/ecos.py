@@ -136,7 +136,8 @@ def run(
         log = (folder / LOG).read_text(encoding="utf-8", errors="replace")
         if code != 0:
             last = next((line for line in reversed(log.splitlines()) if line.strip()), "no output")
-            raise UserError(f"{ssp.path}: {variant}: Ecos failed (exit code {code}): {last}")
+            why = _in_python(ssp) or last
+            raise UserError(f"{ssp.path}: {variant}: Ecos failed (exit code {code}): {why}")
         values = np.load(folder / ROWS)
         done = json.loads((folder / DONE).read_text(encoding="utf-8"))
     times = system.start + system.step * np.arange(len(values))
@@ -146,12 +147,25 @@ def run(
     texts = tuple(dict.fromkeys(warnings))
     result = Run(tuple(names), times, values, done["wall_time"], texts, said)
     try:
-        _check_values(ssp, variant, names, times, values)
+        _check_values(ssp, variant, names, times, values, messages)
         _check_messages(ssp, variant, times, messages)
     except UserError as error:  # values that were read after the last step are not to be trusted
         before = replace(result, times=times[:-1], values=values[:-1], statistics={})
         raise StoppedError(str(error), before if len(times) > 1 else None) from None
     return result
+
+
+def _in_python(ssp: "OpenedSystem") -> str:
+    """Name components that end Ecos if they raise: PythonFMU has freed what Ecos reads then."""
+    from rparm.fmi.fmu_file import describe  # the child needs none of it
+
+    found = [
+        repr(c.name)
+        for c in ssp.system.components
+        if (describe(ssp.fmu(c.name)).description.generationTool or "").startswith("PythonFMU")
+    ]
+    way_out = "run() of rparm.System names it and the time"
+    return f"perhaps Python has raised an error in {' or '.join(found)}; {way_out}" if found else ""
 
 
 def said_at_end(ssp: "OpenedSystem") -> list[str]:
@@ -254,7 +268,12 @@ def _components(ssp: "OpenedSystem", fmu: str) -> str:
 
 
 def _check_values(
-    ssp: "OpenedSystem", variant: str, names: Sequence[str], times: np.ndarray, values: np.ndarray
+    ssp: "OpenedSystem",
+    variant: str,
+    names: Sequence[str],
+    times: np.ndarray,
+    values: np.ndarray,
+    messages: Sequence[re.Match[str]],
 ) -> None:
     """Refuse values (times, names) that are not finite, naming the first component that has one."""
     bad_rows = np.flatnonzero(~np.isfinite(values).all(axis=1))
@@ -268,7 +287,9 @@ def _check_values(
     component, variable = ssp.split((sources or bad)[0])
     value = values[row, list(names).index(f"{component}.{variable}")]
     where = f"{variant}: component {component!r}"
-    raise UserError(f"{where}: {variable!r} is {value} at t = {times[row]:.6g} s")
+    own = (m["text"] for m in messages if m["status"] in BAD and _sender(ssp, m) == repr(component))
+    said = "".join(f": {text}" for text in list(own)[:1])
+    raise UserError(f"{where}: {variable!r} is {value} at t = {times[row]:.6g} s{said}")
 
 
 # ---- the child

@@ -93,6 +93,7 @@ class SspReader:
         self.is_plain = True
         self.are_variants = False  # else all sets of a component apply, the last wins
         self.own: dict[str, str] = {}  # kinds of the system's own connectors, by name
+        self.outside: list[str] = []  # inputs of components that these feed
         self.models: dict[str, Model] = {}  # of the components
 
     def fail(self, file: str, message: str, node: etree._Element | None = None) -> NoReturn:
@@ -156,6 +157,7 @@ class SspReader:
             name=system.get("name"),
             components=tuple(components.values()),
             connections=tuple(filter(None, connections)),
+            outside=tuple(self.outside),
             start=start,
             stop=stop,
             step=step,
@@ -207,6 +209,8 @@ class SspReader:
             self.fail(
                 STRUCTURE, f"{where} has no {kind} {name!r}{did_you_mean(name, self.own)}", node
             )
+        if kind == "input":
+            self.outside.append(connection.end)
         self.is_plain = False
         return None
 

@@ -133,8 +133,10 @@ class _Writer:
         step, start, stop = map(_text, (system.step, system.start, system.stop))
         ends = [(c.start_component, c.start_connector, c.end_component, c.end_connector)
                 for c in system.connections]  # fmt: skip
-        connections = [_connection(*end) for end in ends]
-        connections += [_connection("", *entry) for entry in self.inputs]
+        connections = "".join(_connection(*end) for end in ends)
+        connections += "".join(_connection("", *entry) for entry in self.inputs)
+        if connections:
+            connections = f"    <ssd:Connections>\n{connections}    </ssd:Connections>\n"
         elements = [self.component(i, c) for i, c in enumerate(system.components)]
         own = "".join(self.connector(x, 0, 0.5, *of) for x, *of in self.inputs)
         connectors = f"    <ssd:Connectors>\n{own}    </ssd:Connectors>\n" if own else ""
@@ -146,9 +148,7 @@ class _Writer:
   <ssd:System name={name}>
 {connectors}    <ssd:Elements>
 {"".join(elements)}    </ssd:Elements>
-    <ssd:Connections>
-{"".join(connections)}    </ssd:Connections>
-    <ssd:Annotations>
+{connections}    <ssd:Annotations>
       <ssc:Annotation type="org.openmodelica">
         <oms:Annotations>
           <oms:SimulationInformation>

@@ -116,6 +116,7 @@ class System:
     notes: tuple[str, ...] = ()  # choices where the file says nothing
     # of inputs that move from outside, by component.variable; times are s since the start
     inputs: Mapping[str, Signal] = field(default_factory=dict)
+    outside: tuple[str, ...] = ()  # inputs, by component.variable, that only others can feed
     keep: tuple[str, ...] | None = None  # component.variable to record; None: all outputs
     description: str = ""
 
@@ -211,7 +212,12 @@ class OpenedSystem:
             for variable in model.variables.values()
             if variable.is_a(INPUTS) and f"{component}.{variable.name}" not in fed
         ]
-        held = [f"not connected, constant: {', '.join(alone)}"] if alone else []
+        outside = [name for name in alone if name in self.system.outside]
+        kinds = {
+            "not connected, constant": [name for name in alone if name not in outside],
+            "inputs of the whole system, which nothing moves here, constant": outside,
+        }
+        held = [f"{kind}: {', '.join(names)}" for kind, names in kinds.items() if names]
         return [*self.system.notes, *held]
 
     def with_values(self, variant: str, given: Mapping[str, Any]) -> "OpenedSystem":

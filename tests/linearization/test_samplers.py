@@ -233,7 +233,7 @@ def test_files_and_page_say_that_it_is_sampled(
     rows = [row[0] for row in csv.reader(saved.open(newline=""))]
     assert rows == ["", "next(x1)", "next(x2)", "next(u)", "x1", "x2", "u"]
     page = Path(found["page"]).read_text(encoding="utf-8")
-    for text in ("Sampled every 1000 ms by feedback", "feedback changes u by −0.5", "unit circle"):
+    for text in ("Sampled every 1 s by feedback", "feedback changes u by −0.5", "unit circle"):
         assert text in page
     for name in ("bode", "steps", "poles"):
         assert f'"kind":"{name}"' in page

@@ -12,7 +12,7 @@ from rparm.errors import UserError, WrongValueError
 from rparm.fmi.model import Variable
 from rparm.runs import scenario
 from rparm.runs.inputs import Sines, Table
-from rparm.units import HERTZ, SECONDS, typed_quantity, units_of
+from rparm.units import HERTZ, SECONDS, milliseconds, typed_quantity, units_of
 from tests.support.rparm_project import FMUS, MISTAKES, NAMES, declared, load
 from tests.support.toy_model import DESCRIPTION, TOY, toy
 
@@ -117,6 +117,15 @@ def test_what_is_no_value_is_refused_with_the_known_units(
 def test_a_boolean_has_no_unit() -> None:
     with pytest.raises(WrongValueError, match=r"^expected true or false, got '1 s'$"):
         TOY.variables["quiet"].checked("1 s")
+
+
+def test_a_time_is_written_in_the_unit_that_fits() -> None:
+    written = {
+        0.002: "2 ms", 3.33255e8: "3.33255e8 s", 12.5: "12.5 s", 0.9999999: "1 s", 0.0: "0 s",
+        0.99999: "999.99 ms", 2.02e-8: "20.2 ns", 1e-6: "1 us", -0.25: "-250 ms", 4e-12: "0.004 ns",
+        math.inf: "inf s",
+    }  # fmt: skip
+    assert {time: milliseconds(time) for time in written} == written
 
 
 def test_the_command_line_needs_no_unit() -> None:
