@@ -2,8 +2,9 @@
 
 A class has the attributes `inputs` and `outputs`, lists of names, and `step(self, t, h, inputs)`. A
 step gets the inputs at t; the outputs that it returns hold from t + h on. Until then they have the
-values of the attribute `start`, else 0. Further attributes are parameters. With `save()` and
-`restore(state)` a master can go back. The inputs and outputs of a function `step(t, h, inputs)` are
+values of the attribute `start`, else 0. `types` says which inputs and outputs are bool or int, not
+float, `units` gives units. Further attributes are parameters. With `save()` and `restore(state)` a
+master can go back. The inputs and outputs of a function `step(t, h, inputs)` are
 those of its connections. Each instance runs the file again, so no run sees another's state.
 """
 
@@ -14,7 +15,7 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from ctypes import CFUNCTYPE, Array, c_double, c_int, c_size_t, c_uint, c_void_p
-from dataclasses import dataclass, field
+from dataclasses import InitVar, dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
@@ -34,11 +35,13 @@ from rparm.fmi.fmi_instance import (
     no_call,
     view,
 )
-from rparm.fmi.model import Model, Value, Variable
+from rparm.fmi.model import INTEGER, Model, Value, Variable
+from rparm.units import units_of
 
 SUFFIX = ".py"
 ANY = "Python"  # type of an attribute that is no number, truth value or text
-OWN = ("inputs", "outputs", "start")  # attributes that are no parameters
+OWN = ("inputs", "outputs", "start", "types", "units")  # attributes that are no parameters
+TYPES = {float: "Real", bool: "Boolean", int: "Integer"}  # of inputs and outputs, as in FMUs
 INSTANCE = 1  # handle of an instance in calls of C
 
 
@@ -101,18 +104,25 @@ class PythonComponent(AbstractContextManager["PythonComponent"]):
     @cached_property
     def model(self) -> Model:
         made = self.made()
-        names = [("input", name) for name in made.inputs]
-        names += [("output", name) for name in made.outputs]
-        variables = [
-            Attribute(name, i, "Real", kind, None, None, 0.0 if kind == "input" else None,
-                      -math.inf, math.inf)
-            for i, (kind, name) in enumerate(names)
-        ]  # fmt: skip
+        declared: list[tuple[str, str, str, str | None, Any]] = []
+        for name in made.exchanged:
+            is_input, of = name in (*made.inputs, *made.switched_inputs), made.kinds[name]
+            kind, start = ("input", of(0)) if is_input else ("output", None)
+            declared.append((name, TYPES[of], kind, None, start))
         for name, value in made.attributes.items():
-            kind, start = _kind(value)
+            of_attribute, start = _kind(value)
+            declared.append((name, of_attribute, "parameter", "exact", start))
+        variables = []
+        for i, (name, kind, causality, initial, start) in enumerate(declared):
+            unit, limits = (
+                made.units.get(name),
+                INTEGER if kind == "Integer" else (-math.inf, math.inf),
+            )
+            if unit and kind != "Real":
+                raise UserError(f"{self.path}: units: {name!r} is {kind}: only a number has a unit")
             variables.append(
-                Attribute(name, len(variables), kind, "parameter", "exact", None, start,
-                          -math.inf, math.inf)
+                Attribute(name, i, kind, causality, initial, unit, start, *limits,
+                          units=units_of(unit, {}))
             )  # fmt: skip
         return Model(
             name=self.name or self.path.stem,
@@ -135,14 +145,24 @@ class PythonComponent(AbstractContextManager["PythonComponent"]):
         target = self._target(self._module())
         if isinstance(target, FunctionType):
             inputs, outputs = self.connected
-            return Made(None, target, list(inputs), list(outputs))
+            return Made(None, target, list(inputs), list(outputs), {}, {})
         with self.explained(f"{target.__name__}()"):
             made = target()
         inputs, outputs = (self._names(target, made, kind) for kind in OWN[:2])
         both = [name for name in inputs if name in outputs]
         if both:
             raise UserError(f"{self.path}: {both[0]!r} is both an input and an output")
-        return Made(made, made.step, inputs, outputs)
+        types, units = (self._declared(target, made, kind) for kind in OWN[3:])
+        found = Made(made, made.step, inputs, outputs, types, units)
+        for kind, given, known, what in (
+            ("types", types, found.exchanged, "input or output"),
+            ("units", units, [*found.exchanged, *found.attributes], "input, output or attribute"),
+        ):
+            for name in given:
+                if name not in known:
+                    wrong = f"{kind}: no {what} {name!r}{did_you_mean(str(name), known)}"
+                    raise UserError(f"{self.path}: class {target.__name__!r}: {wrong}")
+        return found
 
     @cached_property
     def _code(self) -> CodeType:
@@ -200,6 +220,17 @@ class PythonComponent(AbstractContextManager["PythonComponent"]):
             raise UserError(f"{where}: expected a list of different names, got {got}")
         return list(given)
 
+    def _declared(self, target: type, made: object, kind: str) -> dict[str, Any]:
+        """Return `types` or `units` of inputs and outputs, by name."""
+        given = getattr(made, kind, {})
+        values = given.values() if isinstance(given, dict) else [None]
+        are_types = kind == "types"
+        if not all(x in TYPES if are_types else isinstance(x, str) and x for x in values):
+            of = "bool, int or float" if are_types else "a text"
+            where = f"{self.path}: class {target.__name__!r}: {kind}"
+            raise UserError(f"{where}: expected a dict that gives a name {of}, got {show(given)}")
+        return given
+
     @contextmanager
     def explained(self, when: str, name: str = "") -> Any:
         """Turn what the user's code raises into the user's error, with its line."""
@@ -230,17 +261,28 @@ def _kind(value: object) -> tuple[str, Any]:
     return ("String", value) if isinstance(value, str) else (ANY, show(value))
 
 
-@dataclass(frozen=True)
+@dataclass
 class Made:
     """An object of the user's class, or the user's function."""
 
     object: Any  # None of a function
-    step: Callable[[float, float, dict[str, float]], Any]
-    inputs: list[str]
+    step: Callable[[float, float, dict[str, Any]], Any]
+    inputs: list[str]  # Reals; at first all
     outputs: list[str]
+    types: InitVar[Mapping[str, type]]
+    units: Mapping[str, str]  # by name, where one is given
+    switched_inputs: list[str] = field(init=False)  # Booleans and Integers
+    switched_outputs: list[str] = field(init=False)
+    kinds: dict[str, type] = field(init=False)  # of inputs and outputs, by name
     attributes: dict[str, Any] = field(init=False)  # that parameters may set, with their values
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, types: Mapping[str, type]) -> None:
+        self.kinds = {name: types.get(name, float) for name in (*self.inputs, *self.outputs)}
+        for kind in OWN[:2]:
+            names = getattr(self, kind)
+            setattr(self, kind, [name for name in names if self.kinds[name] is float])
+            switched = [name for name in names if self.kinds[name] is not float]
+            setattr(self, f"switched_{kind}", switched)
         found: dict[str, Any] = {}
         if self.object is not None:
             for kind in reversed(type(self.object).__mro__[:-1]):
@@ -249,10 +291,15 @@ class Made:
         kept = {
             name: value
             for name, value in found.items()
-            if not (name.startswith("_") or name in (*OWN, *self.inputs, *self.outputs))
+            if not (name.startswith("_") or name in OWN or name in self.kinds)
             and not (callable(value) or hasattr(value, "__get__"))
         }
-        object.__setattr__(self, "attributes", kept)
+        self.attributes = kept
+
+    @property
+    def exchanged(self) -> list[str]:
+        """Inputs and outputs, Reals first; value references are their places."""
+        return [*self.inputs, *self.outputs, *self.switched_inputs, *self.switched_outputs]
 
     @property
     def saves(self) -> bool:
@@ -265,8 +312,8 @@ class Made:
         return code.co_firstlineno if code else 1
 
 
-class _Inputs(dict[str, float]):
-    def __missing__(self, name: str) -> float:
+class _Inputs(dict[str, Any]):
+    def __missing__(self, name: str) -> Any:
         raise KeyError(f"no input {name!r}{did_you_mean(str(name), self)}")
 
 
@@ -290,6 +337,8 @@ class PythonInstance(Instance):
         self._exchanged = [*made.inputs, *made.outputs]
         self._names = list(self.fmu.model.variables)
         self.numbers = np.zeros(len(self._exchanged))  # inputs, then outputs
+        # Booleans and Integers
+        self.switches = {name: 0 for name in (*made.switched_inputs, *made.switched_outputs)}
 
     def __enter__(self) -> Self:
         self._instantiate()
@@ -322,6 +371,8 @@ class PythonInstance(Instance):
             self._check_output(name, "start")
         for i, name in enumerate(self.made.outputs, self._count):
             self.numbers[i] = self._number(name, given.get(name, 0.0), "start")
+        for name in self.made.switched_outputs:
+            self.switches[name] = self._switch(name, given.get(name, 0), "start")
 
     def exit_initialization(self) -> None:
         self._initialized = True
@@ -331,6 +382,9 @@ class PythonInstance(Instance):
     def set(self, name: str, value: Value) -> None:
         if name in self._exchanged:
             self.numbers[self._exchanged.index(name)] = value
+            return
+        if name in self.switches:
+            self.switches[name] = int(value)
             return
         if isinstance(value, list) and isinstance(self.made.attributes[name], np.ndarray):
             try:
@@ -347,6 +401,8 @@ class PythonInstance(Instance):
         raise AssertionError(reference)
 
     def discrete(self, name: str) -> int:
+        if name in self.switches:
+            return self.switches[name]
         return int(getattr(self.made.object, name))
 
     def _real_calls(self, references: Array, values: Array) -> tuple[Call, Call]:
@@ -366,6 +422,14 @@ class PythonInstance(Instance):
     def put_reals(self, places: Sequence[int], numbers: np.ndarray) -> None:
         self.numbers[places] = numbers
 
+    def get_switches(self, places: Sequence[int], values: np.ndarray) -> None:
+        values[:] = [self.discrete(self._names[place]) for place in places]
+
+    def put_switches(self, places: Sequence[int], values: np.ndarray) -> None:
+        self.switches |= {
+            self._names[x]: value for x, value in zip(places, values.tolist(), strict=True)
+        }
+
     def _derivative_call(self, references: Array, orders: Array, values: Array) -> Call:
         return no_call  # its outputs have no derivatives, so masters do not ask
 
@@ -375,21 +439,36 @@ class PythonInstance(Instance):
     # ---- Steps -----------------------------------------------------------------------------------
 
     def do_step(self, start: float, length: float, goes_back: bool = False) -> None:
-        self.numbers[self._count :] = self.stepped(start, length, self.numbers[: self._count])
+        result, when = self._called(start, length, self.numbers[: self._count])
+        self.switches |= {
+            name: self._switch(name, result[name], when) for name in self.made.switched_outputs
+        }
+        self.numbers[self._count :] = self._reals(result, when)
 
     def stepped(self, start: float, length: float, inputs: np.ndarray) -> list[float]:
-        """Call the user's step; return its outputs, in their order."""
+        """Call the user's step with Real inputs; return its Real outputs, in their order."""
+        return self._reals(*self._called(start, length, inputs))
+
+    def _called(
+        self, start: float, length: float, inputs: np.ndarray
+    ) -> tuple[Mapping[str, Any], str]:
         when = f"in the step from t = {start!r} s"
         given = _Inputs(zip(self.made.inputs, inputs.tolist(), strict=True))
+        for name in self.made.switched_inputs:
+            given[name] = self.made.kinds[name](self.switches[name])
         with self.fmu.explained(when, self.name):
             result = self.made.step(start, length, given)
         if not isinstance(result, Mapping):
             raise self._wrong(f"step: expected a dict of outputs, got {show(result)} {when}")
         for name in result:
             self._check_output(name, "step")
-        missing = [name for name in self.made.outputs if name not in result]
+        outputs = [*self.made.outputs, *self.made.switched_outputs]
+        missing = [name for name in outputs if name not in result]
         if missing:
             raise self._wrong(f"step: returned no {missing[0]!r} {when}")
+        return result, when
+
+    def _reals(self, result: Mapping[str, Any], when: str) -> list[float]:
         return [self._number(name, result[name], when) for name in self.made.outputs]
 
     def saved_state(self) -> SavedState:
@@ -410,9 +489,10 @@ class PythonInstance(Instance):
         return CodeError(f"{self.name}: {self.fmu.path}, line {self.made.line}: {text}")
 
     def _check_output(self, name: object, where: str) -> None:
-        if name not in self.made.outputs:
-            known = ", ".join(self.made.outputs) or "none"
-            guess = did_you_mean(str(name), self.made.outputs)
+        outputs = [*self.made.outputs, *self.made.switched_outputs]
+        if name not in outputs:
+            known = ", ".join(outputs) or "none"
+            guess = did_you_mean(str(name), outputs)
             raise self._wrong(f"{where}: {name!r} is no output{guess} (outputs: {known})")
 
     def _number(self, name: str, value: Any, when: str) -> float:
@@ -426,6 +506,15 @@ class PythonInstance(Instance):
             raise self._wrong(f"{name} is {value}: expected a finite number ({when})")
         return value
 
+    def _switch(self, name: str, value: Any, when: str) -> int:
+        """Return a Boolean or Integer that the user's code gives."""
+        number, of = self._number(name, value, when), self.made.kinds[name]
+        least, greatest = (0, 1) if of is bool else INTEGER
+        if not (number.is_integer() and least <= number <= greatest):
+            expected = "True or False" if of is bool else "a whole number of 32 bits"
+            raise self._wrong(f"{name}: expected {expected}, got {show(value)} ({when})")
+        return int(number)
+
 
 class _State:
     """A saved state, as `SavedState` of an FMU."""
@@ -434,10 +523,12 @@ class _State:
         self._instance = instance
 
     def take(self) -> None:
-        self._kept = self._instance.save(), self._instance.numbers.copy()
+        of = self._instance
+        self._kept = of.save(), of.numbers.copy(), dict(of.switches)
 
     def restore(self) -> None:
-        state, self._instance.numbers[:] = self._kept
+        state, self._instance.numbers[:], switches = self._kept
+        self._instance.switches |= switches
         self._instance.restore(state)
 
     def free(self) -> None:
@@ -456,12 +547,15 @@ class _Calls:
         step = CFUNCTYPE(c_int, c_void_p, c_double, c_double, c_int)
         self.fmi2GetReal = values(self._moved(instance.get_reals))
         self.fmi2SetReal = values(self._moved(instance.put_reals))
+        self.fmi2GetBoolean = values(self._moved(instance.get_switches, c_int))
+        self.fmi2SetBoolean = values(self._moved(instance.put_switches, c_int))
         self.fmi2DoStep = step(lambda _, t, h, __: self._status(instance.do_step, t, h))
 
-    def _moved(self, move: Callable[..., None]) -> Callable[..., int]:
+    def _moved(self, move: Callable[..., None], of: type = c_double) -> Callable[..., int]:
         def called(_: int, references: int, count: int, values: int) -> int:
             places = (c_uint * count).from_address(references)[:]
-            return self._status(move, places, view((c_double * count).from_address(values)))
+            memory = (of * count).from_address(values)
+            return self._status(move, places, np.frombuffer(memory, of) if count else np.empty(0))
 
         return called
 

@@ -33,15 +33,19 @@ def pack(name: str, component: PythonComponent, fixed: Mapping[str, Any], path: 
     needed = f"Python {sys.version_info.major}.{sys.version_info.minor}"
     needed += f" with {', '.join(packages)}" if packages else ""
     variables = component.model.variables.values()
-    of = {x: [v.name for v in variables if v.causality == x] for x in ("input", "output")}
-    parameters = [v for v in variables if v.causality == "parameter" and v.type != ANY]
+    own = {v.name: v for v in variables if v.type != ANY}
+    of = {
+        kind: {name: v.type for name, v in own.items() if v.causality == kind}
+        for kind in ("input", "output", "parameter")
+    }
     given = {
         "description": f"{component.path.name}, in Python: needs {needed}",
         "file": component.path.name,
         "target": component.target,
         "inputs": of["input"],
         "outputs": of["output"],
-        "parameters": {variable.name: variable.type for variable in parameters},
+        "parameters": of["parameter"],
+        "units": {name: v.unit for name, v in own.items() if v.unit},
         "fixed": fixed,
     }
     class_name = name + "_" * keyword.iskeyword(name)

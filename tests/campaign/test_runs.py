@@ -298,8 +298,9 @@ def test_a_system_without_parameter_sets_varies_inputs_that_nothing_feeds(tmp_pa
 
 LAW = """
 class Law:
-    inputs = ["x", "reference"]
+    inputs = ["x", "reference", "off"]
     outputs = ["u"]
+    types = {"off": bool}
     kp = 1.0
     integral = 0.0
 
@@ -307,7 +308,16 @@ class Law:
         if self.kp < 0:
             raise ValueError("kp")
         self.integral += h * (inputs["reference"] - inputs["x"])
-        return {"u": self.kp * self.integral}
+        return {"u": 0.0 if inputs["off"] else self.kp * self.integral}
+
+
+class Guard:
+    inputs = ["x"]
+    outputs = ["off"]
+    types = {"off": bool}
+
+    def step(self, t, h, inputs):
+        return {"off": inputs["x"] > 0.05}
 """
 
 
@@ -316,7 +326,8 @@ def test_a_loop_file_with_python_has_the_bits_of_the_master(tmp_path: Path) -> N
     (tmp_path / "law.py").write_text(LAW)
     (tmp_path / "loop.toml").write_text(
         f'name = "Loop"\nstep = 0.05\nstop = 1\n[components]\nplant = "{OSCILLATOR.as_posix()}"\n'
-        'law = "law.py"\n[connections]\n"plant.u" = "law.u"\n"law.x" = "plant.x"\n'
+        'law = "law.py:Law"\nguard = "law.py:Guard"\n[connections]\n"plant.u" = "law.u"\n'
+        '"law.x" = "plant.x"\n"guard.x" = "plant.x"\n"law.off" = "guard.off"\n'
         '[inputs]\n"law.reference" = { sines = [{ amplitude = 2, frequency = "1 Hz" }] }\n'
         '[parameters]\n"plant.omega" = 3\n[variants.stiff]\n"plant.omega" = 9\n'
     )
@@ -331,7 +342,7 @@ def test_a_loop_file_with_python_has_the_bits_of_the_master(tmp_path: Path) -> N
     with runner(given, tmp_path, fmu=tmp_path / "loop.toml") as (runs, job, points):
         found = rows(runs, job, points, range(6))
     assert [bool(text) for text in found.failures] == [False, False, True, True, False, False]
-    assert f"law: {tmp_path / 'law.py'}, line 10: ValueError: kp (" in found.failures[2]
+    assert f"law: {tmp_path / 'law.py'}, line 11: ValueError: kp (" in found.failures[2]
     with opened(tmp_path / "loop.toml") as system, system.unpacked_fmus() as fmus:
         signals = system.system.inputs
         for run, kp, x in ((0, 2.0, 0.1), (5, 0.5, 1.0)):

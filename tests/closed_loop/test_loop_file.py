@@ -12,11 +12,12 @@ import pytest
 from lxml import etree
 from scipy.integrate import solve_ivp
 
+import rparm
 from rparm import building
 from rparm.errors import UserError
 from rparm.federation import federation, network
 from rparm.report import block_diagram
-from rparm.systems import comparison, ecos
+from rparm.systems import comparison, ecos, ssp_writer
 from rparm.systems.master import Master, run_in_master
 from rparm.systems.opened import opened
 from rparm.systems.structure import OpenedSystem
@@ -242,6 +243,46 @@ def test_the_master_finds_a_loop_that_fmus_do_not_declare(parts: Path) -> None:
         assert ecos.unsuited(system).startswith("its FMUs do not exclude an algebraic loop")
         with pytest.raises(UserError, match="the connections form an algebraic loop: "):
             run_in_master(system, "default", ["p.x"])
+
+
+def thermostat() -> np.ndarray:
+    """The thermostat's loop by hand: temperature, heating, switches and windows at the points."""
+    rows = [(290.0, 1, 0, 0)]
+    on = True
+    for _ in range(200):
+        temperature, heating, switches, windows = rows[-1]
+        limit = 280.0 + 20.0 * heating
+        warmed = limit + (temperature - limit) * np.exp(-20.0 / 900.0)
+        now = temperature < 293.15 + (0.5 if on else -0.5) and windows == 0
+        count, on = switches + (now != on), now
+        rows.append((warmed, int(now), count, 2 if switches == 2 else 0))
+    return np.array(rows)
+
+
+def test_python_has_booleans_integers_and_units(tmp_path: Path) -> None:
+    """With the user's types in `step`, by the loop and, packed, by engines."""
+    for name, text in TABLES["thermostat"].items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    columns = ["room.T", "law.heating", "law.switches", "person.windows"]
+    expected = thermostat()
+    assert expected[-1, 2] > 4 and expected[:, 3].any()
+    table = rparm.System(tmp_path / "loop.toml").run()
+    np.testing.assert_allclose(np.array([table[x] for x in columns]).T, expected, rtol=1e-13)
+    assert table.units["room.T"] == "K"
+    with opened(tmp_path / "loop.toml") as system:
+        ssp_writer.write(tmp_path / "Loop.ssp", system)
+    packed = rparm.System(tmp_path / "Loop.ssp").run()
+    assert all(packed[x].tobytes() == table[x].tobytes() for x in columns)
+    with opened(tmp_path / "Loop.ssp") as system:
+        assert system.variable("law.target").unit == "K"
+    text = TABLES["thermostat"]["loop.toml"]
+    for old, new, said in (
+        ('"law.heating"', '"law.switches"', "types differ, Integer and Boolean"),
+        ('"20 degC"', '"20 m"', "law.target: unknown unit 'm'"),
+    ):
+        (tmp_path / "wrong.toml").write_text(text.replace(old, new), encoding="utf-8")
+        with pytest.raises(UserError, match=said):
+            rparm.System(tmp_path / "wrong.toml")
 
 
 # ---- The command ---------------------------------------------------------------------------------
