@@ -23,6 +23,7 @@ from rparm.project import START, VERSIONS
 from rparm.runs import scenario
 from rparm.systems.loop_file import NAME
 from rparm.systems.structure import times
+from rparm.units import NONE
 
 SUFFIX = ".toml"
 TOOLS = project.page("docs/use-in-your-tool.md")
@@ -249,17 +250,28 @@ def _system_file(name: str, components: Mapping[str, tuple[str, Model]]) -> str:
 def _feeding(
     component: str, variable: Variable, components: Mapping[str, tuple[str, Model]]
 ) -> list[str]:
-    """Return outputs of its type and unit that have the input's name; else the most similar one."""
+    """Return outputs of its type and name, of its unit or none; else the most similar of its unit.
+
+    The unit "1" and none are the same.
+    """
     outputs = {
-        f"{other}.{output.name}": output.name
+        f"{other}.{output.name}": output
         for other, (_, model) in components.items()
         for output in model.variables.values()
-        if other != component and output.causality == "output"
-        and (output.type, output.unit) == (variable.type, variable.unit)
-    }  # fmt: skip
-    same = [output for output, name in outputs.items() if name == variable.name]
-    similar = closest(variable.name, outputs.values())
-    return same or [output for output, name in outputs.items() if name == similar][:1]
+        if other != component and output.causality == "output" and output.type == variable.type
+    }
+    alike = {
+        name: x.name
+        for name, x in outputs.items()
+        if x.unit == variable.unit or {x.unit, variable.unit} <= {*NONE}
+    }
+    same = [
+        name
+        for name, x in outputs.items()
+        if x.name == variable.name and (name in alike or not (x.unit and variable.unit))
+    ]
+    similar = closest(variable.name, alike.values())
+    return same or [name for name, own in alike.items() if own == similar][:1]
 
 
 def add_schema_options(parser: argparse.ArgumentParser) -> None:

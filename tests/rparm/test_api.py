@@ -213,6 +213,36 @@ def test_a_new_system_runs_and_guesses_the_connections_of_the_closed_loop(
     assert file.read_text(encoding="utf-8") == text
 
 
+@pytest.mark.parametrize(
+    ("name", "own", "other", "guessed"),
+    [
+        ("tau1", "", "1", True),
+        ("tau_1", "", "1", True),
+        ("tau_1", "1", "", True),
+        ("tau1", "", "N.m", True),  # of one name, and a connection may have a unit at one end
+        ("tau_1", "", "N.m", False),
+        ("tau1", "1", "N.m", False),
+    ],
+)
+def test_one_is_no_unit_where_connections_are_guessed(
+    name: str, own: str, other: str, guessed: bool, tmp_path: Path, console: Console
+) -> None:
+    for model, renamed, unit in (("RPManipulator", name, own), ("RPController", "tau1", other)):
+
+        def change(text: str, renamed: str = renamed, unit: str = unit) -> str:
+            given = f' unit="{unit}"' if unit else ""
+            changed = rf'name="{renamed}"\1<Real{given}'
+            text, count = re.subn(r'name="tau1"([^<]*)<Real unit="N.m"', changed, text)
+            assert count == 1
+            return text
+
+        repacked(rparm.fmu(model), tmp_path / f"{model}.fmu", change)
+    fmus = [tmp_path / f"{model}.fmu" for model in ("RPManipulator", "RPController")]
+    console("new-system", "Loop", *fmus, "--output", tmp_path)
+    text = (tmp_path / "Loop.toml").read_text(encoding="utf-8")
+    assert (f'# "RPManipulator.{name}" = "RPController.tau1"' in text) == guessed
+
+
 # ---- what is wrong
 
 
