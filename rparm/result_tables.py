@@ -10,7 +10,7 @@ from rparm.runs.comparison import TIGHTEST, Failure, Run, Sweep, comparisons
 from rparm.runs.convergence import Convergence
 from rparm.runs.scenario import Scenario
 from rparm.systems.comparison import BOUND, Measure, Outcome
-from rparm.units import milliseconds, seconds, short, unit, verdict
+from rparm.units import duration, seconds, short, unit, verdict
 
 NONE, DONE = "-", "completed"
 SWEEP = ("tolerances", "errors", "violations", "passed")  # keys of the document
@@ -127,7 +127,7 @@ def _seven_digits(value: float) -> str:
 def print_convergence(study: Convergence) -> None:
     """Print a table of errors over the communication step, and what is wrong with them."""
     print()
-    steps = [milliseconds(step) for step in study.problem.steps]
+    steps = [duration(step) for step in study.problem.steps]
     columns = {step: max(5, len(step)) for step in steps}
     names = [row.name for row in study.rows]
     table = Table(study.scenario.name, names, {**columns, "slope": 5}, gap=1)

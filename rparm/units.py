@@ -212,7 +212,7 @@ def seconds(time: float) -> str:
     return f"{time:.3f} s" if time < 10 else f"{time:.1f} s" if time < 100 else f"{time:.0f} s"
 
 
-def milliseconds(seconds: float) -> str:
+def duration(seconds: float) -> str:
     """Write 2 ms for 0.002, and us, ns or s where these fit."""
     size = abs(float(f"{seconds:.6g}"))  # 0.9999999 s is 1 s
     fitting = ((name, unit) for name, unit in TIMES.items() if size >= unit)

@@ -19,7 +19,7 @@ from rparm.systems import comparison, master
 from rparm.systems.comparison import HALVINGS, CouplingStudy, Halved
 from rparm.systems.opened import SUFFIXES, given_file, opened, system_file
 from rparm.systems.structure import OpenedSystem
-from rparm.units import exponents, milliseconds, short
+from rparm.units import duration, exponents, short
 from rparm.units import verdict as passed_or_failed
 
 PART = overview.COUPLING
@@ -96,9 +96,7 @@ def _halved(system: OpenedSystem, variant: str, options: argparse.Namespace) -> 
     )
     index = _written(options, f"{name}_{variant}", page, name)
     order = f", order {first.orders[-1]:.2f}" if math.isfinite(first.orders[-1]) else ""
-    verdict = (
-        f"coupling: error {short(float(first.errors[0]), 1)} at {milliseconds(first.steps[0])}"
-    )
+    verdict = f"coupling: error {short(float(first.errors[0]), 1)} at {duration(first.steps[0])}"
     document = {
         "variant": variant,
         "ways": [
@@ -133,7 +131,7 @@ def _table(found: Sequence[Halved]) -> Table:
     for x in found:
         orders = [*(f"{p:.2f}" if math.isfinite(p) else "–" for p in x.orders), "–", "–"]
         for step, error, p in zip(x.steps.tolist(), x.errors.tolist(), orders, strict=True):
-            names = x.order.replace("_", "-"), x.inputs, milliseconds(step)
+            names = x.order.replace("_", "-"), x.inputs, duration(step)
             rows.append([*names, exponents(f"{error:.2g}"), p, x.worst])
     head = ["order", "inputs", "step", "error", "of order", "largest of"]
     return Table("Errors of the coupling", head, rows)

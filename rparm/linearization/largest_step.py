@@ -22,7 +22,7 @@ from rparm.systems import ssp
 from rparm.systems.comparison import Rest
 from rparm.systems.master import INPUT_MODES, ORDERS, Master
 from rparm.systems.structure import Connection
-from rparm.units import milliseconds, verdict
+from rparm.units import duration, verdict
 
 FASTEST, SLOWEST = 1e-3, 1e2  # of the time scales of fastest and slowest pole: steps to try
 RATIO = 1.04  # of a step to the next one that is tried
@@ -266,7 +266,7 @@ def study_steps(path: Path, rest: Rest) -> dict[str, object]:
     head = f"{f'largest stable step, {path.stem}':<34}  {'predicted':>11}  {'measured':>11}  result"
     print("", head, "-" * len(head), sep="\n")
     for x in limits:
-        cells = "".join(f"  {milliseconds(step):>11}" for step in (x.predicted, x.measured))
+        cells = "".join(f"  {duration(step):>11}" for step in (x.predicted, x.measured))
         print(f"{x.name:<34}{cells}  {verdict(x.passed)}", flush=True)
     return {
         "predicted": {x.name: x.predicted for x in limits},

@@ -15,7 +15,7 @@ from rparm.linearization.responses import frequencies, frequency_response
 from rparm.linearization.study import Study
 from rparm.report import pages
 from rparm.report.charts import Chart, Data
-from rparm.units import exponents, milliseconds, unit
+from rparm.units import duration, exponents, unit
 
 Part = tuple[pages.Table, str, list[Chart]]
 NONE = "–"
@@ -104,19 +104,19 @@ def notes(found: Study) -> list[str]:
     if found.python:
         steps = "the communication step"
         if linear.dt > 1.5 * found.step:
-            steps = f"the common period of steps of {milliseconds(found.step)} and samplers"
+            steps = f"the common period of steps of {duration(found.step)} and samplers"
         texts.append(
-            f"Sampled every {milliseconds(linear.dt)}, {steps}, because of Python: "
+            f"Sampled every {duration(linear.dt)}, {steps}, because of Python: "
             f"{_names(found.python)}. States are those at its begin; inputs are held over it."
         )
     elif linear.dt:
         every = {tick.name: tick.every for tick in linear.ticks}
         why = f" by {_names(list(every))}"
         if min(every.values()) < linear.dt / 1.5:
-            rates = [f"{name} ({milliseconds(time)})" for name, time in every.items()]
+            rates = [f"{name} ({duration(time)})" for name, time in every.items()]
             why = f", the common period of {_names(rates)}, which a tick of the slowest begins"
         texts.append(
-            f"Sampled every {milliseconds(linear.dt)}{why}. States are those just before the "
+            f"Sampled every {duration(linear.dt)}{why}. States are those just before the "
             "first tick of a period, outputs those just after it; inputs are held in between."
             + (" Connections act at once: not a communication step late." if found.variant else "")
         )
@@ -268,7 +268,7 @@ def _hertz(crossing: Crossing) -> float:
 def margins_table(found: Margins) -> pages.Table:
     """Return the margins of a loop; those that it does not have are "–"."""
     at = {name: _or_none(_hertz(x)) for name, x in marks(found).items()}
-    delay = milliseconds(found.delay) if math.isfinite(found.delay) else NONE
+    delay = duration(found.delay) if math.isfinite(found.delay) else NONE
     rows = [
         ["gain margin, up (times)", _or_none(found.gain_up), at.get("up", NONE)],
         ["gain margin, down (times)", _or_none(found.gain_down or math.inf), at.get("down", NONE)],
@@ -283,7 +283,7 @@ def steps_table(found: list[LargestStep] | tuple[LargestStep, ...]) -> pages.Tab
     """Return the largest stable step of each way to step."""
     rows = []
     for x in found:
-        text = "none" if x.step == 0 else milliseconds(x.step)
+        text = "none" if x.step == 0 else duration(x.step)
         text = text if math.isfinite(x.step) else "no limit found"
         rows.append([x.order.replace("_", "-"), x.inputs, text, _or_none(x.frequency)])
     head = ["order", "inputs", "largest stable step", "frequency (Hz)"]
@@ -321,7 +321,7 @@ def bode_chart(model: Linear, step: float | None, found: Margins | None = None) 
         if step is not None:
             sampled = one.sampled(step)
             below = _below(grid, sampled)
-            name = f"{label}, held for {milliseconds(step)}"
+            name = f"{label}, held for {duration(step)}"
             held = _bode(frequency_response(sampled)(below), below)
             curves.append(held | {"name": name, "colour": i, "dashed": True})
     data = {"curves": curves, "marks": _marks(found)}
@@ -349,7 +349,7 @@ def nyquist_chart(loop: Linear, step: float | None, found: Margins | None = None
         sampled = loop.sampled(step)
         below = _below(grid, sampled)
         held = _nyquist(frequency_response(sampled)(below), below)
-        curves.append(held | {"name": f"held for {milliseconds(step)}", "dashed": True})
+        curves.append(held | {"name": f"held for {duration(step)}", "dashed": True})
     data = {"curves": curves, "marks": _marks(found)}
     text = "The loop L in the complex plane, along the frequencies, beside the critical point -1"
     return Chart("Nyquist diagram", text, "nyquist", data | {"reach": FARTHEST}, height=30)
@@ -393,13 +393,13 @@ def _step(model: Linear, length: float, end: float) -> tuple[np.ndarray, np.ndar
 def poles_charts(model: Linear, step: float | None, loop: Linear | None = None) -> list[Chart]:
     """Draw poles in the plane of s, and of the sampled model in the plane of z."""
     if model.dt:
-        title = f"Poles, sampled every {milliseconds(model.dt)}"
+        title = f"Poles, sampled every {duration(model.dt)}"
         return [_poles_chart(title, [("poles", model)], model.dt)]
     every = [("poles", model), *([("when the loop is closed", closed(loop))] if loop else [])]
     found = [_poles_chart("Poles", every, 0.0)]
     if step is not None:
         every = [("poles", model.sampled(step))]
-        found.append(_poles_chart(f"Poles, held for {milliseconds(step)}", every, step))
+        found.append(_poles_chart(f"Poles, held for {duration(step)}", every, step))
     return found
 
 

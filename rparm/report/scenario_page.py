@@ -18,7 +18,7 @@ from rparm.runs.comparison import Comparison, Failure, Run, comparisons, estimat
 from rparm.runs.inputs import Constant, Log, Logged, Signal, Sines, Switches
 from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import Result
-from rparm.units import bits, milliseconds, number, ordinal, rounded_up, sentence, short, unit
+from rparm.units import bits, duration, number, ordinal, rounded_up, sentence, short, unit
 
 DIGITS = 12  # of values; the references of the project have more, users' files have none
 MOST_POINTS = 8  # of a table, to be listed
@@ -240,7 +240,7 @@ def _proven(proof: Mapping[str, ProvenError], model: Model) -> list[tuple[str, s
 
 
 def _lengths(steps: Sequence[float]) -> str:
-    return f"of {milliseconds(steps[0])}" if len(steps) == 1 else "of varying length"
+    return f"of {duration(steps[0])}" if len(steps) == 1 else "of varying length"
 
 
 def _notes(runs: Sequence[Run]) -> list[str]:

@@ -24,7 +24,7 @@ from rparm.runs.inputs import Log
 from rparm.systems import comparison, ecos
 from rparm.systems.comparison import BOUND, Diagram, Measure, Outcome, Study, load_study
 from rparm.systems.structure import OpenedSystem
-from rparm.units import exponents, milliseconds, seconds, short, unit
+from rparm.units import duration, exponents, seconds, short, unit
 
 MOST_ROWS = 350  # of a file of values, which has many columns
 DIGITS = 12  # there; errors have a bound of 1e-7
@@ -247,7 +247,7 @@ def _values(section: Section, folder: Path, outcome: Outcome, rows: np.ndarray) 
     names = run.names if section.folder else comparison.kept(section.ssp)
     values = run.values[np.ix_(rows, [run.names.index(name) for name in names])]
     files.write_trajectory(folder / csv, run.times[rows], names, values, DIGITS, True)
-    every = milliseconds(np.diff(run.times[rows]).max(initial=0.0))
+    every = duration(np.diff(run.times[rows]).max(initial=0.0))
     note = f"It has a row every {every}, the extremes of the plots in between, and {DIGITS} digits."
     return {"csv": csv, "csv_note": note}
 
@@ -291,7 +291,7 @@ def _description(section: Section, variant: str) -> str:
     system, said = section.ssp.system, section.said(variant)
     why_not = "" if section.folder else ecos.unsuited(section.ssp)
     by = f"rparm's own master ({why_not})" if why_not else "Ecos"
-    how = f"Run by {by} with steps of {milliseconds(system.step)}."
+    how = f"Run by {by} with steps of {duration(system.step)}."
     return f"{said.rstrip('.')}. {how}" if said else how
 
 

@@ -20,7 +20,7 @@ from rparm.report.run_data import Axis, Curve, Plot, RunData
 from rparm.runs import comparison
 from rparm.runs.comparison import Failure, Run, Sweep
 from rparm.runs.convergence import Convergence
-from rparm.units import milliseconds, short, verdict
+from rparm.units import duration, short, verdict
 
 ACCURACY = "accuracy"  # name of the page over the tolerance
 UPDATE = "intermediate update"
@@ -159,7 +159,7 @@ def write_convergence(folder: Path, study: Convergence, again: str) -> Entry:
         [row.name, *(short(e, 1) for e in row.errors), f"{row.slope:.2f}", verdict(row.holds)]
         for row in study.rows
     ]
-    head = ["known of the inputs", *map(milliseconds, steps), "slope", "result"]
+    head = ["known of the inputs", *map(duration, steps), "slope", "result"]
     updated = any(row.name == UPDATE for row in study.rows)
     page = RunPage(
         title="Error against communication step",
@@ -173,7 +173,7 @@ def write_convergence(folder: Path, study: Convergence, again: str) -> Entry:
         again=again,
     )
     worst = max(study.rows, key=lambda row: row.errors[-1])
-    where = f"at {milliseconds(steps[-1])}, {worst.name}"
+    where = f"at {duration(steps[-1])}, {worst.name}"
     return _write_study(folder, page, worst.errors[-1], where)
 
 
