@@ -42,6 +42,7 @@ MESSAGE = re.compile(
     r"(?P<status>OK|Warning|Discard|Error|Fatal) (?P<text>.*)"
 )
 BAD = ("Discard", "Error", "Fatal")
+CRASHED = 2**31  # exit codes of Windows from here on; elsewhere they are negative
 # statistics of an FMU's solver at the end of a run, and their names in tables
 STATISTICS = {
     "solver_steps": "solver steps",
@@ -136,7 +137,8 @@ def run(
         log = (folder / LOG).read_text(encoding="utf-8", errors="replace")
         if code != 0:
             last = next((line for line in reversed(log.splitlines()) if line.strip()), "no output")
-            why = _in_python(ssp) or last
+            crashed = code < 0 or code > CRASHED
+            why = (_in_python(ssp) if crashed else "") or last
             raise UserError(f"{ssp.path}: {variant}: Ecos failed (exit code {code}): {why}")
         values = np.load(folder / ROWS)
         done = json.loads((folder / DONE).read_text(encoding="utf-8"))
@@ -288,7 +290,7 @@ def _check_values(
     value = values[row, list(names).index(f"{component}.{variable}")]
     where = f"{variant}: component {component!r}"
     own = (m["text"] for m in messages if m["status"] in BAD and _sender(ssp, m) == repr(component))
-    said = "".join(f": {text}" for text in list(own)[:1])
+    said = f": {text}" if (text := next(own, "")) else ""
     raise UserError(f"{where}: {variable!r} is {value} at t = {times[row]:.6g} s{said}")
 
 

@@ -4,8 +4,8 @@ A class has the attributes `inputs` and `outputs`, lists of names, and `step(sel
 step gets the inputs at t; the outputs that it returns hold from t + h on. Until then they have the
 values of the attribute `start`, else 0. `types` says which inputs and outputs are bool or int, not
 float, `units` gives units. Further attributes are parameters. With `save()` and `restore(state)` a
-master can go back. The inputs and outputs of a function `step(t, h, inputs)` are
-those of its connections. Each instance runs the file again, so no run sees another's state.
+master can go back. The inputs and outputs of a function `step(t, h, inputs)` are those of its
+connections. Each instance runs the file again, so no run sees another's state.
 """
 
 import copy
@@ -104,22 +104,22 @@ class PythonComponent(AbstractContextManager["PythonComponent"]):
     @cached_property
     def model(self) -> Model:
         made = self.made()
-        declared: list[tuple[str, str, str, str | None, Any]] = []
+        inputs = (*made.inputs, *made.switched_inputs)
+        declared: list[tuple[str, str, str, Any]] = []
         for name in made.exchanged:
-            is_input, of = name in (*made.inputs, *made.switched_inputs), made.kinds[name]
-            kind, start = ("input", of(0)) if is_input else ("output", None)
-            declared.append((name, TYPES[of], kind, None, start))
+            of = made.kinds[name]
+            end = ("input", of()) if name in inputs else ("output", None)
+            declared.append((name, TYPES[of], *end))
         for name, value in made.attributes.items():
             of_attribute, start = _kind(value)
-            declared.append((name, of_attribute, "parameter", "exact", start))
+            declared.append((name, of_attribute, "parameter", start))
         variables = []
-        for i, (name, kind, causality, initial, start) in enumerate(declared):
-            unit, limits = (
-                made.units.get(name),
-                INTEGER if kind == "Integer" else (-math.inf, math.inf),
-            )
+        for i, (name, kind, causality, start) in enumerate(declared):
+            unit = made.units.get(name)
             if unit and kind != "Real":
                 raise UserError(f"{self.path}: units: {name!r} is {kind}: only a number has a unit")
+            initial = "exact" if causality == "parameter" else None
+            limits = INTEGER if kind == "Integer" else (-math.inf, math.inf)
             variables.append(
                 Attribute(name, i, kind, causality, initial, unit, start, *limits,
                           units=units_of(unit, {}))
@@ -398,7 +398,7 @@ class PythonInstance(Instance):
             setattr(self.made.object, name, copy.deepcopy(value))
 
     def _integer(self, reference: int) -> int:
-        raise AssertionError(reference)
+        return self.switches[self._names[reference]]
 
     def discrete(self, name: str) -> int:
         if name in self.switches:

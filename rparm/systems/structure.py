@@ -250,6 +250,7 @@ class OpenedSystem:
         return Parameter.of(variable, given)
 
     def split(self, name: str) -> tuple[str, str]:
+        """Return component and variable of a name, either of which may have dots."""
         return split(name, self.models)
 
     def variable(self, name: str) -> Variable:
