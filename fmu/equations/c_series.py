@@ -84,6 +84,20 @@ class Series:
                 last = f"k == 1 ? h * {self.still.of(rate)} : 0.0"
             self.integrals.append(f"row[{i}][k] = {last};")
 
+    def inner(self) -> list[str]:
+        """Where order 0 stands of what may be nothing at the begin of a step and large within."""
+        if self.columns:
+            begin = f"{len(self.rows)} * SERIES_LENGTH + "
+            return [f"{begin}{i}" for value, i in self.columns.items() if self._may_hide(value)]
+        return [f"{i} * SERIES_LENGTH" for value, i in self.rows.items() if self._may_hide(value)]
+
+    def _may_hide(self, value: Value) -> bool:
+        """Return whether it is more than a sum, a sine, or a multiple of an input or the time."""
+        a, b = (*value.arguments, value, value)[:2]
+        if value.op == "*" and a.moves and b.moves:
+            return all(self._varying(x)[1].op not in ("input", "time") for x in (a, b))
+        return value.op == "/" and b.moves or value.op in {*DERIVATIVES} - {"sin", "cos"}
+
     def parts(self) -> dict[str, list[str]]:
         """What equations.c.in has blocks for."""
         if self.is_wide:

@@ -126,4 +126,10 @@ static enum status extend(const struct series_origin *origin, int first, int las
     return STATUS_OK;
 }
 
-const struct series rp_series = {.row_count = RP_SERIES_ROWS, .extend = extend};
+static const size_t inner[] = {(size_t)P * SERIES_LENGTH};
+
+const struct series rp_series = {.row_count = RP_SERIES_ROWS,
+                                 .extend = extend,
+                                 .inner = inner,
+                                 .inner_count = 1,
+                                 .inner_stride = 1};

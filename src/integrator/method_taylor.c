@@ -37,6 +37,7 @@ struct taylor {
                            none */
     double *end_x;      /* the state at the end of the last step */
     double *end_dx;     /* the derivative of the polynomial there, by its argument */
+    double *inner;      /* room for three states */
     double passed; /* end of the step that goes past requested times, s since the restart; -INFINITY
                       if there is none */
 };
@@ -46,7 +47,7 @@ struct taylor {
 static size_t memory_size(const struct ode *ode) {
     const size_t padding = 2 * _Alignof(max_align_t);
     return sizeof(struct taylor) + padding + taylor_series_memory_size(ode) +
-           2 * ode->state_count * sizeof(double);
+           5 * ode->state_count * sizeof(double);
 }
 
 static void destroy(void *memory) {
@@ -63,13 +64,14 @@ static enum status create(struct problem *problem, void **memory) {
         return STATUS_OUT_OF_MEMORY;
     }
     const size_t n = problem->ode.state_count;
-    taylor->end_x = workspace_calloc(2 * n, sizeof *taylor->end_x);
+    taylor->end_x = workspace_calloc(5 * n, sizeof *taylor->end_x);
     const bool has_series = taylor_series_create(problem, &taylor->series);
     if (!has_series || taylor->end_x == NULL) {
         destroy(taylor);
         return STATUS_OUT_OF_MEMORY;
     }
     taylor->end_dx = taylor->end_x + n;
+    taylor->inner = taylor->end_dx + n;
     *memory = taylor;
     return STATUS_OK;
 }
@@ -90,27 +92,41 @@ static enum status restart(void *memory, const double x[]) {
 
 /* ---- Check ---------------------------------------------------------------------------------- */
 
-/* Makes the polynomial fit the equations at the end of the step, *step time scales long: adds
- * orders, or halves *step, which counts as a failed step. is_long: orders are not added.
+/* Makes the polynomial fit the equations in the step and at its end, *step time scales long: adds
+ * orders, or cuts *step, which counts as a failed step. is_long: orders are not added.
  * Writes end_x and end_dx. */
 static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
                             struct method_work *work) {
     struct taylor_series *series = &taylor->series;
+    const struct ode *ode = &series->problem->ode;
     for (;;) {
         double defect;
         enum status status =
             taylor_series_measure_defect(series, *step, taylor->end_x, taylor->end_dx, &defect);
-        // within the bound, the first term left out is about a tolerance at most
-        if (status != STATUS_OK || defect <= series->order + 1) {
+        if (status != STATUS_OK) {
             return status;
         }
-        if (*step == 1.0 && !is_long && series->order < series->largest_order) {
+        double part = 0.5 * *step;
+        // within the bound, the first term left out is about a tolerance at most
+        const bool fits_at_end = defect <= series->order + 1;
+        if (fits_at_end && (ode->inner_count == 0 || taylor_series_hides_nothing(series, *step))) {
+            return STATUS_OK;
+        }
+        if (fits_at_end) {
+            double *x = taylor->inner;
+            double *dx = x + ode->state_count;
+            part = taylor_series_part_that_fits(series, *step, x, dx, dx + ode->state_count);
+            if (part == *step) {
+                return STATUS_OK;
+            }
+        }
+        if (!fits_at_end && *step == 1.0 && !is_long && series->order < series->largest_order) {
             status = taylor_series_add_orders(series, series->order + 2);
             if (status != STATUS_OK) {
                 return status;
             }
-        } else if (series->begin + 0.5 * *step * series->time_scale > series->begin) {
-            *step *= 0.5;
+        } else if (series->begin + part * series->time_scale > series->begin) {
+            *step = part;
             work->failed_steps++;
         } else {
             const double end = series->begin + *step * series->time_scale;

@@ -160,6 +160,16 @@ enum status taylor_series_expand(struct taylor_series *series, double t, double 
 
 /* ---- Check ---------------------------------------------------------------------------------- */
 
+/* Part of its first terms that the last terms of a series which has converged may have. */
+static const double converged = 0x1p-10;
+
+/* Returns by how much a derivative differs from the polynomial's, beyond rounding. */
+static inline double missed(double derivative, double of_polynomial) {
+    const double rounding = 64.0 * DBL_EPSILON * fabs(of_polynomial);
+    const double difference = fabs(derivative - of_polynomial) - rounding;
+    return difference <= 0.0 ? 0.0 : difference;
+}
+
 enum status taylor_series_measure_defect(struct taylor_series *series, double s, double end_x[],
                                          double end_dx[], double *defect) {
     const size_t n = series->problem->ode.state_count;
@@ -178,10 +188,41 @@ enum status taylor_series_measure_defect(struct taylor_series *series, double s,
     series->end = location_is_active(&series->problem->location) ? NAN : end;
     *defect = 0.0;
     for (size_t i = 0; i < n; i++) {
-        const double derivative = end_dx[i];
-        const double rounding = 64.0 * DBL_EPSILON * fabs(derivative);
-        const double missed = fabs(end_row[i][1] - derivative) - rounding;
-        *defect += missed <= 0.0 ? 0.0 : s * missed * series->weight[i];
+        *defect += s * missed(end_row[i][1], end_dx[i]) * series->weight[i];
     }
     return STATUS_OK;
+}
+
+bool taylor_series_hides_nothing(const struct taylor_series *series, double s) {
+    const struct ode *ode = &series->problem->ode;
+    const size_t stride = ode->inner_stride;
+    const double power = s == 1.0 ? 1.0 : pow(s, series->order - 2);
+    for (size_t i = 0; i < ode->inner_count; i++) {
+        const double *first = &series->row[0][0] + ode->inner[i];
+        const double *last = first + stride * (size_t)series->order;
+        const double begin =
+            fabs(first[stride]) + fabs(first[2 * stride]) * s + fabs(first[3 * stride]) * s * s;
+        if (!((fabs(last[0]) * s + fabs(*(last - stride))) * power < converged * begin)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+double taylor_series_part_that_fits(struct taylor_series *series, double s, double x[], double dx[],
+                                    double f[]) {
+    const int points = series->order;
+    const double distance = s / (points + 1);
+    for (int k = 1; k <= points; k++) {
+        const double t = series->begin + k * distance * series->time_scale;
+        taylor_series_evaluate(series, k * distance, x, dx);
+        double defect = problem_rhs(series->problem, t, x, f) == STATUS_OK ? 0.0 : INFINITY;
+        for (size_t i = 0; i < series->problem->ode.state_count; i++) {
+            defect += s * missed(series->time_scale * f[i], dx[i]) * series->weight[i];
+        }
+        if (!(defect <= series->order + 1)) {
+            return k == 1 ? 0.5 * distance : (k - 1) * distance;
+        }
+    }
+    return s;
 }

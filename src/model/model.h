@@ -162,6 +162,12 @@ struct series {
 
     /* True if extend reads has_avx2: a virtual machine takes tens of microseconds to answer. */
     bool asks_for_avx2;
+
+    /* Functions, quotients and products that a state follows from, and that may be nothing at the
+     * begin of a step and large within: coefficient k of quantity i is
+     * (&rows[0][0])[inner[i] + k inner_stride]. NULL if there are none. */
+    const size_t *inner;
+    size_t inner_count, inner_stride;
 };
 
 /* ---- Jacobian ------------------------------------------------------------------------------- */
