@@ -180,7 +180,7 @@ def _series(series: Series, has_domains: bool) -> dict[str, object]:
         "asks_for_avx2": str(series.is_wide).lower(),
         "extend_by_avx2": BY_AVX2.splitlines() if series.is_wide else [],
         "row_of_indicator": ", ".join(rows or ["0"]),
-        "inner": ", ".join(inner or ["0"]),
+        "inner": ", ".join(inner or ["{0, 0}"]),
         "inner_count": len(inner),
         "inner_stride": len(series.columns) or 1,
     }

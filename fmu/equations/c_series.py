@@ -85,18 +85,28 @@ class Series:
             self.integrals.append(f"row[{i}][k] = {last};")
 
     def inner(self) -> list[str]:
-        """Where order 0 stands of what may be nothing at the begin of a step and large within."""
-        if self.columns:
-            begin = f"{len(self.rows)} * SERIES_LENGTH + "
-            return [f"{begin}{i}" for value, i in self.columns.items() if self._may_hide(value)]
-        return [f"{i} * SERIES_LENGTH" for value, i in self.rows.items() if self._may_hide(value)]
+        """What may be nothing at the begin of a step and large within, and its argument."""
+        values = (value for value in self.columns or self.rows)
+        pairs = [(value, argument) for value in values for argument in self._arguments(value)]
+        return [f"{{{self._place(value)}, {self._place(x)}}}" for value, x in pairs]
 
-    def _may_hide(self, value: Value) -> bool:
-        """Return whether it is more than a sum, a sine, or a multiple of an input or the time."""
+    def _arguments(self, value: Value) -> list[Value]:
+        """Of what is more than a sum, a sine, or a multiple of an input or the time."""
         a, b = (*value.arguments, value, value)[:2]
         if value.op == "*" and a.moves and b.moves:
-            return all(self._varying(x)[1].op not in ("input", "time") for x in (a, b))
-        return value.op == "/" and b.moves or value.op in {*DERIVATIVES} - {"sin", "cos"}
+            is_multiple = any(self._varying(x)[1].op in ("input", "time") for x in (a, b))
+            return [] if is_multiple else [value]
+        if value.op == "/" and b.moves:
+            return [self._varying(b)[1]]
+        if value.op not in DERIVATIVES or value.op in ("sin", "cos"):
+            return []
+        return [self._varying(x)[1] for x in value.arguments if x.moves]
+
+    def _place(self, value: Value) -> str:
+        """Where coefficient 0 stands behind the first row's."""
+        if self.columns:
+            return f"{len(self.rows)} * SERIES_LENGTH + {self.columns[value]}"
+        return f"{self.rows[value]} * SERIES_LENGTH"
 
     def parts(self) -> dict[str, list[str]]:
         """What equations.c.in has blocks for."""

@@ -126,7 +126,7 @@ static enum status extend(const struct series_origin *origin, int first, int las
     return STATUS_OK;
 }
 
-static const size_t inner[] = {(size_t)P * SERIES_LENGTH};
+static const struct series_inner inner[] = {{(size_t)P * SERIES_LENGTH, (size_t)P *SERIES_LENGTH}};
 
 const struct series rp_series = {.row_count = RP_SERIES_ROWS,
                                  .extend = extend,

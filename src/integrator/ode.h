@@ -41,12 +41,12 @@ struct ode {
     ode_rounding *rounding; /* NULL if it follows from the limits of the indicators */
     ode_reach *reach;       /* called if events are searched; NULL if any distance is allowed */
     size_t indicator_count; /* 0 without events */
-    const size_t *row_of_indicator; /* as in struct series */
-    const size_t *inner;            /* as in struct series, with the next two */
+    const size_t *row_of_indicator;   /* as in struct series */
+    const struct series_inner *inner; /* as in struct series, with the next two */
     size_t inner_count, inner_stride;
-    ode_series *series;             /* for INTEGRATOR_TAYLOR only; NULL if the model has none */
-    size_t series_row_count;        /* >= state_count if there is a series */
-    size_t state_count;             /* > 0 */
+    ode_series *series;      /* for INTEGRATOR_TAYLOR only; NULL if the model has none */
+    size_t series_row_count; /* >= state_count if there is a series */
+    size_t state_count;      /* > 0 */
     void *context;
 };
 

@@ -193,16 +193,28 @@ enum status taylor_series_measure_defect(struct taylor_series *series, double s,
     return STATUS_OK;
 }
 
+/* True if a quantity moves, by its first coefficient. */
+static bool moves(const struct taylor_series *series, const double *first) {
+    bool is_moving = false;
+    for (int k = 1; k <= series->order; k++) {
+        first += series->problem->ode.inner_stride;
+        is_moving = is_moving || *first != 0.0;
+    }
+    return is_moving;
+}
+
 bool taylor_series_hides_nothing(const struct taylor_series *series, double s) {
     const struct ode *ode = &series->problem->ode;
     const size_t stride = ode->inner_stride;
     const double power = s == 1.0 ? 1.0 : pow(s, series->order - 2);
     for (size_t i = 0; i < ode->inner_count; i++) {
-        const double *first = &series->row[0][0] + ode->inner[i];
+        const double *first = &series->row[0][0] + ode->inner[i].place;
         const double *last = first + stride * (size_t)series->order;
         const double begin =
             fabs(first[stride]) + fabs(first[2 * stride]) * s + fabs(first[3 * stride]) * s * s;
-        if (!((fabs(last[0]) * s + fabs(*(last - stride))) * power < converged * begin)) {
+        const double end = (fabs(last[0]) * s + fabs(*(last - stride))) * power;
+        if (!(end < converged * begin) &&
+            moves(series, &series->row[0][0] + ode->inner[i].argument)) {
             return false;
         }
     }
@@ -211,7 +223,7 @@ bool taylor_series_hides_nothing(const struct taylor_series *series, double s) {
 
 double taylor_series_part_that_fits(struct taylor_series *series, double s, double x[], double dx[],
                                     double f[]) {
-    const int points = series->order;
+    const int points = TAYLOR_INNER_POINTS;
     const double distance = s / (points + 1);
     for (int k = 1; k <= points; k++) {
         const double t = series->begin + k * distance * series->time_scale;

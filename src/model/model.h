@@ -142,6 +142,13 @@ struct series_origin {
     bool has_avx2;                               /* the processor has it: the same bits, faster */
 };
 
+/* A function, quotient or product that a state follows from: coefficient k is
+ * (&rows[0][0])[place + k inner_stride]; likewise of its argument, the quotient's divisor, or the
+ * product itself. */
+struct series_inner {
+    size_t place, argument;
+};
+
 /* The Taylor series of a solution, which a model may offer beside its right-hand side. */
 struct series {
     /* Number of rows that extend writes: first the states in their order, then quantities that it
@@ -163,10 +170,8 @@ struct series {
     /* True if extend reads has_avx2: a virtual machine takes tens of microseconds to answer. */
     bool asks_for_avx2;
 
-    /* Functions, quotients and products that a state follows from, and that may be nothing at the
-     * begin of a step and large within: coefficient k of quantity i is
-     * (&rows[0][0])[inner[i] + k inner_stride]. NULL if there are none. */
-    const size_t *inner;
+    /* What may be nothing at the begin of a step and large within. NULL if there is nothing. */
+    const struct series_inner *inner;
     size_t inner_count, inner_stride;
 };
 
