@@ -92,8 +92,15 @@ static enum status restart(void *memory, const double x[]) {
 
 /* ---- Check ---------------------------------------------------------------------------------- */
 
+static double part_that_fits(struct taylor *taylor, double step) {
+    const size_t n = taylor->series.problem->ode.state_count;
+    double *x = taylor->inner;
+    return taylor_series_part_that_fits(&taylor->series, step, x, x + n, x + 2 * n);
+}
+
 /* Makes the polynomial fit the equations in the step and at its end, *step time scales long: adds
- * orders, or cuts *step, which counts as a failed step. is_long: orders are not added.
+ * orders, or cuts *step, which counts as a failed step; to one time scale, so that the distance of
+ * the points within is known, if it may hide something. is_long: orders are not added.
  * Writes end_x and end_dx. */
 static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
                             struct method_work *work) {
@@ -106,16 +113,14 @@ static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
         if (status != STATUS_OK) {
             return status;
         }
-        double part = 0.5 * *step;
         // within the bound, the first term left out is about a tolerance at most
         const bool fits_at_end = defect <= series->order + 1;
-        if (fits_at_end && (ode->inner_count == 0 || taylor_series_hides_nothing(series, *step))) {
-            return STATUS_OK;
-        }
+        double part = 0.5 * *step;
         if (fits_at_end) {
-            double *x = taylor->inner;
-            double *dx = x + ode->state_count;
-            part = taylor_series_part_that_fits(series, *step, x, dx, dx + ode->state_count);
+            if (ode->inner_count == 0 || taylor_series_hides_nothing(series, *step)) {
+                return STATUS_OK;
+            }
+            part = *step > 1.0 ? fmax(part, 1.0) : part_that_fits(taylor, *step);
             if (part == *step) {
                 return STATUS_OK;
             }
