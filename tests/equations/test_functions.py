@@ -5,6 +5,7 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
 
 from rparm.expressions import expression
@@ -231,3 +232,25 @@ def test_every_function_stands_in_every_place(tmp_path: Path) -> None:
     run = simulated(tmp_path / "Places.fmu", 5.0, 1.0, {})
     for name, value in exact.items():
         assert run[name][-1] == pytest.approx(float(value), rel=1e-12, abs=1e-12), name
+
+
+@pytest.fixture(scope="module")
+def charging() -> np.ndarray:
+    """Voltages each 5 ms of a capacitor behind a diode, by scipy."""
+
+    def rate(t: float, u: np.ndarray) -> np.ndarray:
+        return (1e-12 * np.expm1((5 * np.sin(314 * t) - u) / 0.02585) - u / 1000) / 1e-5
+
+    options = {"rtol": 1e-10, "atol": 1e-11, "max_step": 1e-4}
+    at = np.linspace(0.0, 0.1, 21)
+    return solve_ivp(rate, (0.0, 0.1), [0.0], "LSODA", t_eval=at, **options).y[0]
+
+
+@EACH_METHOD
+@pytest.mark.parametrize("step", [1e-3, 5e-3])
+def test_a_diode_opens_within_a_step(
+    charging: np.ndarray, folder: Path, method: int, step: float
+) -> None:
+    """At the begin of the step its current is exp(-300)."""
+    found = simulated(made(folder, TEXTS["DIODE"]), 0.1, step, {"solver_method": method})
+    np.testing.assert_allclose(found["u"][:: round(5e-3 / step)], charging, rtol=0, atol=1e-7)

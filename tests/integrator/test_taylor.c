@@ -44,13 +44,51 @@ static enum status square_series(double t, double time_scale, int first, int las
     return STATUS_OK;
 }
 
+/* x1' = a pulse of area 1, x2' = 0 */
+static double place, width;
+
+static enum status pulse_rhs(double t, const double x[], double dx[], void *context) {
+    const double z = (t - place) / width;
+    dx[0] = exp(-0.5 * z * z) / (width * sqrt(6.283185307179586));
+    dx[1] = 0.0;
+    return STATUS_OK;
+}
+
+/* Rows behind the states: the argument of the exponential function, and its value. */
+static enum status pulse_series(double t, double time_scale, int first, int last,
+                                double row[][SERIES_LENGTH], void *context) {
+    const double z = (t - place) / width;
+    const double dz = time_scale / width;
+    for (int k = first; k <= last; k++) {
+        row[2][k] = k == 0 ? -0.5 * z * z : k == 1 ? -z * dz : k == 2 ? -0.5 * dz * dz : 0.0;
+        row[3][k] = k == 0 ? exp(row[2][0]) : 0.0;
+        for (int i = 1; i <= k; i++) {
+            row[3][k] += i * row[2][i] * row[3][k - i] / k;
+        }
+        if (k > 0) {
+            row[0][k] = dz / k * row[3][k - 1] / sqrt(6.283185307179586);
+            row[1][k] = 0.0;
+        }
+    }
+    return STATUS_OK;
+}
+
+static const struct series_inner exponential = {3 * SERIES_LENGTH, 2 * SERIES_LENGTH};
+
 /* ---- Runs ----------------------------------------------------------------------------------- */
 
 static struct integrator *integrator;
 static const double usual_tolerance = 1e-10;
 
 static void create_at(ode_rhs *rhs, ode_series *series, double max_step, double tolerance) {
-    const struct ode ode = {.state_count = 2, .rhs = rhs, .series = series, .series_row_count = 2};
+    const bool is_pulse = series == pulse_series;
+    const struct ode ode = {.state_count = 2,
+                            .rhs = rhs,
+                            .series = series,
+                            .series_row_count = is_pulse ? 4 : 2,
+                            .inner = &exponential,
+                            .inner_count = is_pulse ? 1 : 0,
+                            .inner_stride = 1};
     const struct message_sink quiet = {0};
     integrator_destroy(integrator);
     ASSERT_OK(integrator_create(&ode, &quiet, &integrator));
@@ -219,6 +257,39 @@ static void test_no_tolerance_takes_more_orders_than_a_row_has(void) {
     restart(0.0, 0.0, INFINITY, true);
     advance(1e-3, x);
     TEST_ASSERT_EQUAL_INT(SERIES_LENGTH - 1, statistics().last_order);
+}
+
+/* ---- Within a step -------------------------------------------------------------------------- */
+
+/* Returns the largest error of x1 at whole seconds, over places and widths from `narrowest`
+ * on that do not repeat. */
+static double error_over_pulses(double narrowest, double max_step, int count) {
+    double largest = 0.0;
+    create(pulse_rhs, pulse_series, max_step);
+    for (int n = 0; n < count; n++) {
+        double x[2];
+        place = fmod(n * 1.8541019662496845, 3.0);
+        width = narrowest * exp(fmod(n * 1.2451223338, 3.0));
+        restart(0.0, 1.0, INFINITY, n % 2 == 0);
+        for (int t = 1; t <= 3; t++) {
+            const double per_width = 1.0 / (width * sqrt(2.0));
+            advance(t, x);
+            const double exact = erf((t - place) * per_width) + erf(place * per_width);
+            largest = fmax(largest, fabs(x[0] - 0.5 * exact));
+        }
+    }
+    return largest;
+}
+
+/* They last some 16 widths, and the points within have a distance of 1/32 s. */
+static void test_no_step_hides_a_pulse_that_lasts_longer_than_a_part_of_it(void) {
+    TEST_ASSERT_DOUBLE_WITHIN(10.0 * usual_tolerance, 0.0, error_over_pulses(2.5e-3, 0.0, 1000));
+}
+
+/* As src/README.md says: a narrower one needs a longest step. */
+static void test_a_longest_step_finds_a_narrow_pulse(void) {
+    TEST_ASSERT_TRUE(error_over_pulses(1e-4, 0.0, 20) > 0.1);
+    TEST_ASSERT_DOUBLE_WITHIN(10.0 * usual_tolerance, 0.0, error_over_pulses(1e-4, 0.03, 20));
 }
 
 /* ---- Extremes ------------------------------------------------------------------------------- */
