@@ -91,13 +91,9 @@ class Series:
         return [f"{{{self._place(value)}, {self._place(x)}}}" for value, x in pairs]
 
     def _arguments(self, value: Value) -> list[Value]:
-        """Of what is more than a sum, a sine, or a multiple of an input or the time."""
-        a, b = (*value.arguments, value, value)[:2]
-        if value.op == "*" and a.moves and b.moves:
-            is_multiple = any(self._varying(x)[1].op in ("input", "time") for x in (a, b))
-            return [] if is_multiple else [value]
-        if value.op == "/" and b.moves:
-            return [self._varying(b)[1]]
+        """Of a quotient or a function other than sine and cosine."""
+        if value.op == "/" and value.arguments[1].moves:
+            return [self._varying(value.arguments[1])[1]]
         if value.op not in DERIVATIVES or value.op in ("sin", "cos"):
             return []
         return [self._varying(x)[1] for x in value.arguments if x.moves]

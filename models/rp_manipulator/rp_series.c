@@ -126,10 +126,4 @@ static enum status extend(const struct series_origin *origin, int first, int las
     return STATUS_OK;
 }
 
-static const struct series_inner inner[] = {{(size_t)P * SERIES_LENGTH, (size_t)P *SERIES_LENGTH}};
-
-const struct series rp_series = {.row_count = RP_SERIES_ROWS,
-                                 .extend = extend,
-                                 .inner = inner,
-                                 .inner_count = 1,
-                                 .inner_stride = 1};
+const struct series rp_series = {.row_count = RP_SERIES_ROWS, .extend = extend};

@@ -193,14 +193,17 @@ enum status taylor_series_measure_defect(struct taylor_series *series, double s,
     return STATUS_OK;
 }
 
-/* True if a quantity moves, by its first coefficient. */
-static bool moves(const struct taylor_series *series, const double *first) {
-    bool is_moving = false;
-    for (int k = 1; k <= series->order; k++) {
-        first += series->problem->ode.inner_stride;
-        is_moving = is_moving || *first != 0.0;
+/* True if a quantity moves over the step to s by more than its tolerance means, as in stiff
+ * equations whose motion has died away, or in proportion to the time. first: its coefficient 0. */
+static bool moves(const struct taylor_series *series, const double *first, double s) {
+    const size_t stride = series->problem->ode.inner_stride;
+    double bent = 0.0; // the way of all orders but the first
+    for (int k = series->order; k >= 2; k--) {
+        bent = (bent + fabs(first[stride * (size_t)k])) * s;
     }
-    return is_moving;
+    const double way = (bent + fabs(first[stride])) * s;
+    const double rest = bent == 0.0 ? 0.0 : series->problem->settings.relative_tolerance;
+    return !(way <= 16.0 * rest * fabs(*first));
 }
 
 bool taylor_series_hides_nothing(const struct taylor_series *series, double s) {
@@ -214,7 +217,7 @@ bool taylor_series_hides_nothing(const struct taylor_series *series, double s) {
             fabs(first[stride]) + fabs(first[2 * stride]) * s + fabs(first[3 * stride]) * s * s;
         const double end = (fabs(last[0]) * s + fabs(*(last - stride))) * power;
         if (!(end < converged * begin) &&
-            moves(series, &series->row[0][0] + ode->inner[i].argument)) {
+            moves(series, &series->row[0][0] + ode->inner[i].argument, s)) {
             return false;
         }
     }

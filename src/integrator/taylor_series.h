@@ -117,7 +117,8 @@ MUST_CHECK NONNULL enum status taylor_series_measure_defect(struct taylor_series
  * as long as nothing that the states follow from is far below the tolerance there and grows beyond
  * it: exp(-300) at the begin of a step adds nothing to any coefficient of a state. But its own
  * coefficients grow from order to order, or are 0. So a step hides nothing if each inner quantity
- * (model.h) has converged by its own size, or its argument rests. */
+ * (model.h) has converged by its own size, or its argument rests. Sums, sines and products of what
+ * is seen hide nothing. */
 MUST_CHECK NONNULL bool taylor_series_hides_nothing(const struct taylor_series *series, double s);
 
 /* Points within a step that may hide something. */

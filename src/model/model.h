@@ -142,9 +142,8 @@ struct series_origin {
     bool has_avx2;                               /* the processor has it: the same bits, faster */
 };
 
-/* A function, quotient or product that a state follows from: coefficient k is
- * (&rows[0][0])[place + k inner_stride]; likewise of its argument, the quotient's divisor, or the
- * product itself. */
+/* A function or quotient that a state follows from: coefficient k is
+ * (&rows[0][0])[place + k inner_stride]; likewise of its argument or divisor. */
 struct series_inner {
     size_t place, argument;
 };
