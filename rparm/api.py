@@ -458,7 +458,8 @@ def linearize(
     -------
     Linear
         `A`, `B`, `C`, `D`; `states`, `inputs`, `outputs`, `held`; `dt`, in s, if samplers make it
-        discrete; `ss()` and `zoh(step)` give them to python-control.
+        discrete; `ss()` and `zoh(step)` give them to python-control. With `break_at` also `loop`
+        and `margins`, whose `disk`, `sensitivity` and `complementary` have `value` and `frequency`.
     """
     with _needing("control"):
         from rparm.linearization.study import Request, study

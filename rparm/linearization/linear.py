@@ -20,6 +20,8 @@ from rparm.units import typed_quantity
 if TYPE_CHECKING:
     from control import StateSpace
 
+    from rparm.linearization.margins import Margins
+
 CANCELLED = 1e-13  # of the terms of a sum: rounding of a sum that is 0
 EQUAL = 1e-4  # relative, of poles that are equal but for rounding
 ROUNDING = 1e-15  # relative, for each row and column: of singular values that are 0
@@ -50,8 +52,8 @@ class Linear:
         Where dry friction lets what was trimmed lie anywhere in between.
     dropped : tuple of str
         States that are left out as they play no part between inputs and outputs.
-    hidden : ndarray
-        Poles that are left out with them, 1/s.
+    hidden, cancelled : ndarray
+        Poles that are left out with them, as A has them, and those that zeros cancel.
     dt : float
         Time between samples, s; 0: continuous. x is just before the first tick of a period, y just
         after it.
@@ -59,6 +61,9 @@ class Linear:
         Ticks of samplers at the point. Until `discretized`, x' holds between them.
     between : Linear or None
         The model between ticks that has been discretized.
+    loop, margins : Linear and Margins, or None
+        What a signal sent in at the break brings back, its sign changed, and by how much it may
+        change. Of systems that are broken.
     """
 
     states: tuple[str, ...]
@@ -79,9 +84,12 @@ class Linear:
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     dropped: tuple[str, ...] = ()
     hidden: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))
+    cancelled: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))
     dt: float = 0.0
     ticks: tuple[Tick, ...] = ()
     between: "Linear | None" = None
+    loop: "Linear | None" = None
+    margins: "Margins | None" = None
 
     @property
     def poles(self) -> np.ndarray:
@@ -353,6 +361,8 @@ def law_model(instance: PythonInstance, time: float, step: float, u: np.ndarray)
     found, inputs = law(instance, time, step, u), tuple(instance.made.inputs)
     outputs = tuple(instance.made.outputs)
     n, p = len(found.states), len(outputs)
+    ways = (found.partials[:, n:].T != 0) @ closure(found.partials[:, :n].T != 0)
+    unseen = [name for name, way in zip(inputs, ways[:, n - p :], strict=True) if not way.any()]
     return Linear(
         states=found.states,
         inputs=inputs,
@@ -366,6 +376,7 @@ def law_model(instance: PythonInstance, time: float, step: float, u: np.ndarray)
         y=found.x[n - p :],
         rates=(found.after - found.x) / step,
         at=dict(zip((*found.states, *inputs), [*found.x.tolist(), *u.tolist()], strict=True)),
+        flat=tuple(f"step in {name}" for name in unseen),
         dt=step,
     )
 

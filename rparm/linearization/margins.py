@@ -2,9 +2,9 @@
 
 The loop is broken at a signal: L is what comes back, with its sign changed, by what is sent in.
 
-A sampled loop is taken to the plane of w by z = (1 + w T/2) / (1 - w T/2): the unit circle becomes
-the imaginary axis, where gains and phases of L are the same and frequencies are tan(omega T/2) 2/T.
-A further delay is exact in whole samples.
+Where a sampled loop is looked at is found in the plane of w, z = (1 + w T/2) / (1 - w T/2): the
+unit circle becomes the imaginary axis, and frequencies tan(omega T/2) 2/T. A further delay is exact
+in whole samples.
 """
 
 import math
@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rparm.errors import UserError
 from rparm.linearization import responses
-from rparm.linearization.linear import Linear, cleared, zeros
+from rparm.linearization.linear import Linear, cleared
 
 ROUNDING = 1e-12  # relative, of a real part that is 0
+GROWING = 1e-6  # relative, of the real part of a hidden pole: above is growth
 DECADES = 2  # below the slowest and above the fastest pole, zero or crossing: where to search
 FARTHEST = 1e8  # beyond these: zeros and crossings at 0 and infinity, moved by rounding
 BISECTIONS = 60
@@ -32,16 +32,31 @@ class Crossing:
 
 
 @dataclass(frozen=True)
-class Margins:
-    """Margins of a loop; nan or inf if nothing of the kind makes it unstable."""
+class Peak:
+    """A largest gain, and where it is."""
 
-    stable: bool  # without it, all margins are nan
+    frequency: float  # rad/s
+    value: float
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Margins of a loop; nan or inf if nothing of the kind makes it unstable.
+
+    Of the disk margin a, gains between (2 - a) / (2 + a) and its inverse are borne together with
+    phases up to 2 atan(a / 2): 1 / a is the largest |S - 1/2|, with S = 1 / (1 + L).
+    """
+
+    stable: bool  # without it, all margins are nan; with poles that are hidden from the break
     gain_up: float  # factor of the loop's gain at which it loses stability
     gain_down: float  # another one, below 1; 0: none
     phase: float  # further lag in degrees
     delay: float  # further one in s
     gain_crossings: tuple[Crossing, ...]  # where the gain is 1
     phase_crossings: tuple[Crossing, ...]  # where the phase is -180 degrees
+    disk: Peak  # at its frequency
+    sensitivity: Peak  # of S
+    complementary: Peak  # of L / (1 + L)
 
 
 def open_loop(broken: Linear) -> Linear:
@@ -51,38 +66,55 @@ def open_loop(broken: Linear) -> Linear:
 
 def margins(loop: Linear) -> Margins:
     """Return the margins of a loop L, which has one input and one output and is minimal."""
-    if loop.dt:
-        in_w = _in_w(loop)
-        found = margins(in_w)
-        gains, turns = (
-            tuple(_real(crossing, loop.dt) for crossing in crossings)
-            for crossings in (found.gain_crossings, found.phase_crossings)
-        )
-        found = replace(found, gain_crossings=gains, phase_crossings=turns)
-        # with a gain of 1 or more at the end of frequencies, a delay of one sample is too much
-        delays = [*_delays(found), *([loop.dt] if abs(in_w.D[0, 0]) >= 1 else [])]
-        delay = min(delays, default=math.inf)
-        return replace(found, delay=delay) if found.stable else found
-    grid = searched(loop)
+    grid, ends = searched(loop), _ends(loop)
     gains = tuple(_crossings(loop, grid, lambda value: np.abs(value) - 1))
-    turns = (*_crossings(loop, grid, np.imag), *_ends(loop))
+    turns = (*_crossings(loop, grid, np.imag), *(end for end, bound in ends if abs(end.value) > bound))
     turns = tuple(found for found in turns if found.value.real < 0)
-    poles = closed(loop).poles if 1 + loop.D[0, 0] else np.zeros(1)
-    if not np.all(poles.real < -ROUNDING * np.abs(poles)):
-        return Margins(False, math.nan, math.nan, math.nan, math.nan, gains, turns)
+    if not is_stable(loop):
+        none = Peak(math.nan, math.nan)
+        return Margins(False, *[math.nan] * 4, gains, turns, none, none, none)
     factors = [1 / abs(found.value) for found in turns]
-    found = Margins(
+    delays = [lag(found) / found.frequency for found in gains]
+    if not all(abs(end.value) + bound < 1 for end, bound in ends if end.frequency):
+        delays.append(loop.dt)  # at high frequencies any delay is too much, or one of a sample
+    back = _peak(loop, grid, ends, lambda value: 1 / (1 + value) - 0.5)
+    return Margins(
         stable=True,
         gain_up=min((factor for factor in factors if factor > 1), default=math.inf),
         gain_down=max((factor for factor in factors if factor < 1), default=0.0),
         phase=math.degrees(min(map(lag, gains), default=math.nan)),
-        delay=math.inf,
+        delay=min(delays, default=math.inf),
         gain_crossings=gains,
         phase_crossings=turns,
+        disk=replace(back, value=1 / back.value),
+        sensitivity=_peak(loop, grid, ends, lambda value: 1 / (1 + value)),
+        complementary=_peak(loop, grid, ends, lambda value: value / (1 + value)),
     )
-    # at high frequencies any delay is too much
-    delays = [*_delays(found), *([0.0] if abs(loop.D[0, 0]) >= 1 else [])]
-    return replace(found, delay=min(delays, default=math.inf))
+
+
+def is_stable(loop: Linear) -> bool:
+    """Return whether deviations die out when the loop is closed, hidden ones too.
+
+    Hidden ones may stay where they are; where the break does not come to them they may also ring.
+    """
+    if not 1 + loop.D[0, 0]:
+        return False
+    poles = closed(loop).poles
+    dying = np.abs(poles) < 1 - ROUNDING if loop.dt else poles.real < -ROUNDING * np.abs(poles)
+    return bool(dying.all()) and not len(growing(loop)) and not len(ringing(loop, loop.cancelled))
+
+
+def growing(loop: Linear) -> np.ndarray:
+    """Return the rates, 1/s, of hidden poles that grow."""
+    rates = loop.rates_of(loop.hidden)
+    return rates[rates.real > GROWING * np.abs(rates)]
+
+
+def ringing(loop: Linear, hidden: np.ndarray) -> np.ndarray:
+    """Return the rates, 1/s, of hidden poles that neither grow nor die out, except those at 0."""
+    rates = loop.rates_of(hidden)
+    rings = np.abs(rates.imag) > (GROWING / loop.dt if loop.dt else 0.0)
+    return rates[rings & (np.abs(rates.real) <= GROWING * np.abs(rates.imag))]
 
 
 def lag(crossing: Crossing) -> float:
@@ -90,33 +122,43 @@ def lag(crossing: Crossing) -> float:
     return (math.pi + float(np.angle(crossing.value))) % (2 * math.pi)
 
 
-def _delays(found: Margins) -> list[float]:
-    return [lag(crossing) / crossing.frequency for crossing in found.gain_crossings]
+def _ends(loop: Linear) -> list[tuple[Crossing, float]]:
+    """Return the ends of L where it is real, with bounds of their rounding.
+
+    They are at 0, if it has no pole there, and at infinity or the end of a sampled loop.
+    """
+    w = np.array([0.0, math.pi / loop.dt] if loop.dt else [0.0])
+    found = zip(w.tolist(), *responses.bounded_response(loop)(w), strict=True)
+    ends = [(Crossing(at, complex(value.real)), float(bound)) for at, value, bound in found]
+    if loop.dt:
+        return ends
+    at_infinity = Crossing(math.inf, complex(loop.D[0, 0])), 0.0
+    return [*(ends if loop.poles.all() else []), at_infinity]
 
 
-def _in_w(loop: Linear) -> Linear:
-    """Take a sampled loop to the plane of w."""
-    half, one = loop.dt / 2, np.eye(len(loop.A))
-    try:
-        inverse = np.linalg.inv(one + loop.A)
-    except np.linalg.LinAlgError:
-        raise UserError("the broken loop has a pole at -1: its margins are not known") from None
-    A, B = inverse @ (loop.A - one) / half, inverse @ loop.B
-    return replace(loop, A=A, B=B, C=2 / half * loop.C @ inverse, D=loop.D - loop.C @ B, dt=0.0)
+def _peak(
+    loop: Linear,
+    grid: np.ndarray,
+    ends: list[tuple[Crossing, float]],
+    function: Callable[[np.ndarray], np.ndarray],
+) -> Peak:
+    """Find the largest size of a function of L."""
+    from scipy.optimize import minimize_scalar
 
+    response = responses.frequency_response(loop)
 
-def _real(crossing: Crossing, step: float) -> Crossing:
-    """Return a crossing in the plane of w at its frequency."""
-    return replace(crossing, frequency=2 / step * math.atan(crossing.frequency * step / 2))
+    def sizes(w: np.ndarray) -> np.ndarray:
+        return np.nan_to_num(np.abs(function(response(w))))
 
-
-def _ends(loop: Linear) -> Iterator[Crossing]:
-    """Return the ends of L where it is real: at 0, if it has no pole there, and at infinity."""
-    value, bound = (each[0] for each in responses.bounded_response(loop)(np.zeros(1)))
-    if loop.poles.all() and abs(value) > bound:
-        yield Crossing(0.0, complex(value))
-    if loop.D[0, 0]:
-        yield Crossing(math.inf, complex(loop.D[0, 0]))
+    i = int(sizes(grid).argmax())
+    around = tuple(np.log(grid[[max(i - 1, 0), min(i + 1, len(grid) - 1)]]))
+    found = minimize_scalar(
+        lambda x: -sizes(np.exp([x]))[0], bounds=around, method="bounded", options={"xatol": 1e-12}
+    )
+    peaks = [Peak(math.exp(found.x), -float(found.fun))]
+    clear = [end for end, bound in ends if bound < ROUNDING + GROWING * abs(end.value)]
+    peaks += [Peak(end.frequency, float(abs(function(np.array(end.value))))) for end in clear]
+    return max(peaks, key=lambda peak: peak.value)
 
 
 def closed(loop: Linear) -> Linear:
@@ -130,19 +172,28 @@ def closed(loop: Linear) -> Linear:
 def searched(loop: Linear) -> np.ndarray:
     """Return frequencies in rad/s between which L has one crossing at most, ascending.
 
-    Crossings are zeros of L(s) L(-s) - 1 and L(s) - L(-s) on the axis. Rounding moves them as
-    eigenvalues, so they only say where to look, as poles and zeros do.
+    Crossings are zeros of L(s) L(-s) - 1 and L(s) - L(-s) on the axis, or with 1/z for -s on the
+    unit circle. Rounding moves them as eigenvalues, so they only say where to look, as poles and
+    zeros do.
     """
-    if loop.dt:
-        return 2 / loop.dt * np.arctan(searched(_in_w(loop)) * loop.dt / 2)
     scale = responses.suited(loop.A, loop.B, loop.C)
     A, B, C, D = loop.A * scale / scale[:, None], loop.B / scale[:, None], loop.C * scale, loop.D
-    none = np.zeros_like(A)
-    whole = np.block([[A, none], [-C.T @ C, -A.T]])
-    gains = zeros(whole, np.vstack([B, -C.T @ D]), np.hstack([D @ C, B.T]), D @ D - 1)
-    whole = np.block([[A, none], [none, -A]])
-    turns = zeros(whole, np.vstack([B, -B]), np.hstack([C, -C]), np.zeros((1, 1)))
+    none, one, still = np.zeros_like(A), np.eye(len(A)), np.zeros_like(B)
+
+    def zeros(mirrored: list[np.ndarray], last: list[np.ndarray]) -> np.ndarray:
+        back, own = np.hstack(mirrored), np.hstack([none, one, still])
+        whole, lead = (own, back) if loop.dt else (-back, own)
+        whole = np.vstack([np.hstack([A, none, B]), whole, np.hstack(last)])
+        lead = np.vstack([np.hstack([one, none, still]), lead, np.zeros((1, len(whole)))])
+        return _finite(whole, lead, loop.dt)
+
+    gains = zeros([C.T @ C, A.T, C.T @ D], [D @ C, B.T, D @ D - 1])
+    turns = zeros([none, A, B], [C, -C, np.zeros((1, 1))])
+    own = _finite(np.block([[A, B], [C, D]]), np.diag([*[1.0] * len(A), 0.0]), loop.dt)
     poles = np.array([*loop.poles, *closed(loop).poles])
+    if loop.dt:
+        poles = poles[np.abs(poles + 1) > ROUNDING]
+        poles = 2 / loop.dt * (poles - 1) / (poles + 1)
     rates = np.abs(poles[poles != 0]) if poles.any() else np.ones(1)
 
     def near(found: np.ndarray) -> np.ndarray:
@@ -150,8 +201,20 @@ def searched(loop: Linear) -> np.ndarray:
         return found[(size > rates.min() / FARTHEST) & (size < rates.max() * FARTHEST)]
 
     found = near(np.concatenate([gains, turns]))
-    steep = [*poles, *near(zeros(A, B, C, D))]
-    return responses.frequencies(steep, [*np.abs(found), *np.abs(found.imag)], DECADES)
+    further = [*np.abs(found), *np.abs(found.imag)]
+    grid = responses.frequencies([*poles, *near(own)], further, DECADES)
+    return 2 / loop.dt * np.arctan(grid * loop.dt / 2) if loop.dt else grid
+
+
+def _finite(whole: np.ndarray, lead: np.ndarray, dt: float) -> np.ndarray:
+    """Return the finite s, or w of a sampled loop, at which whole - s lead or z lead is singular."""
+    from scipy.linalg import eigvals
+
+    if dt:
+        moving = lead.any(axis=1, keepdims=True)
+        whole, lead = whole - lead, np.where(moving, dt / 2 * (whole + lead), 0.0)
+    found = eigvals(whole, lead)
+    return found[np.isfinite(found)]
 
 
 def _crossings(

@@ -10,7 +10,16 @@ import numpy as np
 
 from rparm.linearization.largest_step import LargestStep
 from rparm.linearization.linear import Linear, participations, zeros
-from rparm.linearization.margins import Crossing, Margins, closed, lag, searched
+from rparm.linearization.margins import (
+    Crossing,
+    Margins,
+    Peak,
+    closed,
+    growing,
+    lag,
+    ringing,
+    searched,
+)
 from rparm.linearization.responses import frequencies, frequency_response
 from rparm.linearization.study import Study
 from rparm.report import pages
@@ -137,13 +146,12 @@ def notes(found: Study) -> list[str]:
             f"Not in the loop: {_names(found.loop.dropped)}. The break does not move them, or they "
             "do not come back to it, or others stand for them."
         )
-        hidden = found.loop.rates_of(found.loop.hidden)
-        growing = hidden[hidden.real > REAL * np.abs(hidden)]
-        if len(growing):
-            texts.append(
-                f"They grow by e^({_short(float(growing.real.max()))} t) whatever the loop does: "
-                "the margins do not say so."
-            )
+        if len(rates := growing(found.loop)):
+            fastest = _short(float(rates.real.max()))
+            texts.append(f"They grow by e^({fastest} t) whatever the loop does.")
+        if len(rates := ringing(found.loop, found.loop.hidden)):
+            hertz = _short(float(np.abs(rates.imag).max()) / (2 * math.pi))
+            texts.append(f"They ring at {hertz} Hz for ever, once moved, whatever the loop does.")
     if found.margins is not None and not found.margins.stable:
         texts.append("The closed loop is unstable here: it has no margins.")
     point = linear.between or linear
@@ -261,8 +269,8 @@ def _marks(found: Margins | None) -> list[Data]:
     ]  # fmt: skip
 
 
-def _hertz(crossing: Crossing) -> float:
-    return crossing.frequency / (2 * math.pi)
+def _hertz(at: Crossing | Peak) -> float:
+    return at.frequency / (2 * math.pi)
 
 
 def margins_table(found: Margins) -> pages.Table:
@@ -274,6 +282,10 @@ def margins_table(found: Margins) -> pages.Table:
         ["gain margin, down (times)", _or_none(found.gain_down or math.inf), at.get("down", NONE)],
         ["phase margin (degrees)", _or_none(found.phase), at.get("phase", NONE)],
         ["delay margin", delay, at.get("delay", NONE)],
+        ["disk margin", _or_none(found.disk.value), _or_none(_hertz(found.disk))],
+        *([name, _or_none(peak.value), _or_none(_hertz(peak))] for name, peak in (
+            ("peak of the sensitivity", found.sensitivity),
+            ("peak of the complementary one", found.complementary))),
         *(["the loop's gain is 1", NONE, _short(_hertz(x))] for x in found.gain_crossings),
     ]  # fmt: skip
     return pages.Table("Margins", ["margin", "value", "at (Hz)"], rows)

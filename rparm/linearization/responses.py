@@ -1,14 +1,17 @@
 """Responses at frequencies, the frequencies to look at, and the minimal part of a linear model.
 
-The minimal part lies between inputs and outputs. Units do not decide what belongs to it: a small
-entry of A may be the inverse of a large mass.
+The minimal part lies between inputs and outputs. Which entries are 0 decides what belongs to it,
+and of states that last also which sums cancel, each compared with its own terms: a small entry of A
+may be the inverse of a large mass.
 """
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rparm.errors import UserError
 from rparm.linearization.linear import Linear, cleared, closure, eigenvalues, scales
 
 ROUNDING = 1e-15  # relative, of entries and operations
@@ -19,9 +22,10 @@ UNDAMPED = 1e-9  # damping below which a pole or zero is taken to have this one
 AT_ONCE = 10**6  # entries of matrices that are solved in one call
 Response = Callable[[np.ndarray], np.ndarray]
 Answers = tuple[np.ndarray, ...]
-NEGLIGIBLE = 1e-11  # relative: less is 0
+NEGLIGIBLE = 1e-11  # of its terms: a sum that is 0
 SPREAD = 1e-6  # relative, of poles that are equal, by rounding
 REFINEMENTS = 3  # of such a pole
+CHECKED, SAME = 30, 1e-4  # frequencies, and relative difference, of what should be the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +36,7 @@ class _Transfer:
     B: np.ndarray
     C: np.ndarray
     D: np.ndarray
+    size: float  # of the points, whose difference to A rounds; 0: it is exact
 
     def values(self, p: np.ndarray) -> np.ndarray:
         """Return values at p (k,)."""
@@ -52,7 +57,8 @@ class _Transfer:
         x = self._states(matrices)
         z = _solved(matrices.transpose(0, 2, 1), self.C.T)
         least = ROUNDING * (2 + len(self.A))
-        left = np.abs(self.B - matrices @ x) + least * np.abs(matrices) @ np.abs(x)
+        sizes = np.abs(matrices) + 2 * self.size * np.eye(len(self.A))
+        left = np.abs(self.B - matrices @ x) + least * sizes @ np.abs(x)
         bounds = np.abs(z).transpose(0, 2, 1) @ left
         bounds = bounds + least * (np.abs(self.C) @ np.abs(x) + np.abs(self.D))
         return self._value(x), bounds[:, 0, 0]
@@ -93,7 +99,7 @@ def frequency_response(model: Linear) -> Response:
 def _transfer(model: Linear) -> _Transfer:
     scale = suited(model.A, model.B, model.C)
     A, B, C = model.A * scale / scale[:, None], model.B / scale[:, None], model.C * scale
-    return _Transfer(A, B, C, model.D)
+    return _Transfer(A, B, C, model.D, float(model.dt > 0))
 
 
 def frequencies(steep: Iterable[complex], further: Iterable[float], decades: float) -> np.ndarray:
@@ -119,21 +125,25 @@ def frequencies(steep: Iterable[complex], further: Iterable[float], decades: flo
 
 # ---- The minimal part ----------------------------------------------------------------------------
 def minimal(model: Linear) -> Linear:
-    """Leave out states that inputs do not move or outputs do not see; some may stand for others."""
+    """Leave out states that inputs do not move or outputs do not see.
+
+    Of states that do not die out some may stand for others, whose poles zeros cancel. UserError if
+    what is left answers otherwise.
+    """
     ways = closure(model.A.T != 0)
     is_between = (model.B.any(axis=1) @ ways) & (ways @ model.C.any(axis=0))
     kept, rest = np.flatnonzero(is_between), np.flatnonzero(~is_between)
-    hidden = [eigenvalues(model.A[np.ix_(rest, rest)])]
+    hidden, cancelled = eigenvalues(model.A[np.ix_(rest, rest)]), [np.zeros(0, complex)]
     A, B, C = model.A[np.ix_(kept, kept)], model.B[kept], model.C[:, kept]
     scale = suited(A, B, C)
     A, B, C = A * scale / scale[:, None], B / scale[:, None], C * scale
-    while (found := _rule(A, B)) is not None:
+    while (found := _rule(A, B, model.dt)) is not None:
         A, B, C, kept, scale = _ruled(found, A, B, C, kept, scale)
-        hidden.append(found.poles)
-    while (found := _rule(A.T, C.T)) is not None:
+        cancelled.append(found.poles)
+    while (found := _rule(A.T, C.T, model.dt)) is not None:
         A, C, B, kept, scale = (each.T for each in _ruled(found, A.T, C.T, B.T, kept, scale))
-        hidden.append(found.poles)
-    return replace(
+        cancelled.append(found.poles)
+    result = replace(
         model,
         states=tuple(model.states[i] for i in kept),
         A=A / scale * scale[:, None],
@@ -142,8 +152,35 @@ def minimal(model: Linear) -> Linear:
         x=model.x[kept],
         rates=model.rates[kept],
         dropped=tuple(name for i, name in enumerate(model.states) if i not in kept),
-        hidden=np.concatenate(hidden),
+        hidden=np.concatenate([hidden, *cancelled]),
+        cancelled=np.concatenate(cancelled),
     )
+    check_same(model, result)
+    return result
+
+
+def check_same(model: Linear, part: Linear) -> None:
+    """Refuse a part whose responses, or poles with those that it hides, are not the model's."""
+    rates = np.abs(model.rates_of(model.poles))
+    rates = rates[(rates > 0) & np.isfinite(rates)]
+    low, high = (rates.min(), rates.max()) if len(rates) else (1.0, 1.0)
+    if model.dt:
+        low, high = min(low, 0.1 / model.dt), math.pi / model.dt / 1.5
+    w = np.geomspace(low / 3, high * 1.5, CHECKED)
+    (values, bounds), (others, further) = (bounded_response(each)(w) for each in (model, part))
+    size = np.maximum(np.abs(values), np.abs(others))
+    is_same = ~(np.abs(values - others) > SAME * size + bounds + further)
+    p = model.points(w)[:, None]
+    (signs, sizes), (turned, logs) = (
+        np.linalg.slogdet(p[..., None] * np.eye(len(each.A)) - each.A) for each in (model, part)
+    )
+    away = p - part.hidden
+    logs = logs + np.log(np.abs(away)).sum(axis=1)
+    turned = turned * (away / np.abs(away)).prod(axis=1)
+    is_same &= ~(np.abs(turned / signs * np.exp(logs - sizes) - 1) > SAME)
+    if not is_same.all():
+        why = "rounding hides which states are in the loop, and its margins"
+        raise UserError(f"--break {model.inputs[0]}: {why}: expected another break")
 
 
 def suited(A: np.ndarray, B: np.ndarray, C: np.ndarray) -> np.ndarray:
@@ -162,23 +199,28 @@ class _Rule:
     poles: np.ndarray
 
 
-def _rule(A: np.ndarray, B: np.ndarray) -> _Rule | None:
-    """Find sums of states that are 0 for ever if they are at first, if there are any.
+def _rule(A: np.ndarray, B: np.ndarray, dt: float) -> _Rule | None:
+    """Find sums of states that are 0 for ever if they are at first, and else do not die out.
 
     Such a sum is a left eigenvector of A that B is orthogonal to: w^T [A - p, B] = 0. Scaling shows
-    a fast mode behind a chain of slow states, which moves them little, but not by rounding.
+    what moves them little, but not by rounding.
     """
     one = np.eye(len(A))
     for found in eigenvalues(A):
+        if (abs(found) < 1 - SPREAD) if dt else (found.real < -SPREAD * abs(found)):
+            continue
         p = found if abs(found.imag) > SPREAD * abs(found) else found.real
+        if dt and abs(abs(p) - 1) < SPREAD and np.isreal(p):
+            p = np.sign(p)
         for _ in range(REFINEMENTS):
             moved = cleared(A - p * one, np.abs(A) + abs(p) * one)
             whole, rows = _equilibrated(np.hstack([moved, B]))
-            left, values, _ = np.linalg.svd(whole)
+            left = np.linalg.svd(whole)[0]
             w = left[:, -1].conj()
             w = np.where(np.abs(w) > NEGLIGIBLE * np.abs(w).max(), w, 0) * rows
             w /= np.linalg.norm(w)
-            if values[-1] < NEGLIGIBLE * values[0]:
+            terms = np.abs(w) @ np.hstack([np.abs(A) + abs(p) * one, np.abs(B)])
+            if (np.abs(w @ np.hstack([moved, B])) <= NEGLIGIBLE * terms).all():
                 parts = [w.real, w.imag] if np.iscomplex(p) else [w]
                 return _Rule(np.column_stack(parts), np.array([p, np.conj(p)][: len(parts)]))
             p = w @ A @ w.conj()

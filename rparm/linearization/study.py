@@ -110,6 +110,7 @@ def of_system(opened: OpenedSystem, request: Request) -> Study:
         else:
             steps = largest_steps(parts, subject.connections, subject.ways, subject.law)
             limits |= {"largest": steps}
+        found = replace(found, **{name: limits.get(name) for name in ("loop", "margins")})
         return Study(path, found, units, request.free, variant, **limits)
 
 
@@ -190,8 +191,11 @@ def document(found: Study, step: float | None) -> Document:
     if found.margins is not None:
         names = ("gain_up", "gain_down", "phase", "delay")
         numbers = {name: finite(getattr(found.margins, name)) for name in names}
-        dropped = list(found.loop.dropped) if found.loop is not None else []
-        result["margins"] = {"stable": found.margins.stable, **numbers, "dropped": dropped}
+        for name in ("disk", "sensitivity", "complementary"):
+            numbers[name] = finite(getattr(found.margins, name).value)
+        loop = found.loop or found.linear
+        lost = {"dropped": list(loop.dropped), "hidden": pairs(loop.hidden)}
+        result["margins"] = {"stable": found.margins.stable, **numbers, **lost}
     return result
 
 
