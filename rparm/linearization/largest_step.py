@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rparm.linearization.linear import Linear
+from rparm.linearization.linear import Linear, scales
 from rparm.linearization.sampling import Tick, by_steps, hold, period
 from rparm.linearization.system import SystemSubject, connected, looped
 from rparm.systems import ssp
@@ -27,6 +27,7 @@ from rparm.units import duration, verdict
 FASTEST, SLOWEST = 1e-3, 1e2  # of the time scales of fastest and slowest pole: steps to try
 RATIO = 1.04  # of a step to the next one that is tried
 BISECTIONS = 60
+NEAR, ROUNDING = 1 - 1e-6, 1e-15  # of an eigenvalue that may be 1, and of entries
 MOST_STEPS = 20  # in a period of samplers
 MOST_TICKS = 2000  # in a step
 Way = tuple[str, str]  # order and inputs, as in `rparm.systems.master`
@@ -94,21 +95,36 @@ def largest_steps(
         found = found.select(part.inputs, part.outputs)
         return found.A, found.B, np.zeros_like(found.B)
 
-    def eigenvalues(step: float, way: Way) -> np.ndarray:
+    def whole(step: float, way: Way) -> np.ndarray:
         maps = (
             transition(loop.parts, loop.connections, step, *way, partial(held, k=k))
             for k in range(len(steps(step)))
         )
-        return np.linalg.eigvals(reduce(lambda before, one: one @ before, maps))
+        return reduce(lambda before, one: one @ before, maps)
 
-    return [_largest(partial(eigenvalues, way=way), way, tried.tolist(), every) for way in ways]
+    return [_largest(partial(whole, way=way), way, tried.tolist(), every) for way in ways]
+
+
+def factor(whole: np.ndarray) -> float:
+    """Return the size of the largest eigenvalue, 1 if only rounding says that it is less."""
+    from scipy.linalg import eig
+
+    found = float(np.abs(np.linalg.eigvals(whole)).max())
+    if not NEAR < found < 1.0:
+        return found
+    scale = scales(whole)
+    whole = whole * scale / scale[:, None]
+    values, left, right = eig(whole, left=True)
+    with np.errstate(divide="ignore"):
+        rounding = ROUNDING * np.linalg.norm(whole) / np.abs((left.conj() * right).sum(axis=0))
+    return 1.0 if (np.abs(values) + rounding >= 1.0).any() else found
 
 
 def _largest(
-    eigenvalues: Callable[[float], np.ndarray], way: Way, tried: list[float], every: list[Tick]
+    whole: Callable[[float], np.ndarray], way: Way, tried: list[float], every: list[Tick]
 ) -> LargestStep:
     def growth(step: float) -> float:
-        return float(np.abs(eigenvalues(step)).max())
+        return factor(whole(step))
 
     low = 0.0
     for high in tried:
@@ -122,7 +138,7 @@ def _largest(
     for _ in range(0 if every else BISECTIONS):
         middle = (low + high) / 2
         low, high = (middle, high) if growth(middle) < 1.0 else (low, middle)
-    found = eigenvalues(low)
+    found = np.linalg.eigvals(whole(low))
     angle = abs(np.angle(found[np.abs(found).argmax()]))
     return LargestStep(*way, low, float(angle / (2 * math.pi * period(every, low))))
 

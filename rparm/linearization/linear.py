@@ -300,7 +300,8 @@ def scales(A: np.ndarray) -> np.ndarray:
     """Return units of states, powers of 2, that make rows and columns of about the same size."""
     from scipy.linalg import matrix_balance
 
-    return matrix_balance(A, permute=False, separate=True)[1][0] if len(A) else np.ones(0)
+    with np.errstate(invalid="ignore"):  # of places, which units beyond 2**63 are taken for
+        return matrix_balance(A, permute=False, separate=True)[1][0] if len(A) else np.ones(0)
 
 
 # ---- Of an FMU -----------------------------------------------------------------------------------
