@@ -68,14 +68,17 @@ def margins(loop: Linear) -> Margins:
     """Return the margins of a loop L, which has one input and one output and is minimal."""
     grid, ends = searched(loop), _ends(loop)
     gains = tuple(_crossings(loop, grid, lambda value: np.abs(value) - 1))
-    turns = (*_crossings(loop, grid, np.imag), *(end for end, bound in ends if abs(end.value) > bound))
+    turns = (
+        *_crossings(loop, grid, np.imag),
+        *(end for end, bound in ends if abs(end.value.real) > bound),
+    )
     turns = tuple(found for found in turns if found.value.real < 0)
     if not is_stable(loop):
         none = Peak(math.nan, math.nan)
         return Margins(False, *[math.nan] * 4, gains, turns, none, none, none)
     factors = [1 / abs(found.value) for found in turns]
     delays = [lag(found) / found.frequency for found in gains]
-    if not all(abs(end.value) + bound < 1 for end, bound in ends if end.frequency):
+    if not all(abs(end.value.real) + bound < 1 for end, bound in ends if end.frequency):
         delays.append(loop.dt)  # at high frequencies any delay is too much, or one of a sample
     back = _peak(loop, grid, ends, lambda value: 1 / (1 + value) - 0.5)
     return Margins(
@@ -156,7 +159,7 @@ def _peak(
         lambda x: -sizes(np.exp([x]))[0], bounds=around, method="bounded", options={"xatol": 1e-12}
     )
     peaks = [Peak(math.exp(found.x), -float(found.fun))]
-    clear = [end for end, bound in ends if bound < ROUNDING + GROWING * abs(end.value)]
+    clear = [end for end, bound in ends if bound < ROUNDING + GROWING * abs(end.value.real)]
     peaks += [Peak(end.frequency, float(abs(function(np.array(end.value))))) for end in clear]
     return max(peaks, key=lambda peak: peak.value)
 
@@ -207,7 +210,7 @@ def searched(loop: Linear) -> np.ndarray:
 
 
 def _finite(whole: np.ndarray, lead: np.ndarray, dt: float) -> np.ndarray:
-    """Return the finite s, or w of a sampled loop, at which whole - s lead or z lead is singular."""
+    """Return the finite s, or w for z if sampled, at which whole - s lead is singular."""
     from scipy.linalg import eigvals
 
     if dt:

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+import mpmath
 import numpy as np
 import pytest
 from rparm.models.closed_loop.study import REST as LOOP
@@ -16,11 +17,13 @@ from scipy.linalg import expm
 from rparm.linearization.largest_step import (
     LargestStep,
     Resting,
+    factor,
     largest_steps,
     resting,
     transition,
 )
-from rparm.linearization.linear import Linear
+from rparm.linearization.linear import Linear, closure
+from rparm.linearization.sampling import exponential, hold
 from rparm.systems.master import INPUT_MODES, ORDERS
 from rparm.systems.structure import Connection
 from tests.support.paths import ROOT
@@ -125,3 +128,50 @@ def test_without_a_loop_there_is_no_limit() -> None:
     opposed = replace(alone, B=-alone.B)  # x' = -x - x
     stable = largest_steps({"a": opposed}, [Connection("a", "x", "a", "u")])
     assert all(isinstance(x, LargestStep) and x.step > 0 for x in stable)
+
+
+def test_steps_of_years_keep_their_digits() -> None:
+    """x' = -a x + c y, y' = -g x, and a^2 above c g: late by a step, x dies out up to a / (c g)."""
+    a, c, g = 4e-4, 1.3, 1e-12
+    A, B, zero = np.array([[-a, c], [0, 0]]), np.array([[0.0], [1.0]]), np.zeros
+    plant = Linear(
+        ("x", "y"), ("u",), ("x",), A, B, np.eye(1, 2), zero((1, 1)), *map(zero, (2, 1, 1, 2))
+    )
+    none = zero((0, 0)), zero((0, 1)), zero((1, 0)), np.array([[-g]])
+    law = Linear((), ("x",), ("u",), *none, *map(zero, (0, 1, 1, 0)))
+    wires = [Connection("plant", "x", "law", "x"), Connection("law", "u", "plant", "u")]
+    ways = [("jacobi", "held"), ("gauss_seidel", "held")]
+    steps = [x.step for x in largest_steps({"plant": plant, "law": law}, wires, ways)]
+    assert steps == pytest.approx([a / c / g, 2 * a / c / g], rel=1e-5)  # but for 1 / (a h)
+    h = 6.7e8
+    F, G, S = hold(A, B, h)
+    exact = c / a * np.array([1, h - 1 / a, h * h / 2 - h / a + 1 / a**2])
+    np.testing.assert_allclose([F[0, 1], G[0, 0], S[0, 0]], exact, rtol=1e-13)
+
+
+def test_a_motion_that_neither_grows_nor_dies_out_has_no_stable_step() -> None:
+    """An undamped mass on a spring, at each step exactly; in units 12 decades apart."""
+    for unit in (1.0, 1e12):
+        A = np.array([[0, unit, 0], [-1 / unit, 0, 0], [0, 0, -1.0]])
+        opposed = Linear(
+            ("x", "v", "y"), ("u",), ("x",), A, np.zeros((3, 1)), np.eye(1, 3), np.zeros((1, 1)),
+            *map(np.zeros, (3, 1, 1, 3)),
+        )  # fmt: skip
+        whole = transition({"a": opposed}, [Connection("a", "x", "a", "u")], 0.01)
+        assert factor(whole) == 1.0
+    assert factor(np.diag([0.5, 1 - 1e-9])) == 1 - 1e-9
+
+
+def test_what_no_power_leads_to_is_exactly_0() -> None:
+    """exp of two chains, and of a slow state beside fast ones, in units 12 decades apart."""
+    source = np.random.default_rng(7)
+    for _ in range(10):
+        units = 10 ** source.uniform(-6, 6, 6)
+        A = np.triu(source.normal(size=(6, 6))) * (source.random((6, 6)) < 0.5)
+        A[np.diag_indices(6)] = -(10 ** source.uniform(-4, 2, 6))
+        found, reached = exponential(A * units[:, None] / units), closure(A != 0)
+        assert not found[~reached].any()
+        with mpmath.workdps(80):
+            exact = np.array(mpmath.expm(mpmath.matrix(A.tolist())).tolist(), float)
+        rounding = 1e-13 * expm(np.where(np.eye(6), A, np.abs(A)))
+        assert (np.abs(found / units[:, None] * units - exact) <= rounding).all()

@@ -5,6 +5,7 @@ both sides of each margin.
 """
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import factorial
 from pathlib import Path
@@ -12,13 +13,17 @@ from pathlib import Path
 import control
 import numpy as np
 import pytest
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, expm, solve_discrete_are
 
+from rparm.errors import UserError
 from rparm.linearization import page
 from rparm.linearization.linear import Linear, participations
-from rparm.linearization.margins import Margins, margins
-from rparm.linearization.responses import minimal
+from rparm.linearization.margins import Margins, margins, open_loop
+from rparm.linearization.responses import check_same, minimal
+from rparm.linearization.sampling import Tick
 from rparm.linearization.study import Study
+from rparm.linearization.system import connected, sampled
+from rparm.systems.structure import Connection
 
 LOOPS = int(os.environ.get("MARGIN_LOOPS", "60"))
 ORDER = 10  # of the rational delay: exact within rounding up to frequency * delay = 2 pi
@@ -89,6 +94,55 @@ def test_margins_at_round_numbers() -> None:
         found = margins(linear(A, enters, 4 * leaves))
         assert not found.stable
         assert np.isnan([found.gain_up, found.gain_down, found.phase, found.delay]).all()
+
+
+def trapezoidal(c: float, plant: int) -> Linear:
+    """L of c (z - 1) / (z + 1): with 1 / s it is one sample late, with 1 / s^2 not."""
+    if plant == 1:  # c T / (z + 1) / z
+        return replace(
+            linear(np.array([[0, 1.0], [0, -1]]), np.array([[0], [1.0]]), c * np.eye(1, 2)), dt=0.1
+        )
+    A, B = np.array([[1, 1.0, 0], [0, 1, 0], [-2 * c, 0, -1]]), np.array([[0.5], [1], [0]])
+    return replace(linear(A, B, np.array([[c + 0.1, 0, 1.0]])), dt=0.1)
+
+
+def test_a_pole_at_the_end_of_frequencies() -> None:
+    """0.1 / (z (z + 1)): -1 times c at 120 degrees; a further sample makes it unstable."""
+    found = margins(minimal(trapezoidal(0.1, 1)))
+    assert found.stable and found.gain_up == pytest.approx(10.0) and found.delay == 0.1
+    (one,), angle = found.gain_crossings, 2 * np.arccos(0.05)
+    assert one.frequency == pytest.approx(angle / 0.1)
+    assert np.radians(found.phase) == pytest.approx(3 * np.pi - 1.5 * angle)
+    assert sampled_radius(*(getattr(trapezoidal(0.1, 1), x) for x in "ABC"), delay=1) > 1
+
+
+def test_a_hidden_pole_that_rings_or_grows_is_not_stable() -> None:
+    """The zero of a sampled 1 / s^2 hides a pole at -1 from the break, which rings for ever."""
+    loop = minimal(trapezoidal(0.1, 2))
+    assert loop.cancelled == pytest.approx([-1.0]) and not margins(loop).stable
+    lag = linear(np.diag([-1.0, 1.0]), np.array([[1.0], [0]]), np.ones((1, 2)))
+    assert not margins(minimal(lag)).stable
+    lag.A[1, 1] = 0.0  # a constant
+    assert margins(minimal(lag)).stable
+    with pytest.raises(UserError, match="--break u: rounding hides which states are in the loop"):
+        check_same(loop, replace(loop, hidden=loop.hidden + 0.1))
+    with pytest.raises(UserError, match="--break u: rounding hides"):
+        check_same(loop, replace(loop, C=1.01 * loop.C))
+
+
+@pytest.mark.parametrize("name", ["mode of damping 0.001", "slow zero", "unstable alone"])
+def test_disk_margin_and_peaks_are_those_of_python_control(name: str) -> None:
+    num, den = LOOPS_BY_NAME[name]
+    found, w = margins(rational(num, den)), np.geomspace(1e-3, 1e4, 2000)
+    for peak in (found.disk, found.sensitivity, found.complementary):
+        w = np.append(w, peak.frequency * (1 + np.linspace(-1e-4, 1e-4, 201)))
+    plain = control.tf(num, den)
+    disk, _, _ = control.disk_margins(plain, np.sort(w))
+    assert found.disk.value == pytest.approx(disk, rel=1e-6)
+    values = plain(1j * w)
+    assert found.sensitivity.value == pytest.approx(np.abs(1 / (1 + values)).max(), rel=1e-6)
+    back = np.abs(values / (1 + values)).max()
+    assert found.complementary.value == pytest.approx(back, rel=1e-6)
 
 
 def product(*factors: list[float]) -> list[float]:
@@ -239,6 +293,97 @@ def test_marks_are_the_margins_of_the_table() -> None:
     assert rows["gain margin, up (times)"] == ["2", "0.275664"]
     for name in ("phase margin (degrees)", "delay margin"):
         assert rows[name][1] == f"{crossing / (2 * np.pi):.6g}"
+
+
+# ---- Sampled systems -----------------------------------------------------------------------------
+SAMPLED = int(os.environ.get("SAMPLED_LOOPS", "30"))
+
+
+def closed_by(
+    plant: tuple[np.ndarray, ...], law: np.ndarray, T: float, late: bool, units: np.ndarray
+) -> tuple[Linear, Callable[[complex], float]]:
+    """L of a plant and a law [states, y] -> [states, u], and the closed loop's radius by its gain.
+
+    The law is a sampler, or `late` as in Python; the radius is from the whole in plain units.
+    """
+    A, B, C = plant
+    n, k = len(A), len(law)
+    motion = expm(T * np.block([[A, B], [np.zeros((1, n + 1))]]))[:n]
+
+    def radius(gain: complex) -> float:
+        tick, after = np.eye(n + k, dtype=complex), np.eye(n + k, dtype=complex)
+        tick[n:] = np.hstack([law[:, k:] @ C, law[:, :k]])
+        after[:n, :n], after[:n, -1] = motion[:, :n], gain * motion[:, n]
+        whole = tick - np.eye(n + k) + after if late else after @ tick
+        if late:
+            whole[n:] = tick[n:]
+        return float(np.abs(np.linalg.eigvals(whole)).max())
+
+    zero = np.zeros
+    own, other = units[:n], np.append(units[n : n + k - 1], 1.0)
+    scaled = law * other[:, None] / np.append(other, 1.0)
+    matrices = A * own[:, None] / own, B * own[:, None], C / own, zero((1, 1))
+    names = [tuple(f"{name}{i}" for i in range(count)) for name, count in (("x", n), ("s", k))]
+    parts = {"p": Linear(names[0], ("u",), ("y",), *matrices, *map(zero, (n, 1, 1, n)))}
+    at = [*map(zero, (k, 1, 1, k))]
+    leaves, through = np.eye(1, k, k - 1), zero((1, 1))
+    wires = [Connection("p", "y", "l", "y"), Connection("l", "u", "p", "u")]
+    if late:
+        parts["l"] = Linear(
+            names[1], ("y",), ("u",), scaled[:, :k], scaled[:, k:], leaves, through, *at, dt=T
+        )
+        whole = sampled(parts, wires[:1], T, ["p.y", "l.u"])
+    else:
+        tick = Tick("s", T, 0.0, [*range(k)], scaled, 0 * scaled, {}, [])
+        still = zero((k, k)), zero((k, 1))
+        parts["l"] = Linear(names[1], ("y",), ("u",), *still, leaves, through, *at, ticks=(tick,))
+        whole = connected(parts, wires[:1]).discretized()
+    return open_loop(whole.select(["p.u"], ["l.u"])), radius
+
+
+@pytest.mark.parametrize(("late", "up"), [(False, 3.967), (True, 4.073)])
+def test_margins_of_a_crane_with_a_sampled_law(late: bool, up: float) -> None:
+    """v' = 100 (pos - y) - 4 v, and u by the position and its difference."""
+    A = np.array([[-4.0, -100, 100, 0], [1, 0, 0, 0], [0, 0, 0, 1], [0, 0, 0, 0]])
+    plant = A, np.eye(4)[:, [3]], np.eye(4)[[1]]
+    loop, radius = closed_by(plant, np.array([[0, 0, 1.0], [10, 0, -10.5]]), 0.1, late, np.ones(9))
+    found = margins(loop)
+    assert found.gain_up == pytest.approx(up, abs=1e-3)
+    assert radius(0.9999 * found.gain_up) < 1 < radius(1.0001 * found.gain_up)
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_margins_of_random_observers_are_those_of_the_whole_loop(late: bool) -> None:
+    """Integrators and lags in series, with a mode or without, in units 12 decades apart."""
+    seen = 0
+    for seed in range(SAMPLED):
+        source = np.random.default_rng(3000 + seed)
+        n, T = int(source.integers(1, 5)), 10 ** source.uniform(-2, -0.3)
+        A = np.diag(source.choice([0.0, -1.0, -5.0, 0.3], n, p=[0.5, 0.2, 0.2, 0.1]))
+        A, B, C = A + np.eye(n, k=-1), np.eye(n, 1), np.eye(1, n, n - 1)
+        if n > 1 and source.random() < 0.5:
+            A[:2, :2] = [[0.0, -8.0], [8.0, -0.1]]
+        motion = expm(T * np.block([[A, B], [np.zeros((1, n + 1))]]))[:n]
+        F, G = motion[:, :n], motion[:, n:]
+        X = solve_discrete_are(F, G, 10 ** source.uniform(-2, 4) * C.T @ C, np.eye(1))
+        Y = solve_discrete_are(F.T, C.T, 10 ** source.uniform(0, 4) * G @ G.T, np.eye(1))
+        K, L = G.T @ X @ F / (1 + G.T @ X @ G), F @ Y @ C.T / (1 + C @ Y @ C.T)
+        law = np.hstack([F - L @ C, G, L])
+        law = np.vstack([law, -K @ law])
+        loop, radius = closed_by((A, B, C), law, T, late, 10 ** source.uniform(-6, 6, 2 * n + 1))
+        found = margins(loop)
+        assert found.stable == (radius(1) < 1), seed
+        if not found.stable:
+            continue
+        seen += 1
+        turn = np.radians(found.phase)
+        for low, high in ((found.gain_up, 1), (1 / max(found.gain_down, 1e-9), -1)):
+            if low < 1e3:
+                inside, outside = ((x * low) ** high for x in (0.999, 1.001))
+                assert radius(inside) < 1 < radius(outside), (seed, low, high)
+        if found.gain_crossings:
+            assert radius(np.exp(-0.999j * turn)) < 1 < radius(np.exp(-1.001j * turn)), seed
+    assert seen > SAMPLED / 3
 
 
 # ---- Random loops --------------------------------------------------------------------------------
