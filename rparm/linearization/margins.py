@@ -21,6 +21,7 @@ GROWING = 1e-6  # relative, of the real part of a hidden pole: above is growth
 DECADES = 2  # below the slowest and above the fastest pole, zero or crossing: where to search
 FARTHEST = 1e8  # beyond these: zeros and crossings at 0 and infinity, moved by rounding
 BISECTIONS = 60
+Seen = tuple[np.ndarray, np.ndarray, np.ndarray]  # frequencies, L there, and bounds of its rounding
 
 
 @dataclass(frozen=True)
@@ -67,9 +68,11 @@ def open_loop(broken: Linear) -> Linear:
 def margins(loop: Linear) -> Margins:
     """Return the margins of a loop L, which has one input and one output and is minimal."""
     grid, ends = searched(loop), _ends(loop)
-    gains = tuple(_crossings(loop, grid, lambda value: np.abs(value) - 1))
+    values, bounds = responses.bounded_response(loop)(grid)
+    seen = grid, values, bounds
+    gains = tuple(_crossings(loop, seen, lambda value: np.abs(value) - 1))
     turns = (
-        *_crossings(loop, grid, np.imag),
+        *_crossings(loop, seen, np.imag),
         *(end for end, bound in ends if abs(end.value.real) > bound),
     )
     turns = tuple(found for found in turns if found.value.real < 0)
@@ -80,7 +83,7 @@ def margins(loop: Linear) -> Margins:
     delays = [lag(found) / found.frequency for found in gains]
     if not all(abs(end.value.real) + bound < 1 for end, bound in ends if end.frequency):
         delays.append(loop.dt)  # at high frequencies any delay is too much, or one of a sample
-    back = _peak(loop, grid, ends, lambda value: 1 / (1 + value) - 0.5)
+    back = _peak(loop, seen, ends, lambda value: 1 / (1 + value) - 0.5)
     return Margins(
         stable=True,
         gain_up=min((factor for factor in factors if factor > 1), default=math.inf),
@@ -90,8 +93,8 @@ def margins(loop: Linear) -> Margins:
         gain_crossings=gains,
         phase_crossings=turns,
         disk=replace(back, value=1 / back.value),
-        sensitivity=_peak(loop, grid, ends, lambda value: 1 / (1 + value)),
-        complementary=_peak(loop, grid, ends, lambda value: value / (1 + value)),
+        sensitivity=_peak(loop, seen, ends, lambda value: 1 / (1 + value)),
+        complementary=_peak(loop, seen, ends, lambda value: value / (1 + value)),
     )
 
 
@@ -141,7 +144,7 @@ def _ends(loop: Linear) -> list[tuple[Crossing, float]]:
 
 def _peak(
     loop: Linear,
-    grid: np.ndarray,
+    seen: Seen,
     ends: list[tuple[Crossing, float]],
     function: Callable[[np.ndarray], np.ndarray],
 ) -> Peak:
@@ -150,13 +153,14 @@ def _peak(
 
     response = responses.frequency_response(loop)
 
-    def sizes(w: np.ndarray) -> np.ndarray:
-        return np.nan_to_num(np.abs(function(response(w))))
-
-    i = int(sizes(grid).argmax())
+    grid, values, _ = seen
+    i = int(np.nan_to_num(np.abs(function(values))).argmax())
     around = tuple(np.log(grid[[max(i - 1, 0), min(i + 1, len(grid) - 1)]]))
     found = minimize_scalar(
-        lambda x: -sizes(np.exp([x]))[0], bounds=around, method="bounded", options={"xatol": 1e-12}
+        lambda x: -float(np.abs(function(response(np.exp([x])))[0])),
+        bounds=around,
+        method="bounded",
+        options={"xatol": 1e-12},
     )
     peaks = [Peak(math.exp(found.x), -float(found.fun))]
     clear = [end for end, bound in ends if bound < ROUNDING + GROWING * abs(end.value.real)]
@@ -221,11 +225,11 @@ def _finite(whole: np.ndarray, lead: np.ndarray, dt: float) -> np.ndarray:
 
 
 def _crossings(
-    loop: Linear, grid: np.ndarray, function: Callable[[np.ndarray], np.ndarray]
+    loop: Linear, seen: Seen, function: Callable[[np.ndarray], np.ndarray]
 ) -> Iterator[Crossing]:
     """Find where a function of L changes its sign, also if it is 0 at a frequency of the grid."""
     response = responses.frequency_response(loop)
-    values, bounds = responses.bounded_response(loop)(grid)
+    grid, values, bounds = seen
     clear = np.flatnonzero(np.abs(function(values)) > bounds)
     signs = np.sign(function(values[clear]))
     changes = np.flatnonzero(signs[:-1] != signs[1:])
