@@ -17,12 +17,13 @@ from scipy.linalg import block_diag, expm, solve_discrete_are
 
 from rparm.errors import UserError
 from rparm.linearization import page
-from rparm.linearization.linear import Linear, participations
+from rparm.linearization.linear import Linear, law_model, participations
 from rparm.linearization.margins import Margins, margins, open_loop
 from rparm.linearization.responses import check_same, minimal
 from rparm.linearization.sampling import Tick
 from rparm.linearization.study import Study
 from rparm.linearization.system import connected, sampled
+from rparm.systems.python_component import PythonComponent
 from rparm.systems.structure import Connection
 
 LOOPS = int(os.environ.get("MARGIN_LOOPS", "60"))
@@ -384,6 +385,29 @@ def test_margins_of_random_observers_are_those_of_the_whole_loop(late: bool) -> 
             turned = np.exp(-1j * np.radians(found.phase))
             assert np.abs(sizes(turned) - 1).min() < 1e-6, seed
     assert seen > SAMPLED / 3
+
+
+def test_an_input_that_nothing_follows_in_this_step_is_named(tmp_path: Path) -> None:
+    """A law that acts every fifth step sums y until then: differences see no way to u."""
+    text = """class Law:
+    inputs, outputs = ["y"], ["u"]
+    count, total, u = 3, 0.0, 0.0
+    def step(self, t, h, inputs):
+        self.total, self.count = self.total + inputs["y"], self.count + 1
+        if self.count % 5 == EVERY:
+            self.u = -0.1 * self.total
+        return {"u": self.u}
+    def save(self):
+        return [self.count, self.total, self.u]
+    def restore(self, saved):
+        self.count, self.total, self.u = saved
+"""
+    for every, flat in (("0", ("step in y",)), ("self.count % 5", ())):
+        (tmp_path / "law.py").write_text(text.replace("EVERY", every), encoding="utf-8")
+        with PythonComponent.read("law.py", tmp_path).instance("law") as law:
+            law.enter_initialization()
+            law.exit_initialization()
+            assert law_model(law, 0.0, 0.1, np.zeros(1)).flat == flat
 
 
 # ---- Random loops --------------------------------------------------------------------------------
