@@ -200,14 +200,14 @@ class _Rule:
 
 
 def _rule(A: np.ndarray, B: np.ndarray, dt: float) -> _Rule | None:
-    """Find sums of states that are 0 for ever if they are at first, and else do not die out.
+    """Find sums of states that are 0 for ever if they are at first; of a sampled A lasting ones.
 
     Such a sum is a left eigenvector of A that B is orthogonal to: w^T [A - p, B] = 0. Scaling shows
     what moves them little, but not by rounding.
     """
     one = np.eye(len(A))
     for found in eigenvalues(A):
-        if (abs(found) < 1 - SPREAD) if dt else (found.real < -SPREAD * abs(found)):
+        if dt and abs(found) < 1 - SPREAD:  # it dies out, and sampling rounds what cancels
             continue
         p = found if abs(found.imag) > SPREAD * abs(found) else found.real
         if dt and abs(abs(p) - 1) < SPREAD and np.isreal(p):
