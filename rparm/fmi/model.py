@@ -55,6 +55,7 @@ class Variable:
     variability: str | None = None
     # parameters that a calculated parameter, or the start value of a state, follows from
     follows: tuple[str, ...] = ()
+    nominal: float | None = None  # usual size of a Real; None: not declared
 
     @property
     def why_it_follows(self) -> str:
@@ -271,7 +272,7 @@ def _variable(variable: ModelVariable, displays: Displays, follows: tuple[str, .
     low, high = (x or y for x, y in ((variable.min, declared.min), (variable.max, declared.max)))
     least, greatest = INTEGER if kind == "Integer" else (-math.inf, math.inf)
     convert = CONVERT.get(kind, lambda _: None)
-    unit = variable.unit or declared.unit
+    unit, nominal = variable.unit or declared.unit, variable.nominal or declared.nominal
     units = units_of(unit, displays) if kind == "Real" else {}
     if variable.relativeQuantity or declared.relativeQuantity:  # a difference
         units = {name: replace(other, offset=Fraction(0)) for name, other in units.items()}
@@ -290,4 +291,5 @@ def _variable(variable: ModelVariable, displays: Displays, follows: tuple[str, .
         description=variable.description or "",
         variability=variable.variability,
         follows=follows,
+        nominal=float(nominal) if kind == "Real" and nominal else None,
     )

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 CANCELLED = 1e-13  # of the terms of a sum: rounding of a sum that is 0
 EQUAL = 1e-4  # relative, of poles that are equal but for rounding
 ROUNDING = 1e-15  # relative, for each row and column: of singular values that are 0
+MOVING = 1e-8  # of the terms of a rate: a smaller one is 0, as of values typed with nine digits
+UNKNOWN = 1e-15  # rounding of numbers that are 0 and have no nominal values
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +59,8 @@ class Linear:
     dt : float
         Time between samples, s; 0: continuous. x is just before the first tick of a period, y just
         after it.
+    nominals : dict of str to float
+        Usual sizes, of states and inputs that declare one.
     ticks : tuple of Tick
         Ticks of samplers at the point. Until `discretized`, x' holds between them.
     between : Linear or None
@@ -86,6 +90,7 @@ class Linear:
     hidden: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))
     cancelled: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))
     dt: float = 0.0
+    nominals: Mapping[str, float] = field(default_factory=dict)
     ticks: tuple[Tick, ...] = ()
     between: "Linear | None" = None
     loop: "Linear | None" = None
@@ -118,8 +123,24 @@ class Linear:
         texts += [f"sampler {t.name} changes {name} by" for t in self.ticks for name in t.changes]
         one = np.eye(len(self.states), len(self.states) + len(self.inputs))
         values = [self.rates, *(list(tick.changes.values()) for tick in self.ticks)]
-        rows = [np.hstack([self.A, self.B]), *(t.partials - one[t.rows] for t in self.ticks)]
+        rates = np.hstack([self.A, self.B])
+        rates = (rates - one) / self.dt if self.dt else rates
+        rows = [rates, *(t.partials - one[t.rows] for t in self.ticks)]
         return texts, np.concatenate(values), np.vstack(rows)
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """Sizes of states and inputs (n + m,): their values, or nominal values if larger."""
+        nominals = [self.nominals.get(name, 0.0) for name in (*self.states, *self.inputs)]
+        return np.maximum(np.abs([*self.x, *self.u]), nominals)
+
+    def moving(self, place: str = "") -> list[str]:
+        """Say what moves at the point, or would move at a tick; `place` stands before names."""
+        _, values, rows = self.balance
+        texts = [f"{place}{name}' = " for name in self.states]
+        texts += [f"{place}{t.name} changes {place}{x} by " for t in self.ticks for x in t.changes]
+        is_moving = np.abs(values) > negligible(rows, self.sizes, MOVING)
+        return [f"{texts[i]}{values[i]:.6g}" for i in np.flatnonzero(is_moving)]
 
     @property
     def are_positions(self) -> np.ndarray:
@@ -286,6 +307,12 @@ def cleared(entries: np.ndarray, terms: np.ndarray) -> np.ndarray:
     return np.where(np.abs(entries) > CANCELLED * terms, entries, 0.0)
 
 
+def negligible(rows: np.ndarray, sizes: np.ndarray, relative: float) -> np.ndarray:
+    """Return what counts as 0 in sums (k,) of `rows` (k, n) by n numbers of these sizes."""
+    terms = np.abs(rows) @ sizes
+    return np.where(terms > 0, relative * terms, UNKNOWN * np.abs(rows).sum(axis=1))
+
+
 def closure(arrows: np.ndarray) -> np.ndarray:
     """Return which nodes can be reached from which, (nodes, nodes), in no step or more."""
     reached = arrows | np.eye(len(arrows), dtype=bool)
@@ -342,6 +369,7 @@ def linear_model(instance: Instance) -> Linear:
         y=y,
         rates=np.append(rates, resting[:, :1]),
         at=dict(zip(knowns, [*x.tolist(), *u.tolist()], strict=True)),
+        nominals={name: size for name in knowns if (size := known[name].nominal)},
         ticks=ticks(instance, declared, states, inputs),
         flat=tuple(instance.fmu.notes("flat")),
         left_out=(

@@ -154,30 +154,17 @@ def notes(found: Study) -> list[str]:
             texts.append(f"They ring at {hertz} Hz for ever, once moved, whatever the loop does.")
     if found.margins is not None and not found.margins.stable:
         texts.append("The closed loop is unstable here: it has no margins.")
-    point = linear.between or linear
-    least = 1e-8 * max(1.0, float(np.abs(linear.x).max(initial=0.0)))
-    moving = [
-        f"{name}' = {rate:.6g}"
-        for name, rate, is_position in zip(
-            point.states, point.rates, point.are_positions, strict=True)
-        if abs(rate) > least and (is_position or not found.trimmed)  # else rounding
-    ]  # fmt: skip
-    moving += [
-        f"{tick.name} changes {name} by {change:.6g}"
-        for tick in point.ticks for name, change in tick.changes.items()
-        if abs(change) > least and not found.trimmed
-    ]  # fmt: skip
-    if moving and found.trimmed:
-        texts.append(f"In steady motion: {_names(moving)}.")
-    elif moving:
+    if found.moving and found.trimmed:
+        texts.append(f"In steady motion: {_names(found.moving)}.")
+    elif found.moving:
         texts.append(
-            f"This is no equilibrium: {_names(moving)}. Deviations are those from the motion that "
+            f"This is no equilibrium: {_names(found.moving)}. Deviations are those from the motion that "
             "begins here; trim leads to an equilibrium."
         )
     return texts
 
 
-def _names(names: list[str] | tuple[str, ...]) -> str:
+def _names(names: Sequence[str]) -> str:
     more = len(names) - LISTED
     return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
 

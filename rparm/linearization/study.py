@@ -64,6 +64,7 @@ class Study:
     margins: Margins | None = None  # of `loop`
     python: Sequence[str] = ()  # components in Python, which sample the system
     step: float = 0.0  # s, of a system
+    moving: Sequence[str] = ()  # what moves at the point; if trimmed, in a steady motion
 
 
 def study(request: Request) -> Study:
@@ -84,9 +85,10 @@ def study(request: Request) -> Study:
         time = start if request.time is None else request.time
         subject = stack.enter_context(FmuSubject(fmu, time))
         trimmed = _point(subject, request)
-        found = subject.finished(subject.at(trimmed.values))
-        found = _chosen(found, trimmed, request)
-        return Study(path, found, _units(subject, found), request.free)
+        whole = subject.at(trimmed.values)
+        moving = trimmed.moving if request.free else whole.moving()
+        found = _chosen(subject.finished(whole), trimmed, request)
+        return Study(path, found, _units(subject, found), request.free, moving=moving)
 
 
 def of_system(opened: OpenedSystem, request: Request) -> Study:
@@ -98,12 +100,14 @@ def of_system(opened: OpenedSystem, request: Request) -> Study:
         subject = stack.enter_context(made)
         trimmed = _point(subject, request)
         parts = subject.parts(trimmed.values)
+        moving = [text for name, part in parts.items() for text in part.moving(f"{name}.")]
         held = subject.held(parts)
         parts = {name: part.without(held[name]) for name, part in parts.items()}
         whole = subject.joined(parts)
         found = _chosen(whole, trimmed, request)
         units = _units(subject, found)
         limits: dict[str, Any] = {"python": tuple(subject.python), "step": opened.system.step}
+        limits["moving"] = trimmed.moving if request.free else moving
         if subject.cut is not None:
             loop = open_loop(whole.select([request.cut], [subject.cut.start]))
             limits |= {"loop": loop, "margins": margins(loop)}

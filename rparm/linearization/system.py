@@ -253,12 +253,13 @@ def _joined(parts: Mapping[str, linear.Linear]) -> dict[str, Any]:
         for key in ("x", "u", "y", "rates")
     }
     at = {f"{name}.{v}": value for name, part in parts.items() for v, value in part.at.items()}
+    nominals = {f"{name}.{v}": x for name, part in parts.items() for v, x in part.nominals.items()}
     flat = [f.replace(" in ", f" in {name}.") for name, part in parts.items() for f in part.flat]
     listed = {
         kind: tuple(f"{name}.{v}" for name, part in parts.items() for v in getattr(part, kind))
         for kind in ("states", "inputs", "outputs", "held", "left_out")
     }
-    return numbers | listed | {"at": at, "flat": tuple(flat)}
+    return numbers | listed | {"at": at, "flat": tuple(flat), "nominals": nominals}
 
 
 def _ticks(parts: Mapping[str, linear.Linear], fed: np.ndarray) -> tuple[Tick, ...]:

@@ -11,6 +11,7 @@ from rparm.errors import UserError
 from rparm.fmi.fmu_file import MODEL_EXCHANGE, Fmu
 from rparm.linearization.linear import FmuSubject, checked_point
 from rparm.linearization.trim import Trimmed, trim
+from tests.equations.examples import made
 from tests.support.rparm_project import MISTAKES
 
 M1, M2, LC1, L1, A, G = 2.0, 1.0, 0.25, 0.5, 0.1, 9.81  # start values of the arm's parameters
@@ -120,3 +121,49 @@ def test_refused(
     with pytest.raises(UserError) as caught:
         trimmed(plant, free, **given)
     assert message in str(caught.value) and "\n" not in str(caught.value)
+
+
+# ---- Sizes far from 1 ----------------------------------------------------------------------------
+SCALES = """
+name = "Scales"
+[parameters]
+gap = { start = 0 }
+[inputs]
+q = { start = 1e-3 }
+u = { start = 5e-9 }
+[states]
+x = { start = 1e-7, derivative = "1.2e-12 - 6e-4 * x" }
+y = { start = 3, derivative = "(1 - y) / 1e10" }
+p = { start = 1, derivative = "1e12 * (q - 2.5e-13 * p)" }
+flow = { start = 1, nominal = 1e-5, derivative = "-flow" }
+fold = { start = 3, derivative = "-(fold - 1)**2 - gap" }
+v = { derivative = "max(0, u - 1e-9) + min(0, u + 1e-9) - v" }
+"""
+EXACT = {"x": 2e-9, "y": 1.0, "p": 2e7, "q": 5e-6, "flow": 0.0}
+
+
+@pytest.fixture(scope="module")
+def scales(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FmuSubject]:
+    path = made(tmp_path_factory.mktemp("scales"), SCALES)
+    with Fmu(path, kind=MODEL_EXCHANGE) as opened, FmuSubject(opened) as subject:
+        yield subject
+
+
+def test_units_do_not_decide_what_is_an_equilibrium(scales: FmuSubject) -> None:
+    """Slow, small and large states; where two solutions meet, half of the digits are rounding."""
+    free = ["x", "y", "p", "fold", "u"]
+    found = trimmed(scales, free, flow=0.0, q=5e-6)
+    for name in free[:3]:
+        assert found.values[name] == pytest.approx(EXACT[name], rel=1e-12, abs=0.0)
+    assert found.values["fold"] == pytest.approx(1.0, abs=1e-7)
+    assert found.intervals == {"u": pytest.approx((-1e-9, 1e-9), rel=1e-9, abs=0)}
+    with pytest.raises(UserError, match="the derivative of fold stays at -1e-13"):
+        trimmed(scales, free, flow=0.0, q=5e-6, gap=1e-13)
+
+
+def test_what_moves_is_said_by_sizes_and_nominal_values(scales: FmuSubject) -> None:
+    """The flow of 1e-14 is nothing beside its nominal value, but x is far from its equilibrium."""
+    at = EXACT | {"fold": 1.0, "u": 0.0}
+    assert scales.at(at | {"flow": 1e-14}).moving() == []
+    assert scales.at(at | {"x": 1e-9}).moving() == ["x' = 6e-13"]
+    assert scales.at(at | {"y": 1.001, "p": 2.01e7}).moving() == ["y' = -1e-13", "p' = -25000"]
