@@ -385,9 +385,15 @@ def _check_finite(instance: Instance, names: list[str], numbers: np.ndarray) -> 
         raise UserError(f"{instance.name}: {names[bad[0]]} or a derivative of it is not finite")
 
 
-def law_model(instance: PythonInstance, time: float, step: float, u: np.ndarray) -> Linear:
+def law_model(
+    instance: PythonInstance,
+    time: float,
+    step: float,
+    u: np.ndarray,
+    nominals: Mapping[str, float] | None = None,
+) -> Linear:
     """Linearize a component in Python at a time, s, with inputs u (m,), as sampled every `step`."""
-    found, inputs = law(instance, time, step, u), tuple(instance.made.inputs)
+    found, inputs = law(instance, time, step, u, nominals), tuple(instance.made.inputs)
     outputs = tuple(instance.made.outputs)
     n, p = len(found.states), len(outputs)
     ways = (found.partials[:, n:].T != 0) @ closure(found.partials[:, :n].T != 0)
@@ -405,7 +411,10 @@ def law_model(instance: PythonInstance, time: float, step: float, u: np.ndarray)
         y=found.x[n - p :],
         rates=(found.after - found.x) / step,
         at=dict(zip((*found.states, *inputs), [*found.x.tolist(), *u.tolist()], strict=True)),
-        flat=tuple(f"step in {name}" for name in unseen),
+        flat=(
+            *(f"a stair in {text}" for text in found.flat),
+            *(f"step in {name}" for name in unseen),
+        ),
         dt=step,
     )
 

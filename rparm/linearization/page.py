@@ -158,8 +158,8 @@ def notes(found: Study) -> list[str]:
         texts.append(f"In steady motion: {_names(found.moving)}.")
     elif found.moving:
         texts.append(
-            f"This is no equilibrium: {_names(found.moving)}. Deviations are those from the motion that "
-            "begins here; trim leads to an equilibrium."
+            f"This is no equilibrium: {_names(found.moving)}. Deviations are those from the "
+            "motion that begins here; trim leads to an equilibrium."
         )
     return texts
 

@@ -26,10 +26,12 @@ UNDEFINED = sys.float_info.max  # in place of a new value that is not finite
 # description of a local variable, as fmu/equations writes it
 ABOUT = re.compile(r"Sampler (\d+), ([^:]+): (?:(period|offset)|(new value|change|count) of (.+))")
 
-MOVED = 2.0**-12  # of a number, or of 1 if it is smaller: to differentiate by
-# ratios of differences over twice and once as much: 1 at a jump and 2 beside it; of second ones 2
-# at a corner and 4 beside it, or any if it is farther away
-FIRST, SECOND = 1.5, (2.5, 100.0)
+# steps of differences: a quarter of a number's size, and halves of it, as many as this
+LEVELS = 48
+AGREE, NEARLY = 1e-9, 1e-5  # of the steepest slope: derivatives by two steps that follow each other
+BETWEEN = 0.62  # of a step: where one that agrees is checked
+ROUNDED = 16 * sys.float_info.epsilon  # of the largest value of a difference
+SEEN = 0.01  # of the steepest slope: rounding by a step is below it
 
 
 @dataclass
@@ -250,10 +252,20 @@ class Law:
     x: np.ndarray  # (n,)
     after: np.ndarray  # (n,) one step later
     partials: np.ndarray  # (n, n + m) of `after` by states and inputs
+    flat: tuple[str, ...]  # effects on a stair, with the causes
 
 
-def law(instance: PythonInstance, time: float, step: float, inputs: np.ndarray) -> Law:
-    """Differentiate the step from `time` with `inputs` (m,); UserError if there is a corner."""
+def law(
+    instance: PythonInstance,
+    time: float,
+    step: float,
+    inputs: np.ndarray,
+    nominals: Mapping[str, float] | None = None,
+) -> Law:
+    """Differentiate the step from `time` with `inputs` (m,), which may have `nominals` by name.
+
+    UserError if there is a corner or a jump, or differences do not agree.
+    """
     kept, made = instance.save(), instance.made
     numbers = _Numbers(instance)
     x = numbers.of(kept)
@@ -270,40 +282,99 @@ def law(instance: PythonInstance, time: float, step: float, inputs: np.ndarray) 
         return np.array([*found, *outputs])
 
     after = stepped(point)
-    columns = [_difference(stepped, point, i, after) for i in range(len(point))]
+    known, effects = [*names, *made.inputs], [*names, *made.outputs]
+    given = [0.0] * len(x) + [(nominals or {}).get(name, 0.0) for name in made.inputs]
+    columns, flat = [], list[str]()
+    for i, cause in enumerate(known):
+        size = 2.0 ** math.ceil(math.log2(max(abs(point[i]), given[i] or 1.0)))
+        column, is_flat = _difference(stepped, point, i, size / 4, after)
+        columns.append(column)
+        flat += [f"{effects[j]} over {cause}" for j in np.flatnonzero(is_flat)]
+        if (bad := np.isnan(column)).any():
+            instance.restore(kept)
+            effect = effects[int(bad.argmax())]
+            why = f"{effect} has a corner or a jump over {cause} at the point, or noise"
+            steps = f"differences agree at no step from {size / 4:.3g} to {size / 2**LEVELS:.3g}"
+            raise UserError(f"{instance.name}: {why}: {steps}: it has no linear model")
     instance.restore(kept)
-    known = [*names, *made.inputs]
-    for cause, (_, corners) in zip(known, columns, strict=True):
-        if corners.any():
-            effect = [*names, *made.outputs][int(corners.argmax())]
-            why = f"{effect} has a corner or a jump over {cause} at the point"
-            raise UserError(f"{instance.name}: {why}: it has no linear model")
-    whole = np.array([column for column, _ in columns]).reshape(len(point), len(after)).T
+    whole = np.array(columns).reshape(len(point), len(after)).T
     resting = np.zeros((len(after), len(made.outputs)))  # no output of before matters
     partials = np.hstack([whole[:, : len(x)], resting, whole[:, len(x) :]])
     outputs = instance.numbers[len(made.inputs) :]
-    return Law((*names, *made.outputs), np.array([*x, *outputs]), after, partials)
+    return Law((*names, *made.outputs), np.array([*x, *outputs]), after, partials, tuple(flat))
 
 
 def _difference(
-    function: Callable[[np.ndarray], np.ndarray], point: np.ndarray, i: int, middle: np.ndarray
+    function: Callable[[np.ndarray], np.ndarray],
+    point: np.ndarray,
+    i: int,
+    longest: float,
+    middle: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivative by number i, of fourth order, and where there is a corner."""
-    length = MOVED * 2.0 ** math.ceil(math.log2(max(abs(point[i]), 1.0)))
+    """Return derivatives (k,) by number i, of fourth order, and where they are 0 of a stair.
 
-    def at(count: int) -> np.ndarray:
-        moved = point.copy()
-        moved[i] += count * length
-        return function(moved)
+    Each is by the longest step that agrees with the two before it, or by shorter ones as long as
+    they agree better; else by the longest that nearly agrees, as rounding to few digits leaves it;
+    else it is 0 on a stair, or nan. One that is below its error is 0.
+    """
+    raised: list[UserError] = []
+    nothing = np.full(len(middle), np.nan)
+    best, nearly, least, steepest = nothing, nothing, nothing, np.zeros(len(middle))
+    is_open, is_new, is_flat = np.ones(len(middle), bool), np.ones(len(middle), bool), best > 0
 
-    near, far = (at(1), at(-1)), (at(2), at(-2))
-    size = np.max(np.abs([*near, *far, middle]), axis=0)
-    rounding = 128 * sys.float_info.epsilon * size
-    once, twice = (np.abs(up + down - 2 * middle) for up, down in (near, far))
-    is_smooth = (SECOND[0] * once <= twice) & (twice <= SECOND[1] * once + rounding)
-    once, wide = (np.abs(up - down) for up, down in (near, far))
-    corners = ((twice > rounding) & ~is_smooth) | ((wide > rounding) & (wide < FIRST * once))
-    return (8 * (near[0] - near[1]) - (far[0] - far[1])) / (12 * length), corners
+    def changes(length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return slopes, twice the even part, and the largest values."""
+        ends, values = [], []
+        for side in (length, -length):
+            moved = point.copy()
+            moved[i] += side
+            ends.append(moved[i])
+            try:
+                values.append(function(moved))
+            except UserError as error:  # so far away the law may have no value
+                raised.append(error)
+                values.append(nothing)
+        slope = (values[0] - values[1]) / (ends[0] - ends[1])
+        return slope, values[0] + values[1] - 2 * middle, np.max(np.abs([*values, middle]), axis=0)
+
+    before = [nothing] * 5
+    with np.errstate(all="ignore"):
+        for k in range(LEVELS):
+            length = longest * 2.0**-k
+            slope, bend, size = changes(length)
+            wide_slope, wide_bend, wide_size, wide_value, wide_error = before
+            value = (4 * slope - wide_slope) / 3
+            error, corner = np.abs(value - wide_value), np.abs(2 * bend - wide_bend / 2) / length
+            rounding = np.maximum(size, wide_size) + abs(point[i]) * np.abs(value)
+            rounding = ROUNDED * rounding / length
+            is_seen = is_new | (rounding <= SEEN * steepest)
+            is_still = (error + corner + np.abs(value) == 0) & ~is_new
+            is_new &= np.isnan(wide_error)
+            steepest = np.fmax(steepest, np.fmax(np.abs(value), corner))
+            slopes = np.fmax(steepest, np.abs(bend) / length)
+            worst, missed = np.maximum(np.maximum(error, wide_error), corner) - rounding, error
+            if (is_open & is_seen & (worst <= NEARLY * slopes)).any():
+                between, _, _ = changes(BETWEEN * length)  # a stair may have steps at all halves
+                missed = np.abs(value + BETWEEN**2 * (slope - value) - between) - error - rounding
+            agrees, almost = (
+                is_seen & ~is_still & (np.maximum(worst, missed) <= limit * slopes)
+                for limit in (AGREE, NEARLY)
+            )
+            better = is_open & np.where(np.isfinite(best), error < least, agrees)
+            is_clear = np.abs(value) > np.maximum(4 * error, rounding)
+            best = np.where(better, np.where(is_clear, value, 0.0), best)
+            least = np.where(better, error, least)
+            nearly = np.where(almost & np.isnan(nearly), value, nearly)
+            is_flat |= is_still & (k < LEVELS // 2)
+            is_open &= np.where(np.isfinite(best), better & (error > rounding), True)
+            if not is_open.any():
+                break
+            before = [slope, bend, size, value, error]
+    if len(raised) >= 2 * LEVELS:
+        raise raised[-1]
+    best = np.where(np.isfinite(best), best, nearly)
+    is_flat &= np.isnan(best)
+    return np.where(is_flat, 0.0, best), is_flat
 
 
 class _Numbers:

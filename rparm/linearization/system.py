@@ -116,7 +116,9 @@ class SystemSubject(ExitStack):
     def law(self, name: str, step: float) -> linear.Linear:
         """Linearize a component in Python at the point of `parts`, called every `step` s."""
         instance, inputs = self._laws[name]
-        return linear.law_model(instance, self.time, step, inputs)
+        feeding = [c for c in self.connections if c.end_component == name]
+        sizes = {c.end_connector: self.variable(c.start).nominal or 0.0 for c in feeding}
+        return linear.law_model(instance, self.time, step, inputs, sizes)
 
     def joined(self, parts: Mapping[str, linear.Linear]) -> linear.Linear:
         """Join parts, without the connection that is cut: as a discrete model if some are sampled.

@@ -147,7 +147,7 @@ REFUSED = {
     ),
     "condition": ("TWO", {"at": {"x[1]": 2.0}}, r"sampler s\[1\] changes on, level at this point"),
     "no value": ("LIMITED", {"at": {"x": 1.5}}, "sampler s: the new value of u is not finite"),
-    "no point": ("AXIS", {"trim": ["x", "y", "u"]}, "by x, y, u: sampler control changes sum by"),
+    "no point": ("AXIS", {"trim": ["x", "y", "u"]}, "by x, y, u: the derivative of w stays at"),
     "moving": ("DEADBEAT", {"at": {"r": 1}, "trim": ["x2", "u"]}, "the derivative of x1 stays at"),
     "sampled twice": ("DEADBEAT", {}, "step: the model is sampled already, every 1 s"),
 }
