@@ -1,6 +1,7 @@
 """The command line: which command arguments ask for, and options that commands share."""
 
 import argparse
+import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -214,8 +215,9 @@ def pairs(option: str, given: Sequence[str]) -> dict[str, str]:
 
 
 def names(given: Sequence[str]) -> list[str]:
-    """Split names between commas, or given one by one."""
-    return [name.strip() for text in given for name in text.split(",") if name.strip()]
+    """Split names between commas, but those of indexes as in T[1,2], or given one by one."""
+    every = (name.strip() for text in given for name in re.split(r",(?![^\[]*\])", text))
+    return [name for name in every if name]
 
 
 def retyped(command: str, positional: Iterable[object], given: Mapping[str, object]) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from rparm.linearization.largest_step import LargestStep
-from rparm.linearization.linear import Linear, participations, zeros
+from rparm.linearization.linear import Linear, closure, participations, zeros
 from rparm.linearization.margins import (
     Crossing,
     Margins,
@@ -20,7 +20,7 @@ from rparm.linearization.margins import (
     ringing,
     searched,
 )
-from rparm.linearization.responses import frequencies, frequency_response
+from rparm.linearization.responses import bounded_response, frequencies, frequency_response
 from rparm.linearization.study import Study
 from rparm.report import pages
 from rparm.report.charts import Chart, Data
@@ -34,7 +34,7 @@ TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding=
 MARGINS, STEPS, EQUILIBRIUM = (TEXTS[name] for name in ("margins", "steps", "equilibrium"))
 POLES, MATRICES = TEXTS["poles"], TEXTS["matrices"]  # of a continuous model, and of a sampled one
 MOST_DRAWN = 2  # inputs and outputs that are drawn: with more, curves would share a colour
-ROUNDING = 1e-12  # of the largest response: less is none
+LOOKED = 40  # frequencies at which a response is looked for
 AROUND = 2.0  # decades beyond the poles that a Bode diagram shows
 SETTLED = 6.0  # time constants of the slowest pole that a step shows
 GROWN = 3.0  # time constants of the fastest pole that grows
@@ -69,10 +69,14 @@ def write(folder: Path, found: Study, step: float | None, again: str, root: str 
         title = "Step response of the closed loop"
         made = [steps_chart(closed(loop), None, found.units, title)]
         parts.append((pages.Table(title, [], []), "", made))
-    shown = drawn(linear)
-    if loop is None and shown.inputs and shown.outputs:
-        responses = [bode_chart(shown, step), steps_chart(shown, step, found.units)]
-        parts.append((pages.Table("Responses", [], []), "", responses))
+    said = notes(found)
+    if loop is None and linear.inputs and linear.outputs:
+        answers = responding(linear)
+        said += _not_drawn(linear, answers)
+        if answers.any():
+            shown = drawn(linear, answers)
+            responses = [bode_chart(shown, step), steps_chart(shown, step, found.units)]
+            parts.append((pages.Table("Responses", [], []), "", responses))
     if len(linear.states):
         table = poles_table(found)
         rows = zip(table.rows, _rows_of(linear, taking_part(linear)), strict=True)
@@ -91,19 +95,26 @@ def write(folder: Path, found: Study, step: float | None, again: str, root: str 
         again=again,
         growing=int((rates.real > REAL * np.abs(rates)).sum()),
         found=found,
-        notes=[*notes(found), *_not_drawn(found)],
+        notes=said,
         parts=parts,
         point=point_table(found),
         about_matrices=MATRICES[linear.dt > 0],
     )
 
 
-def _not_drawn(found: Study) -> list[str]:
-    linear = found.linear
-    if found.loop is not None or max(len(linear.inputs), len(linear.outputs)) <= MOST_DRAWN:
-        return []
-    first = f"the first {MOST_DRAWN} outputs that respond, and inputs"
-    return [f"Charts show {first}; --inputs and --outputs choose."]
+def _not_drawn(linear: Linear, answers: np.ndarray) -> list[str]:
+    """Say what is missing from charts of responses; `answers`: as `responding`."""
+    texts, counts = [], [np.count_nonzero(answers.any(axis=axis)) for axis in (0, 1)]
+    if max(counts) > MOST_DRAWN:
+        first = f"the first {MOST_DRAWN} outputs that respond, and inputs"
+        texts.append(f"Charts show {first}; --inputs and --outputs choose.")
+    for names, axis, what in (
+        (linear.outputs, 1, "outputs respond to no input"),
+        (linear.inputs, 0, "inputs move no output"),
+    ):
+        if idle := [names[i] for i in np.flatnonzero(~answers.any(axis=axis))]:
+            texts.append(f"These {what} and are not in the charts: {_names(idle)}.")
+    return texts
 
 
 # ---- Tables and texts ----------------------------------------------------------------------------
@@ -172,11 +183,7 @@ def _names(names: Sequence[str]) -> str:
 def point_table(found: Study) -> pages.Table:
     """Return the values of states and inputs."""
     values = found.linear.at
-    least = ROUNDING * max(map(abs, values.values()), default=0.0)
-    rows = [
-        [name, value if abs(value) > least else 0.0, unit(found.units.get(name))]
-        for name, value in values.items()
-    ]
+    rows = [[name, value, unit(found.units.get(name))] for name, value in values.items()]
     return pages.Table("The point", ["variable", "value", "unit"], rows)
 
 
@@ -311,12 +318,10 @@ def _or_none(number: float) -> str:
 def bode_chart(model: Linear, step: float | None, found: Margins | None = None) -> Chart:
     """Draw gain and phase of each output by each input, with margins of a loop."""
     grid = _grid(model, found)
-    responses = [(label, one, frequency_response(one)(grid)) for label, one in _channels(model)]
-    largest = max((np.abs(values).max() for _, _, values in responses), default=0.0)
-    shown = [each for each in responses if np.abs(each[2]).max() > ROUNDING * largest]
+    shown = [(label, one) for label, one in _channels(model) if responds(one, grid)]
     curves = []
-    for i, (label, one, values) in enumerate(shown):
-        curves.append(_bode(values, grid) | {"name": label, "colour": i})
+    for i, (label, one) in enumerate(shown):
+        curves.append(_bode(frequency_response(one)(grid), grid) | {"name": label, "colour": i})
         if step is not None:
             sampled = one.sampled(step)
             below = _below(grid, sampled)
@@ -326,7 +331,7 @@ def bode_chart(model: Linear, step: float | None, found: Margins | None = None) 
     data = {"curves": curves, "marks": _marks(found)}
     data |= {"ends": grid[[0, -1]] / (2 * math.pi), "half": step and 0.5 / step}
     data["crossings"] = [_hertz(x) for x in found.gain_crossings] if found else []
-    text = f"Gain and phase over the frequency: {', '.join(label for label, _, _ in shown)}"
+    text = f"Gain and phase over the frequency: {', '.join(label for label, _ in shown)}"
     return Chart("Bode diagram", text, "bode", data, height=30)
 
 
@@ -408,19 +413,29 @@ def _poles_chart(title: str, models: Sequence[tuple[str, Linear]], dt: float) ->
          "cells": [*map(_pole_cells, one.poles, one.rates_of(one.poles))]}
         for name, one in models
     ]  # fmt: skip
-    text = f"Poles in the complex plane: {', '.join(map(str, np.round(models[0][1].poles, 3)))}"
+    text = f"Poles in the complex plane: {', '.join(f'{x:.4g}' for x in models[0][1].poles)}"
     return Chart(title, text, "poles", {"poles": poles, "sampled": dt > 0, "flattest": FLATTEST})
 
 
-def drawn(model: Linear) -> Linear:
-    """Select what pictures show: the first outputs that respond, and inputs they respond to."""
+def responds(one: Linear, grid: np.ndarray) -> bool:
+    """Return whether an output responds to an input at some frequency, by more than rounding."""
+    if not ((one.B.any(axis=1) @ closure(one.A.T != 0) & one.C.any(axis=0)).any() or one.D.any()):
+        return False
+    values, bounds = bounded_response(one)(grid[:: 1 + len(grid) // LOOKED])
+    return bool((np.abs(values) > bounds).any())
+
+
+def responding(model: Linear) -> np.ndarray:
+    """Return which outputs respond to which inputs, (p, m)."""
     grid = frequencies(model.rates_of(model.poles), (), AROUND)
-    s = model.points(grid)[:, None, None]
-    states = np.linalg.solve(s * np.eye(len(model.A)) - model.A, model.B + 0 * s)
-    gains = np.abs(model.C @ states + model.D).max(axis=0)  # (outputs, inputs)
-    responds = gains > ROUNDING * gains.max(initial=0.0)
-    outputs = np.flatnonzero(responds.any(axis=1))[:MOST_DRAWN]
-    inputs = np.flatnonzero(responds[outputs].any(axis=0))[:MOST_DRAWN]
+    every = [responds(one, grid) for _, one in _channels(model)]
+    return np.reshape(np.array(every, bool), model.D.shape)
+
+
+def drawn(model: Linear, answers: np.ndarray) -> Linear:
+    """Select what pictures show: the first outputs that respond, and inputs they respond to."""
+    outputs = np.flatnonzero(answers.any(axis=1))[:MOST_DRAWN]
+    inputs = np.flatnonzero(answers[outputs].any(axis=0))[:MOST_DRAWN]
     return model.select([model.inputs[i] for i in inputs], [model.outputs[i] for i in outputs])
 
 

@@ -15,6 +15,7 @@ import rparm
 from rparm import __main__ as cli
 from rparm.linearization.page import steps_chart
 from rparm.linearization.responses import frequency_response
+from tests.equations.examples import made
 from tests.support.browser import Browser
 from tests.support.rparm_project import MISTAKES
 
@@ -203,6 +204,37 @@ def test_margins_stand_in_the_charts_and_the_page_fits(
     assert step[0]["name"] == "step of arm.tau1 by 1 N·m"
     for text in poles[0]["text"]:
         assert re.search(r"pole (0|-20) 1/s<br>(damping 1<br>)?arm\.d?q[12] \d+ %<br>", text)
+
+
+PRESS = """
+name = "Press"
+[parameters]
+p0 = { start = 2e7, unit = "Pa" }
+G = { start = 2.5e-13, unit = "m3/(s.Pa)" }
+E = { start = 1e12, unit = "Pa/m3" }
+[inputs]
+q = { start = 5e-6, unit = "m3/s" }
+spare = {}
+[states]
+"p[i,j]" = { for = "i = 1..2, j = 1..2", unit = "Pa", derivative = "E * (q - G * p[i,j])" }
+[outputs]
+leak = { value = "G * p[1,2]", unit = "m3/s" }
+fixed = { value = "G * p0", unit = "m3/s" }
+"""
+
+
+def test_small_units_are_shown_and_what_is_missing_in_charts_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Names with indexes between commas; a flow of 5e-6 m3/s beside 200 bar."""
+    command = [str(made(tmp_path, PRESS)), "--output", str(tmp_path), "--trim", "p[1,1],p[1,2]"]
+    command += ["p[2,1], p[2,2]", "--outputs", "p[1,2],leak,fixed"]
+    found = document(command, capsys)
+    assert found["outputs"] == ["p[1,2]", "leak", "fixed"]
+    page = Path(found["page"]).read_text(encoding="utf-8")
+    assert "5e−6" in page and "leak by q" in page
+    assert "These outputs respond to no input and are not in the charts: fixed." in page
+    assert "These inputs move no output and are not in the charts: spare." in page
 
 
 def test_samples_too_dense_to_be_seen_are_not_drawn() -> None:
