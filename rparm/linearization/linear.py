@@ -412,7 +412,7 @@ def law_model(
         rates=(found.after - found.x) / step,
         at=dict(zip((*found.states, *inputs), [*found.x.tolist(), *u.tolist()], strict=True)),
         flat=(
-            *(f"a stair in {text}" for text in found.flat),
+            *(f"a stair or flat part in {text}" for text in found.flat),
             *(f"step in {name}" for name in unseen),
         ),
         dt=step,

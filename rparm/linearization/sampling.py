@@ -252,7 +252,7 @@ class Law:
     x: np.ndarray  # (n,)
     after: np.ndarray  # (n,) one step later
     partials: np.ndarray  # (n, n + m) of `after` by states and inputs
-    flat: tuple[str, ...]  # effects on a stair, with the causes
+    flat: tuple[str, ...]  # effects on a stair or in a dead zone, with the causes
 
 
 def law(
@@ -311,7 +311,7 @@ def _difference(
     longest: float,
     middle: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return derivatives (k,) by number i, of fourth order, and where they are 0 of a stair.
+    """Return derivatives (k,) by number i, of fourth order, and where they miss a stair.
 
     Each is by the longest step that agrees with the two before it, or by shorter ones as long as
     they agree better; else by the longest that nearly agrees, as rounding to few digits leaves it;
@@ -337,11 +337,12 @@ def _difference(
         slope = (values[0] - values[1]) / (ends[0] - ends[1])
         return slope, values[0] + values[1] - 2 * middle, np.max(np.abs([*values, middle]), axis=0)
 
-    before = [nothing] * 5
+    before, sides = [nothing] * 5, []
     with np.errstate(all="ignore"):
         for k in range(LEVELS):
             length = longest * 2.0**-k
             slope, bend, size = changes(length)
+            sides.append([slope + bend / (2 * length), slope - bend / (2 * length)])
             wide_slope, wide_bend, wide_size, wide_value, wide_error = before
             value = (4 * slope - wide_slope) / 3
             error, corner = np.abs(value - wide_value), np.abs(2 * bend - wide_bend / 2) / length
@@ -374,7 +375,23 @@ def _difference(
         raise raised[-1]
     best = np.where(np.isfinite(best), best, nearly)
     is_flat &= np.isnan(best)
-    return np.where(is_flat, 0.0, best), is_flat
+    best = np.where(is_flat, 0.0, best)
+    return best, is_flat | _is_stair(best, np.array(sides), steepest)
+
+
+def _is_stair(best: np.ndarray, sides: np.ndarray, steepest: np.ndarray) -> np.ndarray:
+    """Return where slopes to both sides (levels, 2, k) leave the best one (k,) at once for another.
+
+    On a smooth function they leave it by and by; at a limit they go to 0, and beyond one corner
+    only one side does.
+    """
+    away = np.abs(sides - best)
+    is_away = away.min(axis=1) > 1e-4 * steepest
+    last = len(sides) - 1 - is_away[::-1].argmax(axis=0)
+    then = away.max(axis=1)[np.minimum(last + 2, len(sides) - 1), np.arange(len(best))]
+    first, second = sides[:2].mean(axis=1)
+    is_other = np.abs(first - second) <= 0.1 * np.minimum(np.abs(first - best), np.abs(first))
+    return is_away.any(axis=0) & (last + 2 < len(sides)) & (then <= 1e-7 * steepest) & is_other
 
 
 class _Numbers:
