@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 
@@ -318,25 +319,10 @@ def _difference(
     else it is 0 on a stair, or nan. One that is below its error is 0.
     """
     raised: list[UserError] = []
+    changes = partial(_changes, function, point, i, middle, raised)
     nothing = np.full(len(middle), np.nan)
     best, nearly, least, steepest = nothing, nothing, nothing, np.zeros(len(middle))
     is_open, is_new, is_flat = np.ones(len(middle), bool), np.ones(len(middle), bool), best > 0
-
-    def changes(length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return slopes, twice the even part, and the largest values."""
-        ends, values = [], []
-        for side in (length, -length):
-            moved = point.copy()
-            moved[i] += side
-            ends.append(moved[i])
-            try:
-                values.append(function(moved))
-            except UserError as error:  # so far away the law may have no value
-                raised.append(error)
-                values.append(nothing)
-        slope = (values[0] - values[1]) / (ends[0] - ends[1])
-        return slope, values[0] + values[1] - 2 * middle, np.max(np.abs([*values, middle]), axis=0)
-
     before, sides = [nothing] * 5, []
     with np.errstate(all="ignore"):
         for k in range(LEVELS):
@@ -377,6 +363,29 @@ def _difference(
     is_flat &= np.isnan(best)
     best = np.where(is_flat, 0.0, best)
     return best, is_flat | _is_stair(best, np.array(sides), steepest)
+
+
+def _changes(
+    function: Callable[[np.ndarray], np.ndarray],
+    point: np.ndarray,
+    i: int,
+    middle: np.ndarray,
+    raised: list[UserError],
+    length: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return slopes over a step to both sides, twice the even part, and the largest values."""
+    ends, values = [], []
+    for side in (length, -length):
+        moved = point.copy()
+        moved[i] += side
+        ends.append(moved[i])
+        try:
+            values.append(function(moved))
+        except UserError as error:  # so far away the law may have no value
+            raised.append(error)
+            values.append(np.full(len(middle), np.nan))
+    slope = (values[0] - values[1]) / (ends[0] - ends[1])
+    return slope, values[0] + values[1] - 2 * middle, np.max(np.abs([*values, middle]), axis=0)
 
 
 def _is_stair(best: np.ndarray, sides: np.ndarray, steepest: np.ndarray) -> np.ndarray:
