@@ -53,7 +53,8 @@ def build(
     """
     project.check_installed(NEEDED, "build")
     with suppress(OSError, ValueError, RecursionError):  # the program says what is wrong with them
-        project.refuse_other(Path(file), tomllib.loads(Path(file).read_text("utf-8")), "build")
+        text = Path(file).read_text(encoding="utf-8")
+        project.refuse_other(Path(file), tomllib.loads(text), "build")
     runtimes = project.runtimes(platforms, web)
     with temporary_folder() as work:
         kept, *fmus = _made(Path(file), runtimes, not (platforms or web), work)

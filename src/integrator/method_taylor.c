@@ -99,8 +99,8 @@ static double part_that_fits(struct taylor *taylor, double step) {
 }
 
 /* Makes the polynomial fit the equations in the step and at its end, *step time scales long: adds
- * orders, or cuts *step, which counts as a failed step; to one time scale, so that the distance of
- * the points within is known, if it may hide something. is_long: orders are not added.
+ * orders, or cuts *step, which counts as a failed step; to one or two time scales, so that the
+ * distance of the points within is known, if it may hide something. is_long: orders are not added.
  * Writes end_x and end_dx. */
 static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
                             struct method_work *work) {
@@ -120,7 +120,9 @@ static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
             if (ode->inner_count == 0 || taylor_series_hides_nothing(series, *step)) {
                 return STATUS_OK;
             }
-            part = *step > 1.0 ? fmax(part, 1.0) : part_that_fits(taylor, *step);
+            // with events a scale is the step before: it may grow
+            const double longest = taylor->is_searched ? 2.0 : 1.0;
+            part = *step > longest ? fmax(part, longest) : part_that_fits(taylor, *step);
             if (part == *step) {
                 return STATUS_OK;
             }
