@@ -29,6 +29,7 @@ from rparm.expressions.expression import in_order
 FACTORS = re.compile(r"row\[(\d+)\]\[i( - 1|)\] \* row\[(\d+)\]\[k - i\]")
 FEWEST_IN_PAIRS = 4  # sums of a series that gains by adding up two at once
 WIDE = 150  # values that move in a model whose series has elements side by side
+FLAT = 4  # degree of divisors whose small values show in the states' own terms, not between points
 
 
 class Series:
@@ -91,8 +92,8 @@ class Series:
         return [f"{{{self._place(value)}, {self._place(x)}}}" for value, x in pairs]
 
     def _arguments(self, value: Value) -> list[Value]:
-        """Of a quotient or a function other than sine and cosine."""
-        if value.op == "/" and value.arguments[1].moves:
+        """Of a function other than sine and cosine, or a quotient by a divisor of high degree."""
+        if value.op == "/" and _degree(value.arguments[1]) > FLAT:
             return [self._varying(value.arguments[1])[1]]
         if value.op not in DERIVATIVES or value.op in ("sin", "cos"):
             return []
@@ -424,3 +425,17 @@ def scaled(graph: Graph, roots: list[Value], is_wide: bool) -> list[Value]:
         else:
             found[value] = one, value
     return [product(*found[root]) for root in roots]
+
+
+def _degree(root: Value) -> int:
+    """Return how many moving factors its products have; a function's value counts as one."""
+    degrees: dict[Value, int] = {}
+    for value in in_order([root]):
+        below = [degrees[argument] for argument in value.arguments]
+        if value.op in ("*", "/"):
+            degrees[value] = sum(below)
+        elif value.op in ("+", "-", "negative", "if"):
+            degrees[value] = max(below)
+        else:
+            degrees[value] = int(value.moves)
+    return degrees[root]
