@@ -181,6 +181,8 @@ def _series(series: Series, has_domains: bool) -> dict[str, object]:
         "extend_by_avx2": BY_AVX2.splitlines() if series.is_wide else [],
         "row_of_indicator": ", ".join(rows or ["0"]),
         "inner": ", ".join(inner or ["{0, 0}"]),
+        "may_vanish": str(series.may_vanish).lower(),
+        "is_of_time": str(series.is_of_time).lower(),
         "inner_count": len(inner),
         "inner_stride": len(series.columns) or 1,
     }

@@ -29,6 +29,7 @@ from rparm.expressions.expression import in_order
 FACTORS = re.compile(r"row\[(\d+)\]\[i( - 1|)\] \* row\[(\d+)\]\[k - i\]")
 FEWEST_IN_PAIRS = 4  # sums of a series that gains by adding up two at once
 WIDE = 150  # values that move in a model whose series has elements side by side
+VANISHING = 5  # factors of a product whose zero may have as many orders as the shortest series
 FLAT = 4  # degree of divisors whose small values show in the states' own terms, not between points
 
 
@@ -90,6 +91,16 @@ class Series:
         values = (value for value in self.columns or self.rows)
         pairs = [(value, argument) for value in values for argument in self._arguments(value)]
         return [f"{{{self._place(value)}, {self._place(x)}}}" for value, x in pairs]
+
+    @property
+    def may_vanish(self) -> bool:
+        """All terms of a state's series may be 0, though it does not rest."""
+        return any(_zeros(rate) >= VANISHING for rate in self.rates.values())
+
+    @property
+    def is_of_time(self) -> bool:
+        """A rate follows from the time itself."""
+        return any(op == "time" for rate in self.rates.values() for op, _ in rate.leaves)
 
     def _arguments(self, value: Value) -> list[Value]:
         """Of a function other than sine and cosine, or a quotient by a divisor of high degree."""
@@ -425,6 +436,22 @@ def scaled(graph: Graph, roots: list[Value], is_wide: bool) -> list[Value]:
         else:
             found[value] = one, value
     return [product(*found[root]) for root in roots]
+
+
+def _zeros(root: Value) -> int:
+    """Return of how many orders its zero may be where its factors have simple ones."""
+    orders: dict[Value, int] = {}
+    for value in in_order([root]):
+        below = [orders[argument] for argument in value.arguments]
+        if value.op == "*":
+            orders[value] = sum(below)
+        elif value.op == "/":
+            orders[value] = below[0]
+        elif value.op == "pow":
+            orders[value] = VANISHING * below[0]
+        else:
+            orders[value] = max(below, default=int(value.moves))
+    return orders[root]
 
 
 def _degree(root: Value) -> int:

@@ -192,6 +192,8 @@ static enum status setup(struct instance *instance) {
         instance->ode.inner = model->series->inner;
         instance->ode.inner_count = model->series->inner_count;
         instance->ode.inner_stride = model->series->inner_stride;
+        instance->ode.may_vanish = model->series->may_vanish;
+        instance->ode.is_of_time = model->series->is_of_time;
     }
     return integrator_create(&instance->ode, &instance->sink, &instance->integrator);
 }

@@ -92,20 +92,36 @@ static enum status restart(void *memory, const double x[]) {
 
 /* ---- Check ---------------------------------------------------------------------------------- */
 
-static double part_that_fits(struct taylor *taylor, double step) {
-    const size_t n = taylor->series.problem->ode.state_count;
+/* Points at which a step is looked into, and fewer where a product of polynomials may be hidden. */
+enum { POINTS = 31, FEW_POINTS = 7 };
+
+/* Returns the part of a step, in time scales, that hides nothing: up to the first point within that
+ * does not fit, or a step for which the distance of the points is known. */
+static double part_that_hides_nothing(struct taylor *taylor, double step) {
+    struct taylor_series *series = &taylor->series;
+    const bool is_inner =
+        series->problem->ode.inner_count > 0 && !taylor_series_hides_nothing(series, step);
+    if (!is_inner && !taylor_series_vanishes(series)) {
+        return step;
+    }
+    // with events a scale is the step before: it may grow
+    const double scales = taylor->is_searched ? 2.0 : 1.0;
+    const double longest = is_inner ? scales : POINTS + 1.0;
+    if (step > longest) {
+        return fmax(0.5 * step, longest);
+    }
+    const int points = is_inner || step > 1.0 ? POINTS : FEW_POINTS;
+    const size_t n = series->problem->ode.state_count;
     double *x = taylor->inner;
-    return taylor_series_part_that_fits(&taylor->series, step, x, x + n, x + 2 * n);
+    return taylor_series_part_that_fits(series, step, points, x, x + n, x + 2 * n);
 }
 
 /* Makes the polynomial fit the equations in the step and at its end, *step time scales long: adds
- * orders, or cuts *step, which counts as a failed step; to one or two time scales, so that the
- * distance of the points within is known, if it may hide something. is_long: orders are not added.
- * Writes end_x and end_dx. */
+ * orders, or cuts *step, which counts as a failed step. is_long: orders are not added. Writes end_x
+ * and end_dx. */
 static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
                             struct method_work *work) {
     struct taylor_series *series = &taylor->series;
-    const struct ode *ode = &series->problem->ode;
     for (;;) {
         double defect;
         enum status status =
@@ -115,17 +131,9 @@ static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
         }
         // within the bound, the first term left out is about a tolerance at most
         const bool fits_at_end = defect <= series->order + 1;
-        double part = 0.5 * *step;
-        if (fits_at_end) {
-            if (ode->inner_count == 0 || taylor_series_hides_nothing(series, *step)) {
-                return STATUS_OK;
-            }
-            // with events a scale is the step before: it may grow
-            const double longest = taylor->is_searched ? 2.0 : 1.0;
-            part = *step > longest ? fmax(part, longest) : part_that_fits(taylor, *step);
-            if (part == *step) {
-                return STATUS_OK;
-            }
+        const double part = fits_at_end ? part_that_hides_nothing(taylor, *step) : 0.5 * *step;
+        if (part == *step) {
+            return STATUS_OK;
         }
         if (!fits_at_end && *step == 1.0 && !is_long && series->order < series->largest_order) {
             status = taylor_series_add_orders(series, series->order + 2);

@@ -42,8 +42,9 @@ struct ode {
     ode_reach *reach;       /* called if events are searched; NULL if any distance is allowed */
     size_t indicator_count; /* 0 without events */
     const size_t *row_of_indicator;   /* as in struct series */
-    const struct series_inner *inner; /* as in struct series, with the next two */
+    const struct series_inner *inner; /* as in struct series, with the next four */
     size_t inner_count, inner_stride;
+    bool may_vanish, is_of_time;
     ode_series *series;      /* for INTEGRATOR_TAYLOR only; NULL if the model has none */
     size_t series_row_count; /* >= state_count if there is a series */
     size_t state_count;      /* > 0 */

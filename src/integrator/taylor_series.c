@@ -224,9 +224,25 @@ bool taylor_series_hides_nothing(const struct taylor_series *series, double s) {
     return true;
 }
 
-double taylor_series_part_that_fits(struct taylor_series *series, double s, double x[], double dx[],
-                                    double f[]) {
-    const int points = TAYLOR_INNER_POINTS;
+bool taylor_series_vanishes(const struct taylor_series *series) {
+    const struct ode *ode = &series->problem->ode;
+    if (!ode->may_vanish) {
+        return false;
+    }
+    bool vanishes = false;
+    bool rests = !ode->is_of_time;
+    for (size_t i = 0; i < ode->state_count; i++) {
+        const double *row = series->row[i];
+        vanishes |= row[series->order - 1] == 0.0 && row[series->order] == 0.0;
+        for (int k = 1; rests && k <= series->order; k++) {
+            rests = row[k] == 0.0;
+        }
+    }
+    return vanishes && !rests;
+}
+
+double taylor_series_part_that_fits(struct taylor_series *series, double s, int points, double x[],
+                                    double dx[], double f[]) {
     const double distance = s / (points + 1);
     for (int k = 1; k <= points; k++) {
         const double t = series->begin + k * distance * series->time_scale;

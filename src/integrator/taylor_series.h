@@ -117,15 +117,16 @@ MUST_CHECK NONNULL enum status taylor_series_measure_defect(struct taylor_series
  * as long as nothing that the states follow from is far below the tolerance there and grows beyond
  * it: exp(-300) at the begin of a step adds nothing to any coefficient of a state. But its own
  * coefficients grow from order to order, or are 0. So a step hides nothing if each inner quantity
- * (model.h) has converged by its own size, or its argument rests. Sums, sines and products of what
- * is seen hide nothing. */
+ * (model.h) has converged by its own size, or its argument rests. */
 MUST_CHECK NONNULL bool taylor_series_hides_nothing(const struct taylor_series *series, double s);
 
-/* Points within a step that may hide something. */
-enum { TAYLOR_INNER_POINTS = 31 };
+/* True if the last terms of a state are exactly 0, as from (t (1 - t))^5 at t = 0, unless all
+ * states rest for ever. */
+MUST_CHECK NONNULL bool taylor_series_vanishes(const struct taylor_series *series);
 
-/* Returns the part of the step to s in which the polynomial fits the equations, as far as points at
- * equal distances say: what lasts longer than such a distance is seen. x, dx, f: room for states.
- */
+/* Returns the part of the step to s in which the polynomial fits the equations, as far as so many
+ * points at equal distances say: what lasts longer than such a distance is seen. x, dx, f: room for
+ * states. */
 MUST_CHECK NONNULL double taylor_series_part_that_fits(struct taylor_series *series, double s,
-                                                       double x[], double dx[], double f[]);
+                                                       int points, double x[], double dx[],
+                                                       double f[]);

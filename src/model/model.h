@@ -169,6 +169,9 @@ struct series {
     /* True if extend reads has_avx2: a virtual machine takes tens of microseconds to answer. */
     bool asks_for_avx2;
 
+    bool may_vanish; /* all terms of a state may be 0, though it does not rest: (t (1 - t))^5 */
+    bool is_of_time; /* a derivative follows from the time itself */
+
     /* What may be nothing at the begin of a step and large within. NULL if there is nothing. */
     const struct series_inner *inner;
     size_t inner_count, inner_stride;

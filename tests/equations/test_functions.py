@@ -1,5 +1,6 @@
 """Functions of files with equations: further ones, the file's own, derivatives, compound events."""
 
+from math import comb
 from pathlib import Path
 
 import mpmath
@@ -254,3 +255,12 @@ def test_a_diode_opens_within_a_step(
     """At the begin of the step its current is exp(-300)."""
     found = simulated(made(folder, TEXTS["DIODE"]), 0.1, step, {"solver_method": method})
     np.testing.assert_allclose(found["u"][:: round(5e-3 / step)], charging, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("step", [0.01, 0.1, 1.0])
+def test_what_vanishes_at_both_ends_of_a_step_is_seen(folder: Path, step: float) -> None:
+    """Even powers of the sine have a binomial coefficient as their mean."""
+    method = {"solver_method": METHODS["taylor"]}
+    run = simulated(made(folder, TEXTS["VANISHING"]), 4.0, step, method)
+    for name, value in {"swing": comb(6, 3) / 2**4, "pulse": comb(64, 32) / 2**62}.items():
+        assert run[name][-1] == pytest.approx(value, rel=0, abs=1e-8), name
