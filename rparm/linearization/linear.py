@@ -50,6 +50,8 @@ class Linear:
         Discrete outputs: they have no derivatives.
     flat : tuple of str
         Functions without slope, with the variables that call them.
+    uneven : tuple of str
+        Components in Python that do not do the same in every step.
     intervals : dict of str to (float, float)
         Where dry friction lets what was trimmed lie anywhere in between.
     dropped : tuple of str
@@ -85,6 +87,7 @@ class Linear:
     held: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     flat: tuple[str, ...] = ()
+    uneven: tuple[str, ...] = ()
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     dropped: tuple[str, ...] = ()
     hidden: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))
@@ -415,6 +418,7 @@ def law_model(
             *(f"a stair or flat part in {text}" for text in found.flat),
             *(f"step in {name}" for name in unseen),
         ),
+        uneven=("step",) if found.is_uneven else (),
         dt=step,
     )
 

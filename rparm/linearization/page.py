@@ -152,6 +152,11 @@ def notes(found: Study) -> list[str]:
             f"Without slope: {_names(linear.flat)}. These functions stay as they are at the point: "
             "a loop through them looks open."
         )
+    if linear.uneven:
+        texts.append(
+            f"Not the same in every step: {_names(linear.uneven)}. The model takes it as in the "
+            "step at the point: margins are those of a law that always acts so."
+        )
     if found.loop is not None and found.loop.dropped:
         texts.append(
             f"Not in the loop: {_names(found.loop.dropped)}. The break does not move them, or they "

@@ -171,16 +171,29 @@ def check_same(model: Linear, part: Linear) -> None:
     size = np.maximum(np.abs(values), np.abs(others))
     is_same = ~(np.abs(values - others) > SAME * size + bounds + further)
     p = model.points(w)[:, None]
-    (signs, sizes), (turned, logs) = (
-        np.linalg.slogdet(p[..., None] * np.eye(len(each.A)) - each.A) for each in (model, part)
+    (signs, sizes, rounding), (turned, logs, more) = (
+        _characteristic(each.A, p[..., None]) for each in (model, part)
     )
     away = p - part.hidden
     logs = logs + np.log(np.abs(away)).sum(axis=1)
     turned = turned * (away / np.abs(away)).prod(axis=1)
-    is_same &= ~(np.abs(turned / signs * np.exp(logs - sizes) - 1) > SAME)
+    is_same &= ~(np.abs(turned / signs * np.exp(logs - sizes) - 1) > SAME + rounding + more)
     if not is_same.all():
         why = "rounding hides which states are in the loop, and its margins"
         raise UserError(f"--break {model.inputs[0]}: {why}: expected another break")
+
+
+def _characteristic(A: np.ndarray, p: np.ndarray) -> Answers:
+    """Return the sign and the logarithm of det(p - A) at p (k, 1, 1), and its relative rounding."""
+    scale, one = scales(A), np.eye(len(A))
+    A = A * scale / scale[:, None]
+    matrices = p * one - A
+    try:
+        back = np.abs(np.linalg.inv(matrices)).transpose(0, 2, 1)
+    except np.linalg.LinAlgError:  # p is a pole
+        back = np.full(matrices.shape, np.inf)
+    terms = (back * (np.abs(A) + np.abs(p) * one)).sum(axis=(1, 2))
+    return *np.linalg.slogdet(matrices), ROUNDING * (2 + len(A)) * terms
 
 
 def suited(A: np.ndarray, B: np.ndarray, C: np.ndarray) -> np.ndarray:

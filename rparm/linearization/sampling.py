@@ -9,9 +9,11 @@ import math
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -22,6 +24,7 @@ from rparm.systems.python_component import PythonInstance
 
 SAME = 1e-12  # relative, of times that differ by rounding only
 MOST_TICKS = 10_000  # in a period
+STEPS_AHEAD = 50  # of a law in Python, that are compared
 SMALLEST = 1e-17  # of a sum: a term that changes nothing
 UNDEFINED = sys.float_info.max  # in place of a new value that is not finite
 # description of a local variable, as fmu/equations writes it
@@ -254,6 +257,7 @@ class Law:
     after: np.ndarray  # (n,) one step later
     partials: np.ndarray  # (n, n + m) of `after` by states and inputs
     flat: tuple[str, ...]  # effects on a stair or in a dead zone, with the causes
+    is_uneven: bool  # inputs that did not matter in a step do so in a later one
 
 
 def law(
@@ -269,7 +273,7 @@ def law(
     """
     kept, made = instance.save(), instance.made
     numbers = _Numbers(instance)
-    x = numbers.of(kept)
+    x, are_whole = numbers.of(kept), numbers.are_whole
     names = [f"saved {name}" if name in made.outputs else name for name in numbers.names]
     point = np.array([*x, *inputs])
 
@@ -285,10 +289,26 @@ def law(
     after = stepped(point)
     known, effects = [*names, *made.inputs], [*names, *made.outputs]
     given = [0.0] * len(x) + [(nominals or {}).get(name, 0.0) for name in made.inputs]
+    sizes = [
+        2.0 ** math.ceil(math.log2(max(abs(number), nominal or 1.0)))
+        for number, nominal in zip(point.tolist(), given, strict=True)
+    ]
     columns, flat = [], list[str]()
     for i, cause in enumerate(known):
-        size = 2.0 ** math.ceil(math.log2(max(abs(point[i]), given[i] or 1.0)))
-        column, is_flat = _difference(stepped, point, i, size / 4, after)
+        size = sizes[i]
+        try:
+            column, is_flat = _difference(stepped, point, i, size / 4, after)
+        except UserError:
+            if i >= len(x) or not are_whole[i]:
+                raise
+            if after[i] != x[i]:
+                instance.restore(kept)
+                why = f"each step changes {cause}, a whole number: it has no linear model"
+                way_out = "in place of an index keep a list, and append() and pop(0)"
+                raise UserError(f"{instance.name}: {why}: {way_out}") from None
+            flat.append(f"{instance.name} over {cause}")
+            columns.append(np.zeros(len(after)))
+            continue
         columns.append(column)
         flat += [f"{effects[j]} over {cause}" for j in np.flatnonzero(is_flat)]
         if (bad := np.isnan(column)).any():
@@ -302,7 +322,33 @@ def law(
     resting = np.zeros((len(after), len(made.outputs)))  # no output of before matters
     partials = np.hstack([whole[:, : len(x)], resting, whole[:, len(x) :]])
     outputs = instance.numbers[len(made.inputs) :]
-    return Law((*names, *made.outputs), np.array([*x, *outputs]), after, partials, tuple(flat))
+    moved = inputs + np.array(sizes[len(x) :]) / 4
+    is_uneven = _is_uneven(instance, time, step, inputs, moved)
+    instance.restore(kept)
+    x = np.array([*x, *outputs])
+    return Law((*names, *made.outputs), x, after, partials, tuple(flat), is_uneven)
+
+
+def _is_uneven(
+    instance: PythonInstance, time: float, step: float, inputs: np.ndarray, moved: np.ndarray
+) -> bool:
+    """Return whether moved inputs matter in a step after one in which they do not.
+
+    Where no output of a step follows from its inputs, what is saved counts.
+    """
+    numbers, seen = _Numbers(instance), list[tuple[bool, bool]]()
+
+    def after(kept: object, k: int, u: np.ndarray) -> tuple[list[float], list[float]]:
+        instance.restore(numbers.put(kept, numbers.of(kept)))
+        return instance.stepped(time + k * step, step, u), numbers.of(instance.save())
+
+    with suppress(UserError):
+        for k in range(STEPS_AHEAD):
+            kept = instance.save()
+            others, own = after(kept, k, moved), after(kept, k, inputs)
+            seen.append((own[0] != others[0], own[1] != others[1]))
+    matter = [output if any(x for x, _ in seen) else saved for output, saved in seen]
+    return any(earlier < later for earlier, later in pairwise(matter))
 
 
 def _difference(
@@ -408,14 +454,16 @@ class _Numbers:
 
     def __init__(self, instance: PythonInstance) -> None:
         self._instance, self.names = instance, list[str]()
+        self.are_whole: list[bool] = []  # integers of Python
 
     def of(self, state: object) -> list[float]:
         """Return the numbers; `names` are theirs."""
         found: list[float] = []
-        self.names = []
+        self.names, self.are_whole = [], []
 
         def take(name: str, number: float) -> float:
             found.append(float(number))
+            self.are_whole.append(isinstance(number, int))
             self.names.append(name if name and name[0] != "[" else f"saved{name}")
             return number
 
@@ -433,7 +481,10 @@ class _Numbers:
             return np.array(moved, float).reshape(state.shape)
         if state is None or isinstance(state, bool | str | np.bool_):
             return state
-        if isinstance(state, int | float | np.integer | np.floating):
+        if isinstance(state, int | np.integer):
+            moved = visit(name, int(state))
+            return int(moved) if float(moved).is_integer() else moved
+        if isinstance(state, float | np.floating):
             return visit(name, float(state))
         if isinstance(state, dict):
             begin = f"{name}." if name else ""

@@ -176,6 +176,7 @@ def document(found: Study, step: float | None) -> Document:
         "poles": pairs(linear.poles),
         "left_out": list(linear.left_out),
         "without_slope": list(linear.flat),
+        "uneven": list(linear.uneven),
         "intervals": {name: list(map(finite, ends)) for name, ends in linear.intervals.items()},
     }
     if linear.dt:

@@ -259,7 +259,7 @@ def _joined(parts: Mapping[str, linear.Linear]) -> dict[str, Any]:
     flat = [f.replace(" in ", f" in {name}.") for name, part in parts.items() for f in part.flat]
     listed = {
         kind: tuple(f"{name}.{v}" for name, part in parts.items() for v in getattr(part, kind))
-        for kind in ("states", "inputs", "outputs", "held", "left_out")
+        for kind in ("states", "inputs", "outputs", "held", "left_out", "uneven")
     }
     return numbers | listed | {"at": at, "flat": tuple(flat), "nominals": nominals}
 
@@ -348,10 +348,17 @@ def _feeding(
 
 
 def _clear(part: linear.Linear) -> tuple[np.ndarray, ...]:
-    """Set entries of A, B, C and D to 0 that are rounding, compared with their row and column."""
-    n = len(part.A)
+    """Set entries of A, B, C and D to 0 that are rounding, compared with their row and column.
+
+    Units of states, inputs and outputs are chosen first: small ones are no rounding.
+    """
+    n, m, p = len(part.A), part.B.shape[1], len(part.C)
     whole = np.block([[part.A, part.B], [part.C, part.D]])
     size = np.abs(whole)
+    square = np.zeros((n + m + p, n + m + p))
+    square[:n, : n + m], square[n + m :, : n + m] = size[:n], size[n:]
+    units = linear.scales(square)
+    size = size * units[: n + m] / np.append(units[:n], units[n + m :])[:, None]
     largest = [size.max(axis=i, keepdims=True, initial=0.0) for i in (0, 1)]
     whole = np.where(size > NEGLIGIBLE * np.minimum(*largest), whole, 0.0)
     return whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:]

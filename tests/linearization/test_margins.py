@@ -353,6 +353,35 @@ def test_margins_of_a_crane_with_a_sampled_law(late: bool, up: float) -> None:
     assert sizes(0.9999 * found.gain_up).max() < 1 < sizes(1.0001 * found.gain_up).max()
 
 
+def test_double_poles_at_1_hide_nothing() -> None:
+    """Two masses with a spring, and a position law at one of them."""
+    m, k, d = np.array([1.3, 0.7]), 100, 0.4
+    pull = np.array([[-1.0, 1], [1, -1]]) / m[:, None]
+    A = np.block([[np.zeros((2, 2)), np.eye(2)], [k * pull, d * pull]])
+    plant = A, np.array([[0.0, 0, 1 / m[0], 0]]).T, np.eye(4)[[0]]
+    loop, sizes = closed_by(plant, np.array([[0, 0, 1.0], [300, 0, -320]]), 0.02, False, np.ones(9))
+    up = margins(loop).gain_up
+    assert sizes(0.999 * up).max() < 1 + 1e-9 and sizes(1.001 * up).max() > 1 + 1e-6
+
+
+def test_small_units_are_no_rounding() -> None:
+    """A photo diode with an integral law in SI units: L = 1e8 / (s (1 + 1e-9 s)^2)."""
+    charge, volume, tau, R, C, photon = 1.6e-19, 1e-16, 1e-9, 1e3, 1e-12, 2e-19
+    A = np.array([[-1 / tau, 0], [charge * volume / tau / C, -1 / R / C]])
+    at = [np.zeros(n) for n in (2, 1, 1, 2)]
+    B, D = np.array([[1 / photon / volume], [0]]), np.zeros((1, 1))
+    parts = {"p": Linear(("N", "v"), ("P",), ("v",), A, B, np.eye(2)[[1]], D, *at)}
+    at = [np.zeros(1)] * 4
+    law = D, np.full((1, 1), -1e8 / 800), np.ones((1, 1)), D
+    parts["l"] = Linear(("w",), ("v",), ("P",), *law, *at)
+    wires = [Connection("p", "v", "l", "v")]
+    found = margins(open_loop(connected(parts, wires).select(["p.P"], ["l.P"])))
+    crossing = np.roots([1e-18, 0, 1, -1e8])
+    w = crossing[np.isreal(crossing)].real[0]
+    assert found.gain_up == pytest.approx(20, rel=1e-9)
+    assert found.phase == pytest.approx(90 - 2 * np.degrees(np.arctan(1e-9 * w)), rel=1e-9)
+
+
 @pytest.mark.parametrize("late", [False, True])
 def test_margins_of_random_observers_are_those_of_the_whole_loop(late: bool) -> None:
     """Integrators and lags in series, with a mode or without, in units 12 decades apart."""
@@ -407,7 +436,29 @@ def test_an_input_that_nothing_follows_in_this_step_is_named(tmp_path: Path) -> 
         with PythonComponent.read("law.py", tmp_path).instance("law") as law:
             law.enter_initialization()
             law.exit_initialization()
-            assert law_model(law, 0.0, 0.1, np.zeros(1)).flat == flat
+            model = law_model(law, 0.0, 0.1, np.zeros(1))
+            assert model.flat == flat and bool(model.uneven) == (every == "0")
+
+
+def test_a_number_that_each_step_changes_is_no_index(tmp_path: Path) -> None:
+    text = """class Law:
+    inputs, outputs = ["y"], ["u"]
+    buffer, k = [0.0, 0.0, 0.0], 0
+    def step(self, t, h, inputs):
+        u, self.buffer[self.k] = self.buffer[self.k], -inputs["y"]
+        self.k = (self.k + 1) % 3
+        return {"u": u}
+    def save(self):
+        return {"buffer": self.buffer, "k": self.k}
+    def restore(self, saved):
+        self.buffer, self.k = list(saved["buffer"]), saved["k"]
+"""
+    (tmp_path / "law.py").write_text(text, encoding="utf-8")
+    with PythonComponent.read("law.py", tmp_path).instance("law") as law:
+        law.enter_initialization()
+        law.exit_initialization()
+        with pytest.raises(UserError, match="each step changes k, a whole number"):
+            law_model(law, 0.0, 0.1, np.zeros(1))
 
 
 # ---- Random loops --------------------------------------------------------------------------------
