@@ -100,6 +100,8 @@ def unsuited(ssp: "OpenedSystem") -> str:
         return "its FMUs do not exclude an algebraic loop, which Ecos does not find"
     if chain > len(system.components):  # as often Ecos passes values on at the start
         return "values pass a component more than once at the start, which Ecos does not follow"
+    if name := ssp.passed_on:
+        return f"what a tick at the start sets in {name} goes through another component"
     return absent()
 
 

@@ -183,6 +183,19 @@ class OpenedSystem:
         """Through how many connections values may pass at once; WrongValueError for a loop."""
         return longest_chain(self.system, self.models, is_assumed=True)
 
+    @property
+    def passed_on(self) -> str:
+        """An output that a tick at the start may change and another component passes on at once."""
+        starts = {c.start for c in self.system.connections}
+        for c in self.system.connections:
+            component, end = self.split(c.end)
+            outputs = self.models[component].dependencies.items()
+            passing = any(end in known and f"{component}.{y}" in starts for y, known in outputs)
+            start = self.variable(c.start)
+            if passing and start.variability == "discrete" and start.initial != "calculated":
+                return c.start
+        return ""
+
     def fmu(self, component: str) -> Path:
         return self.folder / self.system.component(component).source
 
