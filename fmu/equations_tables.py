@@ -19,6 +19,7 @@ from rparm.expressions.units import Measure
 
 LARGEST_FILE = 50_000_000  # bytes
 SEPARATORS = ",;\t"  # of columns; between others than commas, a comma may be a decimal point
+THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")  # so written, a comma may be no decimal one
 FAR = 1e300  # beyond every value: the bound where there is none
 INTERPOLATIONS = ("linear", "previous", "pchip")
 OUTSIDE = ("hold", "extend", "error")
@@ -156,6 +157,11 @@ def _columns(given: dict[str, Any], folder: Path) -> dict[str, list[float]]:
         raise ValueError(f"file: {path.name}: {reason}") from None
     has_points = any("." in text for cells in found.values() for _, text in cells)
     mark = "." if has_points or separator == "," else ","
+    commas = [cell for cells in found.values() for cell in cells if mark == "," and "," in cell[1]]
+    if commas and all(THOUSANDS.fullmatch(text) for _, text in commas):
+        where, text = commas[0]
+        either = f"{text.replace(',', '')} or {text.replace(',', '.')}"
+        raise ValueError(f"{where}: expected {either}, no comma that may mean thousands")
     return {key: [_cell(*cell, mark) for cell in cells] for key, cells in found.items()}
 
 

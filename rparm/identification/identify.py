@@ -165,8 +165,21 @@ class Identification:
         second = None if self.validation is None else self.validation.chi2
         for name, chi2 in (("chi2", self.chi2), ("chi2 of the second log", second)):
             if chi2 is not None and not chi2 < SUSPICIOUS:
-                return f"{name} is {chi2:.3g} where noise has 1: {CAUSES}"
+                return f"{name} is {chi2:.3g} where noise has 1: {self._causes}"
         return ""
+
+    @property
+    def _causes(self) -> str:
+        own = []
+        if self.is_one_run:
+            own.append("a log that begins in another mode or between ticks")
+        if any(recording.filled is not None for recording in self.recordings):
+            own.append("inputs in missing rows, which are guesses")
+        return (
+            ", ".join([CAUSES.replace(", or", ","), *own[:-1]]) + f", or {own[-1]}"
+            if own
+            else CAUSES
+        )
 
     @property
     def passed(self) -> bool:

@@ -30,6 +30,7 @@ LARGEST_LOG = 50_000_000  # bytes
 DELIMITERS = ",;\t"
 SEPARATOR = re.compile(r'"?sep=([^\w\s"]|\t)"?(?:\r\n?|\n)', re.IGNORECASE | re.ASCII)  # first line
 DECIMAL_COMMA = re.compile(r"[+-]?(?:\d+,\d*|,\d+)(?:e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
+THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")  # so written, a comma may be no decimal one
 EMPTY = {"na", "n/a", "#n/a", "null"}  # cells without a number, beside NaN and nothing
 MOST_SHOWN = 20  # columns in a message
 MOST_TRIED = 100  # rows, to choose the delimiter by
@@ -248,6 +249,7 @@ class Log:
         found, lines, joined = array("d"), array("q"), list[tuple[int, int]]()
         first, before, last = 0.0, -math.inf, -math.inf
         marks: dict[str, int] = {}  # decimal points and commas, by the line that first has one
+        commas = _Commas()
         for begin, line, row in self._rows():
             if begin < line:
                 joined.append((begin, line))
@@ -267,6 +269,8 @@ class Log:
             if len(marks) > 1:
                 other = min(marks.values())
                 raise self._wrong(f"has another sign of decimals, . or , than line {other}", line)
+            if "," in marks:
+                commas.see(line, [row[i].strip() for i in indices])
             exact = Decimal(cells[0])
             if origin is None:
                 origin = exact
@@ -278,6 +282,11 @@ class Log:
             lines.append(line)
         if not lines:
             raise UserError(f"{self.path}: has no rows below the names of its columns")
+        if not commas.are_decimal and commas.doubtful is not None:
+            line, cell = commas.doubtful
+            either = f"{cell.replace(',', '')} or {cell.replace(',', '.')}"
+            wanted = f"expected {either}, no comma that may mean thousands"
+            raise self._wrong(f"{wanted}, found {show(cell)}", line)
         table = np.array(found).reshape(len(lines), -1)
         for name, values in zip(names, table.T[1:], strict=True):
             if not np.isfinite(values).any():
@@ -314,6 +323,8 @@ class Log:
                     continue
             except ValueError:
                 expected = "a number with a decimal point"
+                if set(row[column].strip()) <= set("+-0123456789.,' "):
+                    expected = "a number without signs of thousands"
             break
         name, found = show(self.names[column]), show(row[column])
         return self._wrong(f"column {name}: expected {expected}, found {found}", line)
@@ -345,6 +356,21 @@ def read_log(path: Path) -> Log:
     names = tuple(name.strip() for name in headers[delimiter])
     head = 2 if named else 1
     return Log(path, text, hashlib.sha256(content).hexdigest(), delimiter, names, head)
+
+
+class _Commas:
+    """Whether commas in cells are decimal ones: in 1,100 it may be a sign of thousands."""
+
+    def __init__(self) -> None:
+        self.are_decimal = False
+        self.doubtful: tuple[int, str] | None = None  # line and cell
+
+    def see(self, line: int, cells: Iterable[str]) -> None:
+        for cell in cells if not self.are_decimal else ():
+            if THOUSANDS.fullmatch(cell):
+                self.doubtful = self.doubtful or (line, cell)
+            elif "," in cell:
+                self.are_decimal = True
 
 
 def _number_text(cell: str) -> str:

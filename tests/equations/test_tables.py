@@ -187,6 +187,7 @@ def test_a_mistake_in_a_table_is_one_line(name: str, tmp_path: Path) -> None:
     (tmp_path / "g.csv").write_text("a,d\n1,2\n2,inf\n")
     (tmp_path / "i.csv").write_text("a,d\n1,2,\n2,3,5\n")
     (tmp_path / "l.csv").write_text("sep=;\na;d\n0.5;1\n1,234;2\n")  # a thousand, or not
+    (tmp_path / "n.csv").write_text("a;d\n1;1,100\n2;900\n")
     (tmp_path / "m.csv").write_text('a,d\n0,1\n"1,234",2\n')
     (tmp_path / "h.csv").write_bytes(b"a,d\n\xff\xfe\n")
     for file, rows in (("j", 5), ("k", 99_999)):  # so many below the quote

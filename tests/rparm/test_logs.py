@@ -81,6 +81,9 @@ def test_logs_of_spreadsheets_are_read(write: Write, mark: str) -> None:
     log = "\n".join([f"{mark}time;force;note;speed", *rows])
     assert loaded(write, log).inputs["force"].tolist() == [1.0, 2.0, 3.0, 4.0, 2.5]
     assert loaded(write, log, "hold = true\n").inputs["force"].tolist() == [1.0, 1.0, 1.0, 4.0, 2.5]
+    times = "1,000", "1,250", "1,500", "1,750", "2,000"  # 1,000 s, not 1000: 1,250 with 0,5 says so
+    log = "\n".join([f"{mark}time;force", *(f"{time};0,5" for time in times)])
+    assert loaded(write, log).inputs["force"].tolist() == [0.5] * 5
 
 
 def test_a_gap_in_what_was_measured_is_no_measurement() -> None:
