@@ -355,10 +355,9 @@ def test_margins_of_a_crane_with_a_sampled_law(late: bool, up: float) -> None:
 
 def test_double_poles_at_1_hide_nothing() -> None:
     """Two masses with a spring, and a position law at one of them."""
-    m, k, d = np.array([1.3, 0.7]), 100, 0.4
-    pull = np.array([[-1.0, 1], [1, -1]]) / m[:, None]
-    A = np.block([[np.zeros((2, 2)), np.eye(2)], [k * pull, d * pull]])
-    plant = A, np.array([[0.0, 0, 1 / m[0], 0]]).T, np.eye(4)[[0]]
+    m, pull = (1.3, 0.7), np.array([-100, -0.4, 100, 0.4])
+    A = np.array([[0, 1, 0, 0], pull / m[0], [0, 0, 0, 1], -pull / m[1]])
+    plant = A, np.array([[0.0, 1 / m[0], 0, 0]]).T, np.eye(4)[[0]]
     loop, sizes = closed_by(plant, np.array([[0, 0, 1.0], [300, 0, -320]]), 0.02, False, np.ones(9))
     up = margins(loop).gain_up
     assert sizes(0.999 * up).max() < 1 + 1e-9 and sizes(1.001 * up).max() > 1 + 1e-6
