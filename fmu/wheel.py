@@ -75,7 +75,8 @@ def _is_used(file: Path) -> bool:
     """Whether a file of a model is of use where there are no tests and no references are made."""
     makes_references = file.suffix == ".py" and file.parent.name == "references"
     only_tested = file.suffix == ".csv" and file.with_suffix("").as_posix().endswith(FOR_TESTS)
-    return file.suffix in OF_MODELS and not makes_references and not only_tested
+    only_built = file.name == "variables.toml"  # the FMUs are there
+    return file.suffix in OF_MODELS and not (makes_references or only_tested or only_built)
 
 
 def _built(root: Path) -> Path:
