@@ -93,7 +93,8 @@ static enum status restart(void *memory, const double x[]) {
 /* ---- Check ---------------------------------------------------------------------------------- */
 
 /* Points at which a step is looked into, and fewer where a product of polynomials may be hidden. */
-enum { POINTS = 31, FEW_POINTS = 7 };
+static const int most_points = 31;
+static const int few_points = 7;
 
 /* Returns the part of a step, in time scales, that hides nothing: up to the first point within that
  * does not fit, or a step for which the distance of the points is known. */
@@ -106,11 +107,11 @@ static double part_that_hides_nothing(struct taylor *taylor, double step) {
     }
     // with events a scale is the step before: it may grow
     const double scales = taylor->is_searched ? 2.0 : 1.0;
-    const double longest = is_inner ? scales : POINTS + 1.0;
+    const double longest = is_inner ? scales : most_points + 1.0;
     if (step > longest) {
         return fmax(0.5 * step, longest);
     }
-    const int points = is_inner || step > 1.0 ? POINTS : FEW_POINTS;
+    const int points = is_inner || step > 1.0 ? most_points : few_points;
     const size_t n = series->problem->ode.state_count;
     double *x = taylor->inner;
     return taylor_series_part_that_fits(series, step, points, x, x + n, x + 2 * n);
