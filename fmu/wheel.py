@@ -31,6 +31,8 @@ OF_FMU += ("src/instance/*.toml",)
 # modules that are not for a model
 OF_RELEASES = ("bill_of_materials", "built", "derive", "pieces", "references", "wheel")
 OF_RELEASES += ("blocks", "derived")  # of plain_c: they write C of models
+# the FMUs are there, with their pictures
+OF_DEVELOPERS = ("variables.toml", "model.svg", "make_references.py", "reference_files.py")
 FOR_TESTS = ("_in", "sampled", "tightest")  # ends of names of tables that no command reads
 FOR_TESTS += tuple(f"{name}/monolithic" for name in ("payload", "integral", "plane", "effort"))
 
@@ -75,8 +77,8 @@ def _is_used(file: Path) -> bool:
     """Whether a file of a model is of use where there are no tests and no references are made."""
     makes_references = file.suffix == ".py" and file.parent.name == "references"
     only_tested = file.suffix == ".csv" and file.with_suffix("").as_posix().endswith(FOR_TESTS)
-    only_built = file.name == "variables.toml"  # the FMUs are there
-    return file.suffix in OF_MODELS and not (makes_references or only_tested or only_built)
+    is_used = file.suffix in OF_MODELS and file.name not in OF_DEVELOPERS
+    return is_used and not makes_references and not only_tested
 
 
 def _built(root: Path) -> Path:
