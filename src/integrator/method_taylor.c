@@ -37,15 +37,15 @@ struct taylor {
                            none */
     double *end_x;      /* the state at the end of the last step */
     double *end_dx;     /* the derivative of the polynomial there, by its argument */
-    double *inner;      /* room for three states */
     double passed; /* end of the step that goes past requested times, s since the restart; -INFINITY
                       if there is none */
+    double *inner; /* room for three states */
 };
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
 static size_t memory_size(const struct ode *ode) {
-    const size_t padding = 2 * _Alignof(max_align_t);
+    const size_t padding = 3 * _Alignof(max_align_t);
     return sizeof(struct taylor) + padding + taylor_series_memory_size(ode) +
            5 * ode->state_count * sizeof(double);
 }
@@ -53,6 +53,7 @@ static size_t memory_size(const struct ode *ode) {
 static void destroy(void *memory) {
     struct taylor *taylor = memory;
     workspace_free(taylor->end_x);
+    workspace_free(taylor->inner);
     taylor_series_destroy(&taylor->series);
     workspace_free(taylor);
 }
@@ -64,14 +65,16 @@ static enum status create(struct problem *problem, void **memory) {
         return STATUS_OUT_OF_MEMORY;
     }
     const size_t n = problem->ode.state_count;
-    taylor->end_x = workspace_calloc(5 * n, sizeof *taylor->end_x);
+    taylor->end_x = workspace_calloc(2 * n, sizeof *taylor->end_x);
     const bool has_series = taylor_series_create(problem, &taylor->series);
-    if (!has_series || taylor->end_x == NULL) {
+    taylor->series.may_hide = problem->ode.inner_count > 0 || problem->ode.may_vanish;
+    // last: most steps do not touch it
+    taylor->inner = workspace_calloc(3 * n, sizeof *taylor->inner);
+    if (!has_series || taylor->end_x == NULL || taylor->inner == NULL) {
         destroy(taylor);
         return STATUS_OUT_OF_MEMORY;
     }
     taylor->end_dx = taylor->end_x + n;
-    taylor->inner = taylor->end_dx + n;
     *memory = taylor;
     return STATUS_OK;
 }
@@ -100,6 +103,9 @@ static const int few_points = 7;
  * does not fit, or a step for which the distance of the points is known. */
 static double part_that_hides_nothing(struct taylor *taylor, double step) {
     struct taylor_series *series = &taylor->series;
+    if (!series->may_hide) {
+        return step;
+    }
     const bool is_inner =
         series->problem->ode.inner_count > 0 && !taylor_series_hides_nothing(series, step);
     if (!is_inner && !taylor_series_vanishes(series)) {

@@ -18,6 +18,7 @@ static inline bool taylor_series_has_few_rows(const struct ode *ode) {
 struct taylor_series {
     struct problem *problem;
     int largest_order;
+    bool may_hide;      /* true if there are inner quantities, or a state may vanish */
     bool is_event_near; /* true if the next long step begins at an event */
     int order;
     int expected_order; /* order to which a step that lands is expanded at first; the result does

@@ -88,6 +88,7 @@ static void create_at(ode_rhs *rhs, ode_series *series, double max_step, double 
                             .series_row_count = is_pulse ? 4 : 2,
                             .inner = &exponential,
                             .inner_count = is_pulse ? 1 : 0,
+
                             .inner_stride = 1};
     const struct message_sink quiet = {0};
     integrator_destroy(integrator);
