@@ -39,7 +39,6 @@ struct taylor {
     double *end_dx;     /* the derivative of the polynomial there, by its argument */
     double passed; /* end of the step that goes past requested times, s since the restart; -INFINITY
                       if there is none */
-    double *inner; /* room for three states */
 };
 
 /* ---- Life ----------------------------------------------------------------------------------- */
@@ -53,7 +52,6 @@ static size_t memory_size(const struct ode *ode) {
 static void destroy(void *memory) {
     struct taylor *taylor = memory;
     workspace_free(taylor->end_x);
-    workspace_free(taylor->inner);
     taylor_series_destroy(&taylor->series);
     workspace_free(taylor);
 }
@@ -65,12 +63,10 @@ static enum status create(struct problem *problem, void **memory) {
         return STATUS_OUT_OF_MEMORY;
     }
     const size_t n = problem->ode.state_count;
-    taylor->end_x = workspace_calloc(2 * n, sizeof *taylor->end_x);
     const bool has_series = taylor_series_create(problem, &taylor->series);
     taylor->series.may_hide = problem->ode.inner_count > 0 || problem->ode.may_vanish;
-    // last: most steps do not touch it
-    taylor->inner = workspace_calloc(3 * n, sizeof *taylor->inner);
-    if (!has_series || taylor->end_x == NULL || taylor->inner == NULL) {
+    taylor->end_x = workspace_calloc(5 * n, sizeof *taylor->end_x); // and room for three states
+    if (!has_series || taylor->end_x == NULL) {
         destroy(taylor);
         return STATUS_OUT_OF_MEMORY;
     }
@@ -119,7 +115,7 @@ static double part_that_hides_nothing(struct taylor *taylor, double step) {
     }
     const int points = is_inner || step > 1.0 ? most_points : few_points;
     const size_t n = series->problem->ode.state_count;
-    double *x = taylor->inner;
+    double *x = taylor->end_dx + n;
     return taylor_series_part_that_fits(series, step, points, x, x + n, x + 2 * n);
 }
 

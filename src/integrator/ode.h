@@ -38,7 +38,6 @@ struct ode {
     const struct series_inner *inner; /* as in struct series, with the next four */
     size_t inner_count, inner_stride;
     bool may_vanish, is_of_time;
-    char unused[32]; /* what each step reads lies in the lines of a cache as without these */
     ode_jacobian *jacobian;  /* for INTEGRATOR_CVODE_BDF only */
     const struct band *band; /* of the Jacobian; NULL: a full one */
     ode_indicators *indicators;
