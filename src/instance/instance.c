@@ -188,12 +188,7 @@ static enum status setup(struct instance *instance) {
     if (model->series != NULL) {
         instance->ode.series = instance_series;
         instance->ode.series_row_count = model->series->row_count;
-        instance->ode.row_of_indicator = model->series->row_of_indicator;
-        instance->ode.inner = model->series->inner;
-        instance->ode.inner_count = model->series->inner_count;
-        instance->ode.inner_stride = model->series->inner_stride;
-        instance->ode.may_vanish = model->series->may_vanish;
-        instance->ode.is_of_time = model->series->is_of_time;
+        instance->ode.rows = model->series;
     }
     return integrator_create(&instance->ode, &instance->sink, &instance->integrator);
 }

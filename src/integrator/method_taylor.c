@@ -44,9 +44,9 @@ struct taylor {
 /* ---- Life ----------------------------------------------------------------------------------- */
 
 static size_t memory_size(const struct ode *ode) {
-    const size_t padding = 3 * _Alignof(max_align_t);
+    const size_t padding = 2 * _Alignof(max_align_t);
     return sizeof(struct taylor) + padding + taylor_series_memory_size(ode) +
-           5 * ode->state_count * sizeof(double);
+           2 * ode->state_count * sizeof(double);
 }
 
 static void destroy(void *memory) {
@@ -63,9 +63,8 @@ static enum status create(struct problem *problem, void **memory) {
         return STATUS_OUT_OF_MEMORY;
     }
     const size_t n = problem->ode.state_count;
+    taylor->end_x = workspace_calloc(2 * n, sizeof *taylor->end_x);
     const bool has_series = taylor_series_create(problem, &taylor->series);
-    taylor->series.may_hide = problem->ode.inner_count > 0 || problem->ode.may_vanish;
-    taylor->end_x = workspace_calloc(5 * n, sizeof *taylor->end_x); // and room for three states
     if (!has_series || taylor->end_x == NULL) {
         destroy(taylor);
         return STATUS_OUT_OF_MEMORY;
@@ -102,8 +101,7 @@ static double part_that_hides_nothing(struct taylor *taylor, double step) {
     if (!series->may_hide) {
         return step;
     }
-    const bool is_inner =
-        series->problem->ode.inner_count > 0 && !taylor_series_hides_nothing(series, step);
+    const bool is_inner = !taylor_series_hides_nothing(series, step);
     if (!is_inner && !taylor_series_vanishes(series)) {
         return step;
     }
@@ -114,9 +112,7 @@ static double part_that_hides_nothing(struct taylor *taylor, double step) {
         return fmax(0.5 * step, longest);
     }
     const int points = is_inner || step > 1.0 ? most_points : few_points;
-    const size_t n = series->problem->ode.state_count;
-    double *x = taylor->end_dx + n;
-    return taylor_series_part_that_fits(series, step, points, x, x + n, x + 2 * n);
+    return taylor_series_part_that_fits(series, step, points);
 }
 
 /* Makes the polynomial fit the equations in the step and at its end, *step time scales long: adds
@@ -303,7 +299,8 @@ static enum status search(struct taylor *taylor, double end) {
     const struct taylor_series *series = &taylor->series;
     struct location *location = &series->problem->location;
     struct step_polynomial *step = &location->step;
-    const size_t *row_of_indicator = series->problem->ode.row_of_indicator;
+    const struct series *rows = series->problem->ode.rows;
+    const size_t *row_of_indicator = rows == NULL ? NULL : rows->row_of_indicator;
     const double length = (end - series->begin) / series->time_scale;
     step->begin = series->begin;
     step->end = end;

@@ -35,19 +35,16 @@ typedef void ode_reach(const double x[], double reach[], void *context);
 /* The fields that each step of `taylor` reads stand last, next to the rest of struct problem. */
 struct ode {
     ode_rhs *rhs;
-    const struct series_inner *inner; /* as in struct series, with the next four */
-    size_t inner_count, inner_stride;
-    bool may_vanish, is_of_time;
     ode_jacobian *jacobian;  /* for INTEGRATOR_CVODE_BDF only */
     const struct band *band; /* of the Jacobian; NULL: a full one */
     ode_indicators *indicators;
-    ode_rounding *rounding; /* NULL if it follows from the limits of the indicators */
-    ode_reach *reach;       /* called if events are searched; NULL if any distance is allowed */
-    size_t indicator_count; /* 0 without events */
-    const size_t *row_of_indicator; /* as in struct series */
-    ode_series *series;             /* for INTEGRATOR_TAYLOR only; NULL if the model has none */
-    size_t series_row_count;        /* >= state_count if there is a series */
-    size_t state_count;             /* > 0 */
+    ode_rounding *rounding;    /* NULL if it follows from the limits of the indicators */
+    ode_reach *reach;          /* called if events are searched; NULL if any distance is allowed */
+    size_t indicator_count;    /* 0 without events */
+    const struct series *rows; /* what its rows are; NULL if they are states only */
+    ode_series *series;        /* for INTEGRATOR_TAYLOR only; NULL if the model has none */
+    size_t series_row_count;   /* >= state_count if there is a series */
+    size_t state_count;        /* > 0 */
     void *context;
 };
 

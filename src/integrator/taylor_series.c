@@ -17,13 +17,15 @@ static const double safety = 0.9;
 
 size_t taylor_series_memory_size(const struct ode *ode) {
     const size_t padding = 3 * _Alignof(max_align_t);
-    return padding + ode->state_count * sizeof(double) +
+    return padding + 4 * ode->state_count * sizeof(double) +
            2 * ode->series_row_count * sizeof(double[SERIES_LENGTH]);
 }
 
 bool taylor_series_create(struct problem *problem, struct taylor_series *series) {
     *series = (struct taylor_series){.problem = problem};
-    series->weight = workspace_calloc(problem->ode.state_count, sizeof *series->weight);
+    const struct series *rows = problem->ode.rows;
+    series->may_hide = rows != NULL && (rows->inner_count > 0 || rows->may_vanish);
+    series->weight = workspace_calloc(4 * problem->ode.state_count, sizeof *series->weight);
     series->row = workspace_calloc(problem->ode.series_row_count, sizeof *series->row);
     if (taylor_series_has_few_rows(&problem->ode)) {
         return series->weight != NULL && series->row != NULL;
@@ -196,7 +198,7 @@ enum status taylor_series_measure_defect(struct taylor_series *series, double s,
 /* True if a quantity moves over the step to s by more than its tolerance means, as in stiff
  * equations whose motion has died away, or in proportion to the time. first: its coefficient 0. */
 static bool moves(const struct taylor_series *series, const double *first, double s) {
-    const size_t stride = series->problem->ode.inner_stride;
+    const size_t stride = series->problem->ode.rows->inner_stride;
     double bent = 0.0; // the way of all orders but the first
     for (int k = series->order; k >= 2; k--) {
         bent = (bent + fabs(first[stride * (size_t)k])) * s;
@@ -207,17 +209,17 @@ static bool moves(const struct taylor_series *series, const double *first, doubl
 }
 
 bool taylor_series_hides_nothing(const struct taylor_series *series, double s) {
-    const struct ode *ode = &series->problem->ode;
-    const size_t stride = ode->inner_stride;
+    const struct series *rows = series->problem->ode.rows;
+    const size_t stride = rows->inner_stride;
     const double power = s == 1.0 ? 1.0 : pow(s, series->order - 2);
-    for (size_t i = 0; i < ode->inner_count; i++) {
-        const double *first = &series->row[0][0] + ode->inner[i].place;
+    for (size_t i = 0; i < rows->inner_count; i++) {
+        const double *first = &series->row[0][0] + rows->inner[i].place;
         const double *last = first + stride * (size_t)series->order;
         const double begin =
             fabs(first[stride]) + fabs(first[2 * stride]) * s + fabs(first[3 * stride]) * s * s;
         const double end = (fabs(last[0]) * s + fabs(*(last - stride))) * power;
         if (!(end < converged * begin) &&
-            moves(series, &series->row[0][0] + ode->inner[i].argument, s)) {
+            moves(series, &series->row[0][0] + rows->inner[i].argument, s)) {
             return false;
         }
     }
@@ -226,11 +228,11 @@ bool taylor_series_hides_nothing(const struct taylor_series *series, double s) {
 
 bool taylor_series_vanishes(const struct taylor_series *series) {
     const struct ode *ode = &series->problem->ode;
-    if (!ode->may_vanish) {
+    if (!ode->rows->may_vanish) {
         return false;
     }
     bool vanishes = false;
-    bool rests = !ode->is_of_time;
+    bool rests = !ode->rows->is_of_time;
     for (size_t i = 0; i < ode->state_count; i++) {
         const double *row = series->row[i];
         vanishes |= row[series->order - 1] == 0.0 && row[series->order] == 0.0;
@@ -241,14 +243,17 @@ bool taylor_series_vanishes(const struct taylor_series *series) {
     return vanishes && !rests;
 }
 
-double taylor_series_part_that_fits(struct taylor_series *series, double s, int points, double x[],
-                                    double dx[], double f[]) {
+double taylor_series_part_that_fits(struct taylor_series *series, double s, int points) {
+    const size_t n = series->problem->ode.state_count;
+    double *x = series->weight + n;
+    double *dx = x + n;
+    double *f = dx + n;
     const double distance = s / (points + 1);
     for (int k = 1; k <= points; k++) {
         const double t = series->begin + k * distance * series->time_scale;
         taylor_series_evaluate(series, k * distance, x, dx);
         double defect = problem_rhs(series->problem, t, x, f) == STATUS_OK ? 0.0 : INFINITY;
-        for (size_t i = 0; i < series->problem->ode.state_count; i++) {
+        for (size_t i = 0; i < n; i++) {
             defect += s * missed(series->time_scale * f[i], dx[i]) * series->weight[i];
         }
         if (!(defect <= series->order + 1)) {

@@ -29,7 +29,7 @@ struct taylor_series {
     double (*row)[SERIES_LENGTH];     /* the coefficients */
     double (*end_row)[SERIES_LENGTH]; /* orders 0 and 1 at the end of a step */
     double end;     /* its time, s since the restart, if the next step can begin with it, or NaN */
-    double *weight; /* 1 over the tolerance of each state */
+    double *weight; /* 1 over the tolerance of each state; then room for three states */
 };
 
 /* Returns the largest number of bytes that create allocates. */
@@ -126,8 +126,6 @@ MUST_CHECK NONNULL bool taylor_series_hides_nothing(const struct taylor_series *
 MUST_CHECK NONNULL bool taylor_series_vanishes(const struct taylor_series *series);
 
 /* Returns the part of the step to s in which the polynomial fits the equations, as far as so many
- * points at equal distances say: what lasts longer than such a distance is seen. x, dx, f: room for
- * states. */
+ * points at equal distances say: what lasts longer than such a distance is seen. */
 MUST_CHECK NONNULL double taylor_series_part_that_fits(struct taylor_series *series, double s,
-                                                       int points, double x[], double dx[],
-                                                       double f[]);
+                                                       int points);

@@ -94,6 +94,7 @@ static void test_a_dip_within_the_touch_is_no_fall(void) {
 /* The modes have just been found valid there. One state, x' = rate. */
 static const double below = -1e-6;
 static const size_t row_of_indicator[1] = {0};
+static const struct series rows = {.row_count = 1, .row_of_indicator = row_of_indicator};
 static double rate;
 static enum { LINE, SINE, SWING } shape;
 static const double pi = 3.141592653589793;
@@ -146,7 +147,7 @@ static double run(int method, enum indicator_kind kind) {
         .jacobian = jacobian,
         .series = series,
         .series_row_count = 1,
-        .row_of_indicator = shape == SWING ? NULL : row_of_indicator,
+        .rows = shape == SWING ? NULL : &rows,
         .indicator_count = 1,
         .indicators = indicators,
     };

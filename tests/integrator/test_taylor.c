@@ -74,6 +74,8 @@ static enum status pulse_series(double t, double time_scale, int first, int last
 }
 
 static const struct series_inner exponential = {3 * SERIES_LENGTH, 2 * SERIES_LENGTH};
+static const struct series pulse_rows = {
+    .row_count = 4, .inner = &exponential, .inner_count = 1, .inner_stride = 1};
 
 /* ---- Runs ----------------------------------------------------------------------------------- */
 
@@ -86,10 +88,7 @@ static void create_at(ode_rhs *rhs, ode_series *series, double max_step, double 
                             .rhs = rhs,
                             .series = series,
                             .series_row_count = is_pulse ? 4 : 2,
-                            .inner = &exponential,
-                            .inner_count = is_pulse ? 1 : 0,
-
-                            .inner_stride = 1};
+                            .rows = is_pulse ? &pulse_rows : NULL};
     const struct message_sink quiet = {0};
     integrator_destroy(integrator);
     ASSERT_OK(integrator_create(&ode, &quiet, &integrator));

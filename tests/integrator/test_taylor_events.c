@@ -5,6 +5,7 @@
 enum row { X, V, LEFT, ROWS };
 
 static const size_t row_of_indicator[1] = {LEFT};
+static const struct series rows = {.row_count = 1, .row_of_indicator = row_of_indicator};
 static struct integrator *integrator;
 static int indicator_calls;
 
@@ -88,7 +89,7 @@ static const double quarter_turn = 0.78539816339744831; // pi / 4
 static int calls_between(double max_step) {
     struct ode ode = oscillator();
     struct integrator_statistics statistics;
-    ode.row_of_indicator = row_of_indicator;
+    ode.rows = &rows;
     start(&ode, max_step);
     TEST_ASSERT_TRUE(go_to(0.5) == 0.5);
     TEST_ASSERT_NULL(integrator_event(integrator));
@@ -110,7 +111,7 @@ static void test_a_row_that_has_not_converged_still_shows_the_event(void) {
 
 static void test_no_state_moves_farther_than_it_may(void) {
     struct ode ode = oscillator();
-    ode.row_of_indicator = row_of_indicator;
+    ode.rows = &rows;
     ode.reach = short_reach;
     start(&ode, 0.0);
     double v = 1.0;
