@@ -243,19 +243,24 @@ bool taylor_series_vanishes(const struct taylor_series *series) {
     return vanishes && !rests;
 }
 
+/* Returns the defect at s, as of a step to `whole`. x, dx, f: room for states. */
+NONNULL static double defect_within(struct taylor_series *series, double s, double whole,
+                                    double x[], double dx[], double f[]) {
+    const double t = series->begin + s * series->time_scale;
+    taylor_series_evaluate(series, s, x, dx);
+    double defect = problem_rhs(series->problem, t, x, f) == STATUS_OK ? 0.0 : INFINITY;
+    for (size_t i = 0; i < series->problem->ode.state_count; i++) {
+        defect += whole * missed(series->time_scale * f[i], dx[i]) * series->weight[i];
+    }
+    return defect;
+}
+
 double taylor_series_part_that_fits(struct taylor_series *series, double s, int points) {
     const size_t n = series->problem->ode.state_count;
-    double *x = series->weight + n;
-    double *dx = x + n;
-    double *f = dx + n;
+    double *room = series->weight + n;
     const double distance = s / (points + 1);
     for (int k = 1; k <= points; k++) {
-        const double t = series->begin + k * distance * series->time_scale;
-        taylor_series_evaluate(series, k * distance, x, dx);
-        double defect = problem_rhs(series->problem, t, x, f) == STATUS_OK ? 0.0 : INFINITY;
-        for (size_t i = 0; i < n; i++) {
-            defect += s * missed(series->time_scale * f[i], dx[i]) * series->weight[i];
-        }
+        const double defect = defect_within(series, k * distance, s, room, room + n, room + 2 * n);
         if (!(defect <= series->order + 1)) {
             return k == 1 ? 0.5 * distance : (k - 1) * distance;
         }
