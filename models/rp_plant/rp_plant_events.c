@@ -196,7 +196,8 @@ static void read_triggered(const struct rp_plant_values *values, const bool *at_
     }
 }
 
-bool rp_plant_modes_exist(const struct rp_plant_modes *modes) {
+/* True if all modes are of their enumerations. */
+static bool modes_exist(const struct rp_plant_modes *modes) {
     const int *joint = modes->joint;
     const int *contact = modes->contact;
     return joint[0] >= RP_PLANT_BACKWARD && joint[0] <= RP_PLANT_FREE &&
@@ -225,7 +226,7 @@ static bool fits(const struct rp_plant_values *values, int joint) {
 
 static bool modes_are_possible(const void *values_pointer, bool is_held) {
     const struct rp_plant_values *values = values_pointer;
-    return rp_plant_modes_exist(&values->modes) && values->modes.payload != RP_PLANT_UNDECIDED &&
+    return modes_exist(&values->modes) && values->modes.payload != RP_PLANT_UNDECIDED &&
            (!is_held || (fits(values, 0) && fits(values, 1)));
 }
 

@@ -49,9 +49,6 @@ struct rp_plant_values {
  * or released; an input or a parameter jumps (rp_plant_events.c). */
 extern const struct model_events rp_plant_events;
 
-/* True if all modes are of their enumerations. */
-bool rp_plant_modes_exist(const struct rp_plant_modes *modes);
-
 /* The Taylor series of the motion in its modes (rp_plant_series.c): states q1, q2, q1', q2', inputs
  * tau1, f2 and the wrench. */
 extern const struct series rp_plant_series;

@@ -53,31 +53,6 @@ void plant_test_random_plant(struct rp_test_random *random, struct rp_plant_valu
     v->modes.payload = v->payload_attached != 0 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED;
 }
 
-void plant_test_random_contacts(struct rp_test_random *random, struct rp_plant_values *v) {
-    struct rp_plant_parameters *p = &v->parameters;
-    for (int i = 0; i < 2; i++) {
-        const int contact = (int)(rp_test_random_bits(random) % 5) - 2;
-        const double depth = rp_test_uniform(random, 0.0, 0.25);
-        p->stops[i] = RP_PLANT_STOPS_COMPLIANT;
-        p->stop_stiffness[i] = rp_test_uniform(random, 1.0, 500.0);
-        p->stop_damping[i] = positive_or_zero(random, 2.0);
-        p->lower[i] = contact > 0 ? v->q[i] + depth : v->q[i] - 1.0;
-        p->upper[i] = contact < 0 ? v->q[i] - depth : v->q[i] + 1.0;
-        v->modes.contact[i] = contact;
-    }
-}
-
-void plant_test_random_inertia(struct rp_test_random *random, struct rp_plant_inertia *inertia) {
-    const double J = pow(10.0, rp_test_uniform(random, -2.0, 1.0));
-    const double m = pow(10.0, rp_test_uniform(random, -2.0, 1.0));
-    const double a = rp_test_uniform(random, -1.0, 1.0);
-    const double b = positive_or_zero(random, 1.0);
-    inertia->D[0][0] = J + m * a * a;
-    inertia->D[0][1] = inertia->D[1][0] = -m * a;
-    inertia->D[1][1] = m + b;
-    inertia->determinant = J * (m + b) + m * a * a * b;
-}
-
 void plant_test_outputs(struct rp_plant_values *v) {
     TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.outputs(v, 3.0));
 }

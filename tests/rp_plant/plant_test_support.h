@@ -18,12 +18,6 @@ void plant_test_random_arm(struct rp_test_random *random, struct rp_plant_values
  * modes; no stops. */
 void plant_test_random_plant(struct rp_test_random *random, struct rp_plant_values *v);
 
-/* Puts joints of a plant in compliant stops, which push or have let go, or between them. */
-void plant_test_random_contacts(struct rp_test_random *random, struct rp_plant_values *v);
-
-/* D11, D12, D22 and the determinant of a positive definite matrix. */
-void plant_test_random_inertia(struct rp_test_random *random, struct rp_plant_inertia *inertia);
-
 void plant_test_outputs(struct rp_plant_values *v);
 
 /* update with constant inputs and absolute tolerances of 1e-10; indicator -1: none has triggered.

@@ -1,9 +1,11 @@
-/* The series of the plant over short steps, at a closed stop too. test_plant_series.py has all
- * orders, test_plant_fmu.py the manipulator's bits. */
+/* The series of the plant on a rigid stop and before modes are decided, and friction over a step.
+ * test_plant_series.py has all orders, fmu/test_plant_fmu.py values against the Lagrangian. */
 #include "last_text.h"
 #include "plant_test_support.h"
+#include "rp_plant_equations.h"
 #include "unity.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -21,23 +23,6 @@ void setUp(void) {
     random_source.state = 37;
 }
 
-/* A step over which the series converges fast, and inputs that are not 0 in polynomials over it. */
-static void next_step(void) {
-    double u[PLANT_INPUTS];
-    double dx[PLANT_STATES];
-    const double x[PLANT_STATES] = {plant.q[0], plant.q[1], plant.dq[0], plant.dq[1]};
-    memcpy(u, &plant.inputs, sizeof u);
-    ASSERT_OK(rp_plant_model.right_hand_side(&plant, 3.0, x, u, dx));
-    time_scale = 5e-4 / (1.0 + 0.01 * (fabs(dx[2]) + fabs(dx[3])));
-    for (int i = 0; i < PLANT_INPUTS; i++) {
-        inputs[i][0] = u[i];
-        for (int k = 1; k < SERIES_INPUT_LENGTH; k++) {
-            const double rate = rp_test_uniform(&random_source, -20.0, 20.0);
-            inputs[i][k] = u[i] != 0.0 ? rate * pow(time_scale, k) : 0.0;
-        }
-    }
-}
-
 static void expand(int last, row all[MAX_ROWS]) {
     const struct series_origin origin = {
         .values = &plant,
@@ -53,91 +38,51 @@ static void expand(int last, row all[MAX_ROWS]) {
     ASSERT_OK(rp_plant_series.extend(&origin, 0, last, all));
 }
 
-/* ---- Equations of motion -------------------------------------------------------------------- */
+/* ---- First orders --------------------------------------------------------------------------- */
 
-enum { DEGREE = 20 };
-
-/* The value at s units; its derivative by s; the sum of the absolute terms of both at s = 1. */
-struct sum {
-    double value, derivative, size;
-};
-
-static struct sum sum_of(const double c[], double s) {
-    struct sum sum = {0};
-    for (int k = DEGREE; k >= 0; k--) {
-        sum.derivative = sum.derivative * s + sum.value;
-        sum.value = sum.value * s + c[k];
-        sum.size += (k + 1) * fabs(c[k]);
-    }
-    return sum;
-}
-
-static void assert_model_at(double s) {
-    double x[PLANT_STATES];
+static void assert_first_orders(void) {
     double u[PLANT_INPUTS];
     double dx[PLANT_STATES];
     double z[RP_PLANT_INDICATORS];
     struct indicator kinds[RP_PLANT_INDICATORS];
-    for (int i = 0; i < PLANT_STATES; i++) {
-        x[i] = sum_of(rows[i], s).value;
-    }
-    for (int i = 0; i < 2; i++) {
-        const int mode = plant.modes.joint[i];
-        if ((mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD) && mode * x[2 + i] < 0.0) {
-            return; // the mode has ended: what friction would be is another matter
-        }
-    }
+    const double x[PLANT_STATES] = {plant.q[0], plant.q[1], plant.dq[0], plant.dq[1]};
+    time_scale = 0.25;
+    memset(inputs, 0, sizeof inputs);
+    memcpy(u, &plant.inputs, sizeof u);
     for (int i = 0; i < PLANT_INPUTS; i++) {
-        u[i] = inputs[i][0] + s * (inputs[i][1] + s * (inputs[i][2] + s * inputs[i][3]));
+        inputs[i][0] = u[i];
     }
+    expand(1, rows);
     ASSERT_OK(rp_plant_model.right_hand_side(&plant, 3.0, x, u, dx));
     ASSERT_OK(rp_plant_model.events->indicators(&plant, 3.0, x, u, z));
     rp_plant_model.events->describe(&plant, kinds);
     for (int i = 0; i < PLANT_STATES; i++) {
-        const struct sum sum = sum_of(rows[i], s);
-        ASSERT_CLOSE(dx[i] * time_scale, sum.derivative, 1e-11 * (time_scale + sum.size));
+        ASSERT_CLOSE(dx[i] * time_scale, rows[i][1], 1e-12 * (100.0 + fabs(dx[i])));
     }
     for (int i = 0; i < RP_PLANT_INDICATORS; i++) {
         if (kinds[i].kind == INDICATOR_OF_MODEL) {
-            const struct sum sum = sum_of(rows[rp_plant_series.row_of_indicator[i]], s);
-            ASSERT_CLOSE(z[i], sum.value, 1e-11 * (100.0 + sum.size));
+            const double found = rows[rp_plant_series.row_of_indicator[i]][0];
+            ASSERT_CLOSE(z[i], found, 1e-12 * (100.0 + fabs(z[i])));
         }
     }
 }
 
-static void test_the_polynomials_satisfy_the_equations(void) {
+/* On a rigid stop, and with modes that are not decided yet. */
+static void test_the_first_orders_are_those_of_the_model(void) {
     for (int n = 0; n < RP_TEST_SAMPLES; n++) {
         plant_test_random_plant(&random_source, &plant);
-        if (n % 3 == 0) { // on a stop
-            plant.parameters.stops[n % 2] = RP_PLANT_STOPS_RIGID;
-            plant.parameters.lower[n % 2] = plant.q[n % 2];
-            plant.parameters.upper[n % 2] = plant.q[n % 2] + 1.0;
-            plant.dq[n % 2] = 0.0;
-            plant.modes.joint[n % 2] = RP_PLANT_STUCK;
-        } else if (n % 3 == 1) {
-            plant_test_random_contacts(&random_source, &plant);
-        } else if (n % 9 == 2) { // Coulomb friction alone: the manipulator's series
-            plant_test_random_arm(&random_source, &plant);
-            plant.parameters.coulomb_friction[0] = 2.0;
-            plant.parameters.coulomb_friction[1] = 3.0;
-            plant.modes.joint[0] = RP_PLANT_FORWARD;
-            plant.modes.joint[1] = RP_PLANT_BACKWARD;
-            plant.modes.payload = RP_PLANT_RELEASED;
+        const int i = n % 2;
+        plant.dq[i] = 0.0;
+        plant.modes.joint[1 - i] = plant.dq[1 - i] > 0.0 ? RP_PLANT_FORWARD : RP_PLANT_BACKWARD;
+        if (n % 4 < 2) {
+            plant.parameters.stops[i] = RP_PLANT_STOPS_RIGID;
+            plant.parameters.lower[i] = plant.q[i] - (n % 8 < 4 ? 0.0 : 1.0);
+            plant.parameters.upper[i] = plant.q[i] + (n % 8 < 4 ? 1.0 : 0.0);
+            plant.modes.joint[i] = RP_PLANT_STUCK;
+        } else {
+            plant.modes = (struct rp_plant_modes){.payload = RP_PLANT_UNDECIDED};
         }
-        next_step();
-        expand(DEGREE, rows);
-        assert_model_at(1.0);
-    }
-}
-
-static void test_modes_that_are_not_decided_yet(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        plant_test_random_plant(&random_source, &plant);
-        plant.modes = (struct rp_plant_modes){.payload = RP_PLANT_UNDECIDED};
-        plant.dq[n % 2] = 0.0;
-        next_step();
-        expand(DEGREE, rows);
-        assert_model_at(0.0);
+        assert_first_orders();
     }
 }
 
@@ -171,6 +116,28 @@ static void test_reach_of_a_velocity(void) {
     assert_reach(0.25, -0.5);
     plant.modes.joint[1] = RP_PLANT_STUCK;
     assert_reach(INFINITY, 0.0);
+}
+
+/* An internal step continues past the velocity 0, where an event ends the mode: friction is smooth
+ * there, but does not fall to what it was before, which the step would take for no change. */
+static void test_friction_of_a_mode_that_is_over_stays_high(void) {
+    struct rp_plant_parameters *p = &plant.parameters;
+    plant_test_start(&plant);
+    p->coulomb_friction[0] = 0.5;
+    p->breakaway_friction[0] = 2.0;
+    p->stribeck_velocity[0] = 0.25;
+    for (int n = 1; n <= 1000; n++) {
+        const double dq = 0.25 * 8.0 * n / 1000.0;
+        const double before = plant_sliding_friction(p, 0, dq);
+        const double after = plant_sliding_friction(p, 0, -dq);
+        const double w = dq / 0.25;
+        ASSERT_CLOSE(before + 1.5 / (1.0 + pow(w, -8.0)), after, 8 * DBL_EPSILON * 2.0);
+        TEST_ASSERT_TRUE(after > 1.1);
+    }
+    for (double speed = 1e6; speed < 1e301; speed *= 1e294) {
+        TEST_ASSERT_TRUE(plant_sliding_friction(p, 0, speed) == 0.5);
+        TEST_ASSERT_TRUE(plant_sliding_friction(p, 0, -speed) == 2.0);
+    }
 }
 
 /* Where nothing of it is left, friction is constant over a step: no coefficient has any. */
