@@ -10,7 +10,7 @@ import functools
 import itertools
 import random
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -80,7 +80,7 @@ def loads_by_newton() -> sp.Matrix:
 @functools.cache
 def terms_of_the_motion() -> dict[str, sp.Expr]:
     """D, C dq and g(q) of the plant, in NAMES."""
-    e = plant.derive()
+    e = equations_of_the_plant()
     q, dq = (sp.Matrix(sp.symbols(names)) for names in (STATES[:2], STATES[2:]))
     kinetic, potential = (sp.Matrix([e.outputs[f"{x}_energy"]]) for x in ("kinetic", "potential"))
     coriolis = (e.inertia * dq).jacobian(q) * dq - kinetic.jacobian(q).T
@@ -239,7 +239,7 @@ def law(case: Case) -> dict[str, sp.Expr]:
     return dict(zip(UNKNOWNS, (*effort, *e, *de, *rates, *unlimited), strict=True))
 
 
-def compiled(names: tuple[str, ...], rows: list[list[sp.Expr]]) -> Callable[..., list]:
+def compiled(names: tuple[str, ...], rows: list[list[sp.Expr]] | sp.Matrix) -> Callable:
     return sp.lambdify(sp.symbols(names), rows, "mpmath", cse=True)
 
 
@@ -311,33 +311,44 @@ COMPLIANT, RIGID, NONE = 3, 2, 1  # items of stops
 
 @dataclass(frozen=True)
 class ExactModel:
-    """Entries of A, B, C and D by names, (unknowns, knowns); unknowns are derivatives by states.
-
-    `found` has values of outputs and locals at the point.
-    """
+    """Entries of A, B, C and D by names, (unknowns, knowns); unknowns are derivatives by states."""
 
     values: Values  # of the point, as the FMU takes them
     rates: Sequence[str]  # states whose derivatives are the first rows
     outputs: Sequence[str]  # the other rows
     knowns: Sequence[str]
     entries: np.ndarray
-    found: Values = field(default_factory=dict)
+
+
+class PlantMode(NamedTuple):
+    """Joints that are held, by a rigid stop or by friction, or pressed into compliant stops."""
+
+    held: tuple[int, ...] = ()
+    side: tuple[int, int] = (0, 0)
+    is_rigid: bool = False
 
 
 @functools.cache
-def plant_rows(
-    held: tuple[int, ...], side: tuple[int, int], is_rigid: bool
-) -> tuple[tuple[str, ...], tuple[str, ...], Callable]:
-    """Names of outputs and of further values; all rows by numbers, and the values.
+def equations_of_the_plant() -> plant.Equations:
+    return plant.derive()
 
-    These joints are held, by a rigid stop or by friction, and pressed into compliant stops.
-    """
-    e = plant.derive()
-    dq = sp.symbols(STATES[2:])
-    pushes = [contacts.force(i, side[i - 1]) for i in (1, 2)]
-    right = e.forces - e.friction + sp.Matrix(pushes)
-    free = [i for i in (0, 1) if i not in held]
-    D = e.inertia
+
+@functools.cache
+def loads_of_the_plant() -> dict[str, sp.Expr]:
+    return dict(zip(LOADS, loads_by_newton(), strict=True))
+
+
+def pushes(mode: PlantMode) -> sp.Matrix:
+    """Forces of the compliant stops, (2,)."""
+    return sp.Matrix([contacts.force(i, mode.side[i - 1]) for i in (1, 2)])
+
+
+@functools.cache
+def motion_of_the_plant(mode: PlantMode) -> sp.Matrix:
+    """Accelerations of both joints, (2,)."""
+    e = equations_of_the_plant()
+    right, D = e.forces - e.friction + pushes(mode), e.inertia
+    free = [i for i in (0, 1) if i not in mode.held]
     motion = sp.zeros(2, 1)
     if len(free) == 2:
         determinant = D[0, 0] * D[1, 1] - D[0, 1] ** 2
@@ -345,43 +356,68 @@ def plant_rows(
         motion[1] = (D[0, 0] * right[1] - D[0, 1] * right[0]) / determinant
     elif free:
         motion[free[0]] = right[free[0]] / D[free[0], free[0]]
+    return motion
+
+
+@functools.cache
+def outputs_of_the_plant(mode: PlantMode) -> dict[str, sp.Expr]:
+    """Outputs whose derivatives are compared, by states and accelerations."""
+    e = equations_of_the_plant()
     outputs = dict(e.outputs)
     for i in (1, 2):
-        if side[i - 1]:
-            depth = contacts.penetration(i, side[i - 1])
+        if mode.side[i - 1]:
+            depth = contacts.penetration(i, mode.side[i - 1])
             spring = sp.Symbol(f"stop_stiffness{i}") * depth**2 / 2
             for name in ("potential_energy", "total_energy"):
                 outputs[name] = outputs[name] + spring
-            outputs[f"stop_force{i}"] = pushes[i - 1]
-        if i - 1 not in held:
+            outputs[f"stop_force{i}"] = pushes(mode)[i - 1]
+        if i - 1 not in mode.held:
             outputs[f"friction{i}"] = e.friction[i - 1]
-    further = terms_of_the_motion() | dict(zip(LOADS, loads_by_newton(), strict=True))
-    reaction = e.forces + sp.Matrix(pushes) - D * motion
-    for i in held:
-        further[f"friction{i + 1}"] = e.breakaway[i] if is_rigid else reaction[i]
-        further[f"stop_force{i + 1}"] = e.breakaway[i] - reaction[i] if is_rigid else sp.S.Zero
+    return outputs
+
+
+@functools.cache
+def entries_of_the_plant(mode: PlantMode) -> Callable:
+    motion = motion_of_the_plant(mode)
+    rows = sp.Matrix([*sp.symbols(STATES[2:]), *motion, *outputs_of_the_plant(mode).values()])
     knowns = sp.symbols((*STATES, *plant.INPUTS))
-    rows = sp.Matrix([*dq, *motion, *outputs.values()])
-    accelerations = dict(zip(sp.symbols(ACCELERATIONS), motion, strict=True))
     # the chain rule keeps the expressions short
-    inner = sp.symbols(ACCELERATIONS)
-    by_motion = rows.jacobian(inner)
-    whole = rows.jacobian(knowns) + by_motion * motion.jacobian(knowns)
-    still = dict.fromkeys([dq[i] for i in held], 0)
-    names = (*plant.PARAMETERS, *STOPS, *STATES, *plant.INPUTS, *plant.SWITCHES)
-    values = sp.Matrix([*outputs.values(), *further.values()])
-    chosen = [rows.subs(accelerations).subs(still) for rows in (whole, values)]
-    function = sp.lambdify(sp.symbols(names), chosen, "mpmath", cse=True)
-    return tuple(outputs), tuple(further), function
+    by_motion = rows.jacobian(sp.symbols(ACCELERATIONS))
+    return of_the_plant(mode, rows.jacobian(knowns) + by_motion * motion.jacobian(knowns))
+
+
+@functools.cache
+def values_of_the_plant(mode: PlantMode) -> tuple[tuple[str, ...], Callable]:
+    """Names of outputs and locals, and their values."""
+    e = equations_of_the_plant()
+    values = outputs_of_the_plant(mode) | terms_of_the_motion() | loads_of_the_plant()
+    reaction = e.forces + pushes(mode) - e.inertia * sp.Matrix(sp.symbols(ACCELERATIONS))
+    for i in mode.held:
+        values[f"friction{i + 1}"] = e.breakaway[i] if mode.is_rigid else reaction[i]
+        values[f"stop_force{i + 1}"] = e.breakaway[i] - reaction[i] if mode.is_rigid else sp.S.Zero
+    return tuple(values), of_the_plant(mode, sp.Matrix([*values.values()]))
 
 
 STOPS = tuple(f"{side}{i}" for side in ("lower", "upper") for i in (1, 2)) + contacts.PARAMETERS
 PLANT_MODES = ("sliding", "held 1", "held 2", "both held", "rigid stop", "compliant stops")
 
 
-def plant_point(mode: str, seed: int) -> ExactModel:
-    """The plant in a mode, with friction, damping and sometimes a payload."""
-    source = random.Random(f"{mode} {seed}")
+PLANT_NUMBERS = (*plant.PARAMETERS, *STOPS, *STATES, *plant.INPUTS, *plant.SWITCHES)
+
+
+def of_the_plant(mode: PlantMode, rows: sp.Matrix) -> Callable[..., sp.Matrix]:
+    """Function of PLANT_NUMBERS, of expressions in them and in the accelerations."""
+    motion = compiled(PLANT_NUMBERS, motion_of_the_plant(mode))
+    function = compiled((*PLANT_NUMBERS, *ACCELERATIONS), rows)
+    return lambda *numbers: function(*numbers, *motion(*numbers))
+
+
+def random_plant(kind: str, seed: int) -> tuple[PlantMode, Values, list[mpmath.mpf]]:
+    """Mode, values as the FMU takes them, and PLANT_NUMBERS.
+
+    With friction, damping and sometimes a payload.
+    """
+    source = random.Random(f"{kind} {seed}")
     values: Values = dict(random_arm(source))
     for i in (1, 2):
         coulomb = source.uniform(0.5, 2.0)
@@ -397,16 +433,16 @@ def plant_point(mode: str, seed: int) -> ExactModel:
     values |= {name: source.uniform(-5.0, 5.0) for name in plant.INPUTS}
     values |= {name: source.uniform(0.05, 0.5) for name in PAYLOAD}
     switches = {"payload_attached": source.random() < 0.5}
-    held = {"held 1": (0,), "held 2": (1,), "both held": (0, 1), "rigid stop": (1,)}.get(mode, ())
+    held = {"held 1": (0,), "held 2": (1,), "both held": (0, 1), "rigid stop": (1,)}.get(kind, ())
     side = (0, 0)
     for i in held:
         values[f"dq{i + 1}"] = 0.0
-        if mode != "rigid stop":
+        if kind != "rigid stop":
             values[f"breakaway_friction{i + 1}"] = 1e5
-    if mode == "rigid stop":
+    if kind == "rigid stop":
         values |= {"upper2": values["q2"], "lower2": values["q2"] - 1.0, "f2": 1e5}
         switches["stops2"] = RIGID
-    if mode == "compliant stops":
+    if kind == "compliant stops":
         side = (source.choice((-1, 1)), source.choice((-1, 1)))
         for i in (1, 2):
             into = values[f"q{i}"] + side[i - 1] * source.uniform(0.01, 0.2)
@@ -415,16 +451,27 @@ def plant_point(mode: str, seed: int) -> ExactModel:
             values |= {f"lower{i}": lower, f"upper{i}": lower + 1.0}
             values[f"stop_stiffness{i}"] = 10 ** source.uniform(1.0, 3.0)
             values[f"stop_damping{i}"] = source.uniform(0.01, 0.2)
-    outputs, further, function = plant_rows(held, side, mode == "rigid stop")
     numbers = plant.prepared(values)
     numbers |= {name: values.get(name, 0.0) for name in (*STOPS, *STATES, *plant.INPUTS)}
     numbers |= {f"direction{i}": float(np.sign(values[f"dq{i}"])) for i in (1, 2)}
     numbers["attached"] = float(switches["payload_attached"])
-    names = (*plant.PARAMETERS, *STOPS, *STATES, *plant.INPUTS, *plant.SWITCHES)
-    entries, found = function(*(mpmath.mpf(numbers[name]) for name in names))
+    mode = PlantMode(held, side, kind == "rigid stop")
+    return mode, values | switches, [mpmath.mpf(numbers[name]) for name in PLANT_NUMBERS]
+
+
+def plant_point(kind: str, seed: int) -> ExactModel:
+    """The linear model of the plant in a mode."""
+    mode, values, numbers = random_plant(kind, seed)
+    entries = entries_of_the_plant(mode)(*numbers).tolist()
     knowns = (*STATES, *plant.INPUTS)
-    model = exact_model(values | switches, STATES, outputs, knowns, entries.tolist())
-    return replace(model, found=dict(zip((*outputs, *further), map(float, found), strict=True)))
+    return exact_model(values, STATES, tuple(outputs_of_the_plant(mode)), knowns, entries)
+
+
+def plant_values(kind: str, seed: int) -> tuple[Values, Values]:
+    """What is given to the plant, and its outputs and locals there."""
+    mode, values, numbers = random_plant(kind, seed)
+    names, function = values_of_the_plant(mode)
+    return values, dict(zip(names, map(float, function(*numbers)), strict=True))
 
 
 def drives_point(seed: int) -> ExactModel:

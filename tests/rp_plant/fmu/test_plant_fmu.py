@@ -15,7 +15,7 @@ from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import initialize
 from tests.rp_plant.fmu.plant_runs import METHODS, each_method, read, started
 from tests.support.rparm_project import load, names_of
-from tests.support.symbolic import PLANT_MODES, plant_point
+from tests.support.symbolic import PLANT_MODES, plant_values
 
 COUNTS = (
     "solver_steps",
@@ -24,7 +24,7 @@ COUNTS = (
     "solver_failed_steps",
     "solver_last_order",
 )
-POINTS = 60
+POINTS = 40
 INDICATORS = [
     kind
     for i in (1, 2)
@@ -111,15 +111,12 @@ def test_with_start_values_it_is_the_arm(plant: Fmu, arm: Fmu, name: str, method
 def test_values_are_those_of_lagrange_and_newton(fmi2_plant: Fmu, mode: str) -> None:
     """Outputs, terms of the motion and joint loads at random points, in modes of all kinds."""
     for seed in range(POINTS):
-        exact = plant_point(mode, seed)
-        with started(fmi2_plant, **exact.values) as instance:
-            found = read(instance, *exact.found)
-        expected = np.array([*exact.found.values()])
-        errors = np.abs(np.array(found) - expected)
-        assert np.isfinite(found).all()
-        assert (errors <= 1e-13 * (np.abs(expected) + np.abs(expected).max())).all(), (
-            mode, seed, dict(zip(exact.found, errors, strict=True)),
-        )  # fmt: skip
+        values, exact = plant_values(mode, seed)
+        with started(fmi2_plant, **values) as instance:
+            found = np.array(read(instance, *exact))
+        expected = np.array([*exact.values()])
+        largest = np.abs(expected) + np.abs(expected).max()
+        np.testing.assert_array_less(np.abs(found - expected), 1e-13 * largest, str((mode, seed)))
 
 
 # ---- Terminals -------------------------------------------------------------------------------
