@@ -11,10 +11,7 @@ from pathlib import Path
 import pytest
 from fmpy.fmi2 import FMU2Model
 
-from rparm.runs import comparison
 from tests.support.instances import ERROR, OK, Instance, LoadedFmu, status_of
-from tests.support.paths import ROOT
-from tests.support.rparm_project import declared, load
 from tests.support.symbolic import (
     CASES,
     CONTROLLER_KNOWNS,
@@ -32,8 +29,6 @@ from tests.support.symbolic import (
 )
 
 UNIT = "RPController"
-
-FOLDER = ROOT / "models" / "rp_controller"
 
 
 @contextmanager
@@ -118,17 +113,3 @@ def test_parameters_of_the_arm_are_the_arms(fmu: Path, loaded: LoadedFmu, tmp_pa
     for name in PARAMETERS:
         for key in ("valueReference", "start", "min"):
             assert getattr(own[name], key) == getattr(arm[name], key), (name, key)
-
-
-# ---- References ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("name", "effort", "limit"),
-    [("limited_integral", "tau1", 14), ("limited_integral", "f2", 9), ("pd_gravity", "f2", 12)],
-)
-def test_scenarios_meet_limits_and_leave_them(name: str, effort: str, limit: float) -> None:
-    scenario = load(f"controller_{name}")
-    column = comparison.load_reference(scenario, declared(FOLDER.name)).column(effort)
-    assert {max(-1, min(1, int(u / limit))) for u in column} == {-1, 0, 1}
-    assert abs(column).max() == limit

@@ -9,12 +9,9 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 
-import numpy as np
 import pytest
 
-from rparm.runs import comparison
 from tests.support.instances import ERROR, Instance, LoadedFmu, status_of
-from tests.support.rparm_project import declared, load
 
 UNIT = "RPController"
 
@@ -163,16 +160,6 @@ def test_same_bits_along_the_same_polynomial(
     assert seen(1) == seen(2) == once
 
 
-# ---- Other interfaces ----------------------------------------------------------------------------
-
-
-def test_the_scenario_meets_its_limits() -> None:
-    scenario = load("controller_sampled")
-    for name, limit in (("tau1", 14.0), ("f2", 9.0)):
-        column = comparison.load_reference(scenario, declared("rp_controller")).column(name)
-        assert abs(column).max() == limit and np.unique(column).size > 50
-
-
 # ---- What is refused -----------------------------------------------------------------------------
 
 
@@ -181,9 +168,3 @@ def test_a_start_at_which_samples_have_no_times_is_refused(loaded: LoadedFmu) ->
         assert status_of(lambda: instance.initialize(start=1e12, sample_time=0.01)) == ERROR
         text = "sample_time = 0.01 s is refused: at a start time of 1e+12 s it must be 0.909495 s"
         assert text in instance.messages[-1].text
-
-
-def test_times_are_fixed(sampled: Callable[..., Instance]) -> None:
-    instance = sampled(0.01)
-    for name in ("sample_time", "delay"):
-        assert status_of(lambda name=name: instance.set(**{name: 0.01})) == ERROR

@@ -1,4 +1,4 @@
-"""RPEnvironment.fmu: force against sympy, scenarios, with the plant, refusals.
+"""RPEnvironment.fmu: force against sympy, with the plant, refusals.
 
 The sympy model takes the tip as a point of the plane that moves with a rotation matrix, and the
 force from the depth below the surface and its rate of change.
@@ -15,15 +15,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from rparm.runs import comparison
 from tests.support.instances import DISCARD, Instance, LoadedFmu, status_of
-from tests.support.paths import ROOT
-from tests.support.rparm_project import declared, load, names_of
 
 UNIT = "RPEnvironment"
 
-FOLDER = ROOT / "models" / "rp_environment"
-SCENARIOS = names_of(FOLDER.name)
 PARAMETERS = ("stiffness", "damping", "position", "angle", "tip_x", "tip_z")
 INPUTS = ("ee_x", "ee_y", "ee_vx", "ee_vy", "ee_angle", "ee_rate")
 KNOWNS = (*PARAMETERS, *INPUTS)
@@ -208,28 +203,3 @@ def test_a_force_beyond_all_numbers_is_discarded(loaded: LoadedFmu) -> None:
     with running(loaded, {"position": 0.0, "stiffness": 1e308, "ee_x": -1e3}) as instance:
         assert status_of(lambda: instance.get("wall_force")) == DISCARD
         assert "wall_force" in instance.messages[-1].text
-
-
-# ---- References ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_scenarios_touch_and_release(name: str) -> None:
-    expected = comparison.load_reference(load(name), declared(FOLDER.name))
-    penetration, force = expected.column("penetration"), expected.column("wall_force")
-    touches = np.flatnonzero((penetration[1:] > 0) & (penetration[:-1] == 0))
-    assert len(touches) >= 3 and (penetration == 0).sum() >= 20
-    assert force.min() == 0.0 and (force[penetration == 0] == 0.0).all()
-    if name == "wall_touch_and_release":
-        assert ((penetration > 0) & (force == 0.0)).sum() >= 5
-
-
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_velocities_of_the_scenarios_are_those_of_the_positions(name: str) -> None:
-    scenario = load(name)
-    times = scenario.times
-    middle = (times[1:] + times[:-1]) / 2
-    for position, velocity in zip(INPUTS[:2] + INPUTS[4:5], INPUTS[2:4] + INPUTS[5:], strict=True):
-        slope = np.diff(scenario.input(position)) / np.diff(times)
-        rate = np.interp(middle, times, scenario.input(velocity))
-        assert abs(slope - rate).max() <= 0.02 * max(abs(rate).max(), 1e-3), position

@@ -1,4 +1,4 @@
-"""RPSensor.fmu: what is refused, event mode, scenarios; counts, velocities and latency, tick by
+"""RPSensor.fmu: event mode; counts, velocities and latency, tick by
 tick, against an independent sensor in fractions."""
 
 import random
@@ -12,12 +12,11 @@ import numpy as np
 import pytest
 from rparm.models.rp_sensor.references.make_references import Encoder
 
-from rparm.errors import UserError
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 from tests.support.instances import instantiated
 from tests.support.paths import ROOT
-from tests.support.rparm_project import declared, fmi3_fmu, load, names_of
+from tests.support.rparm_project import declared, fmi3_fmu
 
 MODEL = ROOT / "models" / "rp_sensor"
 INPUTS = ("q1", "q2")
@@ -136,7 +135,9 @@ def assert_shown(instance: Instance, encoder: object) -> None:
         assert abs(Fraction(got) - exact) <= abs(exact) * Fraction(1, 2**51)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(
+    ("sensor", "seed"), [(f"fmi{2 + seed % 2}", seed) for seed in range(8)], indirect=["sensor"]
+)
 def test_random_motions(sensor: Fmu, seed: int) -> None:
     """Both joints along cubics, communication points anywhere, against the sensor in fractions."""
     chance = random.Random(seed)
@@ -174,17 +175,6 @@ def test_a_tick_at_a_communication_point_belongs_to_the_step_before(sensor: Fmu)
             instance.do_step((i - 1) * 0.125, 0.125)
             seen.append(shown(instance)[0][0])
         assert seen == [i * i for i in range(1, 9)]
-
-
-SCENARIOS = names_of(MODEL.name)
-
-# ---- What is refused ---------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", start_values())
-def test_parameters_are_fixed(sensor: Fmu, name: str) -> None:
-    with started(sensor) as instance, pytest.raises(UserError):
-        instance.set(name, declared(MODEL.name).variables[name].start)
 
 
 # ---- FMI 3.0's event mode ----------------------------------------------------------------------
@@ -246,12 +236,3 @@ def test_inputs_set_at_a_tick_in_event_mode_are_sampled(fmu: Path) -> None:
             assert sensor.updateDiscreteStates()[-2:] == (True, (k + 1) * 0.125)
             assert sensor.getInt32([reference["counts1"]]) == [k * k]
             sensor.enterStepMode()
-
-
-# ---- Scenarios --------------------------------------------------------------------------------
-
-
-def test_scenarios_cover_the_parameters() -> None:
-    found = [load(name).start_values for name in SCENARIOS]
-    for name in set(start_values()) - {"max_internal_steps"}:
-        assert len({values[name] for values in found}) > 1, name

@@ -7,12 +7,11 @@ from contextlib import contextmanager
 import mpmath as mp
 import numpy as np
 import pytest
-from fmpy.fmi1 import FMICallException
 from rparm.models.rp_trajectory.references import make_references
 
 from tests.support.instances import Instance, LoadedFmu
 from tests.support.paths import ROOT
-from tests.support.rparm_project import declared, load, names_of
+from tests.support.rparm_project import declared
 
 UNIT = "RPTrajectory"
 
@@ -20,7 +19,6 @@ MODEL = ROOT / "models" / "rp_trajectory"
 DECLARED = declared(MODEL.name).variables
 START = {name: v.start for name, v in DECLARED.items() if v.causality == "parameter"}
 OUTPUTS = [n for n, v in DECLARED.items() if v.causality == "output" and v.type == "Real"]
-SCENARIOS = names_of(MODEL.name)
 ENUMERATIONS = {name: list(v.items) for name, v in DECLARED.items() if v.type == "Enumeration"}
 
 AROUND = {"x_center": 0.05, "y_center": -0.1, "radius": 0.45, "start_angle": 2.0}
@@ -168,24 +166,7 @@ def test_the_motion_does_not_depend_on_when_it_starts(loaded: LoadedFmu, start: 
             assert first.get(*OUTPUTS) == second.get(*OUTPUTS)
 
 
-# ---- a unit without states and inputs ----------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["radius", "grasp_time"])
-def test_parameters_are_fixed(loaded: LoadedFmu, name: str) -> None:
-    with running(loaded, {}) as instance, pytest.raises(FMICallException):
-        instance.set(**{name: 0.05})
-
-
-# ---- references --------------------------------------------------------------------------------
-
-
-def test_every_motion_and_branch_has_a_scenario() -> None:
-    found = [load(name).start_values for name in SCENARIOS]
-    for name, items in ENUMERATIONS.items():
-        given = {values[name] for values in found}
-        assert given == set(range(1, len(items) + 1)), name
-
+# ---- payload -----------------------------------------------------------------------------------
 
 GRASP, RELEASE = 0.3, 0.70001
 GRASPED = {"grasp_time": GRASP, "release_time": RELEASE}

@@ -12,7 +12,7 @@ import pytest
 
 from rparm.fmi.fmu_file import Fmu
 from tests.rp_plant.fmu.plant_model_exchange import STATES, model
-from tests.rp_plant.fmu.plant_runs import BOUNCY_STOPS, FRICTION, RIGID
+from tests.rp_plant.fmu.plant_runs import BOUNCY_STOPS, FRICTION
 
 STEP = 0.01  # s
 OUTPUTS = [*STATES, "event_count", "mode1", "mode2"]
@@ -92,14 +92,6 @@ def test_a_joint_past_its_stop_that_leaves_is_no_event(plant: Fmu) -> None:
             assert instance.get("q2") == upper
             assert instance.get("event_count") == count
         assert instance.get("dq2") == pytest.approx(-0.1 * STOPS["restitution2"], rel=1e-14)
-
-
-def test_a_joint_exactly_at_its_limit_of_hold_stays(plant: Fmu) -> None:
-    """A slide without friction rests on its stop, and nothing pushes it."""
-    with model(plant.path, stops2=RIGID, lower2=0.0, q2=0.0, g=0.0) as instance:
-        for _ in range(4):
-            instance.handle_event({})
-            assert (instance.get("mode2"), instance.get("event_count")) == (0, 0)
 
 
 # ---- Euler's method --------------------------------------------------------------------------

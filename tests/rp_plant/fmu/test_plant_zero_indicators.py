@@ -42,20 +42,22 @@ from tests.rp_plant.fmu.plant_runs import (
     ],
 )
 def test_a_joint_breaks_away_once_at_a_communication_point(
-    plant: Fmu, method: str, effort: str, rate: float, h: float, expected: float, values: dict
+    fmi2_plant: Fmu, method: str, effort: str, rate: float, h: float, expected: float, values: dict
 ) -> None:
     q2 = 0.2 if effort == "tau1" else 0.0
-    with started(plant, method, smooth_inputs=(effort,), q2=q2, **values) as instance:
+    with started(fmi2_plant, method, smooth_inputs=(effort,), q2=q2, **values) as instance:
         found = events(instance, h, round(expected + 0.1, 1), {effort: rate})
         assert found == [(1, near(expected))]
 
 
 @each_method
-def test_a_motion_continues_after_an_impact_that_ends_a_long_step(plant: Fmu, method: str) -> None:
+def test_a_motion_continues_after_an_impact_that_ends_a_long_step(
+    fmi2_plant: Fmu, method: str
+) -> None:
     """Before it the motion is uniform, and internal steps grow to seconds."""
     stops = {"stops1": RIGID, "lower1": -0.5, "upper1": 0.5}
     values = {"g": 0.0, "a": 0.15, "dq1": 0.8, "coulomb_friction2": 2.0}
-    with started(plant, method, **stops, **values) as instance:
+    with started(fmi2_plant, method, **stops, **values) as instance:
         instance.do_step(0.0, 0.5)
         instance.do_step(0.5, 0.5)
         # plastic: q1 stays, the slide moves at -a dq1 and friction stops it
@@ -64,11 +66,13 @@ def test_a_motion_continues_after_an_impact_that_ends_a_long_step(plant: Fmu, me
 
 @each_method
 @pytest.mark.parametrize("e", [0.0, 0.5])
-def test_two_joints_pushed_onto_their_stops_come_to_rest(plant: Fmu, method: str, e: float) -> None:
+def test_two_joints_pushed_onto_their_stops_come_to_rest(
+    fmi2_plant: Fmu, method: str, e: float
+) -> None:
     """Each impact of one kicks the other off its stop, and it comes back."""
     stops = {"stops1": RIGID, "lower1": -0.5, "restitution1": e}
     stops |= {"stops2": RIGID, "lower2": -0.5, "restitution2": e}
-    with started(plant, method, 1e-8, f2=-20.0, **stops) as instance:
+    with started(fmi2_plant, method, 1e-8, f2=-20.0, **stops) as instance:
         before, _ = read(instance, "total_energy", "impact_loss")
         for i in range(100):
             instance.do_step(i * 0.02, 0.02)
@@ -96,12 +100,12 @@ def ramp(instance: Instance, begin: dict[str, float], rates: dict[str, float]) -
 @each_method
 @pytest.mark.parametrize("others", [{"dq2": 0.5}, {"coulomb_friction2": 1.0}])
 def test_efforts_at_their_limit_that_go_back(
-    plant: Fmu, method: str, others: dict[str, float]
+    fmi2_plant: Fmu, method: str, others: dict[str, float]
 ) -> None:
     """A joint at exactly its friction stays where the effort falls, to break away backward."""
     friction, rate = 3.0, -6.0
     values = {"g": 0.0, "a": 0.0, "coulomb_friction1": friction, **others}
-    with started(plant, method, 1e-12, ("tau1",), **values) as instance:
+    with started(fmi2_plant, method, 1e-12, ("tau1",), **values) as instance:
         ramp(instance, {"tau1": friction}, {"tau1": rate})
         instance.do_step(0.0, 0.5)
         assert (modes(instance)[0], last_event(instance).count) == (0, 0)
@@ -113,8 +117,8 @@ def test_efforts_at_their_limit_that_go_back(
 
 
 @each_method
-def test_a_slide_that_nothing_pushes_rests_on_its_stop(plant: Fmu, method: str) -> None:
-    with started(plant, method, stops2=RIGID, lower2=0.0, g=0.0) as instance:
+def test_a_slide_that_nothing_pushes_rests_on_its_stop(fmi2_plant: Fmu, method: str) -> None:
+    with started(fmi2_plant, method, stops2=RIGID, lower2=0.0, g=0.0) as instance:
         instance.do_step(0.0, 1.0)
         assert (modes(instance)[1], last_event(instance).count) == (0, 0)
 
@@ -123,13 +127,13 @@ def test_a_slide_that_nothing_pushes_rests_on_its_stop(plant: Fmu, method: str) 
 @pytest.mark.parametrize("stops", [RIGID, COMPLIANT])
 @pytest.mark.parametrize("limit", [0.3, 1000.0])
 def test_a_joint_that_leaves_its_stop_does_not_meet_it(
-    plant: Fmu, method: str, stops: int, limit: float
+    fmi2_plant: Fmu, method: str, stops: int, limit: float
 ) -> None:
     """Breaking away from it is the only event; the rounding of the limit is no contact."""
     friction, rate = 3.0, -4.0
     values = {"g": 0.0, "a": 0.0, "coulomb_friction1": FIRM, "coulomb_friction2": friction}
     stop = {"stops2": stops, "upper2": limit, "lower2": limit - 0.5, "stop_stiffness2": 1e4}
-    with started(plant, method, 1e-10, ("f2",), q2=limit, **values, **stop) as instance:
+    with started(fmi2_plant, method, 1e-10, ("f2",), q2=limit, **values, **stop) as instance:
         ramp(instance, {"f2": 0.0}, {"f2": rate})
         instance.do_step(0.0, 1.0)
         count, time = last_event(instance)
@@ -158,8 +162,7 @@ def joint_values(chance: random.Random, joint: int) -> dict[str, float]:
     return values
 
 
-@pytest.mark.parametrize("version", ["fmi2"], indirect=True)
-def test_pulls_at_random_end(plant: Fmu) -> None:
+def test_pulls_at_random_end(fmi2_plant: Fmu) -> None:
     """At all indicators, with all methods and the tightest tolerances: no event repeats itself."""
     chance = random.Random(28)
     for _ in range(200):
@@ -168,7 +171,7 @@ def test_pulls_at_random_end(plant: Fmu) -> None:
         values |= {"g": chance.choice([0.0, 9.81]), "a": chance.choice([0.0, 0.1, -0.3])}
         tolerance = chance.choice([1e-12, 1e-12, 1e-11])
         values |= {"relative_tolerance": tolerance, "max_events": MOST}
-        with started(plant, method, tolerance, ("tau1", "f2"), **values) as instance:
+        with started(fmi2_plant, method, tolerance, ("tau1", "f2"), **values) as instance:
             time = 0.0
             for _ in range(10):
                 begin, rates = {}, {}
