@@ -140,14 +140,14 @@ static int run(const struct grid *grid, int count) {
 }
 
 /* A sum of milliseconds is 1e-9 s off after 334 585 of them. */
-static void test_a_million_milliseconds(void) {
+static void test_half_a_million_milliseconds(void) {
     for (int n = 0; n <= MASTERS; n++) {
         const struct grid grid = {.master = (enum master)(n % MASTERS),
                                   .per_second = 1e3,
                                   .period = 1,
                                   .length = 1,
                                   .returns_early = n == MASTERS};
-        TEST_ASSERT_EQUAL_INT(1000000, run(&grid, 1000000));
+        TEST_ASSERT_EQUAL_INT(500000, run(&grid, 500000));
     }
 }
 

@@ -166,6 +166,29 @@ def test_the_motion_does_not_depend_on_when_it_starts(loaded: LoadedFmu, start: 
             assert first.get(*OUTPUTS) == second.get(*OUTPUTS)
 
 
+@pytest.mark.parametrize(
+    ("parameters", "order"),
+    [
+        ({"motion": "point_to_point", "duration": 1.25}, 1),
+        ({"motion": "circle", "frequency": -0.5, "turns": 2.0, "ramp_time": 1.0}, 2),
+    ],
+)
+def test_the_later_segment_holds_at_a_boundary(
+    loaded: LoadedFmu, parameters: dict[str, object], order: int
+) -> None:
+    """There the acceleration's derivative jumps, where a ramp begins or ends only the second."""
+    column = OUTPUTS.index("ddq1_ref")
+    parameters = {"start_time": 0.5, **parameters}
+    for boundary in boundaries(parameters):
+        found = []
+        for t in (boundary - 1e-9, boundary, boundary + 1e-9):
+            with running(loaded, parameters, start=t) as instance:
+                found.append(derivatives(instance, order)[column])
+        before, now, after = found
+        assert now == pytest.approx(after, rel=0, abs=1e-5)
+        assert abs(now - before) > 1e-3
+
+
 # ---- payload -----------------------------------------------------------------------------------
 
 GRASP, RELEASE = 0.3, 0.70001
