@@ -6,7 +6,6 @@ from rparm.models.machine import continuous
 from rparm.models.machine.continuous import VARIANTS
 from rparm.models.machine.experiment import STEPS_PER_SECOND
 from rparm.models.machine.references import make_references
-from rparm.models.machine.references.components import Environment, Sensor, real
 from rparm.models.machine.references.machine import COMPONENTS, completed, declared
 from rparm.models.machine.references.make_references import variants
 from rparm.models.machine.references.monolithic import COLUMNS, monolithic
@@ -61,46 +60,6 @@ def test_columns_are_all_outputs() -> None:
 def test_unknown_parameters_are_refused() -> None:
     with pytest.raises(UserError, match=r"no parameter 'plant\.m3'"):
         completed({"plant.m3": 1.0})
-
-
-def test_counts_come_late_and_round_half_up() -> None:
-    values = completed({})["sensor"] | {"sample_time": 1.5e-3, "latency": 1}
-    values |= {"resolution1": 0.5, "resolution2": 1.0}
-    sensor = Sensor(values, {"q1": 0.0, "q2": 0.0})
-    shown = []
-    for i in range(1, 7):
-        q = {"q1": 0.25 * i, "q2": -0.5 * i}
-        if i == 3:  # its end is a tick
-            with pytest.raises(UserError, match=r"tick 2 is at the communication point 0\.003 s"):
-                sensor.step(q, real(2) / 1000, real(3) / 1000)
-            break
-        sensor.step(q, real(i - 1) / 1000, real(i) / 1000)
-        shown.append([int(sensor.outputs({})[f"counts{j}"]) for j in (1, 2)])
-    assert shown == [[0, 0], [0, 0]]
-    assert sensor._counts == [[0, 0], [1, -1]]
-    # whole counts are half a count away from others
-    assert [[float(x) for x in s.margins] for s in sensor.samples] == [[0.25, 0.5], [0.25, 0.5]]
-    assert [[float(x) for x in s.positions] for s in sensor.samples] == [[0.0, 0.0], [0.5, -1.0]]
-    assert [float(s.time) for s in sensor.samples] == [0.0, 0.001]
-
-
-def test_the_wall_answers_by_its_law() -> None:
-    values = completed({})["environment"]
-    values |= {"stiffness": 100.0, "damping": 3.0, "position": 1.0, "angle": np.pi / 2}
-    values |= {"tip_x": 0.2, "tip_z": 0.1}
-    wall = Environment(values)
-    # frame 2 turned by 90 degrees: z2 points along y0, x2 along -x0
-    motion = {"ee_x": 2.0, "ee_y": 0.5, "ee_vx": 0.0, "ee_vy": -1.0}
-    motion |= {"ee_angle": np.pi / 2, "ee_rate": 0.5}
-    found = {name: float(value) for name, value in wall.outputs(motion).items()}
-    depth, speed = 1.0 - 0.6, -1.0 + 0.5 * -0.2
-    force = 100.0 * depth - 3.0 * speed
-    assert found["penetration"] == pytest.approx(depth, rel=1e-14)
-    assert found["wall_force"] == pytest.approx(force, rel=1e-14)
-    assert found["ee_fy"] == pytest.approx(force, rel=1e-14)
-    assert found["ee_mz"] == pytest.approx(-0.2 * force, rel=1e-12)
-    away = wall.outputs(motion | {"ee_vy": 50.0})
-    assert away["wall_force"] == 0 and away["ee_fy"] == 0
 
 
 # ---- In continuous time --------------------------------------------------------------------------

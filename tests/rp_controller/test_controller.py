@@ -1,11 +1,15 @@
-"""RPController against a sympy model of its laws, whose arm comes from positions.
+"""RPController against a sympy model of its laws, whose arm comes from positions; what a sample
+computes, and when its efforts take effect.
 
 Values must agree within 1e-12 of the exact ones, relative to the sum of the absolute values of
 their terms.
 """
 
-from collections.abc import Iterator
+import random
+from bisect import bisect_right
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -113,3 +117,162 @@ def test_parameters_of_the_arm_are_the_arms(fmu: Path, loaded: LoadedFmu, tmp_pa
     for name in PARAMETERS:
         for key in ("valueReference", "start", "min"):
             assert getattr(own[name], key) == getattr(arm[name], key), (name, key)
+
+
+# ---- The sampled form ----------------------------------------------------------------------------
+
+# The law of a sample is the continuous one. Here it is PD at one joint, written out in the order of
+# operations of the equations, so that all bits count.
+PD = 1
+GAINS = {"Kp1": 50.0, "Kd1": 8.0, "Ki1": 240.0, "inertia1": 0.75, "tracking_time": 0.125}
+MOTION = {"q1_ref": 0.3125, "q1": 0.0625, "dq1_ref": 0.25, "dq1": 0.75}
+LIMIT = 30.0
+# on the grid of 1 ms or off it; efforts at once, late, or as late as the next sample
+TIMES = {
+    "off the grid": (0.0037, 0.0011),
+    "fast": (0.00031, 0.0003),
+    "slow": (0.0273, 0.0),
+    "on the grid": (0.002, 0.001),
+    "a whole period": (0.003, 0.003),
+    "a whole period, off the grid": (0.0017, 0.0017),
+}
+each_times = pytest.mark.parametrize(("period", "delay"), TIMES.values(), ids=TIMES.keys())
+
+
+@pytest.fixture
+def sampled(loaded: LoadedFmu) -> Iterator[Callable[..., Instance]]:
+    """Makes instances of PD at joint 1 in the sampled form."""
+    made: list[Instance] = []
+
+    def make(period: float, delay: float = 0.0, start: float = 0.0, **values: float) -> Instance:
+        instance = Instance(loaded)
+        made.append(instance)
+        instance.fmi.setInteger([loaded.references["mode"]], [PD])
+        times = {"sample_time": period, "delay": delay}
+        return instance.initialize(start, **(GAINS | MOTION | {"tau1_max": LIMIT} | times | values))
+
+    yield make
+    for instance in made:
+        instance.fmi.freeInstance()
+
+
+def samples(period: float, w: float, count: int, **changed: float) -> list[tuple[float, float]]:
+    """Effort and integral part of joint 1 at each sample, by Euler's method."""
+    v = GAINS | MOTION | changed
+    e, de = v["q1_ref"] - v["q1"], v["dq1_ref"] - v["dq1"]
+    rate, found = 0.0, []
+    for _ in range(count):
+        w += period * rate
+        u = v["inertia1"] * ((v["Kp1"] * e + v["Kd1"] * de) + w)
+        effort = max(-LIMIT, min(LIMIT, u))
+        rate = v["Ki1"] * e - (u - effort) / (v["inertia1"] * v["tracking_time"])
+        found.append((effort, w))
+    return found
+
+
+def last_of(times: list[Fraction], t: float) -> int:
+    """Number of the last of `times` that is not after t."""
+    return bisect_right(times, Fraction(t)) - 1
+
+
+# ---- What a sample computes, and when ------------------------------------------------------------
+
+
+@each_times
+@pytest.mark.parametrize("start", [0.0, -3.3])
+def test_efforts_are_those_of_the_last_sample_that_has_been_computed(
+    sampled: Callable[..., Instance], period: float, delay: float, start: float
+) -> None:
+    """At irregular points none of which is at a sample or an effort; the limit is met."""
+    instance = sampled(period, delay, start, integral1=2.0)
+    count = int(0.62 / period) + 3
+    expected = samples(period, 2.0, count)
+    T, d = Fraction(period), Fraction(delay)
+    starts = [Fraction(start) + k * T for k in range(count)]
+    shown = [starts[0], *(t + d for t in starts[1:])]
+    source = random.Random(3)
+    t, seen = start, set()
+    while t < start + 0.6:
+        t = instance.step(t, source.choice((0.0002, 0.003, 0.011)) * source.uniform(0.5, 1.5))
+        effort, w, rate = instance.get("tau1", "integral1", "dintegral1")
+        assert effort == expected[last_of(shown, t)][0], t
+        assert w == expected[last_of(starts, t)][1], t
+        assert rate == 0.0
+        seen.add(effort)
+    assert LIMIT in seen and min(seen) < LIMIT
+    assert instance.count("solver_steps") == instance.count("solver_rhs_evaluations") == 0
+
+
+def test_the_first_efforts_take_effect_at_once(sampled: Callable[..., Instance]) -> None:
+    instance = sampled(0.25, 0.25, integral1=2.0)
+    (first, _), (second, _) = samples(0.25, 2.0, 2)
+    assert instance.get("tau1", "integral1") == [first, 2.0]
+    instance.set(q1=5.0)
+    assert instance.get("tau1") == [first]
+    instance.set(q1=MOTION["q1"])
+    instance.step(0.0, 0.4375)
+    assert instance.get("tau1") == [first]
+    instance.step(0.4375, 0.125)
+    assert instance.get("tau1") == [second] != [first]
+
+
+def test_inputs_count_at_samples_only(sampled: Callable[..., Instance]) -> None:
+    """Samples at 0, 0.25 and 0.5 s, whose efforts take effect at 0, 0.3125 and 0.5625 s."""
+    instance = sampled(0.25, 0.0625, Ki1=0.0)
+    seen = []
+    for t, q1 in ((0.0, 0.1), (0.125, 0.2), (0.28125, 0.3), (0.4375, 0.0625)):
+        instance.set(q1=q1)
+        instance.step(t, 0.15625 if t else 0.125)
+        seen += instance.get("tau1", "q1_error")
+    (at_start, _), *_ = samples(0.25, 0.0, 1)
+    (at_sample, _), *_ = samples(0.25, 0.0, 1, q1=0.2)
+    errors = [MOTION["q1_ref"] - q1 for q1 in (0.1, 0.2, 0.3, 0.0625)]
+    efforts = [at_start, at_start, at_sample, at_start]  # the input is what it was
+    assert seen == [x for pair in zip(efforts, errors, strict=True) for x in pair]
+
+
+def test_output_derivatives_are_those_of_held_efforts(sampled: Callable[..., Instance]) -> None:
+    instance = sampled(0.25)
+    instance.set_input_derivatives(q1=(0.5, 0.25))
+    names = ("tau1", "f2", "q1_error")
+    references = [instance.loaded.references[name] for name in names]
+    assert instance.fmi.getRealOutputDerivatives(references, [1] * 3) == [0.0, 0.0, -0.5]
+    assert instance.fmi.getRealOutputDerivatives(references, [2] * 3) == [0.0, 0.0, -0.25]
+    known = [instance.loaded.references["q1"]]
+    assert instance.fmi.getDirectionalDerivative(references, known, [1.0]) == [0.0, 0.0, -1.0]
+
+
+# ---- Independence of the master's step -----------------------------------------------------------
+
+
+@each_times
+def test_same_bits_along_the_same_polynomial(
+    sampled: Callable[..., Instance], period: float, delay: float
+) -> None:
+    """Where no value of the line that the input follows is rounded."""
+
+    def seen(every: int) -> list[bytes]:
+        instance = sampled(period, delay, integral1=2.0)
+        found = []
+        for i in range(0, 256, every):
+            t = i / 1024
+            instance.set(q1=0.0625 - 0.5 * t)
+            instance.set_input_derivatives(q1=(-0.5,))
+            instance.step(t, every / 1024)
+            if (i + every) % 8 == 0:
+                found.append(instance.get("tau1", "integral1", "q1_error"))
+        return found
+
+    once = seen(8)
+    assert len({effort for effort, *_ in once}) > 8
+    assert seen(1) == seen(2) == once
+
+
+# ---- What is refused -----------------------------------------------------------------------------
+
+
+def test_a_start_at_which_samples_have_no_times_is_refused(loaded: LoadedFmu) -> None:
+    with Instance(loaded) as instance:
+        assert status_of(lambda: instance.initialize(start=1e12, sample_time=0.01)) == ERROR
+        text = "sample_time = 0.01 s is refused: at a start time of 1e+12 s it must be 0.909495 s"
+        assert text in instance.messages[-1].text

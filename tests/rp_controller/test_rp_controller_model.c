@@ -1,6 +1,6 @@
 /* The controller as the instance runs it. Events of the sampled form: the payload, rounding of
  * their times, which saved ones are possible; the Jacobian where an effort is at its limit; what is
- * refused. test_controller_samples.py runs samples in the FMU, against the law in fractions. */
+ * refused. test_controller.py runs samples in the FMU, against the law in fractions. */
 #include "last_text.h"
 #include "model_test.h"
 #include "rp_controller_events.h"

@@ -109,15 +109,6 @@ def test_outputs_are_those_of_the_wall(loaded: LoadedFmu, case: str) -> None:
             assert (actual[3] > 0) == (case != OUTSIDE) and (actual[4] > 0) == (case == PRESSED)
 
 
-def test_inputs_are_interpolated_within_a_step(loaded: LoadedFmu) -> None:
-    """A tip on a straight line into the wall: the force at the end of the step is that there."""
-    values = {"stiffness": 1000.0, "damping": 10.0, "position": 0.0, "ee_x": 0.1, "ee_vx": -0.5}
-    with running(loaded, values) as instance:
-        instance.set_input_derivatives(ee_x=[-0.5])
-        instance.step(0.0, 0.25)
-        assert instance.get("penetration", "wall_force") == pytest.approx([0.025, 30.0], abs=1e-12)
-
-
 def test_an_input_that_leaves_all_numbers_ends_no_step(loaded: LoadedFmu) -> None:
     """The instance would else be in a state that it cannot read again."""
     with running(loaded, {"ee_x": 0.1}) as instance:

@@ -1,6 +1,8 @@
-"""The reference trajectories: made again they come out the same. Each value: tests/prove."""
+"""The reference trajectories: made again they come out the same; each value: tests/prove. Equations
+of the notes are in the headers once."""
 
 import csv
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -119,3 +121,36 @@ def test_equations_agree_with_the_notes() -> None:
     second = -a * m2 * ddq1 + m2 * ddq2 - c211 * dq1**2 + m2 * g * s - f2
     assert sp.simplify(first) == 0
     assert sp.simplify(second) == 0
+
+
+# ---- Numbers of the notes ------------------------------------------------------------------------
+
+# function: equations of the notes
+STATED = {
+    "arm_angular_jacobian": [1, 2], "arm_link1_jacobian": [3], "arm_mass_matrix": [4, 5, 6, 7, 8],
+    "arm_christoffel": [9], "arm_potential_energy": [10], "arm_gravity_forces": [11],
+    "arm_coriolis_matrix": [12], "arm_inverse_dynamics": [13, 14, 15], "link_motion": [16, 17, 18],
+    "link2_loads": [19, 20, 24, 25], "link1_loads": [21, 22, 23], "loads_of_motion": [26, 27],
+}  # fmt: skip
+# such as "(4)-(8) Mass matrix", above this equation
+COMMENT = re.compile(
+    r"/\* (\(\d+\)(?:(?:-|, )\(\d+\))*) (?:[^*]|\*(?!/))*\*/\nstatic inline [^(]*?(\w+)\("
+)
+
+
+def numbers(text: str) -> list[int]:
+    """Numbers of "(4)-(8)" or "(21)-(23), (27)"."""
+    found = []
+    for part in text.replace("(", "").replace(")", "").split(", "):
+        first, _, last = part.partition("-")
+        found += range(int(first), int(last or first) + 1)
+    return found
+
+
+def test_each_equation_of_the_notes_is_stated_once() -> None:
+    texts = [(MODEL / name).read_text() for name in ("rp_equations.h", "rp_recursion.h")]
+    stated = [
+        (function, numbers(number)) for text in texts for number, function in COMMENT.findall(text)
+    ]
+    assert stated == list(STATED.items())
+    assert sorted(sum(STATED.values(), [])) == list(range(1, 28))

@@ -82,18 +82,6 @@ static double d11_scale(double q2_bound) {
     return rp_test_inertia(&p, fabs(q2_bound)) + p.m2 * p.a * p.a;
 }
 
-static void test_mass_matrix_is_symmetric_positive_definite(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
-        double D[2][2];
-        next_sample();
-        arm_mass_matrix(arm_at(s.q, s.dq), D);
-        double det = D[0][0] * D[1][1] - D[0][1] * D[1][0];
-        TEST_ASSERT_TRUE(D[0][1] == D[1][0]);
-        TEST_ASSERT_TRUE(D[0][0] > 0.0 && det > 0.0);
-        ASSERT_CLOSE(p.m2 * rp_test_inertia(&p, s.q[1]), det, 8 * EPS * p.m2 * d11_scale(s.q[1]));
-    }
-}
-
 /* Central differences of eighth order, exact for polynomials up to degree 8; rounding errs by 2.1
  * times the error of f, by h. */
 static double derivative(double (*f)(const void *context, double x), const void *context, double x,
@@ -293,26 +281,4 @@ static void test_recursion_as_printed_is_short_of_14(void) {
         largest = fmax(largest, fabs(missing) / bound);
     }
     TEST_ASSERT_TRUE(largest > 1e9); /* far above the rounding */
-}
-
-/* ---- Parameters ----------------------------------------------------------------------------- */
-
-static void expect_valid(bool valid, double *field, double value) {
-    double before = *field;
-    *field = value;
-    TEST_ASSERT_EQUAL(valid, rp_parameters_check(&p, NULL, 0));
-    *field = before;
-}
-
-static void test_link_1_needs_some_inertia(void) {
-    rp_test_default_parameters(&p);
-    ASSERT_CLOSE(0.275, arm_fixed_inertia(&p), 2 * EPS * 0.275);
-    p.I1z = p.I2z = 0.0;
-    expect_valid(true, &p.m2, 1.0); /* m1 lc1^2 is left */
-    expect_valid(false, &p.m1, 0.0);
-    expect_valid(false, &p.lc1, 0.0);
-    p.m1 = p.lc1 = 0.0;
-    TEST_ASSERT_TRUE(arm_fixed_inertia(&p) == 0.0);
-    expect_valid(true, &p.I1z, 1e-12);
-    expect_valid(true, &p.I2z, 1e-12);
 }
