@@ -74,24 +74,3 @@ static void test_effort_leaves_the_limit_without_delay(void) {
     step_to(5.0 + 1.001 * delay);
     TEST_ASSERT_TRUE(get(RP_CONTROLLER_tau1) < limit);
 }
-
-/* A master that adds up milliseconds is 1e-9 s off after 334 585 of them: the effort is that of the
- * step at whose end the sample was due, with a delay that of the one before. */
-static void test_every_sample_of_a_master_that_sums_its_steps(void) {
-    static const double h = 1e-3;
-    set(RP_CONTROLLER_sample_time, h);
-    set(RP_CONTROLLER_delay, h);
-    set_integer(RP_CONTROLLER_mode, RP_CONTROLLER_PD);
-    set(RP_CONTROLLER_Kp1, 1.0);
-    set(RP_CONTROLLER_Kd1, 0.0);
-    set(RP_CONTROLLER_inertia1, 1.0);
-    set(RP_CONTROLLER_tau1_max, 1e9);
-    initialize(0.0);
-    double t = 0.0;
-    for (int i = 1; i <= 500000; i++) {
-        set(RP_CONTROLLER_q1_ref, i);
-        ASSERT_OK(instance_do_step(instance, t, h));
-        t += h;
-        TEST_ASSERT_TRUE(get(RP_CONTROLLER_tau1) == i - 1);
-    }
-}

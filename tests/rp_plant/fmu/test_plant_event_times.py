@@ -63,17 +63,19 @@ CONSTANT = {
 
 @pytest.mark.parametrize("method", ["cvode_adams", "cvode_bdf", "taylor"])
 @pytest.mark.parametrize("motion", CONSTANT)
-def test_later_communication_points_do_not_matter(plant: Fmu, method: str, motion: str) -> None:
+def test_later_communication_points_do_not_matter(
+    fmi2_plant: Fmu, method: str, motion: str
+) -> None:
     """With constant inputs and the same first step: all event times, and the state at the end."""
     stop, first = 3.0, 1e-3
-    with started(plant, method, **CONSTANT[motion]) as instance:
+    with started(fmi2_plant, method, **CONSTANT[motion]) as instance:
         expected = dict(events(instance, first, stop))
         end = last_event(instance)
     assert end.count >= 3
     for seed in range(4):
         chance = random.Random(seed)
         longest = (2e-3, 0.02, 0.3, 2.0)[seed]
-        with started(plant, method, **CONSTANT[motion]) as instance:
+        with started(fmi2_plant, method, **CONSTANT[motion]) as instance:
             t, h = 0.0, first
             while t < stop:
                 instance.do_step(t, h)

@@ -90,6 +90,7 @@ def record(fmu: Fmu, scenario: Scenario, names: list[str]) -> tuple[np.ndarray, 
 
 
 @each_method
+@pytest.mark.parametrize("version", ["fmi2"], indirect=True)
 @pytest.mark.parametrize("name", names_of("rp_manipulator"))
 def test_with_start_values_it_is_the_arm(plant: Fmu, arm: Fmu, name: str, method: str) -> None:
     """All Real variables bit for bit, but the sign of zero, and all counters, at each point."""
