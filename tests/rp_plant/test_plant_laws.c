@@ -129,6 +129,12 @@ static void assert_modes_fit(void) {
             TEST_ASSERT_TRUE(mode == RP_PLANT_FREE || mode * moves > 0.0);
             TEST_ASSERT_TRUE(side * moves >= 0.0);
         }
+        const bool is_low = v.q[i] == v.parameters.lower[i];
+        if (v.parameters.stops[i] == RP_PLANT_STOPS_COMPLIANT && v.dq[i] == 0.0 &&
+            (is_low || v.q[i] == v.parameters.upper[i])) { // pushed if it moves into the stop
+            const int pushed = is_low ? RP_PLANT_PUSHED : -RP_PLANT_PUSHED;
+            TEST_ASSERT_EQUAL_INT(pushed * moves < 0.0 ? pushed : 0, v.modes.contact[i]);
+        }
         // no joint leaves its stop to come back from less than the tolerance
         const double into = -side * v.ddq[i];
         TEST_ASSERT_TRUE(jumps || !(side * v.dq[i] > 0.0 && into > 0.0) ||
