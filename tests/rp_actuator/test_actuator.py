@@ -1,12 +1,13 @@
-"""RPActuator.fmu: values of the equations.
+"""RPActuator.fmu: values of the equations, by the drives of the references.
 
 The closed forms are in test_rp_actuator.c.
 """
 
 import random
 
-import numpy as np
 import pytest
+from mpmath import mpf
+from rparm.models.rp_actuator.references.make_references import Drive
 
 from tests.support.instances import Instance, LoadedFmu
 
@@ -41,34 +42,26 @@ def random_point(limit: str, seed: int) -> Values:
     return point
 
 
-def expected(point: Values, limit: str) -> dict[str, float]:
-    """All calculated variables where `limit` decides the currents."""
+def expected(point: Values) -> dict[str, float]:
+    """All calculated variables."""
     result = {}
-    for joint, (command, effort) in enumerate((("tau1_cmd", "tau1"), ("f2_cmd", "f2")), start=1):
-        k, n, resistance, i_max, u_max, time_constant = (
-            point[f"{name}{joint}"] for name in PER_JOINT
-        )
-        current, back_emf = point[f"current{joint}"], n * k * point[f"dq{joint}"]
-        commanded = point[command] / (n * k)
-        limited = {
-            "command": commanded,
-            "current": np.copysign(i_max, commanded),
-            "voltage": (np.copysign(u_max, commanded) - back_emf) / resistance,
-        }[limit]
+    for joint, effort in enumerate(("tau1", "f2"), start=1):
+        drive = Drive({name: mpf(x) for name, x in point.items()}, joint)
+        current = point[f"current{joint}"]
         result |= {
-            effort: n * k * current,
+            effort: drive.constant * current,
             f"current{joint}": current,
-            f"voltage{joint}": resistance * current + back_emf,
-            f"dcurrent{joint}": (limited - current) / time_constant,
-            f"current{joint}_limited": limited,
+            f"voltage{joint}": drive.voltage(current),
+            f"dcurrent{joint}": (drive.limited - current) / drive.time_constant,
+            f"current{joint}_limited": drive.limited,
         }
-    return result
+    return {name: float(x) for name, x in result.items()}
 
 
 @pytest.mark.parametrize("limit", LIMITS)
 def test_values_are_those_of_the_equations(loaded: LoadedFmu, limit: str) -> None:
     for seed in range(20):
         point = random_point(limit, seed)
-        values = expected(point, limit)
+        values = expected(point)
         with Instance(loaded).begin(**point) as instance:
             assert instance.get(*values) == pytest.approx([*values.values()], rel=1e-12)

@@ -1,75 +1,42 @@
-"""RPEnvironment.fmu: force against sympy, with the plant, refusals.
+"""RPEnvironment.fmu: force against the references' in complex numbers, with the plant, refusals."""
 
-The sympy model takes the tip as a point of the plane that moves with a rotation matrix, and the
-force from the depth below the surface and its rate of change.
-"""
-
-import functools
 import math
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
-import sympy as sp
+from mpmath import mp
+from rparm.models.rp_environment.references import make_references
 
 from tests.support.instances import DISCARD, Instance, LoadedFmu, status_of
 
 UNIT = "RPEnvironment"
 
 PARAMETERS = ("stiffness", "damping", "position", "angle", "tip_x", "tip_z")
-INPUTS = ("ee_x", "ee_y", "ee_vx", "ee_vy", "ee_angle", "ee_rate")
+INPUTS, OUTPUTS = make_references.INPUTS, make_references.OUTPUTS
 KNOWNS = (*PARAMETERS, *INPUTS)
-OUTPUTS = ("ee_fx", "ee_fy", "ee_mz", "penetration", "wall_force")
 PRESSED, RELEASED, OUTSIDE = "pressed", "released", "outside"
 CASES = (PRESSED, RELEASED, OUTSIDE)
 
 Values = dict[str, float]
 
 
-# ---- The wall in sympy ---------------------------------------------------------------------------
+# ---- The wall of the references ------------------------------------------------------------------
 
 
-@functools.cache
-def wall(case: str) -> dict[str, sp.Expr]:
-    """Every output: pressed, in the wall but too fast outwards to be pushed, or outside."""
-    s = {name: sp.Symbol(name) for name in KNOWNS}
-    t = sp.Symbol("t")
-    moving = sp.Matrix([s["ee_x"] + s["ee_vx"] * t, s["ee_y"] + s["ee_vy"] * t])
-    turned = s["ee_angle"] + s["ee_rate"] * t
-    # columns: x2 and z2 in frame 0
-    frame2 = sp.Matrix([[-sp.sin(turned), sp.cos(turned)], [sp.cos(turned), sp.sin(turned)]])
-    lever = frame2 * sp.Matrix([s["tip_x"], s["tip_z"]])
-    normal = sp.Matrix([sp.cos(s["angle"]), sp.sin(s["angle"])])
-    depth = s["position"] - normal.dot(moving + lever)
-    now = {t: 0}
-    force = s["stiffness"] * depth + s["damping"] * depth.diff(t) if case == PRESSED else sp.S.Zero
-    x, y = lever
-    results = (
-        force * normal[0],
-        force * normal[1],
-        force * (x * normal[1] - y * normal[0]),
-        depth if case != OUTSIDE else sp.S.Zero,
-        force,
-    )
-    return {name: sp.sympify(r).subs(now) for name, r in zip(OUTPUTS, results, strict=True)}
-
-
-@functools.cache
-def compiled(case: str) -> Callable[..., list[float]]:
-    return sp.lambdify(sp.symbols(KNOWNS), list(wall(case).values()), "math", cse=True)
-
-
-def evaluated(case: str, point: Values) -> np.ndarray:
+def evaluated(point: Values) -> np.ndarray:
     """Return the outputs, (5,)."""
-    return np.array(compiled(case)(*(point[name] for name in KNOWNS)), dtype=float)
+    with mp.workdps(make_references.DIGITS):
+        return np.array(make_references.values(point), dtype=float)
 
 
 def case_of(point: Values) -> str:
-    *_, depth, force = evaluated(PRESSED, point)  # the force without its lower limit
-    return OUTSIDE if depth <= 0 else RELEASED if force <= 0 else PRESSED
+    """Pressed, in the wall but too fast outwards to be pushed, or outside."""
+    *_, depth, force = evaluated(point)
+    return OUTSIDE if depth == 0 else RELEASED if force == 0 else PRESSED
 
 
 def generic_point(case: str, seed: int) -> Values:
@@ -101,7 +68,7 @@ def running(loaded: LoadedFmu, point: Values) -> Iterator[Instance]:
 def test_outputs_are_those_of_the_wall(loaded: LoadedFmu, case: str) -> None:
     for seed in range(20):
         point = generic_point(case, seed)
-        expected = evaluated(case, point)
+        expected = evaluated(point)
         scale = point["stiffness"] + point["damping"]
         with running(loaded, point) as instance:
             actual = np.array(instance.get(*OUTPUTS))
