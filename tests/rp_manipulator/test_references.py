@@ -3,7 +3,6 @@ of the notes are in the headers once."""
 
 import csv
 import re
-import subprocess
 import sys
 from pathlib import Path
 
@@ -19,12 +18,12 @@ from rparm.models.rp_manipulator.references.make_references import (
     outputs,
 )
 
+from rparm.models import make_references
 from rparm.runs.scenario import Scenario
 from tests.support.paths import ROOT
 from tests.support.rparm_project import declared, load, names_of
 
 MODEL = ROOT / "models" / "rp_manipulator"
-PROGRAM = [sys.executable, MODEL.parent / "make_references.py", MODEL.name]
 FILES = ("RPManipulator_ref.csv", "RPManipulator_in.csv", "RPManipulator_ref.opt")
 SCENARIOS = {name: load(name) for name in names_of(MODEL.name)}
 SHORT = ("sixtieth", "irregular_steps")  # the others: ./test.sh --long
@@ -68,17 +67,17 @@ def test_nothing_is_left_over() -> None:
         assert {path.name for path in folder.iterdir()} == set(FILES)
 
 
-def test_the_program_makes_the_same(tmp_path: Path) -> None:
-    command = [*PROGRAM, "early_start", "--output", tmp_path]
-    subprocess.run(command, check=True, cwd=tmp_path)
+def test_the_program_makes_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    arguments = ["make_references.py", MODEL.name, "early_start", "--output", str(tmp_path)]
+    monkeypatch.setattr(sys, "argv", arguments)
+    make_references.main()
     assert_same(SCENARIOS["early_start"], tmp_path / "early_start")
 
 
-def test_unknown_scenario_is_refused() -> None:
-    command = [*PROGRAM, "none"]
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert result.returncode == 1
-    assert result.stderr.startswith("error: no reference 'none' (known: coasting, ")
+def test_unknown_scenario_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "argv", ["make_references.py", MODEL.name, "none"])
+    with pytest.raises(SystemExit, match="^error: no reference 'none' \\(known: coasting, "):
+        make_references.main()
 
 
 @each_scenario

@@ -253,16 +253,6 @@ static void test_a_stop_that_is_moved_away_at_the_event_is_not_met(void) {
     ASSERT_SAME(0.0, v.sums.impact_loss);
 }
 
-static void test_grazing_a_stop_changes_no_velocity(void) {
-    set_stops(1, -1.0, 1.0, 0.5);
-    v.q[1] = nextafter(-1.0, 0.0);
-    v.dq[1] = 1e-3; // already on its way back
-    v.modes.joint[1] = RP_PLANT_FORWARD;
-    plant_test_update(&v, LOWER2);
-    TEST_ASSERT_TRUE(v.q[1] == -1.0 && v.dq[1] == 1e-3);
-    assert_modes(RP_PLANT_STUCK, RP_PLANT_FORWARD);
-}
-
 /* ---- Compliant stops ------------------------------------------------------------------------ */
 
 static const double stiffness = 1000.0;
