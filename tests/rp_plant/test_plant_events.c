@@ -348,6 +348,19 @@ static void test_a_joint_that_breaks_away_on_the_limit_goes_where_its_mode_says(
     }
 }
 
+/* The velocity 1 / c is written to the bit, so that the next search begins at 0. */
+static void test_a_stop_lets_go_and_pushes_again(void) {
+    set_slide_between_compliant_stops();
+    put(-1.25, 1.0);
+    plant_test_update(&v, -1);
+    for (int contact = RP_PLANT_LET_GO; contact >= RP_PLANT_PUSHED; contact--) {
+        put(-1.125, 1.0 / damping + (contact == RP_PLANT_PUSHED ? 1e-13 : -1e-13));
+        trigger(PUSH2, NULL);
+        assert_contact(contact);
+        TEST_ASSERT_TRUE(v.dq[1] == 1.0 / damping);
+    }
+}
+
 static void test_stops_that_are_switched_off_or_moved(void) {
     set_slide_between_compliant_stops();
     put(-1.25, 0.0);
