@@ -4,7 +4,6 @@ import math
 import re
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
 from zipfile import ZipFile
 
 import numpy as np
@@ -22,16 +21,16 @@ GRID, M2 = [("sobol", "grid"), ("runs = 40\n", "")], "[1.0, 3.0]"
 Q1 = "normal = [-2.0, 0.2]"
 
 
-def wrong(folder: Path, mistake: dict[str, Any]) -> Path:
-    changes = map(itemgetter("old", "new"), mistake.get("changes", [mistake]))
-    return write(folder, changes=list(changes))
+def wrong(folder: Path, row: list[str]) -> Path:
+    """The file of a row of mistakes."""
+    return write(folder, changes=list(zip(row[:-1:2], row[1::2], strict=True)))
 
 
-@pytest.mark.parametrize("mistake", MISTAKES["arm"], ids=itemgetter("message"))
-def test_a_mistake_is_refused(mistake: dict[str, Any], tmp_path: Path, console: Console) -> None:
-    path, output = wrong(tmp_path, mistake), tmp_path / "output"
+@pytest.mark.parametrize("row", MISTAKES["arm"]["rows"], ids=itemgetter(-1))
+def test_a_mistake_is_refused(row: list[str], tmp_path: Path, console: Console) -> None:
+    path, output = wrong(tmp_path, row), tmp_path / "output"
     error = console.refused("campaign", path, "--output", output)
-    assert str(path) in error and mistake["message"] in error
+    assert str(path) in error and row[-1] in error
     assert not output.exists()
 
 
@@ -47,12 +46,11 @@ def test_the_file_that_the_mistakes_are_made_in_is_right(tmp_path: Path) -> None
 SYSTEM = HEAD + FILES["SYSTEM"]
 
 
-@pytest.mark.parametrize("mistake", MISTAKES["system"], ids=itemgetter("message"))
-def test_a_mistake_of_a_system_is_refused(mistake: dict[str, str], tmp_path: Path) -> None:
-    changes = [(mistake["old"], mistake["new"])]
+@pytest.mark.parametrize(("old", "new", "message"), MISTAKES["system"]["rows"])
+def test_a_mistake_of_a_system_is_refused(old: str, new: str, message: str, tmp_path: Path) -> None:
     with (
-        pytest.raises(UserError, match=re.escape(mistake["message"])),
-        bases.opened(given := campaign(tmp_path, SYSTEM, changes), None) as base,
+        pytest.raises(UserError, match=re.escape(message)),
+        bases.opened(given := campaign(tmp_path, SYSTEM, [(old, new)]), None) as base,
     ):
         planning.plan(given, base, "test")
 
@@ -129,11 +127,11 @@ def test_the_points_of_a_grid(tmp_path: Path) -> None:
     assert (angles[0], angles[3]) == (-math.pi, math.pi / 2)
 
 
-@pytest.mark.parametrize("mistake", MISTAKES["units"], ids=itemgetter("message"))
-def test_mistakes_get_one_line(mistake: dict[str, str], tmp_path: Path) -> None:
+@pytest.mark.parametrize(("old", "new", "message"), MISTAKES["units"]["rows"])
+def test_mistakes_get_one_line(old: str, new: str, message: str, tmp_path: Path) -> None:
     with pytest.raises(UserError) as caught:
-        converted(campaign(tmp_path, changes=[(mistake["old"], mistake["new"])]))
-    assert mistake["message"] in str(caught.value) and "\n" not in str(caught.value)
+        converted(campaign(tmp_path, changes=[(old, new)]))
+    assert message in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_a_system_takes_units_too(tmp_path: Path) -> None:

@@ -279,7 +279,7 @@ FILES: list[tuple[str, Edit, str]] = [
 ]
 WRONG = [
     *FILES,
-    *((STRUCTURE, replace(x["old"], x["new"]), x["message"]) for x in MISTAKES["structure"]),
+    *((STRUCTURE, replace(old, new), said) for old, new, said in MISTAKES["structure"]["rows"]),
     *(
         (NOMINAL_ARM, replace(TOLERANCE, f'<ssv:Parameter name="{new}'), said)
         for new, said in MISTAKES["parameter_set"]["rows"]

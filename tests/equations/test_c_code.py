@@ -11,7 +11,6 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,6 +18,7 @@ import sympy
 
 from tests.equations.examples import MISTAKES, MODELS
 from tests.support.paths import ROOT
+from tests.support.tables import cases
 
 sys.path.insert(0, str(ROOT / "fmu"))
 from equations.graph import Graph  # noqa: E402
@@ -58,12 +58,14 @@ def body(*lines: str) -> str:
     return "double f(double x) {\n" + "\n".join(lines) + "\n}\n"
 
 
-@pytest.mark.parametrize("case", MISTAKES["c_code"])
-def test_what_is_refused(tmp_path: Path, case: dict[str, Any]) -> None:
-    message = refusal(tmp_path, case["text"])
+@pytest.mark.parametrize(("text", "said"), cases(MISTAKES["c_code"]))
+def test_what_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    """`said` is the line, and words of the message."""
+    message = refusal(tmp_path, f"{text}\n")
+    line, expected = said.split(": ", 1)
     assert "\n" not in message
-    assert message.startswith(f"text.h:{case['line']}: "), message
-    assert case["expected"] in message
+    assert message.startswith(f"text.h:{line}: "), message
+    assert expected in message
 
 
 def test_deep_nesting_is_refused_in_a_line(tmp_path: Path) -> None:

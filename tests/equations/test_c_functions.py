@@ -13,6 +13,7 @@ import pytest
 
 from tests.equations.compiled import Model, ModelFileError, c_model, declaration, read_text
 from tests.equations.examples import METHODS, MISTAKES, MODELS, build, simulated
+from tests.support.tables import cases
 
 import equations_to_fmu  # isort: skip; compiled.py knows where it is
 
@@ -123,13 +124,13 @@ def test_units_that_fit(tmp_path: Path) -> None:
         assert file.code.warnings == ["crane.c:2: 1 / 2 of whole numbers is 0: write 1.0 / 2.0"]
 
 
-@pytest.mark.parametrize("case", MISTAKES["units_of_c_functions"])
-def test_units_that_do_not_fit(tmp_path: Path, case: dict[str, str]) -> None:
-    text = TEXTS["UNITS"].replace("HERE", case["functions"]).replace("VALUE", case["value"])
+@pytest.mark.parametrize(("functions", "value", "said"), MISTAKES["units_of_c_functions"]["rows"])
+def test_units_that_do_not_fit(tmp_path: Path, functions: str, value: str, said: str) -> None:
+    text = TEXTS["UNITS"].replace("HERE", functions).replace("VALUE", value)
     files(tmp_path, text, TEXTS["TENSION"])
     with pytest.raises(ModelFileError) as refused:
         read_text(tmp_path, text)
-    assert case["expected"] in str(refused.value) and "\n" not in str(refused.value)
+    assert said in str(refused.value) and "\n" not in str(refused.value)
 
 
 # ---- What is refused -----------------------------------------------------------------------------
@@ -137,7 +138,7 @@ def test_units_that_do_not_fit(tmp_path: Path, case: dict[str, str]) -> None:
 F = "double f(double x) { return x; }\n"
 Y = "double f(double x) { double y = x;\n"
 STEPS = "more than 100000 steps: use fewer rounds of loops, or fewer calls"
-WHOLE = [(case["code"].encode(), case["expected"]) for case in MISTAKES["c_functions"]]
+WHOLE = [(code.encode(), expected) for code, expected in cases(MISTAKES["c_functions"])]
 WHOLE += [
     (None, "code: bad.c: no such file"),
     (b"", "code: bad.c: is empty, or has more than 200000 bytes"),

@@ -21,6 +21,7 @@ from tests.equations.compiled import (
 )
 from tests.equations.examples import MISTAKES as WRITTEN
 from tests.support.paths import ROOT
+from tests.support.tables import cases
 
 EXAMPLES = [
     path
@@ -31,29 +32,29 @@ HEAD = 'name = "M"\n'
 STATE = HEAD + '[states]\nx = { derivative = "-x" }\n'
 SAMPLED = STATE + "[discrete]\nu = {}\n[sampled.s]\n"
 
-MISTAKES = {name: (m["text"], m["expected"]) for name, m in WRITTEN["model_file"].items()} | {
-    "long message": (
+MISTAKES = [
+    *cases(WRITTEN["model_file"]),
+    (
         STATE + f'[check]\n"{"ä" * 251}" = "1 > 0"', "expected a message of at most 500 bytes",
     ),
-    "digits": (HEAD + f"[inputs]\nu = {{ start = {'9' * 5000} }}", "has a number or a table that"),
-    "functions that multiply": (
+    (HEAD + f"[inputs]\nu = {{ start = {'9' * 5000} }}", "has a number or a table that"),
+    (
         STATE + '[functions]\nf0 = { arguments = ["a"], value = "a * a" }\n' + "".join(
             f'f{i} = {{ arguments = ["a"], value = "f{i - 1}(a) + f{i - 1}(a)" }}\n'
             for i in range(1, 40)
         ),
         "functions and sums make more than 100000 operations of this expression",
     ),
-    "deep": (STATE + f'[where]\na = "{"(" * 200}"', "a: column 102: more than 100 levels"),
-    "many": (
+    (STATE + f'[where]\na = "{"(" * 200}"', "a: column 102: more than 100 levels"),
+    (
         HEAD + "[inputs]\n" + "".join(f"u{i} = {{}}\n" for i in range(1001)), "has more than 1000",
     ),
-    "large": ("#" * 1_000_001, "has 1000001 bytes, expected at most 1000000"),
-}  # fmt: skip
+    ("#" * 1_000_001, "has 1000001 bytes, expected at most 1000000"),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", MISTAKES)
-def test_a_mistake_is_one_line_with_its_place(name: str, tmp_path: Path) -> None:
-    text, expected = MISTAKES[name]
+@pytest.mark.parametrize(("text", "expected"), MISTAKES, ids=[f"{e:.60}" for _, e in MISTAKES])
+def test_a_mistake_is_one_line_with_its_place(text: str, expected: str, tmp_path: Path) -> None:
     with pytest.raises(ModelFileError) as refused:
         read_text(tmp_path, text)
     message = str(refused.value)

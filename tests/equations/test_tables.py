@@ -8,6 +8,7 @@ from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
 
 from tests.equations.compiled import Model, ModelFileError, read_text
 from tests.equations.examples import METHODS, MISTAKES, MODELS, build, made, simulated
+from tests.support.tables import cases
 
 TEXTS = MODELS["tables"]
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
@@ -181,8 +182,8 @@ def test_columns_are_separated_as_spreadsheets_write_them(tmp_path: Path, conten
     assert table.coefficients[0] == (3.0, 3.0, 2.25)
 
 
-@pytest.mark.parametrize("name", MISTAKES["tables"])
-def test_a_mistake_in_a_table_is_one_line(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("text", "expected"), cases(MISTAKES["tables"]))
+def test_a_mistake_in_a_table_is_one_line(text: str, expected: str, tmp_path: Path) -> None:
     (tmp_path / "f.csv").write_text("a,b,b\n1,2,3\n")
     (tmp_path / "g.csv").write_text("a,d\n1,2\n2,inf\n")
     (tmp_path / "i.csv").write_text("a,d\n1,2,\n2,3,5\n")
@@ -192,8 +193,7 @@ def test_a_mistake_in_a_table_is_one_line(name: str, tmp_path: Path) -> None:
     (tmp_path / "h.csv").write_bytes(b"a,d\n\xff\xfe\n")
     for file, rows in (("j", 5), ("k", 99_999)):  # so many below the quote
         (tmp_path / f"{file}.csv").write_text('a,d\n1,2\n2,"3\n' + "4,5\n" * rows)
-    mistake = MISTAKES["tables"][name]
     with pytest.raises(ModelFileError) as refused:
-        read_text(tmp_path, mistake["text"])
+        read_text(tmp_path, text)
     message = str(refused.value)
-    assert mistake["expected"] in message and "\n" not in message and len(message) < 500
+    assert expected in message and "\n" not in message and len(message) < 500

@@ -23,11 +23,8 @@ MODELS = {  # by table of mistakes
     "discrete_variables": "wheel",
 }
 MISTAKES = tables(str(Path(__file__).with_name("mistakes")))
-MISTAKES["variables"]["start_huge"] = {
-    "old": "start = 2.0",
-    "new": "start = 1" + "0" * 400,
-    "words": ["m1", "start = 1000", "number"],
-}
+CASES = [(part, *row) for part in MODELS for row in MISTAKES[part]["rows"]]
+CASES.append(("variables", "start = 2.0", "start = 1" + "0" * 400, "m1", "start = 1000", "number"))
 
 
 def complaint(path: Path) -> str:
@@ -39,15 +36,14 @@ def complaint(path: Path) -> str:
     return text
 
 
-@pytest.mark.parametrize(
-    ("part", "name"), [(part, name) for part in MODELS for name in MISTAKES[part]]
-)
-def test_a_mistake_is_named(tmp_path: Path, part: str, name: str) -> None:
-    model, mistake = MODELS[part], MISTAKES[part][name]
+@pytest.mark.parametrize("case", CASES, ids=lambda case: " ".join(case[3:])[:60])
+def test_a_mistake_is_named(tmp_path: Path, case: tuple[str, ...]) -> None:
+    part, old, new, *words = case
+    model = MODELS[part]
     variables = copied(model, tmp_path, below="tests" if model == "wheel" else "models")
-    change(variables, mistake["old"], mistake["new"])
+    change(variables, old, new)
     text = complaint(variables)
-    assert [word for word in mistake["words"] if word not in text] == []
+    assert [word for word in words if word not in text] == []
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:

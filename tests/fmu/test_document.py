@@ -165,16 +165,18 @@ def test_only_links_that_work_in_the_fmu_are_kept(model_description: Path, tmp_p
     assert "code site up" in page.text_content()
 
 
-@pytest.mark.parametrize("wrong", MISTAKES["document"])
-def test_bad_input_is_named_in_one_line(wrong: dict[str, str], tmp_path: Path) -> None:
-    for key, name in (("readme", "README.md"), ("xml", "modelDescription.xml")):
-        if key in wrong:
-            (tmp_path / name).write_text(wrong[key], encoding="utf-8")
+@pytest.mark.parametrize(("readme", "xml", "message"), MISTAKES["document"]["rows"])
+def test_bad_input_is_named_in_one_line(
+    readme: str, xml: str, message: str, tmp_path: Path
+) -> None:
+    for text, name in ((readme, "README.md"), (xml, "modelDescription.xml")):
+        if text:
+            (tmp_path / name).write_text(text, encoding="utf-8")
     done = run_document(
         [tmp_path / "README.md"], tmp_path / "modelDescription.xml", tmp_path / "out"
     )
     assert done.returncode == 2
-    assert wrong["message"] in done.stderr
+    assert message in done.stderr
     assert done.stderr.startswith("document.py: ")
     assert done.stderr.count("\n") == 1
     assert not (tmp_path / "out").exists()

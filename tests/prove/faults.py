@@ -37,7 +37,7 @@ class Fault:
         return text.replace(self.before, self.after)
 
 
-PLANTED = tuple(Fault(**fault) for fault in tables(__file__)["fault"])
+PLANTED = tuple(Fault(*fault) for fault in tables(__file__)["fault"])
 
 
 def built(folder: Path, file: str, source: str) -> Path | None:

@@ -1,7 +1,6 @@
 """Scenarios with Boolean inputs: how they are read, and runs of the wheel of tests/wheel."""
 
 from collections.abc import Callable, Iterator
-from operator import itemgetter
 
 import numpy as np
 import pytest
@@ -53,13 +52,13 @@ def test_rounding_of_times_does_not_delay_a_switch(write) -> None:
         assert values.tolist() == [False] * n + [True] * (11 - n)
 
 
-@pytest.mark.parametrize("mistake", MISTAKES["scenario_with_brake"], ids=itemgetter("text"))
-def test_mistakes_are_explained(write, mistake: dict[str, str]) -> None:
-    path = write(f"{HEAD}{TIME}[inputs.brake]\n{mistake['text']}\n")
+@pytest.mark.parametrize(("text", "message"), MISTAKES["scenario_with_brake"]["rows"])
+def test_mistakes_are_explained(write, text: str, message: str) -> None:
+    path = write(f"{HEAD}{TIME}[inputs.brake]\n{text}\n")
     with pytest.raises(UserError) as caught:
         scenario.load(path, SWITCHED)
     said = str(caught.value)
-    assert said.startswith(f"{path}: ") and mistake["message"] in said and "\n" not in said
+    assert said.startswith(f"{path}: ") and message in said and "\n" not in said
 
 
 def test_other_types_and_other_shapes_are_refused(write) -> None:

@@ -228,9 +228,7 @@ def test_without_a_command_all_scenarios_run(
     assert console()[0] == 0 and wanted[0].names == [] and wanted[0].command == "run"
 
 
-@pytest.mark.parametrize(
-    ("arguments", "guess"), [(miss["arguments"], miss["message"]) for miss in MISTAKES["word"]]
-)
+@pytest.mark.parametrize(("arguments", "guess"), MISTAKES["word"]["rows"])
 def test_guesses(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

@@ -15,6 +15,7 @@ from rparm.runs import inputs, scenario
 from rparm.runs.scenario import Scenario
 from tests.rparm.test_boolean_inputs import SWITCHED
 from tests.support.rparm_project import FMUS, MISTAKES, Console
+from tests.support.tables import cases
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, TOY, toy
 
 LOG = "time,force\n0.5,1\n1.5,3\n2.25,4.5\n"  # 2 t; the run is from 1 to 2
@@ -185,10 +186,9 @@ def test_a_log_may_begin_elsewhere_than_the_run(write: Write) -> None:
 
 WRONG = [
     # log, further keys, message
-    *(
-        (mistake.get("log", LOG), mistake.get("keys", ""), mistake["message"])
-        for mistake in MISTAKES["log"]
-    ),
+    *((f"{log}\n", "", message) for log, message in cases(MISTAKES["log"])),
+    *((LOG, f"{keys}\n", message) for keys, message in MISTAKES["keys_of_log"]["rows"]),
+    ("", "", "log.csv: expected names of columns in its first line"),
     ('time,force\n1,"' + "x" * 200_000, "", "log.csv, line 2: field larger than field limit"),
     (
         'time,force\n1,2\n2,"3\n' + "4,5\n" * 99_999,

@@ -11,6 +11,7 @@ from rparm import project
 from rparm.errors import UserError
 from rparm.runs import scenario
 from tests.support.rparm_project import MISTAKES
+from tests.support.tables import cases
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, TOY, timed, toy
 
 
@@ -237,16 +238,10 @@ def test_systems_are_found_by_their_names(root: Path) -> None:
 
 # ---- Mistakes ------------------------------------------------------------------------------------
 
-# parts of the table: what stands above their texts
-ABOVE = {"whole": "", "below_head": HEAD, "below_time": f"{HEAD}{TIME}"} | {
-    part: f"{HEAD}{TIME}[{part}]\n" for part in ("parameters", "initial", "inputs.force")
-}
 WRONG = [
-    (ABOVE[part] + mistake["text"], mistake["message"])
-    for part, mistakes in MISTAKES["scenario"].items()
-    for mistake in mistakes
+    *cases(MISTAKES["scenario"]),
+    (timed(0, "1" + "0" * 400, 0.1), "[time] stop: expected a finite number"),
 ]
-WRONG.append((timed(0, "1" + "0" * 400, 0.1), "[time] stop: expected a finite number"))
 
 
 @pytest.mark.filterwarnings("error")

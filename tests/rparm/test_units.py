@@ -96,7 +96,7 @@ def test_a_variable_takes_its_own_unit_and_numbers_as_they_are(model: str) -> No
 
 NUMBER = "expected a number, or a number and its unit (known: m, mm, cm, km), got"
 WRONG = [
-    *((wrong["name"], wrong["given"], wrong["message"]) for wrong in MISTAKES["value"]),
+    *MISTAKES["value"]["rows"],
     *(
         ("q2", text, f"{NUMBER} {text!r}")
         for text in ("", "m", "nan m", "inf m", "-inf", "1,5 m", "1 000 m", "٣ m", "--1 m", "\n")
