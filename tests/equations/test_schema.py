@@ -71,7 +71,9 @@ def test_files_of_the_project_are_valid(kind: str) -> None:
 def test_mistakes_that_show_without_meaning_are_refused(tmp_path: Path) -> None:
     good, of_loops = OF_LOOPS["good"], OF_LOOPS["mistakes"]
     assert not is_refused("loop", good)
-    of_campaigns = [(wrong(tmp_path, row).read_text(), row[-1]) for row in OF_CAMPAIGNS["arm"]]
+    of_campaigns = [
+        (wrong(tmp_path, row).read_text(), row[-1]) for row in OF_CAMPAIGNS["arm"]["rows"]
+    ]
     for kind, mistakes, said in (
         ("model", MISTAKES, OF_MODELS),
         ("scenario", OF_SCENARIOS, OF_OTHERS),
