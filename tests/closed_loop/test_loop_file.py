@@ -35,18 +35,25 @@ WAVE = "{ sines = [{ amplitude = 0.5, frequency = 0.7 }], offset = 0.2 }"
 
 
 # ---- Mistakes ------------------------------------------------------------------------------------
+@pytest.fixture(scope="module")
+def beside(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with files that no loop can use."""
+    found = tmp_path_factory.mktemp("beside")
+    (found / "law.py").write_text("def law(t, h, inputs): ...", encoding="utf-8")
+    (found / "TEXT.fmu").write_text("no archive", encoding="utf-8")
+    repacked(BUILD / "RPManipulator.fmu", found / "TOY.fmu", str, drop="binaries")
+    (found / "other.ssp").touch()
+    return found
+
+
 @pytest.mark.parametrize("mistake", TABLES["mistakes"], ids=lambda row: row[2][:40])
 def test_a_mistake_is_refused_in_a_line(
-    mistake: list[str], tmp_path: Path, console: Console
+    mistake: list[str], beside: Path, tmp_path: Path, console: Console
 ) -> None:
     old, new, message = mistake
     assert TABLES["good"].count(old) == 1
-    path = tmp_path / "self.toml"
+    path = beside / "self.toml"
     path.write_text(TABLES["good"].replace(old, new), encoding="utf-8")
-    (tmp_path / "law.py").write_text("def law(t, h, inputs): ...", encoding="utf-8")
-    (tmp_path / "TEXT.fmu").write_text("no archive", encoding="utf-8")
-    repacked(BUILD / "RPManipulator.fmu", tmp_path / "TOY.fmu", str, drop="binaries")
-    (tmp_path / "other.ssp").touch()
     error = console.refused("system", path, "--output", tmp_path / "report")
     assert error.startswith(f"error: {path}: ") and message in error
     assert error.count(f"{path}: ") == 1
