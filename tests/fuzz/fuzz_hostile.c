@@ -9,6 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Internal steps that one communication step may take here, so that executions are quick. */
+enum { MAX_INTERNAL_STEPS = 300 };
+
 /* ---- Arguments ------------------------------------------------------------------------------- */
 
 static void *arguments[8];
@@ -128,6 +131,7 @@ static void EnterInitializationMode(struct fuzz_input *input, struct fuzz_instan
 /* Resets, then may enter initialization mode, and may exit it. */
 static void Reset(struct fuzz_input *input, struct fuzz_instance *instance) {
     fuzz_reset(instance);
+    fuzz_limit_steps(instance, MAX_INTERNAL_STEPS);
     const unsigned steps = fuzz_below(input, 4);
     if (steps > 0) {
         EnterInitializationMode(input, instance);
@@ -205,14 +209,15 @@ GETTER_OF_VALUES(String, VARIABLE_FLOAT64) // no variable is a String
 
 /* Limits of the work stay low, and most items of enumerations exist. */
 static int any_integer(struct fuzz_input *input, fmi2ValueReference reference) {
+    enum { MOST_ITEMS = 4 };
     const int value = fuzz_integer(input);
     for (size_t i = 0; i < model_description.variable_count; i++) {
         const struct variable *variable = &model_description.variables[i];
         if (variable->reference == reference && variable->type == VARIABLE_ENUMERATION) {
-            return value % (FUZZ_METHODS + 2);
+            return value % (MOST_ITEMS + 2);
         }
         if (variable->reference == reference && variable->owner == VARIABLE_OF_INSTANCE) {
-            return value < FUZZ_MAX_INTERNAL_STEPS ? value : FUZZ_MAX_INTERNAL_STEPS;
+            return value < MAX_INTERNAL_STEPS ? value : MAX_INTERNAL_STEPS;
         }
     }
     return value;

@@ -7,7 +7,6 @@
 
 struct fmu_functions fuzz_fmu;
 void (*fuzz_choose_variety)(unsigned variety);
-fmi2Status (*fuzz_do_step)(struct fuzz_instance *instance, double length);
 
 static const char instance_name[] = "fuzzed";
 
@@ -146,7 +145,6 @@ fmi2Status fuzz_check_call(struct fuzz_instance *instance, const char *name, boo
     }
     if (status == fmi2Error) {
         instance->in_error = true;
-        instance->had_error = true;
     }
     memset(instance->told, 0, sizeof instance->told);
     return status;
@@ -182,38 +180,13 @@ void fuzz_limit_steps(struct fuzz_instance *instance, fmi2Integer limit) {
     }
 }
 
-void fuzz_reset_plain(struct fuzz_instance *instance) {
+void fuzz_reset(struct fuzz_instance *instance) {
     if (FUZZ_CHECKED_PLAIN(instance, Reset) != fmi2OK) {
         fuzz_fail("fmi2Reset fails");
     }
     instance->in_error = false;
     instance->time = 0.0;
-}
-
-void fuzz_reset(struct fuzz_instance *instance) {
-    fuzz_reset_plain(instance);
-    fuzz_limit_steps(instance, FUZZ_MAX_INTERNAL_STEPS);
-}
-
-fmi2Status fuzz_initialize(struct fuzz_instance *instance, double tolerance, double start) {
-    fmi2Status status =
-        FUZZ_CHECKED(instance, SetupExperiment, tolerance != 0.0, tolerance, start, fmi2False, 0.0);
-    if (status == fmi2OK) {
-        instance->time = start;
-        status = FUZZ_CHECKED_PLAIN(instance, EnterInitializationMode);
-    }
-    return status == fmi2OK ? FUZZ_CHECKED_PLAIN(instance, ExitInitializationMode) : status;
-}
-
-fmi2Status fuzz_step(struct fuzz_instance *instance, double length) {
-    if (fuzz_do_step != NULL) {
-        return fuzz_do_step(instance, length);
-    }
-    const fmi2Status status = FUZZ_CHECKED(instance, DoStep, instance->time, length, fmi2True);
-    if (status == fmi2OK) {
-        instance->time += length;
-    }
-    return status;
+    instance->slope = 0.0;
 }
 
 /* ---- Values ---------------------------------------------------------------------------------- */
@@ -229,11 +202,6 @@ const struct variable *fuzz_find(const char *name) {
 
 size_t fuzz_state_count(void) {
     return model_description.model->states.size / sizeof(double);
-}
-
-bool fuzz_is_smooth_input(const struct variable *variable) {
-    return variable->causality == CAUSALITY_INPUT && variable->type == VARIABLE_FLOAT64 &&
-           variable->variability == VARIABILITY_CONTINUOUS;
 }
 
 void fuzz_assert_written(fmi2Status status, const double values[], size_t count, const char *what) {
@@ -329,10 +297,4 @@ void fuzz_assert_same(const struct fuzz_values *expected, const struct fuzz_valu
     if (expected->status != actual->status) {
         fuzz_fail("%s: the status is %d, not %d", what, (int)actual->status, (int)expected->status);
     }
-}
-
-fmi2Integer fuzz_method(unsigned selector) {
-    const unsigned count =
-        model_description.model->series != NULL ? FUZZ_METHODS : FUZZ_METHODS - 1;
-    return 1 + (fmi2Integer)(selector % count);
 }

@@ -7,9 +7,6 @@
 #include "fuzz.h"
 #include "model_description.h"
 
-/* Internal steps that one communication step may take here, so that executions are quick. */
-enum { FUZZ_MAX_INTERNAL_STEPS = 300 };
-
 extern struct fmu_functions fuzz_fmu;
 
 /* What instances for Co-Simulation may have besides in FMI 3.0. */
@@ -28,10 +25,10 @@ struct fuzz_instance {
     fmi2Type kind;
     unsigned variety; /* bits of enum fuzz_variety */
     bool has_logger;
-    bool tells_refusals;            /* errors and discards must come with a text */
-    bool in_error;                  /* since an fmi2Error (section 4.2.4) */
-    bool had_error;                 /* once in its life */
-    double time;                    /* s: where it is, by the calls so far */
+    bool tells_refusals; /* errors and discards must come with a text */
+    bool in_error;       /* since an fmi2Error (section 4.2.4) */
+    double time;         /* s: where it is, by the calls so far */
+    double slope;        /* of all inputs in steps of FMI 3.0 with updates; 0: they are held */
     unsigned told[fmi2Pending + 1]; /* texts by status since the last fuzz_check */
     char text[256];                 /* the last one */
 };
@@ -64,23 +61,11 @@ fmi2FMUstate fuzz_save(struct fuzz_instance *instance);
 void fuzz_restore(struct fuzz_instance *instance, fmi2FMUstate state, double time);
 void fuzz_forget(struct fuzz_instance *instance, fmi2FMUstate *state);
 
-/* fmi2Reset, and max_internal_steps as above. */
-void fuzz_reset(struct fuzz_instance *instance);
-
 /* fmi2Reset. */
-void fuzz_reset_plain(struct fuzz_instance *instance);
+void fuzz_reset(struct fuzz_instance *instance);
 
 /* Limits max_internal_steps, if the model has it, of an instance that was just made or reset. */
 void fuzz_limit_steps(struct fuzz_instance *instance, fmi2Integer limit);
-
-/* SetupExperiment to ExitInitializationMode; the first status that is not fmi2OK. */
-fmi2Status fuzz_initialize(struct fuzz_instance *instance, double tolerance, double start);
-
-/* In place of fmi2DoStep, where a step may end at an event. NULL: no step can. */
-extern fmi2Status (*fuzz_do_step)(struct fuzz_instance *instance, double length);
-
-/* From where the instance is; keeps time. */
-fmi2Status fuzz_step(struct fuzz_instance *instance, double length);
 
 /* ---- Values ---------------------------------------------------------------------------------- */
 
@@ -91,9 +76,6 @@ const struct variable *fuzz_find(const char *name);
 
 /* Continuous states of the model. */
 size_t fuzz_state_count(void);
-
-/* A continuous input: it may have derivatives. */
-bool fuzz_is_smooth_input(const struct variable *variable);
 
 /* All variables, in the order of the table; what is not of the type, or cannot be computed,
  * is 0. */
@@ -115,17 +97,5 @@ void fuzz_assert_same(const struct fuzz_values *expected, const struct fuzz_valu
 
 /* Finite values, if the status is OK; nothing written otherwise (values were poisoned). */
 void fuzz_assert_written(fmi2Status status, const double values[], size_t count, const char *what);
-
-/* ---- After an error -------------------------------------------------------------------------- */
-
-enum { FUZZ_METHODS = 4 }; /* items of solver_method */
-enum { FUZZ_RUN_VARIANTS = 2 * FUZZ_METHODS };
-
-/* One of the methods that can integrate the model. */
-fmi2Integer fuzz_method(unsigned selector);
-
-/* fmi2Reset makes the instance equal to a fresh one of its kind: same bytes when serialized, same
- * bits in a run. Resets it again at the end. */
-void fuzz_assert_as_new(struct fuzz_instance *instance, unsigned variant);
 
 #endif

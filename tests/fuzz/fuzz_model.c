@@ -92,7 +92,7 @@ static bool initialize(struct subject *subject) {
 }
 
 static bool start_again(struct subject *subject) {
-    fuzz_reset_plain(subject->instance);
+    fuzz_reset(subject->instance);
     return initialize(subject);
 }
 
@@ -223,7 +223,7 @@ static void use_forged(struct fuzz_input *input, struct fuzz_instance *other) {
     struct fuzz_values values;
     if (is_quick(other, 4 * MAX_INTERNAL_STEPS) &&
         FUZZ_CHECKED(other, GetReal, &time, 1, &other->time) == fmi2OK &&
-        fuzz_step(other, length) != fmi2Error) {
+        fuzz_model_step(other, length, 0) != fmi2Error) {
         fuzz_read(other, &values);
     }
 }
@@ -237,6 +237,7 @@ static void use_same(struct fuzz_input *input, struct fuzz_instance *instance,
     const double begin = instance->time;
     fmi2FMUstate before = fuzz_save(instance);
     other->time = begin;
+    other->slope = instance->slope;
     const fmi2Status status = fuzz_model_step(instance, length, choices);
     if (fuzz_model_step(other, length, choices) != status) {
         fuzz_fail("a step in another instance has another status than %d", (int)status);
@@ -323,23 +324,57 @@ static void run_co_simulation(struct subject *subject) {
 
 /* ---- The target ------------------------------------------------------------------------------ */
 
+/* From a new or reset instance. */
+static void run(struct fuzz_input *input, struct fuzz_instance *instance) {
+    struct subject subject = {.input = input, .instance = instance};
+    if (initialize(&subject)) {
+        instance->kind == fmi2ModelExchange ? fuzz_model_exchange(&subject)
+                                            : run_co_simulation(&subject);
+    }
+    if (subject.saved != NULL) {
+        fuzz_forget(instance, &subject.saved);
+    }
+}
+
+static void assert_same_bytes(struct fuzz_instance *expected, struct fuzz_instance *actual,
+                              const char *what) {
+    static struct fuzz_bytes bytes[2];
+    fuzz_serialize(expected, &bytes[0]);
+    fuzz_serialize(actual, &bytes[1]);
+    if (!fuzz_are_same_bytes(&bytes[0], &bytes[1])) {
+        fuzz_fail("%s differs from that of a new instance", what);
+    }
+}
+
+/* A reset instance is as a new one, whatever it did before, and so is another run of it. */
+static void assert_as_new(const struct fuzz_input *rest, struct fuzz_instance *instance) {
+    struct fuzz_instance *fresh =
+        fuzz_instance_create(instance->kind, instance->variety, true, false);
+    struct fuzz_input inputs[] = {*rest, *rest};
+    fuzz_reset(instance);
+    assert_same_bytes(fresh, instance, "the state after fmi2Reset");
+    run(&inputs[0], fresh);
+    run(&inputs[1], instance);
+    if (fresh->in_error != instance->in_error) {
+        fuzz_fail("a run after fmi2Reset has an error, or none: %s%s", fresh->text, instance->text);
+    }
+    if (!fresh->in_error) {
+        assert_same_bytes(fresh, instance, "the end of a run after fmi2Reset");
+    }
+    fuzz_instance_free(fresh);
+}
+
 void fuzz_target_run(struct fuzz_input *input) {
     const unsigned selector = fuzz_byte(input);
     const unsigned variety = fuzz_model_variety(input);
     const bool is_exchange = selector % 4 == 3;
-    struct subject subject = {
-        .input = input,
-        .instance = fuzz_instance_create(is_exchange ? fmi2ModelExchange : fmi2CoSimulation,
-                                         is_exchange ? 0 : variety, true, false),
-    };
-    if (initialize(&subject)) {
-        is_exchange ? fuzz_model_exchange(&subject) : run_co_simulation(&subject);
-    }
-    if (subject.saved != NULL) {
-        fuzz_forget(subject.instance, &subject.saved);
-    }
+    const size_t skipped = input->left / 3;
+    const struct fuzz_input rest = {.at = input->at + skipped, .left = input->left - skipped};
+    struct fuzz_instance *instance = fuzz_instance_create(
+        is_exchange ? fmi2ModelExchange : fmi2CoSimulation, is_exchange ? 0 : variety, true, false);
+    run(input, instance);
     if (selector >= 192) {
-        fuzz_assert_as_new(subject.instance, selector);
+        assert_as_new(&rest, instance);
     }
-    fuzz_instance_free(subject.instance);
+    fuzz_instance_free(instance);
 }

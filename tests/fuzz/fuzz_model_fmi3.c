@@ -9,7 +9,6 @@
 static struct {
     fmi2ValueReference variables[FUZZ_VARIABLE_CAPACITY]; /* inputs, then outputs */
     size_t input_count, output_count;
-    double slope;  /* of all inputs; 0: they are held */
     double begin;  /* s: of the step */
     double middle; /* s: from here on it is asked to end; INFINITY: it is not */
     bool was_asked, has_failed;
@@ -26,9 +25,9 @@ static void update(fmi3InstanceEnvironment environment, fmi3Float64 time, fmi3Bo
         fuzz_fail("an intermediate update at %g s may set: %d, get: %d, finished: %d", time, set,
                   get, finished);
     }
-    if (set && updates.slope != 0.0) {
+    if (set && instance->slope != 0.0) {
         for (size_t i = 0; i < updates.input_count; i++) {
-            values[i] = updates.slope * (time - updates.begin);
+            values[i] = instance->slope * (time - updates.begin);
         }
         status = FUZZ_CALL(
             fmi3SetFloat64(c, updates.variables, updates.input_count, values, updates.input_count));
@@ -67,26 +66,15 @@ static void choose_variety(unsigned variety) {
     }
 }
 
-/* A step in which the importer does nothing. */
-static fmi2Status do_plain_step(struct fuzz_instance *instance, double length) {
-    const double slope = updates.slope;
-    updates.slope = 0.0;
-    const fmi2Status status = fuzz_model_step(instance, length, 0);
-    updates.slope = slope;
-    return status;
-}
-
 unsigned fuzz_model_variety(struct fuzz_input *input) {
     fuzz_choose_variety = choose_variety;
-    fuzz_do_step = do_plain_step;
-    updates.slope = 0.0;
     return fuzz_below(input, FUZZ_VARIETIES);
 }
 
 void fuzz_model_move_inputs(struct subject *subject) {
     const double slope = fuzz_likely_real(subject->input);
     // no part of the state: it must be usual whatever state comes next
-    updates.slope = fabs(slope) <= 1e3 ? slope : 1.0;
+    subject->instance->slope = fabs(slope) <= 1e3 ? slope : 1.0;
 }
 
 bool fuzz_model_failed_inside(void) {
