@@ -2,8 +2,8 @@
  * steps with snapshots, and loading and unloading of the shared object. */
 #define _GNU_SOURCE // mallinfo2, RTLD_NOLOAD
 
-#include "fmu_model.h"
 #include "fmu_version.h"
+#include "value_references.h"
 
 #include <dlfcn.h>
 #include <malloc.h>
@@ -11,7 +11,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 static const long growth_limit = 64; /* KiB after the warm-up */
@@ -33,12 +32,10 @@ static void receive(fmi2ComponentEnvironment environment, fmi2String instance_na
 
 /* ---- Memory --------------------------------------------------------------------------------- */
 
-/* KiB, except used. The kernel adds and drops pages of files, 64 KiB at a time: a leak shows in the
- * other pages. */
+/* The kernel adds and drops pages of files, 64 KiB at a time: a leak shows in the other pages. */
 struct memory {
-    long resident; /* with pages of files */
-    long own;      /* resident without them */
-    long used;     /* bytes allocated */
+    long own;  /* KiB, resident without pages of files */
+    long used; /* bytes allocated */
 };
 
 static struct memory memory_now(void) {
@@ -54,12 +51,11 @@ static struct memory memory_now(void) {
     if (file != NULL) {
         fclose(file);
     }
-    return (struct memory){resident * page, (resident - shared) * page, (long)mallinfo2().uordblks};
+    return (struct memory){(resident - shared) * page, (long)mallinfo2().uordblks};
 }
 
 /* ---- Instances ------------------------------------------------------------------------------ */
 
-#if defined FMU_IS_PLANT
 /* The slide is pushed to and fro, against friction and both its stops, without end. */
 static const fmi2ValueReference start_references[] = {
     RP_PLANT_g,      RP_PLANT_coulomb_friction1, RP_PLANT_coulomb_friction2, RP_PLANT_lower2,
@@ -69,25 +65,6 @@ static const fmi2ValueReference items[] = {RP_PLANT_solver_method, RP_PLANT_stop
 static const fmi2ValueReference driven = RP_PLANT_f2;
 static const fmi2ValueReference watched = RP_PLANT_q2;
 static const double effort = 20.0;
-#elif defined FMU_IS_SENSOR
-/* A joint jumps to and fro, with noise and several ticks in a step. Latencies take the place of
- * methods. */
-static const fmi2ValueReference start_references[] = {RP_SENSOR_sample_time, RP_SENSOR_noise1};
-static const double starts[] = {3e-4, 0.01};
-static const fmi2ValueReference items[] = {RP_SENSOR_latency};
-static const fmi2ValueReference driven = RP_SENSOR_q1;
-static const fmi2ValueReference watched = RP_SENSOR_q1_measured;
-static const double effort = 0.5;
-#else
-/* The slide oscillates between a constant force inward and the centrifugal one, without end. */
-static const fmi2ValueReference start_references[] = {RP_MANIPULATOR_g, RP_MANIPULATOR_dq1,
-                                                      RP_MANIPULATOR_f2};
-static const double starts[] = {0.0, 10.0, -20.0};
-static const fmi2ValueReference items[] = {RP_MANIPULATOR_solver_method};
-static const fmi2ValueReference driven = RP_MANIPULATOR_tau1;
-static const fmi2ValueReference watched = RP_MANIPULATOR_q2;
-static const double effort = 0.5;
-#endif
 
 #define COUNT(array) (sizeof(array) / sizeof(array)[0])
 
@@ -96,7 +73,7 @@ static fmi2Component initialized(fmi2Type kind, fmi2Integer method) {
     const fmi2Integer rigid = 2;
     const fmi2Integer numbers[] = {method, rigid};
     const fmi2Component c =
-        fmu.Instantiate("soak", kind, FMU_NAME(GUID), NULL, &callbacks, fmi2False, fmi2False);
+        fmu.Instantiate("soak", kind, RP_PLANT_GUID, NULL, &callbacks, fmi2False, fmi2False);
     expect(c != NULL, "no instance");
     expect(fmu.SetReal(c, start_references, COUNT(starts), starts) == fmi2OK, "start values");
     expect(fmu.SetInteger(c, items, COUNT(items), numbers) == fmi2OK, "method");
@@ -106,7 +83,7 @@ static fmi2Component initialized(fmi2Type kind, fmi2Integer method) {
     return c;
 }
 
-/* One step of 1 ms; the effort, or the angle, changes its sign at every third. */
+/* One step of 1 ms; the effort changes its sign at every third. */
 static double step(fmi2Component c, unsigned long i) {
     const double value = i / 3 % 2 == 0 ? effort : -effort;
     double output = NAN;
@@ -215,10 +192,7 @@ static const struct campaign {
 
 /* The first tenth warms up. */
 static void run(const struct campaign *campaign, unsigned long count) {
-    struct timespec begin;
-    struct timespec end;
     struct memory before = {0};
-    clock_gettime(CLOCK_MONOTONIC, &begin);
     for (unsigned long i = 0; i < count; i++) {
         if (i == count / 10) {
             before = memory_now();
@@ -226,19 +200,12 @@ static void run(const struct campaign *campaign, unsigned long count) {
         campaign->cycle(i);
     }
     const struct memory after = memory_now();
-    clock_gettime(CLOCK_MONOTONIC, &end);
     const long growth = after.own - before.own;
     expect(growth <= growth_limit, "the resident memory grows");
     expect(after.used - before.used <= growth_limit * 1024, "the allocated memory grows");
-    printf(
-        "figures: soak %s, %s, FMI %u.0; cycles %lu; seconds %.1f; findings %lu; resident memory "
-        "%ld KiB; memory growth %ld KiB; growth with pages of files %ld KiB; growth of "
-        "allocated memory "
-        "%ld bytes\n",
-        campaign->name, FMU_NAME(NAME), fmu_version, count,
-        (double)(end.tv_sec - begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec),
-        findings, after.resident, growth, after.resident - before.resident,
-        after.used - before.used);
+    printf("figures: soak %s, FMI %u.0; cycles %lu; findings %lu; memory growth %ld KiB; growth of "
+           "allocated memory %ld bytes\n",
+           campaign->name, fmu_version, count, findings, growth, after.used - before.used);
 }
 
 int main(int argc, char **argv) {
