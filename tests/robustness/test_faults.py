@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -207,7 +206,6 @@ def test_stopped_in_the_middle(
 ) -> None:
     with place.popen(arguments) as process:
         process.stdout.readline()  # the head of the table: an FMU is unpacked
-        time.sleep(0.3)
         process.send_signal(stop)
         out, err = process.communicate(timeout=100)
     if "open it: " not in out:  # else it had ended before
