@@ -1,3 +1,4 @@
+/* What every method does: errors, stops, statistics, failures, first steps, and who watches it. */
 #include "each_method.h"
 #include "integrator_test.h"
 
@@ -32,12 +33,13 @@ static void count_message(void *context, enum status status, const char *text) {
 
 static const double start[2] = {1.0, 0.0};
 
-static void create(ode_rhs *rhs, ode_series *series) {
+static void create(ode_rhs *rhs, ode_series *series, size_t indicators) {
     const struct ode ode = {.state_count = 2,
                             .rhs = rhs,
                             .jacobian = circle_jacobian,
                             .series = series,
                             .series_row_count = 2,
+                            .indicator_count = indicators,
                             .context = &circle};
     const struct message_sink sink = {.write = count_message, .context = &circle};
     ASSERT_OK(integrator_create(&ode, &sink, &integrator));
@@ -58,11 +60,17 @@ static void advance(double t, double x[2]) {
     TEST_ASSERT_EQUAL_DOUBLE(t, reached);
 }
 
+static struct integrator_statistics statistics(void) {
+    struct integrator_statistics found;
+    integrator_get_statistics(integrator, &found);
+    return found;
+}
+
 void setUp(void) {
     circle = (struct circle){.failing_from = INFINITY};
     message_count = 0;
     step_limit = 100000;
-    create(circle_rhs, circle_series);
+    create(circle_rhs, circle_series, 0);
     configure(1e-10);
 }
 
@@ -79,29 +87,9 @@ EACH_METHOD static void test_the_error_follows_the_tolerance(void) {
         advance(10.0, x);
         const double error = hypot(x[0] - cos(10.0), x[1] + sin(10.0));
         // the circle neither grows nor damps errors: at worst all steps' local errors add up
-        struct integrator_statistics statistics;
-        integrator_get_statistics(integrator, &statistics);
-        TEST_ASSERT_TRUE(error < sqrt(2.0) * (double)statistics.steps * pow(10.0, -digits));
+        TEST_ASSERT_TRUE(error < sqrt(2.0) * (double)statistics().steps * pow(10.0, -digits));
         TEST_ASSERT_TRUE(error < coarse);
         coarse = error;
-    }
-}
-
-/* To the bit: other stops do not matter, and cost no steps. */
-EACH_CVODE_METHOD static void test_many_points_lie_where_each_lies_alone(void) {
-    enum { POINTS = 300 };
-    // otherwise the first step depends on the first point
-    const struct integrator_start first = {.horizon = INFINITY, .first_step = 1e-6};
-    double many[POINTS][2];
-    ASSERT_OK(integrator_restart(integrator, start, &first));
-    for (int i = 0; i < POINTS; i++) {
-        advance(0.01 * (i + 1), many[i]);
-    }
-    for (int i = 0; i < POINTS; i++) {
-        double alone[2];
-        ASSERT_OK(integrator_restart(integrator, start, &first));
-        advance(0.01 * (i + 1), alone);
-        TEST_ASSERT_EQUAL_MEMORY(alone, many[i], sizeof alone);
     }
 }
 
@@ -120,47 +108,39 @@ EACH_METHOD static void test_nothing_is_evaluated_beyond_the_horizon(void) {
     TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0), x[0]);
 }
 
-/* What a snapshot relies on: where the stops were in between does not matter. */
-EACH_CVODE_METHOD static void test_a_run_can_be_repeated_with_two_stops(void) {
-    double x[2];
-    double repeated[2];
-    struct integrator_statistics first;
-    struct integrator_statistics second;
-    restart(7.0);
-    for (int i = 1; i <= 60; i++) {
-        advance(0.1 * i, x);
+/* What a snapshot relies on: from any two of the stops on a run goes on to the bit as from all of
+ * them. */
+EACH_CVODE_METHOD static void test_stops_in_between_do_not_matter(void) {
+    enum { STOPS = 70 };
+    // otherwise the first step depends on the first stop
+    const struct integrator_start first = {.horizon = 7.0, .first_step = 1e-6};
+    struct integrator_statistics all[STOPS];
+    double expected[STOPS][2];
+    ASSERT_OK(integrator_restart(integrator, start, &first));
+    for (int i = 0; i < STOPS; i++) {
+        advance(fmin(0.1 * (i + 1), 7.0), expected[i]);
+        integrator_get_statistics(integrator, &all[i]);
     }
-    integrator_get_statistics(integrator, &first);
-
-    restart(7.0);
-    advance(0.1, repeated);
-    advance(0.1 * 60, repeated);
-    TEST_ASSERT_EQUAL_MEMORY(x, repeated, sizeof x);
-    integrator_set_statistics(integrator, &first);
-
-    // and continue alike
-    for (int i = 61; i <= 70; i++) {
-        advance(fmin(0.1 * i, 7.0), repeated);
+    for (int i = 0; i < STOPS; i++) {
+        struct integrator_statistics found;
+        double x[2];
+        configure(1e-10);
+        ASSERT_OK(integrator_restart(integrator, start, &first));
+        advance(fmin(0.1 * (i + 1), 7.0), x);
+        TEST_ASSERT_EQUAL_MEMORY(expected[i], x, sizeof x);
+        integrator_set_statistics(integrator, &all[i]);
+        advance(7.0, x);
+        integrator_get_statistics(integrator, &found);
+        TEST_ASSERT_EQUAL_MEMORY(expected[STOPS - 1], x, sizeof x);
+        TEST_ASSERT_EQUAL_MEMORY(&all[STOPS - 1], &found, sizeof found);
     }
-    integrator_get_statistics(integrator, &second);
-    configure(1e-10);
-    restart(7.0);
-    for (int i = 1; i <= 70; i++) {
-        advance(fmin(0.1 * i, 7.0), x);
-    }
-    TEST_ASSERT_EQUAL_MEMORY(x, repeated, sizeof x);
-    struct integrator_statistics whole;
-    integrator_get_statistics(integrator, &whole);
-    TEST_ASSERT_EQUAL_MEMORY(&whole, &second, sizeof whole);
 }
 
 EACH_METHOD static void test_statistics_add_up_over_restarts(void) {
     double x[2];
-    struct integrator_statistics once;
-    struct integrator_statistics thrice;
     restart(INFINITY);
     advance(1.0, x);
-    integrator_get_statistics(integrator, &once);
+    const struct integrator_statistics once = statistics();
     TEST_ASSERT_TRUE(once.steps > 0);
     TEST_ASSERT_EQUAL_INT(circle.evaluations, once.rhs_evaluations);
 
@@ -168,13 +148,10 @@ EACH_METHOD static void test_statistics_add_up_over_restarts(void) {
         restart(INFINITY);
         advance(1.0, x);
     }
-    integrator_get_statistics(integrator, &thrice);
-    TEST_ASSERT_EQUAL_INT(3 * once.steps, thrice.steps);
-    TEST_ASSERT_EQUAL_INT(circle.evaluations, thrice.rhs_evaluations);
-
+    TEST_ASSERT_EQUAL_INT(3 * once.steps, statistics().steps);
+    TEST_ASSERT_EQUAL_INT(circle.evaluations, statistics().rhs_evaluations);
     configure(1e-10);
-    integrator_get_statistics(integrator, &once);
-    TEST_ASSERT_EQUAL_INT(0, once.steps);
+    TEST_ASSERT_EQUAL_INT(0, statistics().steps);
 }
 
 EACH_METHOD static void test_too_many_steps_leave_a_valid_state(void) {
@@ -191,39 +168,22 @@ EACH_METHOD static void test_too_many_steps_leave_a_valid_state(void) {
     TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, message_status);
 }
 
-/* The Taylor method sees it where an internal step begins. */
-EACH_METHOD static void test_a_right_hand_side_that_fails_on_the_way_ends_the_step_before(void) {
-    double x[2];
-    double reached;
-    configure_integrator(integrator, method, 1e-10, 0.25);
-    circle.failing_from = 1.0;
-    restart(INFINITY);
-    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE,
-                          integrator_advance(integrator, 2.0, step_limit, &reached, x));
-    TEST_ASSERT_TRUE(reached > 0.5 && reached <= 1.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(reached), x[0]);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, -sin(reached), x[1]);
-}
-
 EACH_METHOD static void test_a_right_hand_side_that_fails_at_once_leaves_the_state(void) {
     double x[2];
     double reached;
-    struct integrator_statistics before;
-    struct integrator_statistics after;
     restart(INFINITY);
     advance(1.0, x);
-    integrator_get_statistics(integrator, &before);
+    const double last_step = statistics().last_step;
     circle.failing_from = 0.0;
     restart(INFINITY);
     TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE,
                           integrator_advance(integrator, 2.0, step_limit, &reached, x));
     TEST_ASSERT_EQUAL_DOUBLE(0.0, reached);
     TEST_ASSERT_EQUAL_MEMORY(start, x, sizeof start);
-    integrator_get_statistics(integrator, &after);
-    TEST_ASSERT_EQUAL_DOUBLE(before.last_step, after.last_step); // the last that was taken
+    TEST_ASSERT_EQUAL_DOUBLE(last_step, statistics().last_step); // the last that was taken
 
     integrator_destroy(integrator);
-    create(always_failing, series_always_failing);
+    create(always_failing, series_always_failing, 0);
     configure(1e-10);
     restart(INFINITY);
     TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE,
@@ -253,20 +213,17 @@ EACH_CVODE_METHOD static void test_the_next_step_follows_from_the_second_derivat
 /* An advance that is no multiple of the step is taken in parts of equal length: none is tried that
  * the error test must refuse. */
 EACH_METHOD static void test_advances_need_no_second_attempt(void) {
-    struct integrator_statistics statistics;
     double x[2];
     double t = 1.0;
     restart(INFINITY);
     advance(t, x);
-    integrator_get_statistics(integrator, &statistics);
-    const int64_t failed = statistics.failed_steps;
+    const int64_t failed = statistics().failed_steps;
     for (int i = 0; i < 50; i++) {
         t += 2.3 *
-             (method == INTEGRATOR_ERK ? integrator_next_step(integrator) : statistics.last_step);
+             (method == INTEGRATOR_ERK ? integrator_next_step(integrator) : statistics().last_step);
         advance(t, x);
-        integrator_get_statistics(integrator, &statistics);
     }
-    TEST_ASSERT_LESS_OR_EQUAL_INT(failed + 5, statistics.failed_steps);
+    TEST_ASSERT_LESS_OR_EQUAL_INT(failed + 5, statistics().failed_steps);
 }
 
 /* Whatever state the one before ended with. */
@@ -297,14 +254,12 @@ EACH_METHOD static void test_a_vanishing_step_ends_in_the_same_way_each_time(voi
         enum status statuses[2];
         int64_t evaluations[2];
         for (int k = 0; k < 2; k++) {
-            struct integrator_statistics statistics;
             double x[2];
             double reached;
             configure(1e-8);
             restart(INFINITY);
             statuses[k] = integrator_advance(integrator, lengths[i], step_limit, &reached, x);
-            integrator_get_statistics(integrator, &statistics);
-            evaluations[k] = statistics.rhs_evaluations;
+            evaluations[k] = statistics().rhs_evaluations;
         }
         TEST_ASSERT_EQUAL_INT(statuses[0], statuses[1]);
         TEST_ASSERT_EQUAL_INT(evaluations[0], evaluations[1]);
@@ -377,5 +332,203 @@ EACH_CVODE_METHOD static void test_the_first_step_after_an_event_follows_from_th
         ASSERT_OK(integrator_restart(integrator, thrown, &from));
         ASSERT_OK(integrator_advance(integrator, 1.0, 1000, &reached, x));
         TEST_ASSERT_DOUBLE_WITHIN(1e-3 * expected, expected, first);
+    }
+}
+
+/* ---- Who watches internal steps ---------------------------------------------------------------
+ */
+
+/* Sees each of them once, changes none, and may end an advance. */
+
+static const double tolerance = 1e-9;
+
+enum { MOST_STEPS = 20000 };
+
+static struct {
+    unsigned count;
+    unsigned end_at; /* the step after which it ends the advance, counted from 1; 0: none */
+    double times[MOST_STEPS];
+    double largest_error;
+} seen;
+
+static bool watch(void *context, double t, const double x[]) {
+    TEST_ASSERT_EQUAL_PTR(&seen, context);
+    TEST_ASSERT_TRUE(seen.count < MOST_STEPS);
+    seen.times[seen.count++] = t;
+    seen.largest_error = fmax(seen.largest_error, fmax(fabs(x[0] - cos(t)), fabs(x[1] + sin(t))));
+    return seen.count == seen.end_at;
+}
+
+/* All methods need many internal steps for an advance of some seconds. */
+static const double some_step = 0.25;
+
+static void begin(const struct integrator_start *from, double max_step) {
+    tearDown();
+    circle.failing_from = INFINITY;
+    create(circle_rhs, circle_series, 1);
+    configure_integrator(integrator, method, tolerance, max_step);
+    ASSERT_OK(integrator_restart(integrator, start, from));
+}
+
+static void begin_again(void) {
+    begin(&(struct integrator_start){.horizon = INFINITY}, some_step);
+}
+
+static void watch_from(unsigned end_at) {
+    memset(&seen, 0, sizeof seen);
+    seen.end_at = end_at;
+    integrator_set_observer(integrator, watch, &seen);
+}
+
+static enum status advance_to(double t, int64_t steps, double *reached, double x[2]) {
+    return integrator_advance(integrator, t, steps, reached, x);
+}
+
+static const double stops[] = {0.1, 0.100001, 2.0, 2.5, 9.0};
+enum { STOPS = 5 };
+
+EACH_METHOD static void test_each_step_is_seen_once(void) {
+    double x[2];
+    double reached;
+    begin_again();
+    watch_from(0);
+    for (int i = 0; i < STOPS; i++) {
+        const unsigned before = seen.count;
+        ASSERT_OK(advance_to(stops[i], 100000, &reached, x));
+        for (unsigned k = before; k < seen.count; k++) {
+            TEST_ASSERT_TRUE(seen.times[k] < stops[i]);
+        }
+    }
+    for (unsigned k = 1; k < seen.count; k++) {
+        TEST_ASSERT_TRUE(seen.times[k] > seen.times[k - 1]);
+    }
+    TEST_ASSERT_TRUE(seen.largest_error < 1e3 * tolerance);
+
+    // all but those that end at a stop, or beyond the last one
+    TEST_ASSERT_TRUE(seen.count < statistics().steps);
+    TEST_ASSERT_TRUE(seen.count + STOPS >= statistics().steps);
+}
+
+EACH_METHOD static void test_watching_changes_nothing_nor_the_limit_of_steps(void) {
+    double x[2][STOPS + 1][2];
+    double reached[2];
+    struct integrator_statistics counts[2];
+    memset(counts, 0, sizeof counts);
+    for (int i = 0; i < 4; i++) {
+        const int watched = i / 2;
+        begin_again();
+        if (watched) {
+            watch_from(0);
+        }
+        for (int k = 0; k < STOPS && i % 2 == 0; k++) {
+            ASSERT_OK(advance_to(stops[k], 100000, &reached[watched], x[watched][k]));
+        }
+        if (i % 2 == 0) {
+            counts[watched] = statistics();
+        } else {
+            TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS,
+                                  advance_to(9.0, 12, &reached[watched], x[watched][STOPS]));
+        }
+    }
+    TEST_ASSERT_EQUAL_MEMORY(x[0], x[1], sizeof x[0]);
+    TEST_ASSERT_TRUE(counts[0].steps == counts[1].steps);
+    TEST_ASSERT_TRUE(counts[0].rhs_evaluations <= counts[1].rhs_evaluations);
+    TEST_ASSERT_TRUE(counts[0].last_step == counts[1].last_step);
+    TEST_ASSERT_TRUE(reached[0] == reached[1]);
+    TEST_ASSERT_EQUAL_UINT(12, seen.count);
+}
+
+EACH_METHOD static void test_an_advance_ends_where_the_watcher_says(void) {
+    double x[2];
+    double reached;
+    begin_again();
+    watch_from(7);
+    ASSERT_OK(advance_to(9.0, 100000, &reached, x));
+    TEST_ASSERT_EQUAL_UINT(7, seen.count);
+    TEST_ASSERT_TRUE(reached == seen.times[6]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e3 * tolerance, cos(reached), x[0]);
+    TEST_ASSERT_EQUAL_INT(0, message_count);
+    TEST_ASSERT_TRUE(statistics().steps == 7);
+
+    integrator_set_observer(integrator, NULL, NULL);
+    ASSERT_OK(advance_to(9.0, 100000, &reached, x));
+    TEST_ASSERT_TRUE(reached == 9.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e4 * tolerance, cos(9.0), x[0]);
+    TEST_ASSERT_EQUAL_UINT(7, seen.count);
+}
+
+/* The Taylor method sees it where an internal step begins. An integrator that gives up begins again
+ * with shorter steps: no time is seen twice. Also then the watcher may end the advance, which does
+ * not fail. */
+EACH_METHOD static void test_times_rise_where_the_right_hand_side_fails(void) {
+    double x[2];
+    double reached;
+    begin_again();
+    circle.failing_from = 2.0;
+    watch_from(0);
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, advance_to(9.0, 1000, &reached, x));
+    TEST_ASSERT_TRUE(reached > 1.5 && reached <= 2.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e3 * tolerance, cos(reached), x[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e3 * tolerance, -sin(reached), x[1]);
+    TEST_ASSERT_GREATER_THAN_UINT(5, seen.count);
+    for (unsigned k = 1; k < seen.count; k++) {
+        TEST_ASSERT_TRUE(seen.times[k] > seen.times[k - 1]);
+    }
+    TEST_ASSERT_TRUE(seen.times[seen.count - 1] <= reached);
+    const unsigned all = seen.count;
+    begin_again();
+    circle.failing_from = 2.0;
+    watch_from(all);
+    ASSERT_OK(advance_to(9.0, 1000, &reached, x));
+    TEST_ASSERT_TRUE(reached == seen.times[all - 1]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e3 * tolerance, cos(reached), x[0]);
+}
+
+EACH_METHOD static void test_only_a_point_that_was_passed_is_interpolated(void) {
+    const struct integrator_start on = {.horizon = INFINITY, .continues = true};
+    double x[2] = {-7.0, -7.0};
+    double expected[2];
+    double reached;
+    begin(&on, 0.0);
+    TEST_ASSERT_FALSE(integrator_interpolate(integrator, 0.5, x));
+    TEST_ASSERT_TRUE(x[0] == -7.0);
+    ASSERT_OK(advance_to(1.0, 100000, &reached, x));
+    const double next = 1.0 + 1e-6;
+    if (!(integrator_longest_history((enum integrator_method)method, false) > 0)) {
+        TEST_ASSERT_FALSE(integrator_interpolate(integrator, next, x));
+        return;
+    }
+    TEST_ASSERT_TRUE(integrator_interpolate(integrator, next, x));
+    begin(&on, 0.0);
+    ASSERT_OK(advance_to(1.0, 100000, &reached, expected));
+    ASSERT_OK(advance_to(next, 100000, &reached, expected));
+    TEST_ASSERT_EQUAL_MEMORY(expected, x, sizeof x);
+    TEST_ASSERT_FALSE(integrator_interpolate(integrator, 100.0, x));
+}
+
+/* The circle falls towards the level of an indicator and turns, just above it or as low as a touch.
+ * With taylor steps are longer where events are searched. */
+EACH_METHOD static void test_an_event_that_does_not_come_changes_no_bit(void) {
+    const bool is_erk = method == INTEGRATOR_ERK;
+    begin_again();
+    configure_integrator(integrator, method, is_erk ? 1e-3 : 1e-10, 0.0);
+    for (int i = 0; i < 480 && method != INTEGRATOR_TAYLOR; i++) {
+        const double distance = pow(10.0, -3 - i % 12) * (is_erk && i % 24 > 14 ? -1.0 : 1.0);
+        const double before = pow((8.8 + 0.05 * i) * fabs(distance), 0.25); // s, from the turn
+        const double from[2] = {-cos(before), -sin(before)};
+        const struct indicator indicator = {
+            .kind = INDICATOR_OF_STATE, .factor = 1.0, .offset = 1.0 + distance};
+        struct integrator_start on = {.horizon = INFINITY, .first_step = 1.0};
+        double x[2][3][2];
+        for (int watched = 0; watched < 2; watched++) {
+            ASSERT_OK(integrator_restart(integrator, from, &on));
+            for (int k = 0; k < 3; k++) {
+                double reached;
+                ASSERT_OK(advance_to((1.0 + 0.5 * k) * before, 100000, &reached, x[watched][k]));
+                TEST_ASSERT_NULL(integrator_event(integrator));
+            }
+            on.indicators = &indicator;
+        }
+        TEST_ASSERT_EQUAL_MEMORY(x[0], x[1], sizeof x[0]);
     }
 }
