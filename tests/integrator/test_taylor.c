@@ -1,4 +1,5 @@
-/* Steps by Taylor series: which orders they take, how long they are, and where they end. */
+/* Steps by Taylor series: which orders they take, how long they are, and where they end; events,
+ * whose indicators are rows of the series, and states that may move only so far within a step. */
 #include "integrator_test.h"
 
 /* ---- Equations ------------------------------------------------------------------------------ */
@@ -341,4 +342,110 @@ static void test_shortest_steps_are_exact(void) {
         advance(1.5 * t, x);
         TEST_ASSERT_TRUE(x[0] == 1.5 * t);
     }
+}
+
+/* ---- Events --------------------------------------------------------------------------------- */
+
+/* An oscillator x1' = x2, x2' = -x1 from x1 = 0, x2 = 1. */
+static struct circle circle = {.failing_from = INFINITY};
+static const size_t row_of_left[1] = {2};
+static const struct series left_rows = {.row_count = 1, .row_of_indicator = row_of_left};
+static int indicator_calls;
+
+/* What is left of the energy that x1^2 may have. */
+static enum status energy_left(double t, const double x[], double z[], void *context) {
+    indicator_calls++;
+    z[0] = 0.5 - x[0] * x[0];
+    return STATUS_OK;
+}
+
+static enum status energy_series(double t, double time_scale, int first, int last,
+                                 double row[][SERIES_LENGTH], void *context) {
+    for (int k = first; k <= last; k++) {
+        if (k > 0) {
+            row[0][k] = time_scale / k * row[1][k - 1];
+            row[1][k] = -time_scale / k * row[0][k - 1];
+        }
+        row[2][k] = k == 0 ? 0.5 : 0.0;
+        for (int i = 0; i <= k; i++) {
+            row[2][k] -= row[0][i] * row[0][k - i];
+        }
+    }
+    return STATUS_OK;
+}
+
+static void short_reach(const double x[], double reach[], void *context) {
+    reach[0] = INFINITY;
+    reach[1] = 0.01;
+}
+
+static void begin_oscillator(ode_reach *reach, double max_step) {
+    static const struct indicator of_model = {.kind = INDICATOR_OF_MODEL};
+    const struct integrator_start from = {.horizon = INFINITY, .indicators = &of_model};
+    const struct message_sink quiet = {0};
+    const double x[2] = {0.0, 1.0};
+    const struct ode ode = {
+        .state_count = 2,
+        .rhs = circle_rhs,
+        .series = energy_series,
+        .series_row_count = 3,
+        .rows = &left_rows,
+        .indicator_count = 1,
+        .indicators = energy_left,
+        .reach = reach,
+        .context = &circle,
+    };
+    indicator_calls = 0;
+    integrator_destroy(integrator);
+    ASSERT_OK(integrator_create(&ode, &quiet, &integrator));
+    configure_integrator(integrator, INTEGRATOR_TAYLOR, 1e-12, max_step);
+    ASSERT_OK(integrator_restart(integrator, x, &from));
+}
+
+/* To the time t, or to the event where x^2 is 1/2, at pi / 4. */
+static double go_to(double t) {
+    double reached;
+    double x[2];
+    ASSERT_OK(integrator_advance(integrator, t, 1000, &reached, x));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-11, sin(reached), x[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-11, cos(reached), x[1]);
+    return reached;
+}
+
+static const double quarter_turn = 0.78539816339744831; // pi / 4
+
+/* Calls of the indicators on the way to the event, without those at the restart, at the ends of
+ * steps and at the event. */
+static int calls_between(double max_step) {
+    begin_oscillator(NULL, max_step);
+    TEST_ASSERT_TRUE(go_to(0.5) == 0.5);
+    TEST_ASSERT_NULL(integrator_event(integrator));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, quarter_turn, go_to(2.0));
+    TEST_ASSERT_TRUE(integrator_event(integrator)[0]);
+    return indicator_calls - 2 - (int)statistics().steps;
+}
+
+static void test_a_row_is_the_indicator(void) {
+    TEST_ASSERT_EQUAL_INT(0, calls_between(0.01));
+}
+
+/* x1^2 swings twice as fast as x1: where x1 has just converged, it has not. The event is as exact
+ * as ever, and takes no samples. */
+static void test_a_row_that_has_not_converged_still_shows_the_event(void) {
+    TEST_ASSERT_LESS_THAN_INT(5, calls_between(0.0));
+}
+
+static void test_no_state_moves_farther_than_it_may(void) {
+    begin_oscillator(short_reach, 0.0);
+    double v = 1.0;
+    for (int64_t steps = 0; integrator_event(integrator) == NULL; steps++) {
+        double reached;
+        double x[2];
+        const enum status status = integrator_advance(integrator, 2.0, 1, &reached, x);
+        TEST_ASSERT_TRUE(status == STATUS_TOO_MANY_STEPS || status == STATUS_OK);
+        TEST_ASSERT_TRUE(fabs(x[1] - v) <= 0.01 * (1.0 + 1e-12));
+        TEST_ASSERT_LESS_THAN_INT64(1000, steps);
+        v = x[1];
+    }
+    TEST_ASSERT_TRUE(statistics().steps > 29 && statistics().steps < 60); // v falls by 0.29
 }
