@@ -1,5 +1,6 @@
 /* From one communication point to the next, with each method, against the solution in closed form.
  */
+#include "clock.h"
 #include "each_method.h"
 #include "one_instance.h"
 #include "oscillator_by_hand.h"
@@ -273,6 +274,78 @@ EACH_CVODE_METHOD static void test_a_restart_finds_its_first_step_without_evalua
     ASSERT_OK(instance_get_integer(fresh, &reference, 1, &evaluations));
     TEST_ASSERT_LESS_THAN_INT(evaluations, restarted);
     instance_destroy(fresh);
+}
+
+/* ---- Inputs at four times, and reports ------------------------------------------------------- */
+
+/* u = 1 - t + t^2 - 2 t^3 after the start at 1 s. */
+static double cubic(double time) {
+    const double t = time - 1.0;
+    return 1.0 - t * (1.0 - t * (1.0 - 2.0 * t));
+}
+
+static unsigned asked;
+
+static enum status set_cubic(void *context, double time) {
+    asked++;
+    set(OSCILLATOR_U, cubic(time));
+    return STATUS_OK;
+}
+
+/* x'' = -omega^2 x + u with u a cubic and x(0) = 1, x'(0) = 0: a particular cubic and the free
+ * motion. */
+static double solution(double time) {
+    const double t = time - 1.0;
+    const double w2 = 4.0; // omega = 2
+    const double c[4] = {1.0, -1.0, 1.0, -2.0};
+    const double p3 = c[3] / w2;
+    const double p2 = c[2] / w2;
+    const double p1 = (c[1] - 6.0 * p3) / w2;
+    const double p0 = (c[0] - 2.0 * p2) / w2;
+    return p0 + t * (p1 + t * (p2 + t * p3)) + (1.0 - p0) * cos(2.0 * t) - p1 / 2.0 * sin(2.0 * t);
+}
+
+EACH_METHOD static void test_a_cubic_input_is_exact(void) {
+    const struct step_options options = {.ask_inputs = set_cubic};
+    asked = 0;
+    set(OSCILLATOR_MAX_STEP, 0.25); // so that all methods need some steps
+    initialize_at(1.0);
+    for (int i = 0; i < 4; i++) {
+        ASSERT_OK(instance_do_step_with(instance, 1.0 + 0.25 * i, 0.25, &options));
+        TEST_ASSERT_TRUE(get(OSCILLATOR_U) == cubic(1.25 + 0.25 * i));
+    }
+    TEST_ASSERT_EQUAL_UINT(4 * POLYNOMIAL_NODES, asked);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, solution(2.0), get(OSCILLATOR_X));
+    // afterwards it is held at its last value
+    const double held = get(OSCILLATOR_U);
+    ASSERT_OK(instance_do_step(instance, 2.0, 0.25));
+    TEST_ASSERT_TRUE(held == get(OSCILLATOR_U));
+}
+
+static unsigned report_count;
+static double last_report; /* s */
+
+/* At the third one the step is to end at 90 s. */
+static enum status note(void *context, double time, double *end) {
+    TEST_ASSERT_TRUE(time > last_report && time <= *end);
+    TEST_ASSERT_TRUE(get(OSCILLATOR_TIME) == time);
+    last_report = time;
+    if (++report_count == 3) {
+        *end = 90.0;
+    }
+    return STATUS_OK;
+}
+
+/* Asked for the end of internal steps, a step may take as many of them as without. */
+EACH_METHOD static void test_the_limit_of_internal_steps_holds_over_early_ends(void) {
+    const struct step_options noting = {.accept = note};
+    set_int(OSCILLATOR_MAX_STEPS, 12);
+    initialize_at(1.0);
+    report_count = 0;
+    last_report = 1.0;
+    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS,
+                          instance_do_step_with(instance, 1.0, 99.0, &noting));
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(12, report_count);
 }
 
 /* ---- Messages ------------------------------------------------------------------------------- */
