@@ -38,6 +38,15 @@ static void assert_refused(const char *name) {
     last_text[0] = '\0';
 }
 
+/* With this value of a field the state is refused. */
+#define REFUSED_WITH(field, value, name)                                                           \
+    do {                                                                                           \
+        const struct instance_state kept = state;                                                  \
+        state.field = (value);                                                                     \
+        assert_refused(name);                                                                      \
+        state = kept;                                                                              \
+    } while (0)
+
 /* A real at *value: refused with each of bad, accepted with each of good; then as it was. */
 static void check_real(double *value, const char *name, const double good[2], const double bad[2]) {
     const double kept = *value;
@@ -116,12 +125,15 @@ static void test_counts_can_be_counted_on_from(void) {
 }
 
 static void test_phase_method_and_limit_exist(void) {
-    const struct instance_state saved = state;
-    state.phase = (enum phase) - 1;
-    assert_refused("phase = -1");
-    state.phase = PHASE_COUNT;
-    assert_refused("phase = 4");
-    state = saved;
+    REFUSED_WITH(phase, (enum phase) - 1, "phase = -1");
+    REFUSED_WITH(phase, PHASE_COUNT, "phase = 4");
+    REFUSED_WITH(own.max_internal_steps, 0, "max_internal_steps = 0");
+    REFUSED_WITH(own.max_events, 0, "max_events = 0");
+    REFUSED_WITH(own.event_count, -1, "event_count = -1");
+    const int most = state.own.max_internal_steps;
+    state.own.max_internal_steps = 1;
+    TEST_ASSERT_TRUE(is_plausible());
+    state.own.max_internal_steps = most;
     for (int method = -1; method <= (int)INTEGRATOR_METHODS; method++) {
         const bool exists = method > (int)INTEGRATOR_NO_METHOD && method < (int)INTEGRATOR_METHODS;
         state.own.solver_method = method;
@@ -130,17 +142,6 @@ static void test_phase_method_and_limit_exist(void) {
         }
         TEST_ASSERT_TRUE(is_plausible() == exists);
     }
-    state = saved;
-    state.own.max_internal_steps = 1;
-    TEST_ASSERT_TRUE(is_plausible());
-    state.own.max_internal_steps = 0;
-    assert_refused("max_internal_steps = 0");
-    state = saved;
-    state.own.max_events = 0;
-    assert_refused("max_events = 0");
-    state = saved;
-    state.own.event_count = -1;
-    assert_refused("event_count = -1");
 }
 
 /* A replay goes from the restart to first_time and on to latest_time, within the horizon and the
@@ -247,23 +248,17 @@ static void check_twin(double *value, const char *name) {
     TEST_ASSERT_TRUE_MESSAGE(is_plausible(), name);
 }
 
-static void check_int_twin(int *value, const char *name) {
-    *value += 1;
-    assert_refused(name);
-    *value -= 1;
-    TEST_ASSERT_TRUE_MESSAGE(is_plausible(), name);
-}
-
 static void test_what_stands_twice_agrees(void) {
     struct instance_values *own = &state.own;
     check_twin(&own->time, "the variable time");
     check_twin(&own->effective_relative_tolerance, "effective_relative_tolerance");
     check_twin(&own->solver_last_step, "solver_last_step");
-    check_int_twin(&own->solver_steps, "solver_steps");
-    check_int_twin(&own->solver_rhs_evaluations, "solver_rhs_evaluations");
-    check_int_twin(&own->solver_restarts, "solver_restarts");
-    check_int_twin(&own->solver_failed_steps, "solver_failed_steps");
-    check_int_twin(&own->solver_last_order, "solver_last_order");
+    REFUSED_WITH(own.solver_steps, own->solver_steps + 1, "solver_steps");
+    REFUSED_WITH(own.solver_rhs_evaluations, own->solver_rhs_evaluations + 1,
+                 "solver_rhs_evaluations");
+    REFUSED_WITH(own.solver_restarts, own->solver_restarts + 1, "solver_restarts");
+    REFUSED_WITH(own.solver_failed_steps, own->solver_failed_steps + 1, "solver_failed_steps");
+    REFUSED_WITH(own.solver_last_order, own->solver_last_order + 1, "solver_last_order");
     check_twin(&own->last_event_time, "last_event_time"); // there has been no event
     check_twin(&state.latest_time, "latest_time");
     check_twin(&state.horizon, "horizon");
@@ -277,19 +272,12 @@ static void test_what_stands_twice_agrees(void) {
 }
 
 static void test_the_clock_and_the_history_agree(void) {
+    REFUSED_WITH(experiment.stop_time, 5.0, "horizon = 10");
+    REFUSED_WITH(experiment.stop_time, -1.0, "stop time");
+    REFUSED_WITH(experiment_defined, false, "experiment_defined");
+    REFUSED_WITH(event_point, EVENT_HANDLED, "event_point");
     state.time.s = state.own.time = 1.5; // both, so that only the history contradicts
     assert_refused("latest_time = 1");
-    state.time.s = state.own.time = 1.0;
-    state.experiment.stop_time = 5.0;
-    assert_refused("horizon = 10");
-    state.experiment.stop_time = -1.0;
-    assert_refused("stop time");
-    state.experiment.stop_time = 10.0;
-    state.experiment_defined = false;
-    assert_refused("experiment_defined");
-    state.experiment_defined = true;
-    state.event_point = EVENT_HANDLED;
-    assert_refused("event_point");
 }
 
 static void test_nothing_has_been_before_the_start(void) {
@@ -297,21 +285,12 @@ static void test_nothing_has_been_before_the_start(void) {
     state = instance->state;
     memcpy(block, instance->memory.block, instance->memory.size);
     TEST_ASSERT_TRUE(is_plausible());
-    const struct instance_state saved = state;
-    state.own.time = state.time.s = 1.0;
-    assert_refused("time = 1");
-    state = saved;
-    state.own.solver_steps = 7;
+    REFUSED_WITH(own.event_count, 1, "event_count = 1");
+    REFUSED_WITH(own.last_event_time, 1.0, "last_event_time = 1");
+    REFUSED_WITH(experiment.stop_time_defined, true, "stop_time_defined");
     state.statistics.steps = 7;
-    assert_refused("solver_steps = 7");
-    state = saved;
-    state.own.event_count = 1;
-    assert_refused("event_count = 1");
-    state = saved;
-    state.own.last_event_time = 1.0;
-    assert_refused("last_event_time = 1");
-    state = saved;
-    state.experiment.stop_time_defined = true;
-    state.experiment.stop_time = 1.0;
-    assert_refused("stop_time_defined");
+    REFUSED_WITH(own.solver_steps, 7, "solver_steps = 7");
+    state.statistics.steps = 0;
+    state.time.s = 1.0;
+    REFUSED_WITH(own.time, 1.0, "time = 1");
 }
