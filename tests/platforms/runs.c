@@ -41,22 +41,6 @@ struct model {
     struct change changes[MOST_CHANGES];
 };
 
-/* The text of a file, which the caller frees, or NULL. */
-static char *read_file(const char *path, size_t *size) {
-    FILE *file = fopen(path, "rb");
-    char *text = calloc(1, 1 << 17);
-    *size = file != NULL && text != NULL ? fread(text, 1, (1 << 17) - 1, file) : 0;
-    if (file != NULL) {
-        fclose(file);
-    }
-    if (*size == 0) {
-        fprintf(stderr, "%s cannot be read\n", path);
-        free(text);
-        return NULL;
-    }
-    return text;
-}
-
 static void read_word(const char **at, char word[64]) {
     const size_t length = strcspn(*at, "\n");
     memcpy(word, *at, length < 63 ? length : 63);
@@ -84,15 +68,15 @@ static void read_references(const char **at, struct references *references) {
 }
 
 struct model *runs_read_model(const char *path) {
-    size_t size = 0;
-    char *text = read_file(path, &size);
-    struct model *model = calloc(1, sizeof *model);
+    static char text[1 << 17];
     const char *at = text;
-    if (text == NULL || model == NULL) {
-        free(text);
-        free(model);
+    FILE *file = fopen(path, "rb");
+    struct model *model = file != NULL ? calloc(1, sizeof *model) : NULL;
+    if (model == NULL || fread(text, 1, sizeof text - 1, file) == 0) {
+        fprintf(stderr, "%s cannot be read\n", path);
         return NULL;
     }
+    fclose(file);
     read_word(&at, model->guid);
     read_word(&at, model->name);
     model->state_count = (size_t)read_number(&at);
@@ -116,7 +100,6 @@ struct model *runs_read_model(const char *path) {
             change->items[item] = (fmi2Integer)(int64_t)read_number(&at);
         }
     }
-    free(text);
     return model;
 }
 
@@ -299,7 +282,7 @@ static size_t serialize(struct run *run, fmi2Component c, fmi2FMUstate state,
 
 /* ---- Co-Simulation --------------------------------------------------------------------------- */
 
-enum { STEPS = 200, STEPS_TO_STATE = 40 };
+enum { STEPS = 200 };
 
 /* Length of a step, s. */
 static double length_of(int i) {
@@ -508,24 +491,6 @@ static void exhaust_methods(struct run *run, fmi2Component c) {
     }
 }
 
-/* Switches categories of messages on and off, before calls that cause some of each. */
-static void choose_categories(struct run *run, fmi2Component c) {
-    static const char *const categories[] = {"logEvents",        "logStatusWarning",
-                                             "logStatusDiscard", "logStatusError",
-                                             "logStatusFatal",   "logAll"};
-    enum { COUNT = sizeof categories / sizeof categories[0] };
-    for (int i = -2; i <= COUNT; i++) { // all on, all off, one by one, all off by name
-        const char *const *chosen = &categories[i < COUNT ? i : COUNT - 1];
-        const fmi2Boolean on = i != -1 && i != COUNT;
-        CALL(run, SetDebugLogging, c, on, i >= 0, i >= 0 ? chosen : NULL);
-        initialize(run, c, 1e-2, 0.1);
-        CALL(run, DoStep, c, 0.1, 0.1, fmi2False);
-        CALL_EXPECTING(fmi2Discard, run, GetStatus, c, fmi2DoStepStatus, &(fmi2Status){fmi2OK});
-        CALL_EXPECTING(fmi2Error, run, DoStep, c, 0.1, 0.1, fmi2False);
-        CALL(run, Reset, c);
-    }
-}
-
 static void messages(struct run *run) {
     static const char *const names[] = {"plain", "ünïcödé", "100%d#r1#"};
     static const char *const unknown[] = {"logN%sthing#r1#"};
@@ -538,53 +503,6 @@ static void messages(struct run *run) {
         CALL_EXPECTING(fmi2Error, run, SetDebugLogging, c, fmi2True, 1, unknown);
         free_instance(run, 0);
     }
-    c = instantiate(run, 0, fmi2CoSimulation, "logger", fmi2False);
-    choose_categories(run, c);
-    free_instance(run, 0);
-}
-
-/* ---- States that go to another platform ------------------------------------------------------ */
-
-/* Writes "mark", behind which calls are counted again, and makes further steps. */
-static void go_on(struct run *run, double time) {
-    fprintf(run->transcript, "\nmark");
-    run->call = 1;
-    for (int i = STEPS_TO_STATE; i < 2 * STEPS_TO_STATE; i++) {
-        time = step(run, run->instances[0], i, time, 0);
-    }
-    free_instance(run, 0);
-}
-
-static void write_state(struct run *run, int variant, const char *path) {
-    fmi2Byte bytes[MOST_BYTES];
-    fmi2FMUstate state = NULL;
-    double time = 0.0;
-    const fmi2Component c = instantiate(run, 0, fmi2CoSimulation, run->model->name, fmi2False);
-    change(run, c, variant, 0.0);
-    initialize(run, c, 0.0, time);
-    for (int i = 0; i < STEPS_TO_STATE; i++) {
-        time = step(run, c, i, time, 0);
-    }
-    CALL(run, GetFMUstate, c, &state);
-    const size_t size = serialize(run, c, state, bytes);
-    FILE *file = fopen(path, "wb");
-    run->has_failed |= file == NULL || fwrite(bytes, 1, size, file) != size || fclose(file) != 0;
-    go_on(run, time);
-}
-
-static void read_state(struct run *run, const char *path) {
-    fmi2FMUstate state = NULL;
-    double time = 0.0;
-    size_t size = 0;
-    char *bytes = read_file(path, &size);
-    const fmi2Component c = instantiate(run, 0, fmi2CoSimulation, run->model->name, fmi2False);
-    CALL(run, DeSerializeFMUstate, c, bytes, size, &state);
-    CALL(run, SetFMUstate, c, state);
-    free(bytes);
-    for (int i = 0; i < STEPS_TO_STATE; i++) {
-        time += length_of(i);
-    }
-    go_on(run, time);
 }
 
 /* ---- Runs ------------------------------------------------------------------------------------ */
@@ -594,10 +512,6 @@ static void make_run(struct run *run, const char *what) {
     const int variant = colon != NULL ? colon[1] - '0' : 1;
     if (what[0] == 's') {
         co_simulation(run, variant, (double)strtol(colon + 3, NULL, 10) / 1024.0);
-    } else if (what[0] == 'w') {
-        write_state(run, variant, colon + 3);
-    } else if (what[0] == 'r') {
-        read_state(run, colon + 3);
     } else {
         for (int each = 1; each < VARIANTS; each++) {
             co_simulation(run, each, 0.0);

@@ -2,8 +2,6 @@
  *
  *     everything             all that a platform may do differently
  *     steps:VARIANT:SHIFT    Co-Simulation, with derivatives, rollbacks and a second instance
- *     write:VARIANT:FILE     steps whose serialized state goes to a file, and further ones
- *     read:VARIANT:FILE      the further steps, from that state
  *
  * where VARIANT is a digit, and SHIFT of the first parameter is in 1/1024.
  *
