@@ -96,13 +96,15 @@ static const double below = -1e-6;
 static const size_t row_of_indicator[1] = {0};
 static const struct series rows = {.row_count = 1, .row_of_indicator = row_of_indicator};
 static double rate;
-static enum { LINE, SINE, SWING } shape;
+static enum { LINE, SINE, SWING, JUMP } shape;
+static int calls; /* of the indicator */
 static const double pi = 3.141592653589793;
 static struct integrator *integrator;
 
 void setUp(void) {
     integrator = NULL;
     shape = LINE;
+    calls = 0;
 }
 
 void tearDown(void) {
@@ -135,7 +137,12 @@ static double swing(double t) {
 }
 
 static enum status indicators(double t, const double x[], double z[], void *context) {
-    z[0] = shape == LINE ? x[0] : shape == SINE ? sin(x[0]) - 0.01 : t < 0.5 ? 1.1 : swing(t);
+    calls++;
+    z[0] = shape == LINE   ? x[0]
+           : shape == SINE ? sin(x[0]) - 0.01
+           : shape == JUMP ? (t < 0.3 ? 1.0 : -1.0)
+           : t < 0.5       ? 1.1
+                           : swing(t);
     return STATUS_OK;
 }
 
@@ -147,7 +154,7 @@ static double run(int method, enum indicator_kind kind) {
         .jacobian = jacobian,
         .series = series,
         .series_row_count = 1,
-        .rows = shape == SWING ? NULL : &rows,
+        .rows = shape == SWING || shape == JUMP ? NULL : &rows,
         .indicator_count = 1,
         .indicators = indicators,
     };
@@ -202,5 +209,16 @@ static void test_later_falls_are_located_exactly(void) {
     for (int method = 1; method < INTEGRATOR_METHODS; method++) {
         TEST_ASSERT_DOUBLE_WITHIN(1e-9, (pi - asin(0.01) - below) / rate,
                                   run(method, INDICATOR_OF_MODEL));
+    }
+}
+
+/* A step is divided to 2^-10 of its length, where no polynomial represents the indicator. */
+static void test_a_jump_is_located_in_the_shortest_piece(void) {
+    shape = JUMP;
+    rate = 0.0;
+    for (int method = 1; method < INTEGRATOR_METHODS; method++) {
+        calls = 0;
+        TEST_ASSERT_DOUBLE_WITHIN(0x1p-10, 0.3, run(method, INDICATOR_OF_MODEL));
+        TEST_ASSERT_LESS_THAN_INT(260, calls); // each division samples 22 points or so
     }
 }

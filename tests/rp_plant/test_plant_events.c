@@ -316,11 +316,13 @@ static void test_contacts_follow_from_the_state(void) {
 static void test_at_rest_on_the_limit_the_force_decides(void) {
     set_slide_between_compliant_stops();
     for (int direction = -1; direction <= 1; direction++) {
-        put(-1.0, 0.0);
-        v.inputs.tau[1] = 2.0 * direction;
-        plant_test_update(&v, -1);
-        assert_contact(direction < 0 ? RP_PLANT_PUSHED : RP_PLANT_APART);
-        TEST_ASSERT_EQUAL_INT(RP_PLANT_FREE, v.modes.joint[1]);
+        for (int limit = 1; limit >= -1; limit -= 2) {
+            put(limit, 0.0);
+            v.inputs.tau[1] = 2.0 * direction;
+            plant_test_update(&v, -1);
+            assert_contact(direction == limit ? -limit * RP_PLANT_PUSHED : RP_PLANT_APART);
+            TEST_ASSERT_EQUAL_INT(RP_PLANT_FREE, v.modes.joint[1]);
+        }
     }
     // friction that holds the joint leaves it apart, less of it lets it go into the stop
     v.inputs.tau[1] = -2.0;
