@@ -220,6 +220,7 @@ EACH_METHOD static void test_a_step_that_rounds_to_none_is_refused(void) {
     initialize_of(instance, far, INFINITY);
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_TIME, instance_do_step(instance, far, 1.0));
     TEST_ASSERT_NOT_NULL(strstr(last_text, "does not change the time"));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_TIME, instance_do_step(instance, far - 1.0, 1.0));
     ASSERT_OK(instance_do_step(instance, far, 2.0));
 }
 

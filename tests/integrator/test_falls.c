@@ -59,18 +59,24 @@ static void test_a_fall_up_to_the_latest_is_located_to_the_same_bit(void) {
     TEST_ASSERT_TRUE(left_out > 10000);
 }
 
+static double fall_within(const double c[], int degree, double noise, bool *is_armed) {
+    const struct roots_polynomial p = {c, degree, -1.0};
+    return fall_first(
+        &p, &(struct fall){
+                .latest = INFINITY, .is_restart = true, .is_armed = is_armed, .noise = &noise});
+}
+
 /* p = -s (1 - 4 s) (1 - s / 0.9) / 10: the first fall counts only because p has been above the
- * noise before, between 0.4 and 0.9. */
+ * noise before, between 0.4 and 0.9. s (0.1 - s) is never above it. */
 static void test_an_indicator_that_rises_above_its_noise_is_armed(void) {
-    const double c[ROOTS_LENGTH] = {0.0, -0.1, 0.4 + 0.1 / 0.9, -0.4 / 0.9};
+    const double rising[] = {0.0, -0.1, 0.4 + 0.1 / 0.9, -0.4 / 0.9};
+    const double bent[] = {0.0, 0.1, -1.0};
     bool is_armed = false;
-    double noise = 0.02;
-    const double s = fall_first(
-        &(struct roots_polynomial){c, 3, -1.0},
-        &(struct fall){
-            .latest = INFINITY, .is_restart = true, .is_armed = &is_armed, .noise = &noise});
-    TEST_ASSERT_DOUBLE_WITHIN(1e-14, 0.9, s);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-14, 0.9, fall_within(rising, 3, 0.02, &is_armed));
     TEST_ASSERT_TRUE(is_armed);
+    is_armed = false;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-14, 0.1, fall_within(bent, 2, 0.02, &is_armed));
+    TEST_ASSERT_FALSE(is_armed);
 }
 
 /* p = (s - 0.5)^2 - 1e-6 */
