@@ -2,7 +2,6 @@
  * was saved before leads back. */
 #include "fuzz_hostile.h"
 
-#include "fuzz_bytes.h"
 #include "fuzz_model.h"
 
 #include <math.h>

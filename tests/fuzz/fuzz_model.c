@@ -3,8 +3,6 @@
  */
 #include "fuzz_model.h"
 
-#include "fuzz_bytes.h"
-
 #include <math.h>
 
 enum { MAX_SETTINGS = 12, MAX_OPERATIONS = 16, MAX_INTERNAL_STEPS = 100 };

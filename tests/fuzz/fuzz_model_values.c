@@ -1,4 +1,3 @@
-#include "fuzz_bytes.h"
 #include "fuzz_model.h"
 
 #include <math.h>
