@@ -71,7 +71,7 @@ class Place:
 
     def call(self, arguments: tuple[str, ...], **options) -> tuple[int, str, str]:
         with self.popen(arguments, **options) as process:
-            out, err = process.communicate(timeout=100)
+            out, err = process.communicate(timeout=600)
         return process.returncode, out, err or ""
 
     def written(self) -> list[str]:
@@ -207,7 +207,7 @@ def test_stopped_in_the_middle(
     with place.popen(arguments) as process:
         process.stdout.readline()  # the head of the table: an FMU is unpacked
         process.send_signal(stop)
-        out, err = process.communicate(timeout=100)
+        out, err = process.communicate(timeout=600)
     if "open it: " not in out:  # else it had ended before
         assert (process.returncode, err) == (code, said)
     place.assert_clean()
