@@ -1,6 +1,7 @@
 /* What every struct model promises, at random points in all modes: derivatives are what differences
- * give, the Jacobian is what derivatives give, what is integrated is what is output, and nothing is
- * read that is not given. Models themselves have tests in their folders. */
+ * give, the Jacobian is what derivatives give, what is integrated is what is output, nothing is
+ * read that is not given, and results are written as a whole, whatever stood there before. Of
+ * equations: test_all_is_written.py. Models themselves have tests in their folders. */
 #include "equations.h" /* of RPEnvironment */
 #include "last_text.h"
 #include "rp_actuator_model.h"
@@ -19,7 +20,7 @@
 #include <unity.h>
 
 enum { ARM, PLANT, CONTROLLER, ACTUATOR, TRAJECTORY, SENSOR, WALL, SUBJECTS };
-enum { DOUBLES = 256, STATES = 4, INPUTS = 10, ROWS = 64, POINTS = 2000 };
+enum { DOUBLES = 256, STATES = 4, INPUTS = 10, INDICATORS = 16, ROWS = 64, POINTS = 2000 };
 
 /* A value structure, of any model. */
 union point {
@@ -44,6 +45,7 @@ struct subject {
     const struct model *model;
     struct doubles knowns[2];     /* parameters, inputs, states */
     struct doubles calculated[2]; /* by outputs and propagate */
+    struct range counts;          /* int[], by outputs */
     void (*place)(int n); /* makes a point of kind n of random knowns, far from where it changes */
 };
 
@@ -191,28 +193,29 @@ static void place_wall(int n) {
 // clang-format off
 static const struct subject subjects[SUBJECTS] = {
     [ARM] = {&rp_model, {{0, PLACE(rp_values, ddq)}},
-     {{PLACE(rp_values, ddq), END(rp_values)}}, place_arm},
+     {{PLACE(rp_values, ddq), END(rp_values)}}, .place = place_arm},
     [PLANT] = {&rp_plant_model,
      {{0, PLACE(rp_plant_values, parameters.stops)},
       {PLACE(rp_plant_values, inputs), PLACE(rp_plant_values, ddq)}},
      {{PLACE(rp_plant_values, ddq), PLACE(rp_plant_values, payload_attached)},
-      {PLACE(rp_plant_values, ee_position), END(rp_plant_values)}}, place_plant},
+      {PLACE(rp_plant_values, ee_position), END(rp_plant_values)}}, .place = place_plant},
     [CONTROLLER] = {&rp_controller_model,
      {{0, PLACE(rp_controller_values, parameters.sample_time)},
       {PLACE(rp_controller_values, inputs), PLACE(rp_controller_values, payload_attached)}},
-     {{PLACE(rp_controller_values, dintegral), END(rp_controller_values)}}, place_controller},
+     {{PLACE(rp_controller_values, dintegral), END(rp_controller_values)}}, .place = place_controller},
     [ACTUATOR] = {&rp_actuator_model, {{0, PLACE(rp_actuator_values, dcurrent)}},
-     {{PLACE(rp_actuator_values, dcurrent), END(rp_actuator_values)}}, place_actuator},
+     {{PLACE(rp_actuator_values, dcurrent), END(rp_actuator_values)}}, .place = place_actuator},
     [TRAJECTORY] = {&rp_trajectory_model,
      {{PLACE(rp_trajectory_values, parameters.l1), PLACE(rp_trajectory_values, payload)}},
      {{PLACE(rp_trajectory_values, q), PLACE(rp_trajectory_values, payload_attached)}},
-     place_trajectory},
+     {offsetof(struct rp_trajectory_values, payload_attached), sizeof(int)}, place_trajectory},
     [SENSOR] = {&rp_sensor_model,
      {{0, PLACE(rp_sensor_values, parameters.latency)},
       {PLACE(rp_sensor_values, q), PLACE(rp_sensor_values, q_measured)}},
-     {{PLACE(rp_sensor_values, q_measured), PLACE(rp_sensor_values, counts)}}, place_sensor},
+     {{PLACE(rp_sensor_values, q_measured), PLACE(rp_sensor_values, counts)}},
+     {offsetof(struct rp_sensor_values, counts), sizeof(int[2])}, place_sensor},
     [WALL] = {&equations_model, {{0, PLACE(equations_values, v_n_x)}},
-     {{PLACE(equations_values, v_n_x), END(equations_values)}}, place_wall},
+     {{PLACE(equations_values, v_n_x), END(equations_values)}}, .place = place_wall},
 };
 // clang-format on
 
@@ -309,6 +312,7 @@ static void check_what_is_read(void) {
     union point clean = at, clean_first = first, clean_second = second;
     union point dirty = at, dirty_first = first, dirty_second = second, alone = first;
     poison_calculated(&dirty);
+    poison(&dirty, subject->counts.offset, subject->counts.size);
     poison_calculated(&dirty_first);
     poison_calculated(&dirty_second);
     poison_calculated(&alone);
@@ -323,18 +327,26 @@ static void check_what_is_read(void) {
     TEST_ASSERT_EQUAL_MEMORY(&clean_second, &dirty_second, model->values_size);
 }
 
-/* The right-hand side and the Jacobian take states and inputs from their arguments; bit for bit
- * what outputs and propagate give. A joint that is stuck rests. */
-static void check_integration(void) {
-    double x[STATES], u[INPUTS], dx[STATES], J[STATES * STATES];
-    const size_t count = model->states.size / sizeof(double);
-    union point expected = at, given = at;
-    ASSERT_OK(model->outputs(&expected, now));
+/* The point with NaN for all that pure functions take from their arguments, x and u. */
+static union point without_arguments(double x[STATES], double u[INPUTS]) {
+    union point given = at;
     memcpy(x, (char *)&at + model->states.offset, model->states.size);
     memcpy(u, (char *)&at + model->inputs.offset, model->inputs.size);
     poison_calculated(&given);
     poison(&given, model->states.offset, model->states.size);
     poison(&given, model->inputs.offset, model->inputs.size);
+    return given;
+}
+
+/* The right-hand side and the Jacobian take states and inputs from their arguments; bit for bit
+ * what outputs and propagate give. A joint that is stuck rests. */
+static void check_integration(void) {
+    double x[STATES], u[INPUTS], dx[STATES], J[STATES * STATES];
+    const size_t count = model->states.size / sizeof(double);
+    union point expected = at;
+    const union point given = without_arguments(x, u);
+    ASSERT_OK(model->outputs(&expected, now));
+    memset(dx, 0xff, sizeof dx);
     ASSERT_OK(model->right_hand_side(&given, now, x, u, dx));
     TEST_ASSERT_TRUE(count == 0 || memcmp((char *)&expected + model->derivatives.offset, dx,
                                           model->derivatives.size) == 0);
@@ -355,6 +367,52 @@ static void check_integration(void) {
         for (size_t i = 0; i < count; i++) {
             TEST_ASSERT_TRUE(J[i + count * j] == (rests && i >= 2 ? 0.0 : rate[i]));
         }
+    }
+}
+
+/* An indicator's fields of its kind. */
+static void check_indicator(const struct indicator *indicator, double z) {
+    unsigned char rises;
+    memcpy(&rises, &indicator->rises, 1); // another value than 0 and 1 is none of a bool
+    switch (indicator->kind) {
+    case INDICATOR_UNUSED:
+        TEST_ASSERT_TRUE(z == 1.0);
+        return;
+    case INDICATOR_OF_STATE:
+        TEST_ASSERT_LESS_THAN_size_t(model->states.size / sizeof(double), indicator->state);
+        TEST_ASSERT_TRUE(rises <= 1 && isfinite(indicator->factor) && isfinite(indicator->offset));
+        return;
+    case INDICATOR_OF_MODEL:
+        TEST_ASSERT_TRUE(isfinite(indicator->offset));
+        return;
+    default:
+        TEST_FAIL_MESSAGE("an indicator of no kind");
+    }
+}
+
+static void check_events(void) {
+    const struct model_events *events = model->events;
+    double x[STATES], u[INPUTS], z[INDICATORS], reach[STATES];
+    struct indicator described[INDICATORS];
+    const union point given = without_arguments(x, u);
+    TEST_ASSERT_TRUE(events->next_time == NULL || !isnan(events->next_time(&given)));
+    TEST_ASSERT_LESS_OR_EQUAL_size_t(INDICATORS, events->indicator_count);
+    if (events->indicator_count > 0) {
+        memset(described, 0xff, sizeof described);
+        memset(z, 0xff, sizeof z);
+        events->describe(&at, described);
+        ASSERT_OK(events->indicators(&given, now, x, u, z));
+    }
+    for (size_t i = 0; i < events->indicator_count; i++) {
+        TEST_ASSERT_TRUE(isfinite(z[i]));
+        check_indicator(&described[i], z[i]);
+    }
+    memset(reach, 0xff, sizeof reach);
+    if (events->reach != NULL) {
+        events->reach(&given, x, reach);
+    }
+    for (size_t i = 0; events->reach != NULL && i < model->states.size / sizeof(double); i++) {
+        TEST_ASSERT_TRUE(reach[i] >= 0.0);
     }
 }
 
@@ -390,6 +448,11 @@ static void check_series(int n) {
         ASSERT_OK(model->series->extend(&origin, from, last, rows));
     }
     TEST_ASSERT_EQUAL_MEMORY(at_once, rows, model->series->row_count * sizeof rows[0]);
+    for (size_t i = 0; i < model->states.size / sizeof(double); i++) {
+        for (int k = 0; k < SERIES_LENGTH; k++) {
+            TEST_ASSERT_FALSE(isnan(rows[i][k]));
+        }
+    }
 }
 
 static void check(int which) {
@@ -403,6 +466,9 @@ static void check(int which) {
         next_point(n);
         check_what_is_read();
         check_integration();
+        if (model->events != NULL) {
+            check_events();
+        }
         if (model->series != NULL && model->series->row_count > 0) {
             check_series(n);
         }
