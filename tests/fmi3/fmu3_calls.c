@@ -9,11 +9,11 @@ static const fmi3ValueReference tau1 = RP_MANIPULATOR_tau1;
 static const fmi3ValueReference ddq1 = RP_MANIPULATOR_ddq1;
 static const fmi3Int32 order = 1;
 static const double one = 1.0;
-static const double zeros[FMU3_STATES];
+static const double zeros[FMU_STATES];
 
 // where results go
 static bool flags[5];
-static double reals[FMU3_STATES];
+static double reals[FMU_STATES];
 static size_t count;
 
 /* ---- With these arguments ------------------------------------------------------------------- */
@@ -62,11 +62,11 @@ CALL(SetBinary, NULL, 0, NULL, NULL, 0)
 CALL_PLAIN(EnterContinuousTimeMode)
 CALL(CompletedIntegratorStep, true, &flags[0], &flags[1])
 CALL(SetTime, now)
-CALL(SetContinuousStates, zeros, FMU3_STATES)
-CALL(GetContinuousStateDerivatives, reals, FMU3_STATES)
+CALL(SetContinuousStates, zeros, FMU_STATES)
+CALL(GetContinuousStateDerivatives, reals, FMU_STATES)
 CALL(GetEventIndicators, reals, 0)
-CALL(GetContinuousStates, reals, FMU3_STATES)
-CALL(GetNominalsOfContinuousStates, reals, FMU3_STATES)
+CALL(GetContinuousStates, reals, FMU_STATES)
+CALL(GetNominalsOfContinuousStates, reals, FMU_STATES)
 CALL(GetNumberOfEventIndicators, &count)
 CALL(GetNumberOfContinuousStates, &count)
 

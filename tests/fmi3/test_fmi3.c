@@ -10,12 +10,18 @@
 /* ---- Instances ------------------------------------------------------------------------------ */
 
 /* Called as fmi3LogMessageCallback. */
-static void count_message(fmi3InstanceEnvironment environment, fmi3Status status,
-                          fmi3String category, fmi3String message) {
-    struct fmu3_importer *to = environment;
-    to->count[status]++;
-    snprintf(to->category, sizeof to->category, "%s", category);
-    snprintf(to->texts, sizeof to->texts, "%s", message);
+static void keep(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category,
+                 fmi3String message) {
+    const fmi2CallbackFunctions callbacks = fmu_callbacks(&messages);
+    callbacks.logger(&messages, "m", (fmi2Status)status, category, message);
+}
+
+/* What InstantiateCoSimulation returns; these variables are for intermediate updates. */
+static fmi3Instance instantiate(const char *name, const char *token, bool logging_on,
+                                const fmi3ValueReference required[], size_t count) {
+    fmu_log_clear(&messages);
+    return fmu3.InstantiateCoSimulation(name, token, NULL, false, logging_on, false, false,
+                                        required, count, NULL, keep, NULL);
 }
 
 static void test_instantiate_says_what_it_refuses(void) {
@@ -30,28 +36,25 @@ static void test_instantiate_says_what_it_refuses(void) {
         {"m", RP_MANIPULATOR_GUID, RP_MANIPULATOR_GUID, RP_MANIPULATOR_TOKEN_FMI3},
         {"m", "{%s%n#}", "{%s%n##}", RP_MANIPULATOR_TOKEN_FMI3},
     };
-    for (size_t i = 0; i < 2 * FMU3_COUNT(cases); i++) {
+    for (size_t i = 0; i < 2 * FMU_COUNT(cases); i++) {
         const char *name = cases[i / 2].name;
         const char *token = cases[i / 2].token;
-        fmu3_clear_messages(&importer);
-        TEST_ASSERT_NULL(i % 2 == 0 ? fmu3.InstantiateModelExchange(name, token, NULL, false, false,
-                                                                    &importer, count_message)
-                                    : fmu3.InstantiateCoSimulation(name, token, NULL, false, false,
-                                                                   false, false, NULL, 0, &importer,
-                                                                   count_message, NULL));
-        TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3Error]);
-        TEST_ASSERT_EQUAL_STRING("logStatusError", importer.category);
-        fmu3_assert_logged(&importer, cases[i / 2].wrong);
-        fmu3_assert_logged(&importer, cases[i / 2].expected);
+        fmu_log_clear(&messages);
+        TEST_ASSERT_NULL(
+            i % 2 == 0 ? fmu3.InstantiateModelExchange(name, token, NULL, false, false, NULL, keep)
+                       : instantiate(name, token, false, NULL, 0));
+        TEST_ASSERT_EQUAL_UINT(1, messages.count[fmi3Error]);
+        TEST_ASSERT_EQUAL_UINT(1, fmu_log_count(&messages, "logStatusError"));
+        fmu_assert_logged(&messages, cases[i / 2].wrong);
+        fmu_assert_logged(&messages, cases[i / 2].expected);
     }
 }
 
 static void test_scheduled_execution_is_refused(void) {
     TEST_ASSERT_NULL(fmu3.InstantiateScheduledExecution("m", RP_MANIPULATOR_TOKEN_FMI3, "", false,
-                                                        false, &importer, count_message, NULL, NULL,
-                                                        NULL));
-    TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3Error]);
-    fmu3_assert_logged(&importer, "Co-Simulation");
+                                                        false, NULL, keep, NULL, NULL, NULL));
+    TEST_ASSERT_EQUAL_UINT(1, messages.count[fmi3Error]);
+    fmu_assert_logged(&messages, "Co-Simulation");
 }
 
 /* Continuous inputs and outputs of the model, and nothing else, may be named for intermediate
@@ -67,23 +70,21 @@ static void test_variables_of_intermediate_updates(void) {
                                              9,
                                              9999,
                                              UINT32_MAX};
-    struct fmu3_options options = {.required = good, .required_count = FMU3_COUNT(good)};
-    (void)fmu3_co_simulation(&importer, &options);
-    TEST_ASSERT_EQUAL_UINT(0, fmu3_message_count(&importer));
-    for (size_t i = 0; i < FMU3_COUNT(bad); i++) {
+    const fmi3Instance made =
+        instantiate("m", RP_MANIPULATOR_TOKEN_FMI3, false, good, FMU_COUNT(good));
+    TEST_ASSERT_NOT_NULL(made);
+    fmu3.FreeInstance(made);
+    TEST_ASSERT_EQUAL_UINT(0, fmu_log_total(&messages));
+    for (size_t i = 0; i < FMU_COUNT(bad); i++) {
         char number[16];
         const fmi3ValueReference mixed[] = {good[0], bad[i]};
-        options = (struct fmu3_options){.required = mixed, .required_count = 2};
-        fmu3_clear_messages(&importer);
-        TEST_ASSERT_NULL(fmu3_try_co_simulation(&importer, &options));
+        TEST_ASSERT_NULL(instantiate("m", RP_MANIPULATOR_TOKEN_FMI3, false, mixed, 2));
         snprintf(number, sizeof number, "%u", (unsigned)bad[i]);
-        fmu3_assert_logged(&importer, number);
-        TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3Error]);
+        fmu_assert_logged(&messages, number);
+        TEST_ASSERT_EQUAL_UINT(1, messages.count[fmi3Error]);
     }
-    options = (struct fmu3_options){.required = NULL, .required_count = 2};
-    fmu3_clear_messages(&importer);
-    TEST_ASSERT_NULL(fmu3_try_co_simulation(&importer, &options));
-    fmu3_assert_logged(&importer, "NULL");
+    TEST_ASSERT_NULL(instantiate("m", RP_MANIPULATOR_TOKEN_FMI3, false, NULL, 2));
+    fmu_assert_logged(&messages, "NULL");
 }
 
 static void test_callbacks_may_be_null(void) {
@@ -114,9 +115,8 @@ static void fail(fmi3Instance instance) {
 
 /* Section 2.3.1: with logging off errors are sent all the same, and nothing else. */
 static void test_errors_cannot_be_silenced(void) {
-    static const struct fmu3_options logging = {.logging_on = true};
     static const fmi3String events[] = {"logEvents"};
-    const fmi3Instance quiet = fmu3_co_simulation(&importer, NULL);
+    const fmi3Instance quiet = instantiate("quiet", RP_MANIPULATOR_TOKEN_FMI3, false, NULL, 0);
     for (int round = 0; round < 3; round++) {
         if (round == 1) {
             ASSERT_OK(fmu3.SetDebugLogging(quiet, false, 0, NULL));
@@ -124,37 +124,38 @@ static void test_errors_cannot_be_silenced(void) {
             static const fmi3String errors[] = {"logStatusError", "logStatusFatal"};
             ASSERT_OK(fmu3.SetDebugLogging(quiet, false, 2, errors));
         }
-        fmu3_clear_messages(&importer);
+        fmu_log_clear(&messages);
         discard(quiet);
         fmu3_initialize(quiet, 0.0);
-        TEST_ASSERT_EQUAL_UINT(0, fmu3_message_count(&importer));
+        TEST_ASSERT_EQUAL_UINT(0, fmu_log_total(&messages));
         fail(quiet);
-        TEST_ASSERT_EQUAL_UINT(1, fmu3_message_count(&importer));
-        TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3Error]);
+        TEST_ASSERT_EQUAL_UINT(1, fmu_log_total(&messages));
+        TEST_ASSERT_EQUAL_UINT(1, messages.count[fmi3Error]);
     }
 
-    const fmi3Instance loud = fmu3_co_simulation(&importer, &logging);
-    fmu3_clear_messages(&importer);
+    fmu3.FreeInstance(quiet);
+    const fmi3Instance loud = instantiate("loud", RP_MANIPULATOR_TOKEN_FMI3, true, NULL, 0);
+    fmu_log_clear(&messages);
     discard(loud);
-    TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3Discard]);
-    TEST_ASSERT_GREATER_THAN_UINT(0, importer.count[fmi3OK]); // the call
+    TEST_ASSERT_EQUAL_UINT(1, messages.count[fmi3Discard]);
+    TEST_ASSERT_GREATER_THAN_UINT(0, messages.count[fmi3OK]); // the call
     ASSERT_OK(fmu3.SetDebugLogging(loud, true, 1, events));
-    fmu3_clear_messages(&importer);
+    fmu_log_clear(&messages);
     discard(loud);
-    TEST_ASSERT_EQUAL_UINT(0, fmu3_message_count(&importer));
+    TEST_ASSERT_EQUAL_UINT(0, fmu_log_total(&messages));
     fmu3_initialize(loud, 0.0);
-    TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3OK]);
-    TEST_ASSERT_EQUAL_STRING("logEvents", importer.category);
+    TEST_ASSERT_EQUAL_UINT(1, messages.count[fmi3OK]);
+    TEST_ASSERT_EQUAL_UINT(1, fmu_log_count(&messages, "logEvents"));
     ASSERT_OK(fmu3.SetDebugLogging(loud, true, 0, NULL));
     discard(loud);
-    TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3Discard]);
+    TEST_ASSERT_EQUAL_UINT(1, messages.count[fmi3Discard]);
+    fmu3.FreeInstance(loud);
 }
 
 static void test_an_unknown_category_is_an_error(void) {
     static const fmi3String unknown[] = {"logEvents", "logNothing"};
-    const fmi3Instance instance = fmu3_co_simulation(&importer, NULL);
-    ASSERT_ERROR(fmu3.SetDebugLogging(instance, true, 2, unknown));
-    fmu3_assert_logged(&importer, "logNothing");
+    ASSERT_ERROR(fmu3.SetDebugLogging(fmu3_co_simulation(NULL), true, 2, unknown));
+    fmu_assert_logged(&messages, "logNothing");
 }
 
 /* ---- Values --------------------------------------------------------------------------------- */
@@ -162,12 +163,12 @@ static void test_an_unknown_category_is_an_error(void) {
 /* A new instance refuses the call, and says this. */
 #define ASSERT_REFUSED(text, name, ...)                                                            \
     do {                                                                                           \
-        const fmi3Instance c = fmu3_co_simulation(&importer, NULL);                                \
+        const fmi3Instance c = fmu3_co_simulation(NULL);                                           \
         fmu3_initialize(c, 0.0);                                                                   \
-        fmu3_clear_messages(&importer);                                                            \
+        fmu_log_clear(&messages);                                                                  \
         TEST_ASSERT_EQUAL_INT_MESSAGE(fmi3Error, fmu3.name(c, __VA_ARGS__), #name);                \
-        TEST_ASSERT_EQUAL_UINT_MESSAGE(1, importer.count[fmi3Error], #name);                       \
-        fmu3_assert_logged(&importer, text);                                                       \
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(1, messages.count[fmi3Error], #name);                       \
+        fmu_assert_logged(&messages, text);                                                        \
         fmu3_free(c);                                                                              \
     } while (0)
 
@@ -180,7 +181,7 @@ static void test_counts_that_differ_are_errors(void) {
     double values[] = {-1.0, -1.0, -1.0};
     fmi3Int32 integers[3] = {0};
     fmi3Int64 items[3] = {0};
-    for (size_t i = 0; i < FMU3_COUNT(counts); i++) {
+    for (size_t i = 0; i < FMU_COUNT(counts); i++) {
         const size_t n = counts[i];
         ASSERT_REFUSED(text, GetFloat64, of, 2, values, n);
         ASSERT_REFUSED(text, SetFloat64, of, 2, values, n);
@@ -200,7 +201,7 @@ static void test_types(void) {
     const fmi3ValueReference steps = RP_MANIPULATOR_max_internal_steps;
     fmi3Int32 integer = -1;
     fmi3Int64 item = -1;
-    fmi3Instance c = fmu3_co_simulation(&importer, NULL);
+    fmi3Instance c = fmu3_co_simulation(NULL);
     ASSERT_OK(fmu3.GetInt64(c, &method, 1, &item, 1));
     TEST_ASSERT_EQUAL_INT(1, item);
     ASSERT_OK(fmu3.GetInt32(c, &steps, 1, &integer, 1));
@@ -212,17 +213,17 @@ static void test_types(void) {
     TEST_ASSERT_EQUAL_INT(3, item);
 
     static const fmi3Int64 no_items[] = {0, 5, -1, INT64_MAX, INT64_MIN, (INT64_C(1) << 32) + 1};
-    for (size_t i = 0; i < FMU3_COUNT(no_items); i++) {
+    for (size_t i = 0; i < FMU_COUNT(no_items); i++) {
         ASSERT_DISCARD(fmu3.SetInt64(c, &method, 1, &no_items[i], 1));
     }
     ASSERT_ERROR(fmu3.GetInt32(c, &method, 1, &integer, 1));
-    fmu3_assert_logged(&importer, "enumeration");
-    c = fmu3_co_simulation(&importer, NULL);
+    fmu_assert_logged(&messages, "enumeration");
+    c = fmu3_co_simulation(NULL);
     ASSERT_ERROR(fmu3.GetInt64(c, &steps, 1, &item, 1));
-    fmu3_assert_logged(&importer, "int32");
-    c = fmu3_co_simulation(&importer, NULL);
+    fmu_assert_logged(&messages, "int32");
+    c = fmu3_co_simulation(NULL);
     ASSERT_ERROR(fmu3.SetInt32(c, &method, 1, &integer, 1));
-    c = fmu3_co_simulation(&importer, NULL);
+    c = fmu3_co_simulation(NULL);
     ASSERT_ERROR(fmu3.SetInt64(c, &steps, 1, &item, 1));
 }
 
@@ -240,7 +241,7 @@ static void test_types_without_variables(void) {
 
 /* Start values, and what was set, can be read before initialization. */
 static void test_values_before_initialization(void) {
-    const fmi3Instance c = fmu3_co_simulation(&importer, NULL);
+    const fmi3Instance c = fmu3_co_simulation(NULL);
     TEST_ASSERT_TRUE(fmu3_get(c, RP_MANIPULATOR_m1) == 2.0);
     fmu3_set(c, RP_MANIPULATOR_q2, 0.25);
     TEST_ASSERT_TRUE(fmu3_get(c, RP_MANIPULATOR_q2) == 0.25);
@@ -254,7 +255,7 @@ static void update_discrete_states(fmi3Instance c) {
     double next = -1.0;
     ASSERT_OK(
         fmu3.UpdateDiscreteStates(c, &flags[0], &flags[1], &flags[2], &flags[3], &flags[4], &next));
-    for (size_t i = 0; i < FMU3_COUNT(flags); i++) {
+    for (size_t i = 0; i < FMU_COUNT(flags); i++) {
         TEST_ASSERT_FALSE(flags[i]);
     }
     TEST_ASSERT_TRUE(next != -1.0);
@@ -263,9 +264,9 @@ static void update_discrete_states(fmi3Instance c) {
 /* An input that jumps in event mode does what it does between steps. */
 static void test_inputs_may_jump_in_event_mode(void) {
     static const struct fmu3_options events = {.event_mode = true};
-    double x[2][FMU3_STATES];
+    double x[2][FMU_STATES];
     for (int with_events = 0; with_events < 2; with_events++) {
-        const fmi3Instance c = fmu3_co_simulation(&importer, with_events ? &events : NULL);
+        const fmi3Instance c = fmu3_co_simulation(with_events ? &events : NULL);
         fmu3_initialize(c, 0.0);
         if (with_events) {
             update_discrete_states(c);
@@ -299,11 +300,11 @@ static void test_results_of_an_event_need_a_place(void) {
         for (int i = 0; i < 5; i++) {
             places[i] = i == missing ? NULL : &flags[i];
         }
-        const fmi3Instance c = fmu3_co_simulation(&importer, &events);
+        const fmi3Instance c = fmu3_co_simulation(&events);
         fmu3_initialize(c, 0.0);
         ASSERT_ERROR(fmu3.UpdateDiscreteStates(c, places[0], places[1], places[2], places[3],
                                                places[4], missing == 5 ? NULL : &next));
-        fmu3_assert_logged(&importer, "NULL");
+        fmu_assert_logged(&messages, "NULL");
         fmu3_free(c);
     }
 }
@@ -314,12 +315,12 @@ static void test_results_of_a_step_need_a_place(void) {
     for (int missing = 0; missing < 4; missing++) {
         bool flags[3];
         double reached;
-        const fmi3Instance c = fmu3_co_simulation(&importer, NULL);
+        const fmi3Instance c = fmu3_co_simulation(NULL);
         fmu3_initialize(c, 0.0);
         ASSERT_ERROR(fmu3.DoStep(c, 0.0, 0.1, true, missing == 0 ? NULL : &flags[0],
                                  missing == 1 ? NULL : &flags[1], missing == 2 ? NULL : &flags[2],
                                  missing == 3 ? NULL : &reached));
-        fmu3_assert_logged(&importer, "NULL");
+        fmu_assert_logged(&messages, "NULL");
         fmu3_free(c);
     }
 }

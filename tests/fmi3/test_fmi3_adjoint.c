@@ -12,7 +12,7 @@ static void test_parameters_and_repeated_knowns(void) {
     const double one = 1.0;
     double adjoint[3];
     double directional;
-    const fmi3Instance instance = fmu3_co_simulation(&importer, NULL);
+    const fmi3Instance instance = fmu3_co_simulation(NULL);
     fmu3_set(instance, RP_MANIPULATOR_q1, 0.7);
     ASSERT_OK(fmu3.EnterInitializationMode(instance, false, 0.0, 0.0, false, 0.0));
     ASSERT_OK(fmu3.GetAdjointDerivative(instance, &unknown, 1, of, 3, &seed, 1, adjoint, 3));
@@ -38,14 +38,14 @@ static void test_what_is_refused(void) {
         {RP_MANIPULATOR_solver_steps, RP_MANIPULATOR_solver_steps},
         {9999, 9999},
     };
-    for (size_t k = 0; k < 2 * FMU3_COUNT(wrong); k++) {
+    for (size_t k = 0; k < 2 * FMU_COUNT(wrong); k++) {
         const bool is_unknown = k % 2 == 1;
         fmi3ValueReference rows[] = {RP_MANIPULATOR_ddq1, RP_MANIPULATOR_ddq2};
         fmi3ValueReference columns[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2};
         *(is_unknown ? &rows[1] : &columns[1]) = wrong[k / 2][is_unknown];
         const double seed[] = {1.0, 1.0};
         double result[] = {-1.0, -1.0};
-        const fmi3Instance instance = fmu3_co_simulation(&importer, NULL);
+        const fmi3Instance instance = fmu3_co_simulation(NULL);
         fmu3_initialize(instance, 0.0);
         ASSERT_ERROR(fmu3.GetAdjointDerivative(instance, rows, 2, columns, 2, seed, 2, result, 2));
         TEST_ASSERT_TRUE(result[0] == -1.0 && result[1] == -1.0);
@@ -53,7 +53,7 @@ static void test_what_is_refused(void) {
     }
     const fmi3ValueReference ddq1 = RP_MANIPULATOR_ddq1;
     const fmi3ValueReference dq1 = RP_MANIPULATOR_dq1;
-    const fmi3Instance instance = fmu3_co_simulation(&importer, NULL);
+    const fmi3Instance instance = fmu3_co_simulation(NULL);
     fmu3_set(instance, RP_MANIPULATOR_dq1, 1e160);
     fmu3_initialize(instance, 0.0);
     const double seed = 1e200;

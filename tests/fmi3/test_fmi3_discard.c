@@ -20,8 +20,8 @@ static const fmi3ValueReference integers[] = {
 
 /* All that an importer can see. */
 struct seen {
-    double reals[FMU3_COUNT(reals)];
-    fmi3Int32 integers[FMU3_COUNT(integers)];
+    double reals[FMU_COUNT(reals)];
+    fmi3Int32 integers[FMU_COUNT(integers)];
     double derivatives[2];
 };
 
@@ -30,9 +30,9 @@ static struct seen look(fmi3Instance instance) {
     static const fmi3ValueReference derived[] = {RP_MANIPULATOR_ddq1, RP_MANIPULATOR_ee_x};
     struct seen seen;
     memset(&seen, 0, sizeof seen);
-    ASSERT_OK(fmu3.GetFloat64(instance, reals, FMU3_COUNT(reals), seen.reals, FMU3_COUNT(reals)));
-    ASSERT_OK(fmu3.GetInt32(instance, integers, FMU3_COUNT(integers), seen.integers,
-                            FMU3_COUNT(integers)));
+    ASSERT_OK(fmu3.GetFloat64(instance, reals, FMU_COUNT(reals), seen.reals, FMU_COUNT(reals)));
+    ASSERT_OK(
+        fmu3.GetInt32(instance, integers, FMU_COUNT(integers), seen.integers, FMU_COUNT(integers)));
     ASSERT_OK(fmu3.GetOutputDerivatives(instance, derived, 2, orders, seen.derivatives, 2));
     return seen;
 }
@@ -63,7 +63,7 @@ static void prepare(fmi3Instance instance, int i) {
 static const int largest[] = {0, 60, 400, 60, 5}; // by solver_method
 
 static fmi3Instance begin(int with_method, const struct fmu3_options *options) {
-    const fmi3Instance instance = fmu3_co_simulation(&importer, options);
+    const fmi3Instance instance = fmu3_co_simulation(options);
     fmu3_set_method(instance, with_method);
     fmu3_set_int32(instance, RP_MANIPULATOR_max_internal_steps, largest[with_method]);
     fmu3_set(instance, RP_MANIPULATOR_dq1, 1.0);
@@ -115,7 +115,7 @@ EACH_METHOD static void test_it_has_them_with_intermediate_updates_too(void) {
     static const struct fmu3_options options = {.intermediate_updates = true,
                                                 .early_return = true,
                                                 .required = inputs,
-                                                .required_count = FMU3_COUNT(inputs)};
+                                                .required_count = FMU_COUNT(inputs)};
     importer.update = moving_inputs;
     compare_runs(method, &options);
 }
@@ -149,7 +149,7 @@ static void extreme_inputs(struct fmu3_importer *of, const struct fmu3_update *u
 
 static void test_inputs_whose_polynomial_overflows(void) {
     static const struct fmu3_options options = {
-        .intermediate_updates = true, .required = inputs, .required_count = FMU3_COUNT(inputs)};
+        .intermediate_updates = true, .required = inputs, .required_count = FMU_COUNT(inputs)};
     struct seen seen[2];
     for (int fails = 0; fails < 2; fails++) {
         extreme = 0.0;

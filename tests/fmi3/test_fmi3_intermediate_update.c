@@ -12,14 +12,14 @@ static const fmi3ValueReference inputs[] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_
 static const fmi3ValueReference outputs[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_ddq1};
 
 static const struct fmu3_options with_inputs = {
-    .intermediate_updates = true, .required = inputs, .required_count = FMU3_COUNT(inputs)};
+    .intermediate_updates = true, .required = inputs, .required_count = FMU_COUNT(inputs)};
 static const struct fmu3_options with_outputs = {.intermediate_updates = true,
                                                  .early_return = true,
                                                  .required = outputs,
-                                                 .required_count = FMU3_COUNT(outputs)};
+                                                 .required_count = FMU_COUNT(outputs)};
 
 static fmi3Instance swinging(const struct fmu3_options *options, int with_method, double start) {
-    const fmi3Instance instance = fmu3_co_simulation(&importer, options);
+    const fmi3Instance instance = fmu3_co_simulation(options);
     fmu3_set_method(instance, with_method);
     fmu3_set(instance, RP_MANIPULATOR_relative_tolerance, 1e-11);
     fmu3_set(instance, RP_MANIPULATOR_q1, 0.3);
@@ -51,7 +51,7 @@ static void set_smooth_inputs(struct fmu3_importer *of, const struct fmu3_update
     smooth_inputs(update->time, u);
     const fmi3Status status = fmu3.SetFloat64(of->instance, inputs, 2, u, 2);
     asked->status = status > asked->status ? status : asked->status;
-    if (asked->count < FMU3_COUNT(asked->times)) {
+    if (asked->count < FMU_COUNT(asked->times)) {
         asked->times[asked->count++] = update->time;
     }
 }
@@ -75,7 +75,7 @@ static void test_inputs_are_asked_for_at_four_times(void) {
 
 /* What is asked for and not set keeps its value: the same bits as without intermediate updates. */
 EACH_METHOD static void test_what_is_not_set_keeps_its_value(void) {
-    double x[2][FMU3_STATES];
+    double x[2][FMU_STATES];
     for (int updates = 0; updates < 2; updates++) {
         const fmi3Instance instance = swinging(updates ? &with_inputs : NULL, method, 0.0);
         for (int i = 0; i < 50; i++) {
@@ -138,7 +138,7 @@ static void get_outputs(struct fmu3_importer *of, const struct fmu3_update *upda
 EACH_METHOD static void test_outputs_at_internal_steps(void) {
     static struct points points;
     const double start = 1.0;
-    double x[2][FMU3_STATES];
+    double x[2][FMU_STATES];
     memset(&points, 0, sizeof points);
     importer.update = get_outputs;
     importer.data = &points;
@@ -193,7 +193,7 @@ EACH_METHOD static void test_outputs_follow_moving_inputs(void) {
                                              RP_MANIPULATOR_actuator_power, RP_MANIPULATOR_dq1,
                                              RP_MANIPULATOR_dq2};
     static const struct fmu3_options options = {
-        .intermediate_updates = true, .required = all, .required_count = FMU3_COUNT(all)};
+        .intermediate_updates = true, .required = all, .required_count = FMU_COUNT(all)};
     double largest_error = 0.0;
     importer.update = compare_power;
     importer.data = &largest_error;
@@ -234,7 +234,7 @@ EACH_METHOD static void test_an_early_return_is_obeyed(void) {
     const double end = 0.6;
     const fmi3Instance whole = swinging(NULL, method, 0.0);
     fmu3_step(whole, 0.0, end);
-    for (size_t i = 0; i < FMU3_COUNT(after); i++) {
+    for (size_t i = 0; i < FMU_COUNT(after); i++) {
         struct request request = {.at_update = 8, .after = after[i]};
         importer.update = ask_for_return;
         importer.data = &request;
@@ -353,7 +353,7 @@ static void test_what_is_not_allowed_makes_the_step_fail(void) {
     static const struct fmu3_options options = {.intermediate_updates = true,
                                                 .early_return = true,
                                                 .required = both,
-                                                .required_count = FMU3_COUNT(both)};
+                                                .required_count = FMU_COUNT(both)};
     static const struct intrusion intrusions[] = {
         {"a parameter is read", false, read, .reference = RP_MANIPULATOR_m1},
         {"an output that was not named", false, read, .reference = RP_MANIPULATOR_ee_x},
@@ -369,18 +369,18 @@ static void test_what_is_not_allowed_makes_the_step_fail(void) {
         {"the instance is freed while inputs are set", true, .call = free_instance},
         {"the instance is freed after an error", false, .call = free_after_error},
     };
-    for (size_t i = 0; i < FMU3_COUNT(intrusions); i++) {
+    for (size_t i = 0; i < FMU_COUNT(intrusions); i++) {
         struct intrusion intrusion = intrusions[i];
         importer.update = intrude;
         importer.data = &intrusion;
         const fmi3Instance instance = swinging(&options, 1, 0.0);
-        fmu3_clear_messages(&importer);
+        fmu_log_clear(&messages);
         const struct fmu3_step step = fmu3_try_step(instance, 0.0, 0.5);
         TEST_ASSERT_EQUAL_UINT_MESSAGE(1, intrusion.calls, intrusion.name);
         TEST_ASSERT_EQUAL_INT_MESSAGE(fmi3Error, intrusion.status, intrusion.name);
         TEST_ASSERT_EQUAL_INT_MESSAGE(fmi3Error, step.status, intrusion.name);
         TEST_ASSERT_TRUE_MESSAGE(step.reached == -1.0 && step.early, intrusion.name); // not written
-        TEST_ASSERT_GREATER_THAN_UINT_MESSAGE(0, importer.count[fmi3Error], intrusion.name);
+        TEST_ASSERT_GREATER_THAN_UINT_MESSAGE(0, messages.count[fmi3Error], intrusion.name);
 
         // terminated: values can be read, and a reset leads out
         (void)fmu3_get(instance, RP_MANIPULATOR_q1);

@@ -126,10 +126,9 @@ static fmi3Instance instantiate(enum kind kind) {
         .event_mode = kind == CO_SIMULATION_WITH_EVENTS,
         .intermediate_updates = true,
         .required = in_updates,
-        .required_count = FMU3_COUNT(in_updates),
+        .required_count = FMU_COUNT(in_updates),
     };
-    return kind == MODEL_EXCHANGE ? fmu3_model_exchange(&importer)
-                                  : fmu3_co_simulation(&importer, &options);
+    return kind == MODEL_EXCHANGE ? fmu3_model_exchange() : fmu3_co_simulation(&options);
 }
 
 static fmi3Instance reach(enum kind kind, char state) {
@@ -147,7 +146,7 @@ static fmi3Instance reach(enum kind kind, char state) {
     } else if (state == 'T') {
         ASSERT_OK(fmu3.Terminate(c));
     }
-    fmu3_clear_messages(&importer);
+    fmu_log_clear(&messages);
     return c;
 }
 
@@ -164,15 +163,15 @@ static void assert_in_state(enum kind kind, char state, fmi3Instance c, double n
         {'N', FMU3_CompletedIntegratorStep},
         {'S', FMU3_DoStep},
     };
-    for (size_t i = 0; i < FMU3_COUNT(proofs); i++) {
+    for (size_t i = 0; i < FMU_COUNT(proofs); i++) {
         if (proofs[i].state == state) {
             TEST_ASSERT_EQUAL_INT_MESSAGE(fmi3OK, fmu3_call(proofs[i].proof, c, now), text);
             return;
         }
     }
-    fmu3_clear_messages(&importer);
+    fmu_log_clear(&messages);
     TEST_ASSERT_EQUAL_INT_MESSAGE(fmi3Error, fmu3_try_set(c, RP_MANIPULATOR_tau1, 1.0), text);
-    fmu3_assert_logged(&importer, "terminated");
+    fmu_assert_logged(&messages, "terminated");
     (void)fmu3_get(c, RP_MANIPULATOR_q1);
 }
 
@@ -185,19 +184,19 @@ static void check(enum kind kind, enum fmu3_function function, char state) {
     const fmi3Instance c = reach(kind, state);
     if (function == FMU3_FreeInstance) {
         fmu3_free(c);
-        TEST_ASSERT_EQUAL_UINT_MESSAGE(0, fmu3_message_count(&importer), text);
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(0, fmu_log_total(&messages), text);
         return;
     }
     const fmi3Status status = fmu3_call(function, c, 0.0);
     if (is_allowed(kind, function, state)) {
         TEST_ASSERT_EQUAL_INT_MESSAGE(fmi3OK, status, text);
-        TEST_ASSERT_EQUAL_UINT_MESSAGE(0, importer.count[fmi3Error], text);
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(0, messages.count[fmi3Error], text);
         assert_in_state(kind, state_after(kind, function, state), c,
                         function == FMU3_DoStep ? fmu3_calls_step : 0.0, text);
     } else {
         TEST_ASSERT_EQUAL_INT_MESSAGE(fmi3Error, status, text);
-        TEST_ASSERT_EQUAL_UINT_MESSAGE(1, importer.count[fmi3Error], text);
-        fmu3_assert_logged(&importer, fmu3_function_names[function]);
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(1, messages.count[fmi3Error], text);
+        fmu_assert_logged(&messages, fmu3_function_names[function]);
         assert_in_state(kind, 'T', c, 0.0, text);
     }
     TEST_ASSERT_EQUAL_INT_MESSAGE(fmi3OK, fmu3.Reset(c), text);
@@ -267,7 +266,7 @@ static void test_intermediate_update_mode(void) {
             TEST_ASSERT_TRUE_MESSAGE(inside.status == fmi3Error || function == FMU3_FreeInstance,
                                      name);
             TEST_ASSERT_EQUAL_INT_MESSAGE(fmi3Error, status, name);
-            fmu3_assert_logged(&importer, name);
+            fmu_assert_logged(&messages, name);
             assert_in_state(CO_SIMULATION, 'T', c, 0.0, name);
         }
         importer.update = NULL;
@@ -301,7 +300,7 @@ static struct {
 /* A logger that calls a function of the instance whose message it gets. */
 static void meddle(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category,
                    fmi3String message) {
-    const fmi3Instance c = ((struct fmu3_importer *)environment)->instance;
+    const fmi3Instance c = importer.instance;
     meddler.messages++;
     meddler.notes += strstr(message, "refused inside the logger") != NULL;
     if (c == NULL) {
@@ -323,35 +322,33 @@ static void get_while_updating(fmi3InstanceEnvironment environment, fmi3Float64 
     double value = 0.0;
     *return_early = false;
     if (get) {
-        (void)fmu3.GetFloat64(((struct fmu3_importer *)environment)->instance, &q1, 1, &value, 1);
+        (void)fmu3.GetFloat64(importer.instance, &q1, 1, &value, 1);
     }
 }
 
-static void run_with(fmi3LogMessageCallback logger, double x[FMU3_STATES]) {
+static void run_with(fmi3LogMessageCallback logger, double x[FMU_STATES]) {
     const fmi3ValueReference q1 = RP_MANIPULATOR_q1;
-    static struct fmu3_importer here; // callbacks see it by its address
-    here = (struct fmu3_importer){0};
     const fmi3Instance c = fmu3.InstantiateCoSimulation("meddled with", RP_MANIPULATOR_TOKEN_FMI3,
                                                         NULL, false, logger != NULL, false, false,
-                                                        &q1, 1, &here, logger, get_while_updating);
+                                                        &q1, 1, NULL, logger, get_while_updating);
     TEST_ASSERT_NOT_NULL(c);
     meddler.messages = meddler.refused = meddler.notes = 0;
-    here.instance = c;
+    importer.instance = c;
     fmu3_initialize(c, 0.0);
     for (int i = 0; i < 3; i++) {
         fmu3_step(c, 0.125 * i, 0.125);
     }
     fmu3_get_states(c, x);
-    here.instance = NULL;
+    importer.instance = NULL;
     fmu3.FreeInstance(c);
 }
 
 static void test_no_call_comes_through_from_the_logger(void) {
-    double expected[FMU3_STATES];
+    double expected[FMU_STATES];
     run_with(NULL, expected);
     for (int function = 0; function < FMU3_FUNCTION_COUNT; function++) {
         const char *name = fmu3_function_names[function];
-        double x[FMU3_STATES];
+        double x[FMU_STATES];
         meddler.function = (enum fmu3_function)function;
         run_with(meddle, x);
         TEST_ASSERT_EQUAL_MEMORY_MESSAGE(expected, x, sizeof x, name);

@@ -12,7 +12,7 @@
 
 const unsigned fmu_version = 3;
 
-static struct fmu3_functions fmi3;
+struct fmu3_functions fmu3;
 
 struct fmu_fmi3_options fmu_fmi3_options;
 
@@ -71,7 +71,7 @@ static void update(fmi3InstanceEnvironment adapted_pointer, fmi3Float64 time, fm
         values[i] = d[0] + t * (d[1] + t / 2.0 * (d[2] + t / 3.0 * d[3]));
     }
     if (set) {
-        (void)fmi3.SetFloat64(adapted->instance, inputs, INPUTS, values, INPUTS);
+        (void)fmu3.SetFloat64(adapted->instance, inputs, INPUTS, values, INPUTS);
     }
 }
 
@@ -82,7 +82,7 @@ static const char *GetTypesPlatform(void) {
 }
 
 static const char *GetVersion(void) {
-    return strcmp(fmi3.GetVersion(), "3.0") == 0 ? "2.0" : "wrong";
+    return strcmp(fmu3.GetVersion(), "3.0") == 0 ? "2.0" : "wrong";
 }
 
 static fmi2Component Instantiate(fmi2String name, fmi2Type type, fmi2String guid,
@@ -107,14 +107,14 @@ static fmi2Component Instantiate(fmi2String name, fmi2Type type, fmi2String guid
     }
     adapted->is_model_exchange = type == fmi2ModelExchange;
     if (adapted->is_model_exchange) {
-        adapted->instance = fmi3.InstantiateModelExchange(name, token, location, visible != 0,
+        adapted->instance = fmu3.InstantiateModelExchange(name, token, location, visible != 0,
                                                           logging_on != 0, adapted, pass_on);
     } else {
         const struct fmu_fmi3_options *options = &fmu_fmi3_options;
         const bool has_update = options->update != NULL;
         adapted->has_event_mode = options->event_mode;
         adapted->update = options->update;
-        adapted->instance = fmi3.InstantiateCoSimulation(
+        adapted->instance = fmu3.InstantiateCoSimulation(
             name, token, location, visible != 0, logging_on != 0, options->event_mode,
             options->early_return, has_update ? options->required : inputs,
             has_update    ? options->required_count
@@ -129,13 +129,13 @@ static fmi2Component Instantiate(fmi2String name, fmi2Type type, fmi2String guid
     if (!logging_on) { // then FMI 2.0 sends all but events and calls, FMI 3.0 only errors
         static const fmi3String categories[] = {"logStatusWarning", "logStatusDiscard",
                                                 "logStatusError", "logStatusFatal"};
-        (void)fmi3.SetDebugLogging(adapted->instance, true, 4, categories);
+        (void)fmu3.SetDebugLogging(adapted->instance, true, 4, categories);
     }
     return adapted;
 }
 
 static void FreeInstance(fmi2Component c) {
-    fmi3.FreeInstance(instance_of(c));
+    fmu3.FreeInstance(instance_of(c));
     free(c);
 }
 
@@ -156,15 +156,15 @@ static fmi2Status SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fm
 static fmi2Status EnterInitializationMode(fmi2Component c) {
     static const struct adapted nothing = {0};
     const struct adapted *adapted = c != NULL ? c : &nothing;
-    return status_of(fmi3.EnterInitializationMode(instance_of(c), adapted->has_tolerance,
+    return status_of(fmu3.EnterInitializationMode(instance_of(c), adapted->has_tolerance,
                                                   adapted->tolerance, adapted->start,
                                                   adapted->has_stop, adapted->stop));
 }
 
 static fmi2Status ExitInitializationMode(fmi2Component c) {
-    const fmi3Status status = fmi3.ExitInitializationMode(instance_of(c));
+    const fmi3Status status = fmu3.ExitInitializationMode(instance_of(c));
     if (status == fmi3OK && ((const struct adapted *)c)->has_event_mode) {
-        return status_of(fmi3.EnterStepMode(instance_of(c)));
+        return status_of(fmu3.EnterStepMode(instance_of(c)));
     }
     return status_of(status);
 }
@@ -175,7 +175,7 @@ static fmi2Status Reset(fmi2Component c) {
         memset(adapted->input, 0, sizeof adapted->input);
         (void)SetupExperiment(c, fmi2False, 0.0, 0.0, fmi2False, 0.0);
     }
-    return status_of(fmi3.Reset(instance_of(c)));
+    return status_of(fmu3.Reset(instance_of(c)));
 }
 
 /* ---- Values --------------------------------------------------------------------------------- */
@@ -191,7 +191,7 @@ static size_t input_index(fmi2ValueReference reference) {
 
 static fmi2Status GetReal(fmi2Component c, const fmi2ValueReference references[], size_t count,
                           fmi2Real values[]) {
-    const fmi3Status status = fmi3.GetFloat64(instance_of(c), references, count, values, count);
+    const fmi3Status status = fmu3.GetFloat64(instance_of(c), references, count, values, count);
     for (size_t i = 0; FMU_UPDATES && status == fmi3OK && i < count; i++) {
         if (input_index(references[i]) < INPUTS) { // what was set, not what moved on
             values[i] = ((const struct adapted *)c)->input[input_index(references[i])][0];
@@ -202,7 +202,7 @@ static fmi2Status GetReal(fmi2Component c, const fmi2ValueReference references[]
 
 static fmi2Status SetReal(fmi2Component c, const fmi2ValueReference references[], size_t count,
                           const fmi2Real values[]) {
-    const fmi3Status status = fmi3.SetFloat64(instance_of(c), references, count, values, count);
+    const fmi3Status status = fmu3.SetFloat64(instance_of(c), references, count, values, count);
     for (size_t i = 0; status == fmi3OK && i < count; i++) {
         if (input_index(references[i]) < INPUTS) {
             ((struct adapted *)c)->input[input_index(references[i])][0] = values[i];
@@ -224,14 +224,14 @@ static bool has_enumeration(const fmi2ValueReference references[], size_t count,
 static fmi2Status GetInteger(fmi2Component c, const fmi2ValueReference references[], size_t count,
                              fmi2Integer values[]) {
     if (!has_enumeration(references, count, values)) {
-        return status_of(fmi3.GetInt32(instance_of(c), references, count, values, count));
+        return status_of(fmu3.GetInt32(instance_of(c), references, count, values, count));
     }
     fmi3Status status = fmi3OK;
     for (size_t i = 0; i < count && status == fmi3OK; i++) {
         fmi3Int64 item = values[i];
         status = fmu_is_enumeration(references[i])
-                     ? fmi3.GetInt64(instance_of(c), &references[i], 1, &item, 1)
-                     : fmi3.GetInt32(instance_of(c), &references[i], 1, &values[i], 1);
+                     ? fmu3.GetInt64(instance_of(c), &references[i], 1, &item, 1)
+                     : fmu3.GetInt32(instance_of(c), &references[i], 1, &values[i], 1);
         values[i] = fmu_is_enumeration(references[i]) ? (fmi2Integer)item : values[i];
     }
     return status_of(status);
@@ -240,14 +240,14 @@ static fmi2Status GetInteger(fmi2Component c, const fmi2ValueReference reference
 static fmi2Status SetInteger(fmi2Component c, const fmi2ValueReference references[], size_t count,
                              const fmi2Integer values[]) {
     if (!has_enumeration(references, count, values)) {
-        return status_of(fmi3.SetInt32(instance_of(c), references, count, values, count));
+        return status_of(fmu3.SetInt32(instance_of(c), references, count, values, count));
     }
     fmi3Status status = fmi3OK;
     for (size_t i = 0; i < count && status == fmi3OK; i++) {
         const fmi3Int64 item = values[i];
         status = fmu_is_enumeration(references[i])
-                     ? fmi3.SetInt64(instance_of(c), &references[i], 1, &item, 1)
-                     : fmi3.SetInt32(instance_of(c), &references[i], 1, &values[i], 1);
+                     ? fmu3.SetInt64(instance_of(c), &references[i], 1, &item, 1)
+                     : fmu3.SetInt32(instance_of(c), &references[i], 1, &values[i], 1);
     }
     return status_of(status);
 }
@@ -260,7 +260,7 @@ static fmi2Status GetBoolean(fmi2Component c, const fmi2ValueReference reference
                              fmi2Boolean values[]) {
     fmi3Boolean flags[MOST_BOOLEANS] = {false};
     const bool is_usual = values != NULL && count <= MOST_BOOLEANS;
-    const fmi3Status status = fmi3.GetBoolean(instance_of(c), references, count,
+    const fmi3Status status = fmu3.GetBoolean(instance_of(c), references, count,
                                               is_usual ? flags : (fmi3Boolean *)values, count);
     for (size_t i = 0; is_usual && status == fmi3OK && i < count; i++) {
         values[i] = flags[i];
@@ -275,7 +275,7 @@ static fmi2Status SetBoolean(fmi2Component c, const fmi2ValueReference reference
     for (size_t i = 0; is_usual && i < count; i++) {
         flags[i] = values[i] != fmi2False;
     }
-    return status_of(fmi3.SetBoolean(instance_of(c), references, count,
+    return status_of(fmu3.SetBoolean(instance_of(c), references, count,
                                      is_usual ? flags : (const fmi3Boolean *)values, count));
 }
 
@@ -309,7 +309,7 @@ static fmi2Status DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Bool
     if (adapted != NULL) {
         adapted->step_start = time;
     }
-    const fmi3Status status = fmi3.DoStep(instance_of(c), time, step, no_rollback != 0, &event,
+    const fmi3Status status = fmu3.DoStep(instance_of(c), time, step, no_rollback != 0, &event,
                                           &terminate, &early, &reached);
     if (status != fmi3OK) {
         return status_of(status);
@@ -341,7 +341,7 @@ static fmi2Status NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
     fmi3Boolean flags[5] = {true, true, true, true, true};
     fmi3Float64 next = 0.0;
     const fmi3Status status =
-        fmi3.UpdateDiscreteStates(instance_of(c), info != NULL ? &flags[0] : NULL, &flags[1],
+        fmu3.UpdateDiscreteStates(instance_of(c), info != NULL ? &flags[0] : NULL, &flags[1],
                                   &flags[2], &flags[3], &flags[4], &next);
     if (status == fmi3OK) {
         *info = (fmi2EventInfo){flags[0], flags[1], flags[2], flags[3], flags[4], next};
@@ -353,7 +353,7 @@ static fmi2Status CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_rollba
                                           fmi2Boolean *enter_event_mode, fmi2Boolean *terminate) {
     fmi3Boolean event = true;
     fmi3Boolean end = true;
-    const fmi3Status status = fmi3.CompletedIntegratorStep(instance_of(c), no_rollback != 0,
+    const fmi3Status status = fmu3.CompletedIntegratorStep(instance_of(c), no_rollback != 0,
                                                            enter_event_mode != NULL ? &event : NULL,
                                                            terminate != NULL ? &end : NULL);
     if (status == fmi3OK) {
@@ -368,7 +368,7 @@ static fmi2Status CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_rollba
 
 #define PLAIN(name, name3)                                                                         \
     static fmi2Status name(fmi2Component c) {                                                      \
-        return status_of(fmi3.name3(instance_of(c)));                                              \
+        return status_of(fmu3.name3(instance_of(c)));                                              \
     }
 PLAIN(Terminate, Terminate)
 PLAIN(EnterEventMode, EnterEventMode)
@@ -377,7 +377,7 @@ PLAIN(CancelStep, ExitConfigurationMode) // an error in every state
 
 #define ARRAY(name, name3, element)                                                                \
     static fmi2Status name(fmi2Component c, element values[], size_t count) {                      \
-        return status_of(fmi3.name3(instance_of(c), values, count));                               \
+        return status_of(fmu3.name3(instance_of(c), values, count));                               \
     }
 ARRAY(SetContinuousStates, SetContinuousStates, const fmi2Real)
 ARRAY(GetDerivatives, GetContinuousStateDerivatives, fmi2Real)
@@ -388,7 +388,7 @@ ARRAY(GetNominalsOfContinuousStates, GetNominalsOfContinuousStates, fmi2Real)
 /* Parameters and arguments stand in parentheses. */
 #define SAME(name, name3, parameters, arguments)                                                   \
     static fmi2Status name parameters {                                                            \
-        return status_of(fmi3.name3 arguments);                                                    \
+        return status_of(fmu3.name3 arguments);                                                    \
     }
 SAME(SetTime, SetTime, (fmi2Component c, fmi2Real time), (instance_of(c), time))
 SAME(SetDebugLogging, SetDebugLogging,
@@ -429,7 +429,7 @@ void *fmu_version_open(struct fmu_functions *functions) {
 #define ADAPTED(name, kinds, states) name,
     *functions = (struct fmu_functions){FMI2_FUNCTION_LIST(ADAPTED)};
 #undef ADAPTED
-    return fmu3_library_open(FMU_LIBRARY, &fmi3);
+    return fmu3_library_open(FMU_LIBRARY, &fmu3);
 }
 
 const char *fmu_name_of(enum fmu_function function) {

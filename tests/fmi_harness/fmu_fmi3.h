@@ -15,6 +15,9 @@ struct fmu_fmi3_options {
 };
 extern struct fmu_fmi3_options fmu_fmi3_options;
 
+/* Functions of the loaded FMU. */
+extern struct fmu3_functions fmu3;
+
 /* The instance behind a component. */
 fmi3Instance fmu_fmi3_instance(fmi2Component c);
 

@@ -1,8 +1,8 @@
 """Arm, plant, drives and controller in sympy, evaluated with 40 digits, at random points.
 
 Shares nothing with the C code: equations of motion and outputs are those of the references, from
-positions; joint loads are derived here by Newton's and Euler's laws. Tests compare values and
-derivatives of the arm (Model), the controller's laws (law), values of the plant and linear models
+positions; joint loads are derived here by Newton's and Euler's laws. Tests compare values of the
+arm (arm_expressions), the controller's laws (law), values of the plant and linear models
 (ExactModel) with FMUs.
 """
 
@@ -11,7 +11,6 @@ import itertools
 import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import mpmath
@@ -29,8 +28,6 @@ from tests.support.instances import INPUTS
 KNOWNS = (*PARAMETERS, *INPUTS, *STATES)
 TERMS = ("D11", "D12", "D22", "coriolis1", "coriolis2", "gravity1", "gravity2")
 LOADS = ("f1_x", "f1_z", "tau1_y", "f2_x", "f2_z", "tau2_y")
-# derivatives of the inputs with respect to time: orders 1 and 2
-INPUT_RATES = (("tau1_rate", "f2_rate"), ("tau1_bend", "f2_bend"))
 DRIVES = ("armature1", "armature2", "damping1", "damping2")
 NAMES = (*PARAMETERS, *DRIVES, *PAYLOAD, "attached", *plant.INPUTS, *STATES, *ACCELERATIONS)
 
@@ -109,77 +106,13 @@ def random_arm(source: random.Random) -> Values:
 DECADES = {"m1": (-1.0, 1.5), "m2": (-2.0, 1.5), "I1z": (-3.0, 1.0), "I2z": (-3.0, 1.0)}
 
 
-@dataclass(frozen=True)
-class Exact:
-    """Exact value of a derivative, and the largest of what it could have been made of."""
-
-    value: mpmath.mpf
-    scale: mpmath.mpf
-
-    def assert_is(self, actual: float, what: object) -> None:
-        bound = max(abs(self.value) * mpmath.mpf("1e-11"), self.scale * mpmath.mpf("1e-14"))
-        assert abs(mpmath.mpf(actual) - self.value) <= bound, (what, actual, self.value, self.scale)
-
-
-class Model:
-    """Every output and local in terms of parameters, inputs and states, with its derivatives."""
-
-    def __init__(self) -> None:
-        equations = derive()
-        self.outputs = tuple(equations.outputs)
-        self.accelerations = equations.accelerations
-        arm = dict.fromkeys((*PAYLOAD, "attached", *plant.INPUTS[2:]), 0)
-        arm |= dict(zip(ACCELERATIONS, equations.accelerations, strict=True))
-        self.expressions = (
-            equations.outputs
-            | terms_of_the_arm()
-            | dict(zip(LOADS, loads_by_newton().subs(arm), strict=True))
-        )
-
-    @cached_property
-    def _jacobian(self) -> Callable[..., list]:
-        rows = sp.Matrix(list(self.expressions.values())).jacobian(sp.symbols(KNOWNS))
-        return sp.lambdify(sp.symbols(KNOWNS), rows, "mpmath", cse=True)
-
-    def jacobian(self, at: Values, knowns: tuple[str, ...]) -> dict[tuple[str, str], Exact]:
-        """Derivatives of every output and local with respect to `knowns`, by their names."""
-        rows = self._jacobian(*(mpmath.mpf(at[name]) for name in KNOWNS))
-        exact = {}
-        for i, unknown in enumerate(self.expressions):
-            row = {known: rows[i, KNOWNS.index(known)] for known in knowns}
-            scale = max(abs(entry) for entry in row.values())
-            exact |= {(unknown, known): Exact(entry, scale) for known, entry in row.items()}
-        return exact
-
-    @cached_property
-    def _along_the_motion(self) -> Callable[..., list]:
-        """Terms of the derivatives of orders 1 and 2 of each output."""
-        rates = {
-            **dict(zip(STATES, (*sp.symbols(STATES[2:]), *self.accelerations), strict=True)),
-            **dict(zip(INPUTS, sp.symbols(INPUT_RATES[0]), strict=True)),
-            **dict(zip(INPUT_RATES[0], sp.symbols(INPUT_RATES[1]), strict=True)),
-        }
-
-        def terms(expression: sp.Expr) -> list[sp.Expr]:
-            return [expression.diff(sp.Symbol(name)) * rate for name, rate in rates.items()]
-
-        once = [terms(self.expressions[name]) for name in self.outputs]
-        rows = [row for first in once for row in (first, terms(sp.Add(*first)))]
-        names = (*KNOWNS, *INPUT_RATES[0], *INPUT_RATES[1])
-        return sp.lambdify(sp.symbols(names), rows, "mpmath", cse=True)
-
-    def along_the_motion(self, at: Values, rates: list[list]) -> dict[tuple[str, int], Exact]:
-        """Derivatives of every output with respect to time, by name and order.
-
-        `rates`: derivatives of (tau1, f2) of order 1, then 2.
-        """
-        arguments = (*(mpmath.mpf(at[name]) for name in KNOWNS), *rates[0], *rates[1])
-        rows = iter(self._along_the_motion(*arguments))
-        return {
-            (name, order): Exact(mpmath.fsum(row), max(abs(term) for term in row))
-            for name in self.outputs
-            for order, row in zip((1, 2), itertools.islice(rows, 2), strict=True)
-        }
+def arm_expressions() -> dict[str, sp.Expr]:
+    """Every output and local of the arm in terms of parameters, inputs and states."""
+    equations = derive()
+    arm = dict.fromkeys((*PAYLOAD, "attached", *plant.INPUTS[2:]), 0)
+    arm |= dict(zip(ACCELERATIONS, equations.accelerations, strict=True))
+    loads = dict(zip(LOADS, loads_by_newton().subs(arm), strict=True))
+    return equations.outputs | terms_of_the_arm() | loads
 
 
 # ---- The laws of RPController --------------------------------------------------------------------

@@ -1,17 +1,22 @@
-"""Long runs, masters that are a little off, and what the solver says of itself."""
+"""The arm's values against sympy, long runs, masters that are a little off, and what the solver
+says of itself."""
 
 import math
+import random
 from ctypes import c_double
 from types import SimpleNamespace
 
 import heyoka as hy
+import mpmath
 import numpy as np
 import pytest
+import sympy as sp
 from fmpy import fmi2
 from rparm.models.rp_manipulator.references.make_references import integrator
 
 from tests.support.instances import INPUTS, STATES, Instance, LoadedFmu
 from tests.support.rparm_project import declared
+from tests.support.symbolic import KNOWNS, arm_expressions, random_arm
 
 START = {"q1": -1.43, "q2": 0.58, "dq1": 1.97, "dq2": 0.12}
 # In the horizontal plane a constant force draws link 2 in, the spin drives it out: bounded for
@@ -26,6 +31,33 @@ def reference(values: dict[str, float]) -> hy.taylor_adaptive:
     motion = integrator(case, inputs, pars=len(INPUTS))
     motion.pars[:] = [np.longdouble(values.get(name, 0.0)) for name in INPUTS]
     return motion
+
+
+# ---- Values --------------------------------------------------------------------------------------
+
+
+def test_every_output_and_local_has_its_symbolic_value(loaded: LoadedFmu) -> None:
+    """At points without zeros, the slide on both sides of the axis."""
+    expressions = arm_expressions()
+    names = tuple(expressions)
+    assert {
+        variable.name
+        for variable in loaded.description.modelVariables
+        if variable.causality in ("output", "local") and variable.variability == "continuous"
+    } == {*names, "der_q1", "der_q2"}
+    for seed in range(6):
+        source = random.Random(seed)
+        point = random_arm(source)
+        point |= {name: source.uniform(-30.0, 30.0) for name in INPUTS}
+        point |= {name: source.uniform(-3.0, 3.0) for name in STATES}
+        with Instance(loaded).begin(**point) as instance:
+            at = {
+                sp.Symbol(n): mpmath.mpf(x)
+                for n, x in zip(KNOWNS, instance.get(*KNOWNS), strict=True)
+            }
+            expected = [float(expressions[name].evalf(40, subs=at)) for name in names]
+            scale = max(abs(value) for value in expected)
+            assert instance.get(*names) == pytest.approx(expected, rel=1e-11, abs=1e-14 * scale)
 
 
 # ---- Ten minutes -------------------------------------------------------------------------------
