@@ -158,6 +158,25 @@ static void test_an_unknown_category_is_an_error(void) {
     fmu_assert_logged(&messages, "logNothing");
 }
 
+/* Called as fmi3LogMessageCallback. */
+static void free_instance(fmi3InstanceEnvironment environment, fmi3Status status,
+                          fmi3String category, fmi3String message) {
+    messages.count[status]++;
+    fmu3.FreeInstance(importer.instance);
+}
+
+static void test_an_instance_is_not_freed_by_its_logger(void) {
+    const fmi3Instance c = fmu3.InstantiateModelExchange("m", RP_MANIPULATOR_TOKEN_FMI3, NULL,
+                                                         false, true, NULL, free_instance);
+    importer.instance = c;
+    fmu_log_clear(&messages);
+    fmu3_initialize(c, 0.0);
+    TEST_ASSERT_GREATER_THAN_UINT(1, messages.count[fmi3OK]);
+    TEST_ASSERT_EQUAL_UINT(messages.count[fmi3OK], messages.count[fmi3Error]);
+    importer.instance = NULL;
+    fmu3.FreeInstance(c);
+}
+
 /* ---- Values --------------------------------------------------------------------------------- */
 
 /* A new instance refuses the call, and says this. */

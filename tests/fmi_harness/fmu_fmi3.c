@@ -438,6 +438,7 @@ const char *fmu_name_of(enum fmu_function function) {
         [FMU_SetReal] = "fmi3SetFloat64",
         [FMU_GetInteger] = "fmi3GetInt32",
         [FMU_SetInteger] = "fmi3SetInt32",
+        [FMU_CancelStep] = "fmi3ExitConfigurationMode",
         [FMU_GetFMUstate] = "fmi3GetFMUState",
         [FMU_SetFMUstate] = "fmi3SetFMUState",
         [FMU_FreeFMUstate] = "fmi3FreeFMUState",
