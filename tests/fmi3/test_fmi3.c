@@ -1,5 +1,7 @@
 /* What FMI 3.0 asks of every function: instances, messages, counts and types of values, event mode,
- * results of a step. Sections 2.2.4, 2.2.6.2, 2.3.1 and 4.2. */
+ * results of a step, adjoint derivatives, states of other versions and kinds. That adjoint
+ * derivatives are the transposed directional ones: test_knowns.py. Sections 2.2.4, 2.2.6.2, 2.2.11,
+ * 2.3.1 and 4.2. */
 #include "fmu3_harness.h"
 
 #include <math.h>
@@ -341,5 +343,130 @@ static void test_results_of_a_step_need_a_place(void) {
                                  missing == 3 ? NULL : &reached));
         fmu_assert_logged(&messages, "NULL");
         fmu3_free(c);
+    }
+}
+
+/* ---- Adjoint derivatives -------------------------------------------------------------------- */
+
+/* Of parameters, too, before the first step; a known that is listed twice is answered twice. */
+static void test_adjoint_derivatives_by_parameters_and_repeated_knowns(void) {
+    const fmi3ValueReference unknown = RP_MANIPULATOR_potential_energy;
+    const fmi3ValueReference of[] = {RP_MANIPULATOR_g, RP_MANIPULATOR_q1, RP_MANIPULATOR_g};
+    const double seed = 2.0;
+    const double one = 1.0;
+    double adjoint[3];
+    double directional;
+    const fmi3Instance instance = fmu3_co_simulation(NULL);
+    fmu3_set(instance, RP_MANIPULATOR_q1, 0.7);
+    ASSERT_OK(fmu3.EnterInitializationMode(instance, false, 0.0, 0.0, false, 0.0));
+    ASSERT_OK(fmu3.GetAdjointDerivative(instance, &unknown, 1, of, 3, &seed, 1, adjoint, 3));
+    ASSERT_OK(
+        fmu3.GetDirectionalDerivative(instance, &unknown, 1, of, 1, &one, 1, &directional, 1));
+    TEST_ASSERT_TRUE(directional != 0.0);
+    TEST_ASSERT_TRUE(adjoint[0] == seed * directional);
+    TEST_ASSERT_TRUE(adjoint[2] == adjoint[0]);
+    // also later
+    ASSERT_OK(fmu3.ExitInitializationMode(instance));
+    double later[3];
+    ASSERT_OK(fmu3.GetAdjointDerivative(instance, &unknown, 1, of, 3, &seed, 1, later, 3));
+    TEST_ASSERT_EQUAL_MEMORY(adjoint, later, sizeof later);
+}
+
+/* Nothing is written where one of them is refused. */
+static void test_adjoint_derivatives_that_are_refused(void) {
+    static const fmi3ValueReference wrong[][2] = {
+        // as a known, as an unknown
+        {RP_MANIPULATOR_ee_x, RP_MANIPULATOR_time},
+        {RP_MANIPULATOR_ddq1, RP_MANIPULATOR_m1},
+        {RP_MANIPULATOR_relative_tolerance, RP_MANIPULATOR_tau1},
+        {RP_MANIPULATOR_solver_steps, RP_MANIPULATOR_solver_steps},
+        {9999, 9999},
+    };
+    for (size_t k = 0; k < 2 * FMU_COUNT(wrong); k++) {
+        const bool is_unknown = k % 2 == 1;
+        fmi3ValueReference rows[] = {RP_MANIPULATOR_ddq1, RP_MANIPULATOR_ddq2};
+        fmi3ValueReference columns[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2};
+        *(is_unknown ? &rows[1] : &columns[1]) = wrong[k / 2][is_unknown];
+        const double seed[] = {1.0, 1.0};
+        double result[] = {-1.0, -1.0};
+        const fmi3Instance instance = fmu3_co_simulation(NULL);
+        fmu3_initialize(instance, 0.0);
+        ASSERT_ERROR(fmu3.GetAdjointDerivative(instance, rows, 2, columns, 2, seed, 2, result, 2));
+        TEST_ASSERT_TRUE(result[0] == -1.0 && result[1] == -1.0);
+        fmu3_free(instance);
+    }
+    const fmi3ValueReference ddq1 = RP_MANIPULATOR_ddq1;
+    const fmi3ValueReference dq1 = RP_MANIPULATOR_dq1;
+    const fmi3Instance instance = fmu3_co_simulation(NULL);
+    fmu3_set(instance, RP_MANIPULATOR_dq1, 1e160);
+    fmu3_initialize(instance, 0.0);
+    const double seed = 1e200;
+    double result = -1.0;
+    ASSERT_DISCARD(fmu3.GetAdjointDerivative(instance, &ddq1, 1, &dq1, 1, &seed, 1, &result, 1));
+    TEST_ASSERT_TRUE(result == -1.0);
+}
+
+/* ---- States of other versions and kinds ------------------------------------------------------ */
+
+enum kind { MODEL_EXCHANGE, CO_SIMULATION, CO_SIMULATION_WITH_EVENTS, KINDS };
+
+static fmi2Type type_of(enum kind kind) {
+    return kind == MODEL_EXCHANGE ? fmi2ModelExchange : fmi2CoSimulation;
+}
+
+static fmi2Component of_kind(enum kind kind) {
+    fmu_fmi3_options.event_mode = kind == CO_SIMULATION_WITH_EVENTS;
+    const fmi2Component c = fmu_instantiate_as(type_of(kind), &messages, false);
+    fmu_fmi3_options.event_mode = false;
+    return c;
+}
+
+static void assert_refused(const struct fmu_functions *by, fmi2Component c,
+                           const struct fmu_bytes *bytes, const char *words) {
+    fmi2FMUstate made = NULL;
+    fmu_log_clear(&messages);
+    ASSERT_ERROR(by->DeSerializeFMUstate(c, bytes->data, bytes->size, &made));
+    TEST_ASSERT_NULL(made);
+    TEST_ASSERT_EQUAL_UINT(1, messages.count[fmi2Error]);
+    fmu_assert_logged(&messages, words);
+}
+
+static void test_states_of_the_other_version_are_refused(void) {
+    static struct fmu_functions fmu2;
+    const fmi2CallbackFunctions callbacks = fmu_callbacks(&messages);
+    TEST_ASSERT_NOT_NULL(fmu_library_open(FMU2_LIBRARY, &fmu2));
+    for (enum kind kind = MODEL_EXCHANGE; kind < KINDS; kind++) {
+        fmi2FMUstate state = NULL;
+        struct fmu_bytes of_2 = {0};
+        struct fmu_bytes of_3 = fmu_save_bytes(of_kind(kind));
+        const fmi2Component c = fmu2.Instantiate("m", type_of(kind), RP_MANIPULATOR_GUID, "",
+                                                 &callbacks, fmi2False, fmi2False);
+        ASSERT_OK(fmu2.GetFMUstate(c, &state));
+        ASSERT_OK(fmu2.SerializedFMUstateSize(c, state, &of_2.size));
+        struct fmu_bytes room = {0};
+        of_2 = fmu_bytes_copy(&room, of_2.size);
+        ASSERT_OK(fmu2.SerializeFMUstate(c, state, of_2.data, of_2.size));
+        for (enum kind to = MODEL_EXCHANGE; to < KINDS; to++) {
+            assert_refused(&fmu, of_kind(to), &of_2, "it is one of FMI 2, the instance of FMI 3");
+        }
+        assert_refused(&fmu2, c, &of_3, "it is one of FMI 3, the instance of FMI 2");
+        fmu2.FreeInstance(c);
+        fmu_bytes_free(&of_2);
+        fmu_bytes_free(&of_3);
+    }
+}
+
+static void test_states_of_other_kinds_are_refused(void) {
+    static const char *const names[] = {"an instance for Model Exchange",
+                                        "an instance for Co-Simulation cannot",
+                                        "an instance for Co-Simulation with event mode"};
+    for (enum kind from = MODEL_EXCHANGE; from < KINDS; from++) {
+        struct fmu_bytes bytes = fmu_save_bytes(of_kind(from));
+        for (enum kind to = MODEL_EXCHANGE; to < KINDS; to++) {
+            if (to != from) {
+                assert_refused(&fmu, of_kind(to), &bytes, names[to]);
+            }
+        }
+        fmu_bytes_free(&bytes);
     }
 }
