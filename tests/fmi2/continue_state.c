@@ -1,4 +1,4 @@
-/* The other process of test_fmi2_serialization.c: continue_state FROM TO restores the serialized
+/* The other process of test_fmi2_snapshots.c: continue_state FROM TO restores the serialized
  * state in a file and steps on; writes the values, and the state before the step, serialized again,
  * to another file. */
 #include "fmu_harness.h"

@@ -26,7 +26,7 @@ static const struct {
     [FMU_GetInteger] = {"-MCFTE", "-MVNTE"},
     [FMU_GetBoolean] = {"-MCFTE", "-MVNTE"},
     [FMU_GetString] = {"-MCFTE", "-MVNTE"},
-    [FMU_SetReal] = {"IMC---", "IMVN--"}, // which variables: test_fmi2_modes.c
+    [FMU_SetReal] = {"IMC---", "IMVN--"}, // which variables: test_fmi2_values.c
     [FMU_SetInteger] = {"IMC---", "IMV---"},
     [FMU_SetBoolean] = {"IMC---", "IMV---"},
     [FMU_SetString] = {"IMC---", "IMV---"},

@@ -17,7 +17,7 @@ static void collect(void *context, enum status status, const char *text) {
     (void)strncat(texts, text, sizeof texts - strlen(texts) - 1);
 }
 
-/* The first row is checked as all others: tests/wheel/test_wheel_states.c. */
+/* The first row is checked as all others: tests/wheel/test_wheel.c. */
 static void test_a_wrong_field_in_the_first_row_is_refused(void) {
     struct variable variable = oscillator_description.variables[1]; // omega, a parameter
     struct model_description wrong = oscillator_description;

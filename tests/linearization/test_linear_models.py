@@ -1,6 +1,6 @@
 """A, B, C and D of FMUs against exact ones, at random points: all versions and kinds of FMI.
 
-tests/fmi2/test_derivatives.py has those of the arm.
+tests/models/test_every_model.c has those of the arm.
 """
 
 from collections.abc import Callable, Iterator

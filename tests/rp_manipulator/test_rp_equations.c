@@ -1,5 +1,5 @@
 /* Equations of the notes that no FMU shows, by their definitions, and the two formulations, one by
- * the other. tests/fmi2/test_derivatives.py compares all that FMUs show with sympy. */
+ * the other. tests/fmi2/test_unit.py compares all that the FMU shows with sympy. */
 #include "rp_recursion.h"
 #include "rp_test_support.h"
 #include "unity.h"

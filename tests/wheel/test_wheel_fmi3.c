@@ -117,42 +117,40 @@ static void assert_at(double time, double angle) {
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, angle, get_real(WHEEL_angle));
 }
 
-/* Without event mode and early return the importer sees nothing but the end of the step. */
-static void test_events_inside_the_step(void) {
-    start(false, false);
-    const struct outcome outcome = step(0.0, 5.0);
-    assert_outcome(outcome, false, false);
-    TEST_ASSERT_TRUE(outcome.reached == 5.0);
-    assert_caught(true);
-    assert_at(5.0, 2.0);
-}
-
-static void test_early_return_after_the_event(void) {
-    start(false, true);
-    assert_outcome(step(0.0, 1.0), false, false);
-    const struct outcome outcome = step(1.0, 5.0);
-    assert_outcome(outcome, false, true);
-    TEST_ASSERT_TRUE(outcome.reached == get_real(WHEEL_time));
-    assert_caught(true);
-    assert_at(2.0, 2.0);
-    assert_outcome(step(outcome.reached, 6.0 - outcome.reached), false, false);
-    assert_caught(true);
-    assert_at(6.0, 2.0);
-}
-
-static void test_event_mode_without_early_return(void) {
-    start(true, false);
-    assert_outcome(step(0.0, 1.0), false, false);
-    const struct outcome outcome = step(1.0, 5.0);
-    assert_outcome(outcome, true, false);
-    TEST_ASSERT_TRUE(outcome.reached == 6.0);
-    assert_caught(true);
-    assert_at(6.0, 2.0);
-    ASSERT_OK(fmu3.EnterEventMode(wheel));
-    update();
-    assert_caught(true);
-    ASSERT_OK(fmu3.EnterStepMode(wheel));
-    assert_outcome(step(6.0, 1.0), false, false);
+/* Without event mode the event is handled in the step; without early return the step goes on to its
+ * end. With both it ends at the event's left limit, and event mode shows both limits. */
+static void test_a_step_over_the_event(void) {
+    static const struct {
+        bool event_mode, early_return;
+        double end;
+        bool is_caught; /* at the end of the step */
+    } ways[] = {{false, false, 6.0, true},
+                {false, true, 2.0, true},
+                {true, false, 6.0, true},
+                {true, true, 2.0, false}};
+    for (size_t i = 0; i < sizeof ways / sizeof ways[0]; i++) {
+        start(ways[i].event_mode, ways[i].early_return);
+        assert_outcome(step(0.0, 1.0), false, false);
+        const struct outcome outcome = step(1.0, 5.0);
+        assert_outcome(outcome, ways[i].event_mode, ways[i].early_return);
+        TEST_ASSERT_TRUE(outcome.reached == get_real(WHEEL_time));
+        assert_caught(ways[i].is_caught);
+        assert_at(ways[i].end, 2.0);
+        if (ways[i].event_mode) {
+            ASSERT_OK(fmu3.EnterEventMode(wheel));
+            assert_caught(ways[i].is_caught);
+            for (int k = 0; k < 2; k++) {
+                update();
+                assert_caught(true);
+            }
+            TEST_ASSERT_TRUE(get_real(WHEEL_angle) == 2.0 && get_real(WHEEL_to_stop) == 1.0);
+            ASSERT_OK(fmu3.EnterStepMode(wheel));
+        }
+        assert_outcome(step(outcome.reached, 7.0 - outcome.reached), false, false);
+        assert_caught(true);
+        assert_at(7.0, 2.0);
+        release();
+    }
 }
 
 /* Up to the left limit of the event. */
@@ -165,20 +163,6 @@ static double step_to_event(void) {
     assert_caught(false);
     assert_at(2.0, 2.0);
     return outcome.reached;
-}
-
-static void test_event_mode_shows_both_limits(void) {
-    const double time = step_to_event();
-    ASSERT_OK(fmu3.EnterEventMode(wheel));
-    assert_caught(false);
-    update();
-    assert_caught(true);
-    update();
-    assert_caught(true);
-    TEST_ASSERT_TRUE(get_real(WHEEL_angle) == 2.0 && get_real(WHEEL_to_stop) == 1.0);
-    ASSERT_OK(fmu3.EnterStepMode(wheel));
-    assert_outcome(step(time, 4.0), false, false);
-    assert_caught(true);
 }
 
 static void test_the_next_step_passes_an_event_that_is_due(void) {
