@@ -42,6 +42,7 @@ static fmi3Instance instantiate(fmi2Type type) {
         TEST_ASSERT_LESS_THAN_size_t(FMU_COUNT(components), i);
     }
     components[i] = fmu_instantiate_as(type, &messages, false);
+    importer.component = components[i];
     importer.instance = fmu_fmi3_instance(components[i]);
     return importer.instance;
 }

@@ -21,8 +21,9 @@ extern struct fmu3_importer {
     /* Called in intermediate updates; NULL: they are only counted. */
     void (*update)(struct fmu3_importer *importer, const struct fmu3_update *update);
     unsigned updates;
-    fmi3Instance instance; /* the last one made */
-    void *data;            /* of update */
+    fmi2Component component; /* the last one made */
+    fmi3Instance instance;   /* its own */
+    void *data;              /* of update */
 } importer;
 
 struct fmu3_options {
