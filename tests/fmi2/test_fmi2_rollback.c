@@ -203,49 +203,6 @@ static void assert_long(fmi2Component c) {
     TEST_ASSERT_GREATER_THAN_INT(3, fmu_get_integer(c, RP_MANIPULATOR_solver_restarts));
 }
 
-enum { HELD_STEPS = 6000 };
-
-static const double held_step = 5e-3; // s
-
-static void step_held(fmi2Component c, unsigned step, struct fmu_values *values) {
-    ASSERT_OK(fmu.DoStep(c, step * held_step, held_step, fmi2True));
-    ASSERT_OK(fmu_get_all(c, values));
-}
-
-EACH_METHOD static void test_rollback_is_exact_where_nothing_is_set_for_long(void) {
-    static struct fmu_values run[HELD_STEPS];
-    const fmi2Component plain = fmu_lasting(method, &messages);
-    for (unsigned step = 0; step < HELD_STEPS; step++) {
-        step_held(plain, step, &run[step]);
-    }
-    assert_long(plain);
-
-    struct fmu_random random = {.state = 1};
-    const fmi2Component c = fmu_lasting(method, &messages);
-    fmi2FMUstate state = NULL;
-    unsigned saved_at = 0;
-    unsigned step = 0;
-    int left = 200; // times to go back
-    while (step < HELD_STEPS) {
-        char text[64];
-        struct fmu_values values;
-        snprintf(text, sizeof text, "held, step %u", step);
-        if (state == NULL || fmu_random_below(&random, 40) == 0) {
-            ASSERT_OK(fmu.GetFMUstate(c, &state));
-            saved_at = step;
-        }
-        step_held(c, step, &values);
-        fmu_assert_same_values(&run[step], &values, text);
-        step++;
-        if (left > 0 && fmu_random_below(&random, 30) == 0) {
-            fmu_restore(c, state);
-            step = saved_at;
-            left--;
-        }
-    }
-    TEST_ASSERT_LESS_THAN_INT(100, left); // it went back often
-}
-
 /* Single steps of thousands of internal steps each, repeated after a detour. */
 EACH_METHOD static void test_rollback_is_exact_over_steps_of_many_internal_steps(void) {
     const double length = 20.0;
