@@ -1,12 +1,11 @@
-"""The wheel's FMUs in fmpy: their descriptions, and runs in which a Boolean input switches."""
+"""Descriptions of the wheel's FMUs. Runs in which its Boolean input switches:
+tests/rparm/test_boolean_inputs.py."""
 
 import os
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from zipfile import ZipFile
 
-import fmpy
-import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
@@ -17,7 +16,6 @@ FMUS = {
     "fmi2": FOLDER / "tests" / "wheel" / "Wheel.fmu",
     "fmi3": FOLDER / "tests" / "wheel" / "fmi3" / "Wheel.fmu",
 }
-SPEED = 7.0  # rad/s
 
 both_versions = pytest.mark.parametrize("version", ["fmi2", "fmi3"])
 
@@ -62,33 +60,6 @@ def test_what_only_one_version_has() -> None:
         {"valueReference": "50", "dependencies": "1 10"},  # to_stop: stop, angle
         {"valueReference": "51", "dependencies": "1 20"},  # push: stop, speed
     ]
-
-
-@both_versions
-@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
-def test_an_integer_counts_while_a_boolean_input_says_so(version: str, kind: str) -> None:
-    switches = [(0.0, True), (2.0, True), (2.0, False), (4.0, False), (4.0, True), (6.0, True)]
-    inputs = np.array(
-        [(time, SPEED, counting) for time, counting in switches],
-        dtype=[("time", float), ("speed", float), ("is_counting", bool)],
-    )
-    result = fmpy.simulate_fmu(
-        str(FMUS[version]),
-        fmi_type=kind,
-        solver="Euler",  # exact here; fmpy's CVode sets Booleans in continuous-time mode
-        step_size=0.5,
-        stop_time=6.0,
-        output_interval=0.5,
-        input=inputs,
-        output=["angle", "turns", "is_turning", "is_counting"],
-    )
-    np.testing.assert_allclose(result["angle"], SPEED * result["time"], rtol=0, atol=1e-5)
-    counting = result["is_counting"].astype(bool)
-    assert counting.any() and not counting.all()
-    expected = np.where(counting, np.floor(result["angle"] / (2 * np.pi)), 0)
-    np.testing.assert_array_equal(result["turns"], expected)
-    assert len(set(expected)) > 4
-    assert result["is_turning"][1:].all()
 
 
 def test_early_return_is_announced_with_events_only(fmu: Path) -> None:
