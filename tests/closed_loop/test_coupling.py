@@ -151,11 +151,6 @@ def test_the_law_is_the_controllers_own(loop: ClosedLoop) -> None:
     assert np.abs(study.law(loop, held)[0] - held["controller.tau1"]).max() > 3e-3
 
 
-def test_simpson_is_exact_for_cubics() -> None:
-    t = np.linspace(0, 2, 9)
-    assert study.simpson(t**3 - t, t[1]) == pytest.approx(2.0, rel=1e-14)
-
-
 @pytest.mark.parametrize("step", [2e-3, 1e-3])
 def test_the_end_effectors_error_is_what_the_delays_predict(loop: ClosedLoop, step: float) -> None:
     jacobi, gauss_seidel, ahead = tracking = closed_loop.study_tracking(loop, step)

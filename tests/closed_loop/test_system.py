@@ -186,16 +186,6 @@ def test_ecos_is_at_the_reference_of_its_order(system: System, variant: str) -> 
         assert difference(result[name][rows], values) <= (0 if name in discrete else BOUND), name
 
 
-def test_the_bound_tells_one_order_from_another() -> None:
-    """A delay of one step more or less, or none at all, is far beyond it."""
-    other = CLOSED_LOOP.reference("nominal", "monolithic.csv")
-    result, rows = CLOSED_LOOP.run("nominal"), CLOSED_LOOP.rows(other)
-    assert difference(result["arm.q1"][rows], other["arm.q1"]) > 100 * BOUND
-    sampled = CLOSED_LOOP.reference("nominal", "sampled.csv")
-    effort = "controller.tau1"
-    assert difference(result[effort][rows], sampled[effort]) > 100 * BOUND
-
-
 @pytest.mark.parametrize(("system", "variant"), OF_FMI_3, ids=lambda x: getattr(x, "folder", x))
 def test_fmus_of_fmi_3_give_the_same_bits(system: System, variant: str) -> None:
     first, second = system.run(variant), system.run(variant, "fmi3")

@@ -37,14 +37,6 @@ def test_plant(opened: OpenedPage, plant: Native, method: str) -> None:
     assert len(np.unique(numbers[:, 0])) > 0.9 * STEPS  # it moves
 
 
-def test_one_bit_is_noticed(opened: OpenedPage, plant: Native) -> None:
-    """An effort that differs in its last bit, in one step of the swing."""
-    inputs = efforts(len(INPUTS))[:50]
-    expected = plant.trajectory(PLANT, inputs)
-    inputs[20, 0] = np.nextafter(inputs[20, 0], np.inf)
-    assert opened.doubles("trajectory", PLANT, inputs.tolist(), OUTPUTS, INPUTS) != expected
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_serialized_state(opened: OpenedPage, plant: Native, method: str) -> None:
     """All that an instance keeps, the integrator's history too, has the same bytes."""

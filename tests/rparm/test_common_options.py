@@ -6,11 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from rparm import command_line, files, project
+from rparm import command_line, project
 from rparm.command_line import COMMANDS
 from rparm.commands import run as run_command
 from rparm.commands.completion import SCRIPT, SHELLS
-from rparm.systems import comparison
 from tests.support.paths import ROOT
 from tests.support.programs import RPARM, python, run
 from tests.support.rparm_project import (
@@ -25,7 +24,6 @@ from tests.support.rparm_project import (
     reference_file,
     repacked,
 )
-from tests.support.ssp_files import SSP, edited, replace
 
 # what each command cannot do without
 NEEDED = MISTAKES["needed"]
@@ -74,23 +72,6 @@ def test_the_playground_is_copied_and_shown(
     assert json.loads(out) == {"exit_code": 0, "page": str(copy)} and shown == [copy.as_uri()]
 
 
-def test_the_picture_of_the_coupling_is_shown(
-    tmp_path: Path, shown: list[str], monkeypatch: pytest.MonkeyPatch, console: Console
-) -> None:
-    _, module = comparison.coupling_study()
-
-    def draw(_: Path, report: Path) -> dict[str, dict[str, object]]:
-        (report / module.COUPLING_PICTURE).touch()
-        return {"part": {"passed": True}}
-
-    monkeypatch.setattr(module, "study_coupling", draw)
-    code, out, _ = console("coupling", "--output", tmp_path, "--open", "--json")
-    picture = Path(json.loads(out)["picture"])
-    assert code == 0 and picture.is_file() and picture.parent == tmp_path
-    page = tmp_path / "coupling" / "closed_loop.html"
-    assert shown == [page.as_uri()] and 'src="../coupling.png"' in page.read_text("utf-8")
-
-
 def test_a_command_without_a_page_writes_its_document_and_says_that_there_is_none(
     tmp_path: Path, shown: list[str], console: Console
 ) -> None:
@@ -110,21 +91,6 @@ def test_an_fmu_is_copied(tmp_path: Path, console: Console) -> None:
         assert code == 0 and out.startswith(f"{file}: FMI ")
         assert file.read_bytes() == (ROOT / built / "RPPlant.fmu").read_bytes()
     assert "no model 'RPPlants'" in console.refused("fmu", "RPPlants")
-
-
-def test_a_federation_writes_what_it_recorded(
-    tmp_path: Path, shown: list[str], console: Console
-) -> None:
-    short = {"SystemStructure.ssd": replace('stopTime="6"', 'stopTime="0.5"')}
-    system = edited(SSP, tmp_path / "Short.ssp", short)
-    arguments = ("nominal", "--ssp", system, "--output", tmp_path, "--json", "--quiet", "--open")
-    code, out, err = console("federation", *arguments)
-    assert code == 0 and err == "--open: federation has written no page\n" and shown == []
-    (row,) = json.loads(out)["variants"]
-    names, values = files.read_trajectory(
-        tmp_path / "nominal.csv", lambda text, _: ValueError(text)
-    )
-    assert names[0] == "time" and "arm.q1" in names and len(values) == row["steps"] + 1
 
 
 # ---- completion ----------------------------------------------------------------------------------

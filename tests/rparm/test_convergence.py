@@ -3,28 +3,21 @@ slope 4 with intermediate update of FMI 3.0."""
 
 import json
 import shutil
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 import sympy as sp
-from rparm.models.rp_manipulator.references.make_references import final_state, integrator
+from rparm.models.rp_manipulator.references.make_references import final_state
 
 from rparm import result_tables
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
-from rparm.project import convergence_files
-from rparm.report.writer import ReportWriter
 from rparm.runs import convergence
 from rparm.runs.convergence import (
     FACTORS,
-    INTERMEDIATE_UPDATE,
     NAMES,
-    ORDERS,
     POWERS,
     Convergence,
     Problem,
@@ -64,22 +57,6 @@ def made_up(problem: Problem, *coefficients: float, floor: float = 1e-13) -> Con
 # ---- The exact final state ---------------------------------------------------------------------
 
 
-def test_exact_state_made_again_is_the_same(tmp_path: Path) -> None:
-    folders = [path.stem for path in convergence_files()]
-    command = [sys.executable, MODEL.parent / "make_references.py", MODEL.name, *folders]
-    subprocess.run([*command, "--output", tmp_path], check=True, cwd=tmp_path)
-    assert sorted(path.name for path in tmp_path.iterdir()) == folders
-    for name in folders:
-        files = (MODEL / "references" / name / "exact.json", tmp_path / name / "exact.json")
-        if files[0].read_bytes() == files[1].read_bytes():
-            continue  # always so on one kind of machine
-        old, new = (json.loads(file.read_text()) for file in files)
-        assert old["time"] == new["time"]
-        for key in ("final", "largest"):
-            for state, value in old[key].items():
-                assert abs(new[key][state] - value) <= 1e-14 * old["largest"][state]
-
-
 def test_exact_state_does_not_depend_on_the_precision(problem: Problem) -> None:
     final, largest = final_state(problem.scenario, np.float64)
     assert problem.final_error(final) < 1e-12
@@ -114,71 +91,6 @@ def test_order_of_convergence(study: Convergence, case: int) -> None:
     assert study.slopes[case] == pytest.approx(slope, rel=1e-9)
     assert abs(slope - (1, 2, 3, 4, 4)[case]) <= 0.2
     assert study.holds(case)
-
-
-def taylor(sines: Sines, times: np.ndarray, _: np.ndarray) -> list[np.ndarray]:
-    """Derivatives 0 to 3 at `times`, (4, steps)."""
-    return [sines.derivative(times, order) for order in ORDERS]
-
-
-def cubic(sines: Sines, times: np.ndarray, h: np.ndarray) -> list[np.ndarray]:
-    """Derivatives 0 to 3 at `times` of the cubic through four values of each step, (4, steps)."""
-    a, b, c, d = (sines.derivative(times + h * i / 3, 0).astype(h.dtype) for i in range(4))
-    return [
-        a,
-        (-11 * a + 18 * b - 9 * c + 2 * d) / (2 * h),
-        (2 * a - 5 * b + 4 * c - d) * 9 / h**2,
-        (-a + 3 * b - 3 * c + d) * 27 / h**3,
-    ]
-
-
-@pytest.mark.parametrize(
-    ("case", "derivatives"), [(ORDERS[-1], taylor), (INTERMEDIATE_UPDATE, cubic)]
-)
-def test_error_of_the_integration_by_itself(
-    opened: Fmu,
-    updated: Fmu,
-    study: Convergence,
-    case: int,
-    derivatives: Callable[[Sines, np.ndarray, np.ndarray], list[np.ndarray]],
-) -> None:
-    """Against the exact solution for the very cubics that the FMU is given.
-
-    The inputs have no error here, so all of it is the integrator's. It is at most twice the study's
-    estimate and at most a hundredth of every error that the slope is fitted to. The slope is also
-    that of all errors from a hundred times this one.
-    """
-    import heyoka as hy
-
-    problem, width = study.problem, len(ORDERS)
-    polynomials = {}
-    for i, name in enumerate(problem.inputs):
-        c = [hy.par[width * i + k] for k in range(width)]
-        t = hy.time
-        polynomials[name] = c[0] + t * (c[1] + t / 2.0 * (c[2] + t / 3.0 * c[3]))
-    real = np.longdouble
-    motion = integrator(problem.scenario, polynomials, real, width * len(polynomials))
-    start = motion.state.copy()
-    errors = []
-    for factor in FACTORS:
-        times = problem.scenario.times[::factor].astype(real)
-        h = np.diff(times)
-        known = np.vstack([derivatives(s, times[:-1], h) for s in problem.inputs.values()])
-        motion.state[:] = start
-        for length, row in zip(h, known.T.astype(real), strict=True):
-            motion.time = real(0)
-            motion.pars[:] = row
-            motion.propagate_until(length)
-        exact = dict(zip(problem.exact, motion.state.astype(float).tolist(), strict=True))
-        fmu = updated if case == INTERMEDIATE_UPDATE else opened
-        states = convergence.final_state(fmu, problem, case, factor)
-        errors.append(replace(problem, exact=exact).final_error(states))
-    largest, found = max(errors), study.errors[case]
-    assert largest <= 2 * study.integration_error
-    assert np.all(found[study.fitted[case]] >= 100 * largest)
-    clear = found >= 100 * largest
-    assert clear[:5].all() and study.fitted[case].sum() <= clear.sum()
-    assert abs(convergence.slope(problem.steps[clear], found[clear]) - 4) <= 0.2
 
 
 # ---- Fit and verdict ---------------------------------------------------------------------------
@@ -256,16 +168,6 @@ def test_damaged_exact_states_are_refused(tmp_path: Path, content: str | None, r
         (model / "references/smooth_inputs/exact.json").write_text(content)
     with pytest.raises(UserError, match=f"exact.json: {reason}"):
         convergence.load(path, declared(MODEL.name))
-
-
-def test_report_shows_a_failure(problem: Problem, tmp_path: Path) -> None:
-    errors = np.array([problem.steps, problem.steps, problem.steps**3, problem.steps**4])
-    broken = Convergence(problem, errors)
-    index = ReportWriter(tmp_path).write({}, studies=[broken])
-    assert "FAILED" in index.read_text(encoding="utf-8")
-    page = (tmp_path / "studies" / f"{PATH.stem}.html").read_text(encoding="utf-8")
-    assert "1st derivatives: slope" in page
-    assert "intermediate update" not in page  # of an FMU of FMI 2.0
 
 
 # ---- Command line ------------------------------------------------------------------------------

@@ -19,7 +19,6 @@ from rparm.fmi.model import Variable
 from rparm.runs import comparison, simulation
 from rparm.runs.simulation import Result
 from tests.support.rparm_project import (
-    BUILD,
     FMUS,
     LONG,
     SHORT,
@@ -73,13 +72,6 @@ def test_one_version_needs_no_other(
         assert (code, err) == (0, "") and "bits" not in out and "FMI" not in out
         page = (report / "scenarios" / f"{SHORT}.html").read_text(encoding="utf-8")
         assert f"RPManipulator (FMI {full})" in page and "bits" not in page
-
-
-@pytest.mark.parametrize("name", [NAME, f"fmi3/{NAME}"])
-def test_an_fmu_of_either_version_can_be_given(project: Path, console: Console, name: str) -> None:
-    arguments = ["run", SHORT, "--tolerance", "1e-8", "--report", project / "report"]
-    code, out, err = console(*arguments, "--fmu", BUILD / name)
-    assert (code, err) == (0, "") and "bits" not in out and "passed: 1 scenario; " in out
 
 
 def test_one_bit_that_differs_fails(
@@ -183,18 +175,6 @@ def test_the_models_are_the_same(path: Path) -> None:
 
 
 # ---- failures ------------------------------------------------------------------------------------
-
-
-def test_fmu_with_another_token(fmu: Path, tmp_path: Path) -> None:
-    def change(xml: str) -> str:
-        return xml.replace('instantiationToken="', 'instantiationToken="x', 1)
-
-    reason = r"token\.fmu: fmi3InstantiateCoSimulation failed: .*(?i:token)"
-    with (
-        Fmu(repacked(fmi3_fmu(fmu), tmp_path / "token.fmu", change)) as other,
-        pytest.raises(UserError, match=reason),
-    ):
-        simulation.simulate(other, load(SHORT))
 
 
 def test_the_folder_of_binaries_of_fmi_2_is_not_looked_at(fmu: Path, tmp_path: Path) -> None:

@@ -29,7 +29,6 @@ from tests.support.programs import python
 from tests.support.rparm_project import (
     BUILD,
     FMUS,
-    MISTAKES,
     SHORT,
     Console,
     declared,
@@ -108,11 +107,6 @@ def test_sources_use_what_every_system_has(path: Path) -> None:
     assert list(not_portable(ast.parse(path.read_text(encoding="utf-8")))) == []
 
 
-@pytest.mark.parametrize(("line", "found"), MISTAKES["portability"]["rows"])
-def test_what_not_every_system_has_is_noticed(line: str, found: str) -> None:
-    assert list(not_portable(ast.parse(line))) == [found]
-
-
 # ---- Names of files ------------------------------------------------------------------------------
 
 # characters and names that Windows keeps for itself
@@ -135,11 +129,6 @@ def test_names_in_the_archives_suit_every_system() -> None:
 @pytest.mark.parametrize("top", ["rparm", "fmu", "models", "src", "tests"])
 def test_names_in_the_project_suit_every_system(top: str) -> None:
     assert unusable([path.relative_to(ROOT).as_posix() for path in (ROOT / top).rglob("*")]) == []
-
-
-@pytest.mark.parametrize("names", [["a:b"], ["x/con.c"], ["x./y"], ["x/a?"], ["x/A.c", "x/a.c"]])
-def test_names_that_do_not_are_noticed(names: list[str]) -> None:
-    assert unusable(names) == names
 
 
 # ---- Runs ----------------------------------------------------------------------------------------
