@@ -19,7 +19,9 @@ from rparm.campaign.runs import Plugin
 from rparm.errors import UserError
 from tests.campaign.cluster import processes
 from tests.campaign.cluster.processes import (
+    ENVIRONMENT,
     blocks,
+    cluster,
     completed,
     finish,
     kill_group,
@@ -31,7 +33,7 @@ from tests.campaign.cluster.processes import (
 )
 from tests.campaign.files import ARM, campaign, write
 from tests.campaign.runners import engine_of, rows, runner
-from tests.support.hosts import LOOPBACK
+from tests.support.hosts import LOOPBACK, Host, Network
 from tests.support.paths import FMI_HEADERS, ROOT
 from tests.support.rparm_project import FMUS, Console, declared
 from tests.support.ssp_files import edited
@@ -317,3 +319,87 @@ def test_its_replay_ends_with_a_message(crashing: Path, tmp_path: Path, console:
     code, out, _ = console(*arguments, CRASHES)
     assert code == 1
     assert "m2 = 3.0" in out and out.endswith("failed: the run takes its process down\n")
+
+
+# ---- Scheduler and workers on different hosts ----------------------------------------------------
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Programs that soon take a connection for dead; 11 s are the least that Dask takes."""
+    monkeypatch.setitem(ENVIRONMENT, "DASK_DISTRIBUTED__COMM__TIMEOUTS__TCP", "11s")
+    monkeypatch.setitem(ENVIRONMENT, "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT", "5s")
+
+
+@pytest.fixture(params=["loopback", "namespaces"])
+def hosts(request: pytest.FixtureRequest) -> tuple[Host, Host]:
+    """Where the campaign and the scheduler are, and where the workers are."""
+    if request.param == "loopback":
+        return LOOPBACK, LOOPBACK
+    made = request.getfixturevalue("apart")
+    return made.here, made.there
+
+
+def test_two_hosts_make_the_same_table(
+    file: Path, undisturbed: str, hosts: tuple[Host, Host], tmp_path: Path
+) -> None:
+    here, there = hosts
+    with cluster(here, [there, there]) as (address, scheduler, arms):
+        process = start(file, tmp_path / "apart", "--scheduler", address, host=here)
+        wait_for(lambda: blocks(tmp_path / "apart") >= 3)
+        os.kill(arms[0].pid, signal.SIGKILL)  # the other one continues
+        code, out, err = finish(process)
+        assert code == 0, err
+        assert table(out) == undisturbed
+        process = start(file, tmp_path / "lost", "--scheduler", address, host=here)
+        wait_for(lambda: blocks(tmp_path / "lost") >= 3)
+        os.kill(scheduler.pid, signal.SIGKILL)
+        code, _, err = finish(process)
+        assert code == 2
+        assert err.splitlines()[-1].startswith("error: the scheduler is gone; the same command")
+        assert "Traceback" not in err
+    assert completed(file, tmp_path / "lost", "--workers", 1) == undisturbed
+
+
+@pytest.mark.usefixtures("impatient")
+def test_others_go_on_without_a_worker_whose_link_is_lost(
+    file: Path, undisturbed: str, apart: Network, tmp_path: Path
+) -> None:
+    with cluster(apart.here, [apart.here, apart.there]) as (address, _, arms):
+        registered(arms[1])
+        process = start(file, tmp_path, "--scheduler", address, host=apart.here)
+        wait_for(lambda: blocks(tmp_path) >= 3)
+        apart.cut()
+        assert process.poll() is None
+        code, out, err = finish(process)
+    assert code == 0, err
+    assert table(out) == undisturbed
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_campaign_begins_without_a_worker_whose_link_is_lost(
+    file: Path, undisturbed: str, apart: Network, tmp_path: Path
+) -> None:
+    with cluster(apart.here, [apart.here, apart.there]) as (address, _, arms):
+        for worker in arms:
+            registered(worker)
+        apart.cut()
+        options = ("--scheduler", address)
+        assert completed(file, tmp_path, *options, host=apart.here) == undisturbed
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_lost_link_to_the_scheduler_ends_a_campaign(
+    file: Path, undisturbed: str, apart: Network, tmp_path: Path
+) -> None:
+    with cluster(apart.there, [apart.there]) as (address, *_):
+        options = ("--scheduler", address)
+        process = start(file, tmp_path, *options, host=apart.here)
+        wait_for(lambda: blocks(tmp_path) >= 3)
+        apart.cut()
+        code, _, err = finish(process)
+        assert code == 2
+        assert err.splitlines()[-1].startswith("error: the scheduler is gone; the same command")
+        assert "Traceback" not in err
+        apart.mend()
+        assert completed(file, tmp_path, *options, host=apart.here) == undisturbed

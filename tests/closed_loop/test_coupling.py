@@ -12,7 +12,6 @@ from rparm.models.closed_loop.coupling import loop as closed_loop
 from rparm.models.closed_loop.coupling import report, study
 from rparm.models.closed_loop.coupling.loop import METHODS, REFERENCE_AHEAD, REFERENCES, ClosedLoop
 from rparm.models.closed_loop.coupling.study import (
-    FAST_AND_SLOW,
     FAST_STOP,
     FastAndSlow,
     StepErrors,
@@ -180,16 +179,6 @@ def test_step_doubling_takes_fewer_steps(loop: ClosedLoop, motion: FastAndSlow) 
 
 def test_the_motion_meets_its_reference(motion: FastAndSlow) -> None:
     assert motion.check() <= 1e-6
-
-
-def test_the_reference_of_the_motion_is_up_to_date(tmp_path: Path) -> None:
-    from rparm.models.closed_loop.references import make_references
-    from rparm.models.reference_files import write_variant
-
-    write_variant(tmp_path, make_references.fast_and_slow())
-    made = tmp_path / FAST_AND_SLOW.name
-    rows = [np.loadtxt(path, delimiter=",", skiprows=1) for path in (made, FAST_AND_SLOW)]
-    np.testing.assert_allclose(*rows, rtol=0, atol=1e-13)
 
 
 # ---- The command ---------------------------------------------------------------------------------

@@ -103,5 +103,3 @@ def test_libcosim_is_at_the_reference_of_its_order(
     result = libcosim(path, names, system.steps, tmp_path)
     for name in names:
         assert difference(result[name][rows - 1], expected[name][1:]) <= BOUND, name
-
-

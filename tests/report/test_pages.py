@@ -1,17 +1,22 @@
 """The pages of a report in a browser: quiet, readable, complete."""
 
+import random
 import re
+from dataclasses import replace
 from pathlib import Path
-from urllib.parse import quote
+from urllib.parse import quote, unquote, urlsplit
 
+import lxml.html
 import pytest
 
 from rparm import project
 from rparm.report.system_page import MOST_ROWS
 from rparm.systems import comparison, ssp
-from tests.report.conftest import LATE, SCENARIOS, STRANGE, VARIANT, show
+from tests.identification.synthetic import ARM, write
+from tests.report.conftest import CONTENT, LATE, SCENARIOS, STRANGE, VARIANT, show
 from tests.rparm.test_accuracy import OF_SCENARIOS
-from tests.support.browser import Browser
+from tests.support.browser import INVALID, Browser, Firefox
+from tests.support.rparm_project import Console
 
 # bytes of a report, so that it stays small
 WHOLE = 12_000_000
@@ -257,3 +262,131 @@ def test_the_whole_report_stays_small(report: Path) -> None:
     assert numbers[VARIANT] / 2 < len(csv.read_text("utf-8").split(",")) <= numbers[VARIANT]
     assert csv.stat().st_size <= numbers[VARIANT] * OF_NUMBER
     assert len(numbers) >= 10 and whole < WHOLE
+
+
+# ---- The start page ------------------------------------------------------------------------------
+
+
+LOOP = """name = "Bench"
+step = 0.01
+stop = 0.2
+[components]
+arm = "RPManipulator"
+control = "RPController"
+[connections]
+"control.q1" = "arm.q1"
+"arm.tau1" = "control.tau1"
+[parameters]
+"arm.q1" = 0.3
+"""
+CAMPAIGN = """title = "Payload"
+description = "Another second link."
+scenario = "hanging_swing"
+time = { stop = 0.1 }
+sampling = "sobol"
+runs = 8
+[parameters.m2]
+uniform = [0.5, 1.5]
+[keep]
+final = ["q1"]
+"""
+IDENTIFY = (
+    *("--inputs", "tau1", "f2", "--measured", "q1", "q2", "--parameters", "m2"),
+    *("--set", "I1z=0.12", "a=110mm", "l1=0.55"),
+)
+QUICK = "constant_effort_single_step"
+# a command -> the names of its results
+COMMANDS = {
+    ("run", QUICK): [QUICK, "accuracy"],
+    ("run", "late_start", "--tolerance", "1e-8"): ["late_start"],
+    ("run", "mine.toml"): ["mine"],
+    ("system", "bench.toml"): ["Bench_default"],
+    ("coupling", "bench.toml"): ["Bench_default"],
+    ("linearize", "RPPlant"): ["RPPlant"],
+    ("linearize", "RPPlant", "--at", "q1=30deg"): ["RPPlant"],
+    ("identify", "RPManipulator", "log.csv", *IDENTIFY): ["RPManipulator"],
+    ("campaign", "payload.toml", "--workers", "1", "--no-dashboard"): ["payload"],
+    ("campaign", "payload.toml", "--replay", "3"): ["run_3"],
+    ("prove", QUICK): [QUICK],
+}
+
+
+def links(page: Path) -> list[Path]:
+    """The files that a page leads to by plain links."""
+    tree = lxml.html.fromstring(page.read_bytes())
+    addresses = [urlsplit(link) for link in tree.xpath("//a/@href")]
+    return [(page.parent / unquote(x.path)).resolve() for x in addresses if x.path]
+
+
+def test_each_result_is_listed_once_and_opens(
+    console: Console, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever the order of the commands: from the start page to each page and back."""
+    monkeypatch.chdir(tmp_path)
+    for name, text in (("mine", CONTENT), ("bench", LOOP), ("payload", CAMPAIGN)):
+        Path(f"{name}.toml").write_text(text, encoding="utf-8")
+    write(replace(ARM, duration=2.0), Path("log.csv"), 1)
+    order = random.Random(45).sample(list(COMMANDS), len(COMMANDS))
+    for command in (*order, order[0]):
+        code, out, err = console(*command, "--output", "all")
+        assert code == 0, (command, out, err)
+        assert "all/" in out.splitlines()[-1] and " --open" in out.splitlines()[-1], command
+    index = Path("all/index.html").resolve()
+    found = links(index)
+    names = [name for some in COMMANDS.values() for name in some]
+    assert len(found) == len(set(found)) == len(names)
+    pages = {page for page in index.parent.rglob("*.html") if page != index}
+    assert pages == set(found)
+    for page in pages:
+        assert index in links(page), page
+    for style in lxml.html.fromstring(index.read_bytes()).xpath("//link[@rel='stylesheet']/@href"):
+        assert (index.parent / style).is_file()
+
+
+def test_it_searches_filters_and_sorts(browser: Browser, report: Path) -> None:
+    """Without scripts all lines are there; with them those that were asked for."""
+    browser.open(report / "index.html")
+    shown = (
+        "Object.entries(arguments[0]).forEach(([id, value]) => {"
+        " document.getElementById(id).value = value;"
+        " document.getElementById(id).dispatchEvent(new Event('input', {bubbles: true})); });"
+        "return [...document.querySelectorAll('.what a')].filter(x => x.offsetParent)"
+        ".map(x => x.innerText)"
+    )
+    every = browser.run(shown, {})
+    assert browser.run(shown, {"search": LATE.upper(), "kind": "scenario"}) == [LATE]
+    assert browser.run(shown, {"search": "", "kind": "", "verdict": "completed"}) == [STRANGE]
+    assert browser.run(shown, {"verdict": "", "kind": "system"}) == [VARIANT]
+    by_name = browser.run(shown, {"kind": "", "sort": "name"})
+    assert by_name == sorted(every, key=str.lower) != every
+    assert browser.run(shown, {"sort": ""}) == every
+
+
+# ---- The browsers of the tests -------------------------------------------------------------------
+
+WRONG = """<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>Page</title>
+<link rel="icon" href="data:,"></head><body><main><h1>Page</h1><div style="width: 1000px">x</div>
+<p style="color: #aaa">Text</p><img src="data:,"><math><msub><mi>x</mi></msub></math>
+<img alt="" src="https://example.org/a.png"><script>
+console.error("wrong"); console.warn("odd"); fetch("http://a.test/"); nothing();
+</script></main></body></html>"""
+
+
+def test_what_pages_must_not_do_is_noticed(each_browser: Browser, tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    page.write_text(WRONG, encoding="utf-8")
+    each_browser.open(page, width=400, dark=True, reduced_motion=True, scale=2)
+    for _ in range(1000):
+        each_browser.update()
+        if len(each_browser.requests) == 2:
+            break
+    with pytest.raises(AssertionError) as caught:
+        each_browser.check_quiet()
+    words = ["wrong", "odd", "nothing", *[INVALID] * isinstance(each_browser, Firefox)]
+    assert all(word in str(caught.value) for word in words)
+    assert each_browser.overflow() >= 600
+    found = {text.partition(":")[0] for text in each_browser.violations()}
+    assert found == {"color-contrast", "image-alt"}
+    shown = "return [innerWidth, devicePixelRatio, ...arguments[0].map(x => matchMedia(x).matches)]"
+    queries = ["(prefers-color-scheme: dark)", "(prefers-reduced-motion: reduce)"]
+    assert each_browser.run(shown, queries) == [400, 2, True, True]

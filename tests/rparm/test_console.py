@@ -4,6 +4,7 @@ import argparse
 import json
 import math
 import random
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -11,19 +12,30 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rparm import command_line, result_tables
+from rparm import command_line, project, result_tables
 from rparm import project as project_folders
 from rparm.command_line import COMMANDS
 from rparm.commands import run as run_command
+from rparm.commands.completion import SCRIPT, SHELLS
 from rparm.console import json_line, results_stream, stage, verdict_line
 from rparm.fmi.fmu_file import Fmu
 from rparm.result_tables import RunTable, SweepTable
 from rparm.runs.comparison import TOLERANCES, Run, Runs, Sweep
 from rparm.units import seconds, short, shortened
 from tests.support.paths import ROOT
-from tests.support.programs import python
-from tests.support.rparm_project import FMUS, LONG, MISTAKES, SHORT, Console, load
-from tests.support.ssp_files import SSP
+from tests.support.programs import RPARM, python, run
+from tests.support.rparm_project import (
+    FMUS,
+    LONG,
+    MISTAKES,
+    NAMES,
+    SHORT,
+    Console,
+    fmi3_fmu,
+    load,
+    reference_file,
+    repacked,
+)
 
 RANDOM = random.Random(5)
 ERRORS = (0.0, 1e-300, 9.96e-10, 0.99999, 1e22, math.inf, math.nan)
@@ -40,14 +52,14 @@ def widest(capsys: pytest.CaptureFixture[str]) -> int:
 
 
 @pytest.fixture(scope="module")
-def run() -> Run:
+def done() -> Run:
     with Fmu(FMUS["rp_manipulator"]) as fmu:
         return Runs({"rp_manipulator": fmu}).run(load(SHORT), 1e-8)
 
 
 @pytest.mark.parametrize("columns", [200, 80, 60])
 def test_no_table_is_wider_than_the_terminal(
-    run: Run, columns: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    done: Run, columns: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Whatever the names, the numbers and what has failed."""
     monkeypatch.setenv("COLUMNS", str(columns))
@@ -60,8 +72,8 @@ def test_no_table_is_wider_than_the_terminal(
             for name, tolerance in zip(known, tolerances, strict=True):
                 error, time = RANDOM.choice(ERRORS), 10 ** RANDOM.uniform(-4, 5)
                 steps = RANDOM.choice((1, 999_999, 10_000_000))
-                result = replace(run.result, tolerance=tolerance, steps=steps, wall_time=time)
-                wrong = replace(run, result=result, errors={"a_long_name_of_a_variable": error})
+                result = replace(done.result, tolerance=tolerance, steps=steps, wall_time=time)
+                wrong = replace(done, result=result, errors={"a_long_name_of_a_variable": error})
                 table.row(name, tolerance, [wrong], ["tolerance 1e-11: did not run to its end"])
                 table.row(name, tolerance, [], ["did not run"])
         assert widest(capsys) <= limit
@@ -69,7 +81,7 @@ def test_no_table_is_wider_than_the_terminal(
             sweeps = SweepTable(known, TOLERANCES)
             for name in known:
                 errors = tuple(RANDOM.choice(ERRORS) for _ in TOLERANCES)
-                scenario = replace(run.scenario, name=name)
+                scenario = replace(done.scenario, name=name)
                 sweeps.row(Sweep(scenario, TOLERANCES, errors, ["error " * 30, "x" * 100]))
             times = [10 ** RANDOM.uniform(0, 6) for _ in range(3)]
             table = result_tables.FederationTable(known, 1e-12)
@@ -257,13 +269,203 @@ def test_stages_are_for_terminals(
         assert capsys.readouterr().err == ""
 
 
-def test_systems_fit_into_80_columns(tmp_path: Path, console: Console) -> None:
-    arguments = ("system", "nominal", "--ssp", SSP, "--report", tmp_path / "r")
+# ---- What all commands have ----------------------------------------------------------------------
+
+
+# what each command cannot do without
+NEEDED = MISTAKES["needed"]
+COMMON = ["--json", "--quiet", "--output", "here", "--open"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_them(command: str) -> None:
+    arguments = [command, *NEEDED.get(command, []), *COMMON]
+    options = command_line.parsed(arguments)
+    assert options.json and options.quiet and options.open
+    assert Path("here") in vars(options).values()
+    for option in (["--json"], ["--quiet"], ["--open"], ["--output", "here"]):
+        alone = vars(command_line.parsed([command, *NEEDED.get(command, []), *option]))
+        without = vars(command_line.parsed([command, *NEEDED.get(command, [])]))
+        assert sum(alone[name] != without[name] for name in alone) == 1
+
+
+@pytest.fixture
+def shown(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What a browser is given."""
+    addresses: list[str] = []
+    monkeypatch.setattr("webbrowser.open_new_tab", lambda url: bool(addresses.append(url)) or True)
+    return addresses
+
+
+def test_a_new_scenario_goes_into_a_folder_and_is_shown(
+    tmp_path: Path, shown: list[str], console: Console
+) -> None:
+    folder = tmp_path / "below" / "here"
+    assert console("new", "mine", "--output", folder, "--open")[0] == 0
+    assert (folder / "mine.toml").is_file() and shown == [(folder / "mine.toml").as_uri()]
+    (tmp_path / "taken").touch()
+    assert "taken" in console.refused("new", "mine", "--output", tmp_path / "taken")
+
+
+def test_the_playground_is_copied_and_shown(
+    tmp_path: Path, shown: list[str], monkeypatch: pytest.MonkeyPatch, console: Console
+) -> None:
+    page = tmp_path / "index.html"
+    page.write_text("the page", encoding="utf-8")
+    monkeypatch.setattr(project, "playground_page", lambda: page)
+    code, out, _ = console("playground", "--output", tmp_path / "mine", "--open", "--json")
+    copy = tmp_path / "mine" / "playground.html"
+    assert (code, copy.read_text(encoding="utf-8")) == (0, "the page")
+    assert json.loads(out) == {"exit_code": 0, "page": str(copy)} and shown == [copy.as_uri()]
+
+
+def test_a_command_without_a_page_writes_its_document_and_says_that_there_is_none(
+    tmp_path: Path, shown: list[str], console: Console
+) -> None:
+    code, out, err = console("list", "--json", "--quiet", "--output", tmp_path, "--open")
+    assert code == 0 and err == "--open: list has written no page\n" and shown == []
+    assert (tmp_path / "list.json").read_text(encoding="utf-8") == out
+    (tmp_path / "taken").touch()
+    error = console.refused("list", "--output", tmp_path / "taken")
+    assert "taken/list.json: cannot be written" in error
+
+
+def test_an_fmu_is_copied(tmp_path: Path, console: Console) -> None:
+    for arguments, built in ((["RPPlant"], "build"), (["rp_plant", "--fmi", "3"], "build/fmi3")):
+        folder = tmp_path / built
+        code, out, _ = console("fmu", *arguments, "--output", folder)
+        file = folder / "RPPlant.fmu"
+        assert code == 0 and out.startswith(f"{file}: FMI ")
+        assert file.read_bytes() == (ROOT / built / "RPPlant.fmu").read_bytes()
+    assert "no model 'RPPlants'" in console.refused("fmu", "RPPlants")
+
+
+# ---- completion ----------------------------------------------------------------------------------
+
+BASH = """
+source "$1"; shift
+COMP_WORDS=("$@") COMP_CWORD=$(($# - 1))
+function=$(complete -p "$1" | sed 's/.* -F \\([^ ]*\\) .*/\\1/')
+$function
+printf '%s\\n' "${COMPREPLY[@]}"
+"""
+
+
+@pytest.fixture(scope="module")
+def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("completion") / "script"
+    file.write_text(python(*RPARM, "completion", "bash", check=True).stdout, encoding="utf-8")
+    return file
+
+
+@pytest.mark.parametrize(
+    ("words", "wanted"), [*MISTAKES["completes"]["rows"], (["completion", ""], list(SHELLS))]
+)
+def test_bash_completes(script: Path, tmp_path: Path, words: list[str], wanted: list[str]) -> None:
+    (tmp_path / "my_scenario.toml").touch()
+    (tmp_path / "my_notes.txt").touch()
+    (tmp_path / "my folder").mkdir()
+    done = run("bash", "-c", BASH, "bash", script, SCRIPT, *words, cwd=tmp_path, check=True)
+    assert done.stdout.split("\n")[:-1] == wanted
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_every_shell_has_a_script(shell: str, tmp_path: Path, console: Console) -> None:
+    code, out, err = console("completion", shell)
+    assert (code, err) == (0, "") and SCRIPT in out and "hanging_swing" in out
+    assert console("completion", shell, "--output", tmp_path)[0] == 0
+    assert (tmp_path / SHELLS[shell]).read_text(encoding="utf-8") == out
+
+
+ARM = FMUS["rp_manipulator"]
+
+
+def test_run_passes(project: Path, fmu: Path, console: Console) -> None:
+    folder = project / "report"
+    code, out, err = console("run", "--fmu", fmu, "--report", folder)
+    assert code == 0 and err == ""
+    rows = [line.split() for line in out.splitlines() if line.endswith("passed")]
+    assert [[*row[:2], row[4]] for row in rows] == [[LONG, "500", "1e-8"], [SHORT, "1", "1e-8"]]
+    for row in rows:  # an error at each tolerance, in rows of one length
+        assert len(row) == len(rows[0]) and float(row[2]) < 1e-6 and float(row[5]) < 1e-8
+    assert "errors follow the tolerance, 1e-4 to 1e-11: 2 scenarios" in out
+    assert f"passed: 2 scenarios; {folder / 'index.html'}; open it: " in out.splitlines()[-1]
+    assert out.endswith(" --open\n")
+    for page in (f"scenarios/{SHORT}", "studies/accuracy"):
+        assert (folder / f"{page}.html").is_file()
+
+
+def test_run_of_one_scenario_at_one_tolerance(project: Path, fmu: Path, console: Console) -> None:
+    folder = project / "report"
+    arguments = ("run", SHORT, SHORT, "--tolerance", "1e-6", "--fmu", fmu, "--report", folder)
     code, out, _ = console(*arguments)
-    table = out.split("passed: ")[0]
-    assert code == 0 and max(map(len, table.splitlines())) <= 80
-    assert "passed: 1 variant; " in out.splitlines()[-1]
-    code, out, err = console(*arguments, "--json")
-    (variant,) = document(out)["variants"]
-    assert code == 0 and variant["passed"] and 0 < variant["error"] <= variant["bound"]
-    assert "passed: 1 variant; " in err.splitlines()[-1]
+    assert code == 0 and "passed: 1 scenario; " in out
+    assert out.partition("passed: ")[0].count("1e-6") == 1 and "1e-11" not in out
+    assert not (folder / "studies/accuracy.html").exists()
+
+
+def test_slow_scenarios_called_by_name_are_not_swept(
+    project: Path, fmu: Path, console: Console, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run_command, "QUICK", 0.0)
+    code, out, _ = console("run", SHORT, "--fmu", fmu, "--report", project / "report")
+    assert code == 0 and f"{SHORT}: no sweep" in out and "error at tolerance" not in out
+
+
+def test_run_with_a_worse_reference_fails(project: Path, fmu: Path, console: Console) -> None:
+    file = reference_file(project, LONG)
+    lines = file.read_text().splitlines()
+    header, row = lines[0].split(","), lines[250].split(",")
+    column = header.index('"ee_vy"')
+    row[column] = repr(float(row[column]) + 1e-3)
+    lines[250] = ",".join(row)
+    file.write_text("\n".join(lines) + "\n")
+    code, out, err = console("run", "--fmu", fmu, "--report", project / "report")
+    assert code == 1 and err == ""
+    assert len(re.findall("(?m)^  tolerance 1e-(8|11): error .* of ee_vy, above its", out)) == 2
+    assert "  FAILED: error" in out and f"\nfailed: 1 scenario: {LONG}; " in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        *((mistake["arguments"], mistake["message"]) for mistake in MISTAKES["command"]),
+        (["run", "--fmi", "2", "--fmu", fmi3_fmu(ARM)], "is an FMU of FMI 3.0, --fmi wants 2.0"),
+        (["run", "--fmi", "3", "--fmu", ARM], "is an FMU of FMI 2.0, --fmi wants 3.0"),
+    ],
+)
+def test_mistakes_of_the_user(
+    project: Path, console: Console, arguments: list[object], reason: str
+) -> None:
+    assert reason in console.refused(*arguments)
+
+
+def test_fmus_with_another_token(project: Path, console: Console) -> None:
+    for path, token, said in (
+        (ARM, "guid", "fmi2Instantiate failed: the GUID 'x"),
+        (fmi3_fmu(ARM), "instantiationToken", "fmi3InstantiateCoSimulation failed: "),
+    ):
+        wrong = {"old": f'{token}="', "new": f'{token}="x'}
+        other = repacked(path, project / "x.fmu", lambda xml, w=wrong: xml.replace(*w.values(), 1))
+        error = console.failed("run", SHORT, "--fmu", other, "--report", project / "report")
+        assert f"x.fmu: {said}" in error and "token" in error.lower() + "token" * (path == ARM)
+
+
+@pytest.mark.parametrize("command", [("run", SHORT), ("system", "nominal"), ("coupling",)])
+def test_reports_where_no_files_can_be(
+    tmp_path: Path, console: Console, command: tuple[str, ...]
+) -> None:
+    """Root may write everywhere but to /proc; systems without it have folders without rights."""
+    closed = Path("/proc")
+    if not closed.is_dir():
+        closed = tmp_path / "closed"
+        closed.mkdir(mode=0o500)
+    (tmp_path / "taken").touch()
+    for folder in (closed, closed / "new", tmp_path / "taken", tmp_path / "taken" / "new"):
+        assert "cannot be written" in console.refused(*command, "--report", folder)
+
+
+def test_runs_from_anywhere(tmp_path: Path) -> None:
+    lines = python("-m", "rparm", "list", folder=tmp_path, check=True).stdout.splitlines()
+    assert [line.split()[0] for line in lines] == NAMES
+    assert all(load(name).title in line for name, line in zip(NAMES, lines, strict=True))

@@ -13,7 +13,7 @@ import pytest
 from rparm.errors import UserError
 from rparm.runs import inputs, scenario
 from rparm.runs.scenario import Scenario
-from tests.rparm.test_boolean_inputs import SWITCHED
+from tests.rparm.test_scenario import SWITCHED
 from tests.support.rparm_project import FMUS, MISTAKES, Console
 from tests.support.tables import cases
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, TOY, toy

@@ -1,6 +1,7 @@
 """The master and its step-size control, on oscillators x'' = -omega^2 x + gain u."""
 
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from rparm.systems import step_control
 from rparm.systems.master import Master, Snapshot
 from rparm.systems.python_component import PythonComponent
 from rparm.systems.structure import Connection
+from tests.support.paths import ROOT
 from tests.support.rparm_project import BUILD, MISTAKES, fmi3_fmu
 
 H, STEPS = 0.05, 40
@@ -429,3 +431,86 @@ def test_mistakes_in_python_are_named_in_one_line(
     assert "\n" not in str(caught.value)
     assert caught.value.code == code
     assert isinstance(caught.value, CodeError) == (code == 1)
+
+
+# ---- Booleans: a trajectory attaches a payload to the plant and its controller -------------------
+
+
+COMPONENTS = {"trajectory": "RPTrajectory", "controller": "RPController", "plant": "RPPlant"}
+REFERENCES = [f"{d}q{i}_ref" for d in ("", "d", "dd") for i in (1, 2)]
+STATES = ("q1", "q2", "dq1", "dq2")
+SWITCHES = [
+    Connection("trajectory", "payload_attached", end, "payload_attached")
+    for end in ("controller", "plant")
+]
+REAL = [
+    *(Connection("trajectory", name, "controller", name) for name in REFERENCES),
+    *(Connection("plant", name, "controller", name) for name in STATES),
+    *(Connection("controller", name, "plant", name) for name in ("tau1", "f2")),
+]
+# 0: the reference rests until 0.5 s
+WRENCH = [
+    Connection("trajectory", "ddq2_ref", "plant", name) for name in ("ee_fx", "ee_fy", "ee_mz")
+]
+PAYLOAD = {"payload_mass": 1.0, "payload_inertia": 0.004, "payload_x": 0.02, "payload_z": 0.05}
+STEP_SIZE, GRASP = 2.0**-9, 2.0**-6  # s; the grasp is a communication point
+
+
+@pytest.fixture(scope="module", params=["2.0", "3.0"])
+def fmus(request: pytest.FixtureRequest) -> Iterator[dict[str, Fmu]]:
+    folder = ROOT / "build" / ("fmi3" if request.param == "3.0" else "")
+    with ExitStack() as stack:
+        yield {
+            name: stack.enter_context(Fmu(folder / f"{fmu}.fmu"))
+            for name, fmu in COMPONENTS.items()
+        }
+
+
+def wired(fmus: dict[str, Fmu], **options: str) -> Master:
+    return Master(fmus, [*REAL, *WRENCH, *SWITCHES], **options)
+
+
+def carrying(grasp: float) -> dict[str, dict[str, float]]:
+    carried = {"grasp_time": grasp, "release_time": 1.0}
+    plant = {"damping2": 20.0, "relative_tolerance": 1e-10}
+    return {"trajectory": carried, "controller": dict(PAYLOAD), "plant": plant | PAYLOAD}
+
+
+@pytest.mark.parametrize("order", ["jacobi", "gauss_seidel"])
+@pytest.mark.parametrize("inputs", ["held", "extrapolated"])
+def test_all_follows_a_switch_at_its_time(fmus: dict[str, Fmu], order: str, inputs: str) -> None:
+    """At the grasp, efforts are those of a start with the payload from the same state."""
+    with wired(fmus, order=order, inputs=inputs) as master:
+        master.initialize(0.0, None, carrying(GRASP))
+        rows = master.run(np.arange(round(GRASP / STEP_SIZE) + 2) * STEP_SIZE)
+        before, after, later = (dict(zip(master.names, row, strict=True)) for row in rows[-3:])
+    start = carrying(0.0)
+    start["plant"] |= {name: after[f"plant.{name}"] for name in STATES}
+    with wired(fmus) as other:
+        other.initialize(0.0, None, start)
+        wanted = dict(zip(other.names, other.values, strict=True))
+    assert after["controller.tau1"] == pytest.approx(wanted["controller.tau1"], rel=1e-12)
+    assert after["controller.tau1"] > before["controller.tau1"] + 4.0
+    # the plant carries the payload from the next step on: until then it shows an acceleration,
+    # which is the slope of dq1 in that step
+    assert after["plant.ddq1"] > 10.0
+    assert abs(later["plant.ddq1"]) < (1.0 if inputs == "extrapolated" else 1e-12)
+
+
+def test_going_back_over_a_switch_repeats_bit_for_bit(fmus: dict[str, Fmu]) -> None:
+    with wired(fmus) as master:
+        master.initialize(0.0, None, carrying(GRASP))
+        master.run(np.arange(5) * STEP_SIZE)
+        with Snapshot(master) as snapshot:
+            snapshot.take()
+            first = master.run(np.arange(4, 17) * STEP_SIZE)
+            snapshot.restore()
+            np.testing.assert_array_equal(master.run(np.arange(4, 17) * STEP_SIZE), first)
+
+
+def test_a_boolean_feeds_a_boolean_only(fmus: dict[str, Fmu]) -> None:
+    wrong = Connection("trajectory", "payload_attached", "plant", "tau1")
+    with pytest.raises(UserError, match=r"payload_attached -> plant\.tau1: a Boolean feeds"):
+        Master(fmus, [wrong])
+    with pytest.raises(UserError, match=r"^plant\.payload_attached: is connected more than once"):
+        Master(fmus, [*REAL, *WRENCH, *SWITCHES, SWITCHES[-1]])

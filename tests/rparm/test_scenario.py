@@ -1,7 +1,8 @@
-"""Reading of scenarios: what right files give, how they are found, and what mistakes are told."""
+"""Reading of scenarios: what right files give, how they are found, a line for each mistake."""
 
 import math
 import re
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,16 @@ import pytest
 
 from rparm import project
 from rparm.errors import UserError
-from rparm.runs import scenario
-from tests.support.rparm_project import MISTAKES
+from rparm.fmi.fmu_file import CO_SIMULATION, INSTANCES, Fmu
+from rparm.fmi.model import METHOD, SMALLEST_TOLERANCES, TOLERANCE
+from rparm.runs import scenario, simulation
+from rparm.runs import scenario as scenarios
+from rparm.runs.comparison import Runs
+from rparm.runs.scenario import Scenario
+from rparm.systems.master import Master
+from rparm.systems.structure import Connection
+from tests.support.rparm_project import BUILD, FMUS, MISTAKES, SHORT, Console, declared, fmi3_fmu
+from tests.support.ssp_files import SSP, edited, replace
 from tests.support.tables import cases
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, TOY, timed, toy
 
@@ -39,13 +48,10 @@ def test_everything_given(write) -> None:
     assert not run.times.flags.writeable and not run.inputs["force"].flags.writeable
 
 
-def test_only_what_is_needed(write) -> None:
+def test_what_is_not_given_has_its_start_value(write) -> None:
     run = scenario.load(write(HEAD + TIME), TOY)
     assert run.parameters == run.initial == run.inputs == {}
     assert run.reference_rows.tolist() == [0, 1, 2, 3, 4]
-
-
-def test_what_is_not_given_has_its_start_value(write) -> None:
     run = scenario.load(write(f"{HEAD}{TIME}[parameters]\nmass = 3\n[initial]\nspeed = 1\n"), TOY)
     assert run.start_values == {
         "mass": 3.0, "speed": 1.0, "force": 2.5, "gear": 2, "max_steps": 7, "quiet": False,
@@ -172,27 +178,16 @@ def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_find_by_name(write, root: Path) -> None:
+def test_a_scenario_is_found_by_its_name(write, root: Path) -> None:
+    assert project.scenario_files() == {}
     first, second = write("", "swing"), write("", "fall")
     write("").with_name("README.md").write_text("")
     assert project.scenario_files()["swing"] == first
     assert project.scenario_file("fall") == second
-
-
-def test_find_suggests_a_name(write, root: Path) -> None:
-    write("", "swing")
-    write("", "fall")
-    message = re.escape("no scenario 'swinf', did you mean 'swing'? (./run.sh list names them)")
-    with pytest.raises(UserError, match=f"^{message}$"):
-        project.scenario_file("swinf")
-    with pytest.raises(UserError, match=re.escape("no scenario 'x' (./run.sh")):
-        project.scenario_file("x")
-
-
-def test_find_without_scenarios(root: Path) -> None:
-    assert project.scenario_files() == {}
-    with pytest.raises(UserError, match=re.escape("no scenario 'x' (./run.sh")):
-        project.scenario_file("x")
+    for name, guess in (("swinf", ", did you mean 'swing'?"), ("x", "")):
+        message = re.escape(f"no scenario '{name}'{guess} (./run.sh list names them)")
+        with pytest.raises(UserError, match=f"^{message}$"):
+            project.scenario_file(name)
 
 
 def test_two_models_with_a_scenario_of_the_same_name(write, root: Path) -> None:
@@ -254,17 +249,12 @@ def test_mistake_is_explained_in_one_line(write, text: str, message: str) -> Non
     assert said.startswith(f"{path}: ") and message in said and "\n" not in said
 
 
-def test_missing_file(write) -> None:
-    path = write("").with_name("none.toml")
-    with pytest.raises(UserError, match=rf"^{re.escape(str(path))}: no such file$"):
-        scenario.load(path, TOY)
-
-
-def test_bytes_that_are_not_text(write) -> None:
-    path = write("")
+def test_what_is_no_text_is_refused(write) -> None:
+    path, none = write(""), write("").with_name("none.toml")
     path.write_bytes(b"title = '\xff'")
-    with pytest.raises(UserError, match="not UTF-8 text, at byte 9"):
-        scenario.load(path, TOY)
+    for wrong, message in ((path, "not UTF-8 text, at byte 9"), (none, "no such file$")):
+        with pytest.raises(UserError, match=f"^{re.escape(str(wrong))}: {message}"):
+            scenario.load(wrong, TOY)
 
 
 @pytest.mark.parametrize(("keys", "message"), MISTAKES["elsewhere"]["rows"])
@@ -276,3 +266,222 @@ def test_what_a_scenario_elsewhere_is_of(tmp_path: Path, keys: str, message: str
     with pytest.raises(UserError, match=f"^{re.escape(str(path))}: {message}") as error:
         scenario.load(path, TOY)
     assert "\n" not in str(error.value)
+
+
+# ---- Boolean inputs ------------------------------------------------------------------------------
+
+
+SWITCHED = toy(
+    DESCRIPTION.replace(
+        "  </ModelVariables>",
+        '<ScalarVariable name="brake" valueReference="11" causality="input" variability="discrete">'
+        '<Boolean start="true"/></ScalarVariable>'
+        '<ScalarVariable name="level" valueReference="12" causality="input" variability="discrete">'
+        '<Integer start="3"/></ScalarVariable></ModelVariables>',
+    )
+)
+
+
+def brake(write: Callable[..., object], text: str, time: str = TIME) -> np.ndarray:
+    return scenario.load(write(f"{HEAD}{time}[inputs.brake]\n{text}\n"), SWITCHED).inputs["brake"]
+
+
+def test_a_boolean_is_held(write) -> None:
+    """At its start value, a constant, or from each time of a table on."""
+    table = "table = [[0.25, true], [0.5, false], [0.9, true]]"
+    for values, expected in (
+        (scenario.load(write(HEAD + TIME), SWITCHED).input("brake"), [True] * 5),
+        (brake(write, "constant = false"), [False] * 5),
+        (brake(write, table), [True, True, False, False, True]),
+    ):
+        assert values.dtype == bool and values.tolist() == expected
+    assert not values.flags.writeable
+
+
+def test_rounding_of_times_does_not_delay_a_switch(write) -> None:
+    """n steps of 0.1 s from 0.3 s on are often a bit less than n / 10 s after the start."""
+    for n in range(1, 10):
+        table = f"table = [[0, false], [{n / 10}, true]]"
+        values = brake(write, table, f"[time]\nstart = 0.3\nstop = {0.3 + 1.0}\nstep = 0.1\n")
+        assert values.tolist() == [False] * n + [True] * (11 - n)
+
+
+@pytest.mark.parametrize(("text", "message"), MISTAKES["scenario_with_brake"]["rows"])
+def test_mistakes_are_explained(write, text: str, message: str) -> None:
+    path = write(f"{HEAD}{TIME}[inputs.brake]\n{text}\n")
+    with pytest.raises(UserError) as caught:
+        scenario.load(path, SWITCHED)
+    said = str(caught.value)
+    assert said.startswith(f"{path}: ") and message in said and "\n" not in said
+
+
+def test_other_types_and_other_shapes_are_refused(write) -> None:
+    with pytest.raises(UserError, match=r"level\]: is of type Integer, expected Real or Boolean$"):
+        scenario.load(write(f"{HEAD}{TIME}[inputs.level]\nconstant = 1\n"), SWITCHED)
+    with pytest.raises(UserError, match="constant: expected a number, got true"):
+        scenario.load(write(f"{HEAD}{TIME}[inputs.force]\nconstant = true\n"), SWITCHED)
+
+
+# ---- runs of the wheel ---------------------------------------------------------------------------
+
+
+@pytest.fixture(params=["fmi2", "fmi3"])
+def wheel(request: pytest.FixtureRequest) -> Iterator[Fmu]:
+    path = BUILD / "tests" / "wheel" / "Wheel.fmu"
+    with Fmu(path if request.param == "fmi2" else fmi3_fmu(path)) as fmu:
+        yield fmu
+
+
+INPUTS = "[inputs.speed]\nconstant = 3.0\n[inputs.is_counting]\n"
+
+
+def test_a_boolean_input_and_parameter_reach_the_fmu(
+    write, wheel: Fmu, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    counted: list[tuple[float, int]] = []
+    read = wheel.model.variables["turns"].reference
+    instance_class = INSTANCES[wheel.model.fmi_version, CO_SIMULATION]
+    do_step = instance_class.do_step
+
+    def step_and_read(self, start: float, length: float, goes_back: bool = False) -> None:
+        do_step(self, start, length, goes_back)
+        counted.append((start + length, self._integer(read)))
+
+    monkeypatch.setattr(instance_class, "do_step", step_and_read)
+    text = timed(0, 10, 1) + "[parameters]\nis_reversed = true\n" + INPUTS
+    text += "table = [[0, false], [4, true], [7, false]]\n"
+    loaded = scenario.load(write(text), wheel.model)
+    monkeypatch.setattr(simulation, "_steps_made", 0)  # else the compiled loop may step
+    simulation.simulate(wheel, loaded)
+    assert [time for time, _ in counted] == list(range(1, 11))
+    for time, turns in counted:
+        expected = -np.floor(3.0 * time / (2 * np.pi)) if 4 < time <= 7 else 0
+        assert turns == expected
+
+
+def test_only_boolean_inputs(write, wheel: Fmu) -> None:
+    text = f"{timed(0, 2, 1)}[initial]\nangle = 1.0\n[inputs.is_counting]\nconstant = false\n"
+    result = simulation.simulate(wheel, scenario.load(write(text), wheel.model))
+    assert set(result.values[:, result.names.index("angle")]) == {1.0}
+
+
+def turns(wheel: Fmu, counting: object) -> int | None:
+    """Turns that one of two wheels counts, which give each other their speed in a master."""
+    other = [Connection("a", "angle", "b", "speed"), Connection("b", "angle", "a", "speed")]
+    with Master({"a": wheel, "b": wheel}, other) as master:
+        start = {"angle": 20.0, "is_counting": counting}
+        master.initialize(0.0, None, {"a": start, "b": {"angle": 1.0}})
+        instance = master.components["a"].instance
+        return instance.integer("turns")
+
+
+def test_a_master_leaves_boolean_inputs_at_their_start(wheel: Fmu) -> None:
+    assert turns(wheel, True) == 3
+    assert turns(wheel, False) == 0
+    with pytest.raises(UserError, match=r"^a\.is_counting: expected true or false, got 1$"):
+        turns(wheel, 1)
+
+
+# ---- Tolerances that a method of integration cannot reach ----------------------------------------
+
+
+TOLERANT = MISTAKES["tolerances"]["SCENARIO"]
+
+
+def with_tolerance(folder: Path, method: str, tolerance: float, parameter: float = 0.0) -> Scenario:
+    text = TOLERANT.format(tolerance=tolerance, method=method, parameter=parameter)
+    path = folder / "x.toml"
+    path.write_text(text, encoding="utf-8")
+    return scenarios.load(path, declared("rp_manipulator"))
+
+
+def effective_tolerance(fmu: Fmu, method: str, tolerance: float) -> float:
+    """What the FMU integrates at."""
+    with fmu.instance("x") as instance:
+        instance.set_up(0.0, 1.0)
+        instance.set(METHOD, fmu.model.variables[METHOD].items[method])
+        instance.set(TOLERANCE, tolerance)
+        instance.enter_initialization()
+        instance.exit_initialization()
+        value = instance.reals(["effective_relative_tolerance"])
+        value.get()
+        return float(value.view[0])
+
+
+def test_the_smallest_tolerances_are_those_of_the_fmus() -> None:
+    """Above it a tolerance makes a difference, below it none, in both versions of FMI."""
+    for folder in FMUS:
+        methods = declared(folder).variables.get(METHOD)
+        assert methods is None or set(methods.items) == set(SMALLEST_TOLERANCES)
+    for path in (FMUS["rp_manipulator"], fmi3_fmu(FMUS["rp_manipulator"])):
+        with Fmu(path) as fmu:
+            for method, smallest in SMALLEST_TOLERANCES.items():
+                least = effective_tolerance(fmu, method, smallest)
+                assert effective_tolerance(fmu, method, 2 * smallest) == pytest.approx(
+                    2 * least, rel=1e-9
+                )
+                for factor in (0.5, 1e-3, 1e-18):
+                    assert effective_tolerance(fmu, method, factor * smallest) == pytest.approx(
+                        least, rel=1e-9
+                    )
+
+
+@pytest.mark.parametrize("method", SMALLEST_TOLERANCES)
+def test_what_a_method_cannot_reach_is_refused(tmp_path: Path, method: str) -> None:
+    smallest = SMALLEST_TOLERANCES[method]
+    for good in (smallest, math.nextafter(smallest, 1), 1e-4):
+        assert with_tolerance(tmp_path, method, good).smallest_tolerance == smallest
+        with_tolerance(tmp_path, method, 1e-8, good)
+    for bad in (math.nextafter(smallest, 0), smallest / 2, 1e-30, 5e-324):
+        for arguments, key in (((bad,), "tolerance"), ((1e-8, bad), "[parameters] relative_")):
+            with pytest.raises(UserError, match=re.escape(f"x.toml: {key}")) as caught:
+                with_tolerance(tmp_path, method, *arguments)
+            assert f"the smallest of {method}, got {bad!r}" in str(caught.value)
+
+
+def test_errors_are_estimated_down_to_the_smallest_tolerance(tmp_path: Path) -> None:
+    """From a run that is another one."""
+    with Fmu(FMUS["rp_manipulator"]) as fmu:
+        runs = Runs({"rp_manipulator": fmu})
+        for method, smallest in SMALLEST_TOLERANCES.items():
+            scenario = with_tolerance(tmp_path, method, smallest)
+            assert 0 < runs.estimated(scenario, smallest).error < 1e-8
+
+
+@pytest.mark.parametrize(("tolerance", "code"), [("4.9999e-12", 2), ("5e-12", 0)])
+def test_the_option_of_run(tmp_path: Path, console: Console, tolerance: str, code: int) -> None:
+    arguments = ("run", SHORT, "--fmi", "2", "--tolerance", tolerance, "--report", tmp_path / "r")
+    if code == 0:
+        assert console(*arguments)[0] == 0
+        return
+    words = f"--tolerance: {SHORT}: expected at least 5e-12, the smallest of cvode_adams"
+    assert words in console.refused(*arguments) and not (tmp_path / "r").exists()
+
+
+def test_systems_and_campaigns(tmp_path: Path, console: Console) -> None:
+    place = "resources/arm_nominal.ssv"
+    fine = edited(SSP, tmp_path / "fine.ssp", {place: replace('"1e-11"', '"5e-12"')})
+    assert console("system", "--list", "--ssp", fine)[0] == 0
+    path = edited(SSP, tmp_path / "bad.ssp", {place: replace('"1e-11"', '"4.9e-12"')})
+    error = console.refused("system", "--list", "--ssp", path)
+    assert "component 'arm': 'relative_tolerance': expected at" in error
+
+
+CAMPAIGN = MISTAKES["tolerances"]["CAMPAIGN"]
+
+
+@pytest.mark.parametrize(("section", "expected"), MISTAKES["tolerances"]["rows"])
+def test_of_campaigns(tmp_path: Path, section: str, expected: str) -> None:
+    planning = pytest.importorskip("rparm.campaign.planning")
+    from rparm.campaign import bases, campaign_file
+
+    path = tmp_path / "test.toml"
+    path.write_text(f"{CAMPAIGN}{section}\n", encoding="utf-8")
+    given = campaign_file.read(path)
+    with bases.opened(given, None, path) as base:
+        if not expected:
+            planning.plan(given, base, path)
+            return
+        with pytest.raises(UserError, match=re.escape(f"test.toml: {expected}")) as caught:
+            planning.plan(given, base, path)
+    assert "expected at least 5e-12, the smallest of cvode_adams, got 1e-1" in str(caught.value)

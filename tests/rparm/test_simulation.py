@@ -1,19 +1,35 @@
 """One run of an FMU on fmpy, and FMUs that cannot be run."""
 
 import re
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pytest
 from fmpy import fmi2
 
+import rparm
 from rparm import files
 from rparm.console import Progress
-from rparm.errors import UserError
+from rparm.errors import StoppedError, UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.runs import simulation
-from tests.support.rparm_project import LONG, MISTAKES, SHORT, edit, fmi3_fmu, load, repacked
+from rparm.runs.scenario import Scenario
+from rparm.runs.simulation import Result
+from tests.support.rparm_project import (
+    FMUS,
+    LONG,
+    MISTAKES,
+    NAMES,
+    SHORT,
+    edit,
+    fmi3_fmu,
+    load,
+    repacked,
+)
 from tests.support.ssp_files import edited
 
 
@@ -28,13 +44,6 @@ def test_rows_are_what_an_importer_reads(opened: Fmu) -> None:
     column = dict(zip(result.names, result.values.T, strict=True))
     power = held["tau1"] * column["dq1"] + held["f2"] * column["dq2"]
     np.testing.assert_allclose(column["actuator_power"], power, rtol=1e-12, atol=1e-12)
-
-
-def test_progress_counts_all_steps(opened: Fmu, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulation, "PROGRESS_EVERY", 0.0)
-    counted: list[int] = []
-    result = simulation.simulate(opened, load(LONG), progress=counted.append)
-    assert sum(counted) == result.steps and len(counted) > 1
 
 
 def test_progress_is_silent_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
@@ -156,3 +165,108 @@ def test_fmu_with_a_binary_that_is_cut_off(fmu: Path, tmp_path: Path, kept: int)
     with pytest.raises(UserError, match=refused), Fmu(path) as other:
         simulation.simulate(other, load(SHORT))
     assert Path.cwd() == here
+
+
+# ---- The compiled loop ---------------------------------------------------------------------------
+
+
+both_versions = pytest.mark.parametrize("version", [2, 3])
+
+
+def of_version(folder: str, version: int) -> Fmu:
+    return Fmu(FMUS[folder] if version == 2 else fmi3_fmu(FMUS[folder]))
+
+
+@pytest.fixture(autouse=True)
+def which_loop(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+    """Names of the loops that ran."""
+    ran: list[str] = []
+    for name in ("_step_through", "_step_compiled"):
+        loop = getattr(simulation, name)
+
+        def named(*arguments: object, loop: Callable = loop, name: str = name) -> object:
+            ran.append(name)
+            return loop(*arguments)
+
+        monkeypatch.setattr(simulation, name, named)
+    monkeypatch.setattr(simulation, "_steps_made", 0)
+    return ran
+
+
+def assert_same(fmu: Fmu, scenario: Scenario) -> Result:
+    """Both loops make the same of a scenario; what it is."""
+    plain, fast = (simulation.simulate(fmu, scenario, compiled=x) for x in (False, True))
+    assert plain.names == fast.names and plain.messages == fast.messages
+    for name in ("tolerance", "steps", "solver_steps", "solver_rhs_evaluations"):
+        assert getattr(plain, name) == getattr(fast, name)
+    assert plain.values.tobytes() == fast.values.tobytes()
+    assert plain.times.tobytes() == fast.times.tobytes() and not fast.integers
+    return fast
+
+
+@both_versions
+@pytest.mark.parametrize("name", NAMES)
+def test_a_scenario_has_the_same_bits(name: str, version: int, which_loop: list[str]) -> None:
+    scenario = replace(load(name), panels=())
+    with of_version(scenario.model, version) as fmu:
+        result = assert_same(fmu, scenario)
+    assert len(result.values) == len(scenario.reference_rows)
+    assert which_loop == ["_step_through", "_step_compiled"]
+
+
+@both_versions
+def test_a_step_that_fails_keeps_the_rows_before_and_the_message(version: int) -> None:
+    scenario = replace(load("constant_effort"), reference_every=3)
+    force = np.where(np.arange(len(scenario.times)) < 100, 1.0, 1e308)
+    scenario = replace(scenario, inputs={**scenario.inputs, "f2": force})
+    with of_version("rp_manipulator", version) as fmu:
+        stopped = []
+        for compiled in (False, True):
+            with pytest.raises(StoppedError) as caught:
+                simulation.simulate(fmu, scenario, compiled=compiled)
+            stopped.append(caught.value)
+    plain, fast = stopped
+    assert str(plain) == str(fast) and "in the step from t = 1.0 s failed" in str(fast)
+    assert len(fast.result.times) == 34 and fast.result.solver_steps is None
+    assert plain.result.values.tobytes() == fast.result.values.tobytes()
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_progress_counts_all_steps_and_may_interrupt(
+    monkeypatch: pytest.MonkeyPatch, compiled: bool
+) -> None:
+    monkeypatch.setattr(simulation, "PROGRESS_EVERY", 0.0)
+    counted: list[int] = []
+
+    def interrupt(_: int) -> NoReturn:
+        raise KeyboardInterrupt
+
+    with of_version("rp_manipulator", 2) as fmu:
+        scenario = load("sine_efforts")
+        simulation.simulate(fmu, scenario, progress=counted.append, compiled=compiled)
+        assert sum(counted) == len(scenario.times) - 1 and len(counted) > 3
+        with pytest.raises(KeyboardInterrupt):
+            simulation.simulate(fmu, scenario, progress=interrupt, compiled=compiled)
+        assert_same(fmu, scenario)
+
+
+def test_it_is_used_where_it_pays(monkeypatch: pytest.MonkeyPatch, which_loop: list[str]) -> None:
+    """After enough steps of one process, by programs at once, and never for drawn Integers."""
+    monkeypatch.setattr(simulation, "WORTH_COMPILING", 1200)
+    with of_version("rp_manipulator", 2) as fmu:
+        for _ in range(4):
+            simulation.simulate(fmu, load("constant_effort"))
+    rparm.Scenario("constant_effort").run()
+    rparm.simulate(FMUS["rp_manipulator"], stop_time=1.0, step=0.1)
+    with of_version("rp_plant", 2) as fmu:
+        assert simulation.simulate(fmu, load("stick_slip")).integers
+    plain, compiled = ["_step_through"], ["_step_compiled"]
+    assert which_loop == plain * 2 + compiled * 4 + plain
+
+
+def test_without_numba_the_plain_loop_runs(
+    monkeypatch: pytest.MonkeyPatch, which_loop: list[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "rparm.fmi.compiled_loop", None)
+    table = rparm.simulate(FMUS["rp_manipulator"], stop_time=1.0, step=0.1)
+    assert len(table["time"]) == 11 and which_loop == ["_step_through"]

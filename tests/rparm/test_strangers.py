@@ -11,9 +11,10 @@ import pytest
 
 from rparm import project
 from rparm.command_line import file_or_name, retyped
+from rparm.interruption import uninterrupted
 from rparm.needs import NO_READER
 from tests.support.paths import ROOT
-from tests.support.programs import run
+from tests.support.programs import python, run
 from tests.support.rparm_project import BUILD, MISTAKES, Console
 
 COMMAND = [sys.executable, "-P", "-m", "rparm"]
@@ -105,7 +106,7 @@ def test_toml_names_no_such_file(odd_folder: Path, console: Console) -> None:
 # ---- Terminals and readers -----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("columns", [1, 2, 3, 9, 0, -1])
+@pytest.mark.parametrize("columns", [1, 9, 0, -1])
 def test_a_terminal_may_be_narrow(
     columns: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, console: Console
 ) -> None:
@@ -138,3 +139,101 @@ def test_a_current_folder_that_is_gone_is_named(arguments: list[str], tmp_path: 
     done = run(*command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)})
     assert done.returncode == 2 and "the current folder cannot be used: " in done.stderr
     assert done.stderr.count("error:") == 1
+
+
+# ---- Signals between the making of a thing and its assignment ------------------------------------
+
+
+# Sends itself a signal right after the call of a function with a certain number.
+PROGRAM = """
+import os, signal, subprocess, sys
+from rparm.__main__ import _as_program
+
+kind, number, stop, *sys.argv[1:] = sys.argv[1:]
+made = []
+
+def interrupted(function, is_meant):
+    def call(*arguments, **options):
+        result = function(*arguments, **options)
+        if is_meant(arguments):
+            made.append(result)
+            if len(made) == int(number):
+                print("made", result, flush=True)
+                os.kill(os.getpid(), getattr(signal, stop))
+        return result
+    return call
+
+if kind == "folder":
+    is_ours = lambda arguments: os.path.basename(arguments[0]).startswith("rparm-")
+    os.mkdir = interrupted(os.mkdir, is_ours)
+else:
+    is_child = lambda arguments: "rparm.systems.ecos" in arguments[0]
+    subprocess._fork_exec = interrupted(subprocess._fork_exec, is_child)
+sys.exit(_as_program())
+"""
+
+
+def stopped(folder: Path, stop: str, kind: str, number: int, *command: str) -> str:
+    """Run a command until it is stopped; the line that says what had just been made."""
+    environment = {"TMPDIR": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+    done = python("-c", PROGRAM, kind, number, stop, *command, environment=environment)
+    expected = {"SIGINT": (130, "interrupted\n"), "SIGTERM": (143, "")}
+    assert (done.returncode, done.stderr) == expected[stop]
+    return next(line for line in done.stdout.splitlines() if line.startswith("made"))
+
+
+@pytest.mark.parametrize(
+    ("stop", "kind", "number", "command"),
+    [
+        ("SIGTERM", "folder", 1, ("run", "wall_inclined")),
+        ("SIGINT", "folder", 1, ("system", "nominal")),
+        ("SIGTERM", "folder", 3, ("system", "nominal")),
+        ("SIGINT", "process", 1, ("system", "nominal")),
+    ],
+    ids=["folder of an FMU", "folder of a system", "folder of a run of Ecos", "process of Ecos"],
+)
+def test_what_has_just_been_made(
+    tmp_path: Path, stop: str, kind: str, number: int, command: tuple[str, ...]
+) -> None:
+    line = stopped(tmp_path, stop, kind, number, *command, "--report", str(tmp_path / "report"))
+    assert list(tmp_path.iterdir()) == []
+    if kind == "process":
+        with pytest.raises(ProcessLookupError):
+            os.kill(int(line.split()[1]), 0)
+
+
+def test_signals_wait_until_the_end_of_the_outer_block(tmp_path: Path) -> None:
+    program = """
+import os, signal
+from rparm.interruption import handle_endings, uninterrupted
+received = handle_endings()
+done = []
+try:
+    with uninterrupted():
+        with uninterrupted():
+            os.kill(os.getpid(), signal.SIGTERM)
+            done.append(1)
+        done.append(2)
+        os.kill(os.getpid(), signal.SIGINT)
+    done.append(3)
+except SystemExit as end:
+    print(done, end.code, [signal.Signals(n).name for n in received])
+with uninterrupted():
+    print("goes on")
+"""
+    done = python("-c", program, check=True)
+    assert done.stdout == "[1, 2] 143 ['SIGTERM', 'SIGINT']\ngoes on\n"
+
+
+def test_an_exception_in_a_block_stays_what_it_is() -> None:
+    with pytest.raises(ValueError, match="of the block"), uninterrupted():
+        raise ValueError("of the block")
+
+
+def test_an_interrupt_that_was_caught_does_not_set_the_exit_code(tmp_path: Path) -> None:
+    (tmp_path / "interrupted.py").write_text(
+        "from rparm import __main__ as program\n"
+        "try: exec('raise KeyboardInterrupt')\n"  # as where numba is imported
+        "except KeyboardInterrupt: program._end(130)\n"
+    )
+    assert python("-m", "interrupted", folder=tmp_path).returncode == 130

@@ -1,6 +1,5 @@
 """Pages in headless Chromium and Firefox, without network: what they show, request and report."""
 
-import base64
 import json
 import shutil
 import subprocess
@@ -148,13 +147,6 @@ class Browser:
             for node in found["nodes"]
         ]
 
-    def screenshot(self, path: Path, *, whole: bool = False) -> None:
-        """Write a picture of the view, or of the whole page, as PNG."""
-        answer = self._command(
-            "Page.captureScreenshot", {"format": "png", "captureBeyondViewport": whole}
-        )
-        path.write_bytes(base64.b64decode(answer["data"]))
-
     def _command(self, name: str, parameters: dict[str, Any]) -> Any:
         return self.driver.execute_cdp_cmd(name, parameters)
 
@@ -282,11 +274,6 @@ class Firefox(Browser):
         )
         assert answer["type"] == "success", answer["exceptionDetails"]["text"]
         return json.loads(answer["result"]["value"])
-
-    def screenshot(self, path: Path, *, whole: bool = False) -> None:
-        part = {"context": self._tab, "origin": "document" if whole else "viewport"}
-        answer = self._command("browsingContext.captureScreenshot", part)
-        path.write_bytes(base64.b64decode(answer["data"]))
 
     def _command(self, name: str, parameters: dict[str, Any]) -> Any:
         answer = self._connection.send_cmd(name, parameters)
