@@ -1,6 +1,5 @@
 """The player: plays, goes to a time, obeys keys, and suits who looks at it."""
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -28,7 +27,8 @@ def label(page: Browser) -> str:
 
 
 def test_nothing_moves_before_it_is_asked_to(page: Browser) -> None:
-    time.sleep(0.2)
+    next_frame = "new Promise(done => requestAnimationFrame(done))"
+    page.run(f"return {next_frame}.then(() => {next_frame})")
     assert row(page) == 0
     assert label(page) == "Play"
 

@@ -59,13 +59,6 @@ def test_strangers_are_refused(client: Client, user: int | None) -> None:
     assert said["answers"] == dict.fromkeys(places, expected)
 
 
-@pytest.mark.parametrize("scheme", ["tcp", "tls"])
-def test_a_client_without_credentials_is_refused(client: Client, scheme: str) -> None:
-    address = client.scheduler.address.replace("tls", scheme)
-    with pytest.raises((OSError, TypeError)):
-        Client(address, timeout=2)
-
-
 def listening(process: psutil.Process) -> set[tuple[str, int]]:
     """Where a process and those that it started take messages from the network."""
     found = set()

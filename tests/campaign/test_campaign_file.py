@@ -35,15 +35,6 @@ def test_a_mistake_is_refused(row: list[str], tmp_path: Path, console: Console) 
     assert not output.exists()
 
 
-def test_the_file_that_the_mistakes_are_made_in_is_right(tmp_path: Path) -> None:
-    given = campaign(tmp_path)
-    with bases.opened(given, None) as base:
-        job = planning.plan(given, base, "test")
-    assert [name for name, _ in job.targets] == ["m2", "q1"]
-    assert job.steps == 200 and job.stop == 1.0
-    assert [m.column for m in job.measures][:2] == ["final(q1)", "final(q2)"]
-
-
 SYSTEM = HEAD + FILES["SYSTEM"]
 
 

@@ -19,15 +19,8 @@ from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, not_a_number,
 from tests.support.systems import BOUND, CASES, CLOSED_LOOP, System, difference
 
 SSP3 = SSP.parent / "fmi3" / SSP.name
-STATES = ("q1", "q2", "dq1", "dq2")
 STRUCTURE = "SystemStructure.ssd"
 REPORT = ("{0}.html", "{0}.csv")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def is_built() -> None:
-    if not SSP.is_file():
-        pytest.fail(f"{SSP}: no such file, ./run.sh builds it")
 
 
 # ---- the command ---------------------------------------------------------------------------------

@@ -91,15 +91,6 @@ def test_the_filter_knows_how_wrong_it_is(controlled: tuple[np.ndarray, ...]) ->
     assert abs(squares.mean() - 2.0) < 4.0 * np.sqrt(4.0 / len(squares))
 
 
-def test_the_filter_is_better_than_its_encoders(controlled: tuple[np.ndarray, ...]) -> None:
-    """Rates from differences of two measurements would be 1000 sqrt(2) times their noise wrong."""
-    true, estimated, _ = controlled
-    wrong = np.sqrt(np.mean((estimated - true)[1000:] ** 2, axis=0))
-    noise = lqr_and_kalman.ENCODER_NOISE
-    assert np.all(wrong[:2] < noise / 4)
-    assert np.all(wrong[2:] < np.sqrt(2) * noise / lqr_and_kalman.PERIOD / 100)
-
-
 def test_the_filter_settles_at_the_riccati_equation() -> None:
     """At the goal its covariance is that of the stationary filter of python-control."""
     model = lqr_and_kalman.Arm()
@@ -152,25 +143,6 @@ def test_a_free_motion_keeps_its_energy(environment: gymnasium_environment.ArmEn
         last, *_ = environment.step(np.zeros(2))
     assert np.abs(last - first).max() > 1.0
     assert energy(last) == pytest.approx(energy(first), abs=1e-6)
-
-
-def test_a_seed_gives_the_same_bits(environment: gymnasium_environment.ArmEnvironment) -> None:
-    def rollout(seed: int) -> np.ndarray:
-        states = [environment.reset(seed=seed)[0]]
-        actions = np.random.default_rng(0).uniform(-1.0, 1.0, (20, 2))
-        states += [environment.step(action)[0] for action in actions]
-        return np.array(states)
-
-    first, other = rollout(5), rollout(6)
-    assert not np.array_equal(first, other)
-    assert np.array_equal(first, rollout(5))
-
-
-def test_an_episode_has_its_length(environment: gymnasium_environment.ArmEnvironment) -> None:
-    environment.reset(seed=0)
-    for step in range(1, gymnasium_environment.STEPS + 1):
-        _, _, terminated, truncated, _ = environment.step(np.zeros(2))
-        assert not terminated and truncated == (step == gymnasium_environment.STEPS)
 
 
 def test_episodes_by_hand_end_at_the_goal(tmp_path: Path) -> None:

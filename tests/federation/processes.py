@@ -11,8 +11,9 @@ import psutil
 
 from tests.support.hosts import LOOPBACK, Host
 from tests.support.paths import ROOT
-from tests.support.ssp_files import SSP
+from tests.support.ssp_files import SSP, edited, replace
 
+LIMIT = 120.0  # s, far above what an end takes
 Process = subprocess.Popen
 Start = Callable[..., Process]  # by arguments of the command line, and the host
 
@@ -66,6 +67,19 @@ def federation(start: Start, *arguments: str, system: Path = SSP, host: Host = L
     return start("federation", "nominal", "--ssp", str(system), *arguments, host=host)
 
 
+def long(folder: Path) -> Path:
+    """The same system, whose run does not end before something else ends it."""
+    change = {"SystemStructure.ssd": replace('stopTime="6"', 'stopTime="600"')}
+    return edited(SSP, folder / "Long.ssp", change)
+
+
 def wait_for_steps(process: Process) -> None:
     """Read what a federation with components elsewhere prints, until it steps them."""
     assert any(line.startswith("connected: ") for line in process.stdout), "no steps"
+
+
+def ended(process: Process, code: int = 0) -> str:
+    """What a process prints that ends by itself, with this code."""
+    text, _ = process.communicate(timeout=LIMIT)
+    assert process.returncode == code, text
+    return text

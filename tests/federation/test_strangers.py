@@ -11,16 +11,21 @@ import pytest
 
 from rparm.federation import network
 from rparm.federation.network import KEY
-from tests.federation.processes import Process, Start, federation, wait_for_steps
+from tests.federation.processes import (
+    LIMIT,
+    Process,
+    Start,
+    ended,
+    federation,
+    long,
+    wait_for_steps,
+)
 from tests.support.hosts import DEVICE, Network
 from tests.support.paths import ROOT
 from tests.support.programs import run
-from tests.support.ssp_files import SSP, edited, replace
+from tests.support.ssp_files import SSP
 
 # ---- On this machine -----------------------------------------------------------------------------
-
-
-LIMIT = 120.0  # s
 
 
 def said(address: str, user: int | None, *arguments: str) -> str:
@@ -45,8 +50,7 @@ def test_strangers_change_nothing(start: Start, user: int | None) -> None:
     for arguments in (["arm"], ["other", "--observer"]):
         assert said(address, user, *arguments).startswith("refused: "), arguments
     for process in (here, there):
-        text, _ = process.communicate(timeout=LIMIT)
-        assert process.returncode == 0, text  # the values are those of the master
+        ended(process)  # the values are those of the master
 
 
 def test_a_federation_has_one_port_on_loopback(start: Start) -> None:
@@ -72,17 +76,17 @@ def test_keys_that_can_be_guessed_are_refused(start: Start, wrong: str) -> None:
     with pytest.MonkeyPatch.context() as patched:
         patched.setenv(KEY, wrong)
         here = federation(start)
-    text, _ = here.communicate(timeout=LIMIT)
-    assert here.returncode == 2
-    assert text == f"error: {KEY}: expected 16 to 128 letters and digits in the environment\n"
+    assert (
+        ended(here, 2)
+        == f"error: {KEY}: expected 16 to 128 letters and digits in the environment\n"
+    )
 
 
 def test_a_component_elsewhere_needs_the_key(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(KEY)
     there = start("federate", str(SSP), "nominal", "arm", "--broker", "tcp://127.0.0.1:1")
-    text, _ = there.communicate(timeout=LIMIT)
-    assert there.returncode == 2
-    assert text == f"error: {KEY}: not in the environment, copy the whole line of the federation\n"
+    said = f"error: {KEY}: not in the environment, copy the whole line of the federation\n"
+    assert ended(there, 2) == said
 
 
 # ---- Two hosts -----------------------------------------------------------------------------------
@@ -103,29 +107,19 @@ def apart_from_the_arm(
 def test_two_hosts_give_the_values_of_one(start: Start, apart: Network) -> None:
     """The command compares them with those of the master."""
     for process in apart_from_the_arm(start, apart, SSP):
-        text, _ = process.communicate(timeout=LIMIT)
-        assert process.returncode == 0, text
+        ended(process)
 
 
 def test_a_lost_link_ends_both(start: Start, apart: Network, tmp_path: Path) -> None:
-    long = edited(
-        SSP,
-        tmp_path / "Long.ssp",
-        {"SystemStructure.ssd": replace('stopTime="6"', 'stopTime="600"')},
-    )
-    here, there = apart_from_the_arm(start, apart, long, "--silence", "10")
+    here, there = apart_from_the_arm(start, apart, long(tmp_path), "--silence", "10")
     wait_for_steps(here)
     apart.cut()
     for process, words in ((here, "arm has been silent"), (there, "23404 has been silent")):
-        text, _ = process.communicate(timeout=LIMIT)
-        assert process.returncode == 2, text
-        assert f"{words} for 10 s" in text.splitlines()[-1]
+        assert f"{words} for 10 s" in ended(process, 2).splitlines()[-1]
 
 
 def test_what_a_host_without_a_network_lacks_is_said(start: Start, apart: Network) -> None:
     command = ("ip", "address", "flush", "dev", DEVICE)
     subprocess.run([*apart.here.enter, *command], check=True)
     offline = federation(start, system=SSP, host=apart.here)
-    text, _ = offline.communicate(timeout=LIMIT)
-    assert offline.returncode == 2
-    assert "needs an IPv4 address besides 127.0.0.1" in text.splitlines()[-1]
+    assert "needs an IPv4 address besides 127.0.0.1" in ended(offline, 2).splitlines()[-1]

@@ -18,16 +18,3 @@ async function compared(rows) {
   const { values, other, difference } = curve;
   return { said, title, times: page.x, values, other, difference, traces: page.plots[0].drawing.data?.length };
 }
-
-/** Times in ms from a move of the slider until the frame after it is drawn. */
-async function responses(count) {
-  const found = [];
-  for (let i = 0; i < count; i++) {
-    const begin = performance.now();
-    page.bar.value = Math.floor((page.x.length * (i * 0.618)) % page.x.length);
-    page.bar.dispatchEvent(new Event('input', { bubbles: true }));
-    await new Promise((next) => { requestAnimationFrame(() => setTimeout(next)); });
-    found.push(performance.now() - begin);
-  }
-  return found.sort((a, b) => a - b);
-}

@@ -1,6 +1,5 @@
 """The cursor of a page: it shows the values that the page links, in all plots and the player."""
 
-from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import quote
 
@@ -9,10 +8,9 @@ import pytest
 from selenium.webdriver.common.keys import Keys
 
 from rparm.__main__ import main
-from rparm.report import scenario_page
 from rparm.report.run_data import ROUNDING
 from rparm.runs.comparison import SMALLEST_SCALE
-from tests.report.conftest import CONTENT, LATE, SCENARIOS, STRANGE, VARIANT, show
+from tests.report.conftest import LATE, SCENARIOS, STRANGE, VARIANT, show
 from tests.support.browser import Browser
 from tests.support.rparm_project import MISTAKES
 from tests.support.ssp_files import read_csv
@@ -182,20 +180,3 @@ def test_files_of_no_use_are_refused(tmp_path: Path, capsys: pytest.CaptureFixtu
         assert error.startswith("error: ") and str(file) in error and words in error
     assert main([*given, "--with", str(tmp_path)]) == 2
     assert f"{SCENARIOS[0]}.csv: no such file" in capsys.readouterr().err
-
-
-def test_how_soon_the_page_of_10000_rows_responds(
-    browser: Browser, tmp_path: Path, record_property: Callable[[str, object], None]
-) -> None:
-    """A report, no bound: 10 000 steps, and a page that shows all of their rows."""
-    file = tmp_path / "long.toml"
-    file.write_text(CONTENT.replace("step = 0.01", "step = 1e-4"), encoding="utf-8")
-    every = lambda columns: np.arange(len(columns[0]))  # noqa: E731
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(scenario_page, "thinned", every)
-        assert main(["run", str(file), "--report", str(tmp_path)]) == 0
-    show(browser, tmp_path / "files/long.html", width=1400)
-    assert browser.run("return page.x.length") == 10001
-    found = browser.run(f"{IN_PAGE} return responses(40)")
-    record_property("slider_ms", {"median": found[20], "largest": found[-1]})
-    print(f"slider of 10 000 rows: median {found[20]:.1f} ms, largest {found[-1]:.1f} ms")

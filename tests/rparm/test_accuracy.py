@@ -200,16 +200,6 @@ def refused(project: Path, name: str = LONG) -> str:
     return text
 
 
-def test_reads_references() -> None:
-    for name in NAMES:
-        loaded = load(name)
-        model = declared(loaded.model)
-        read = comparison.load_reference(loaded, model)
-        assert list(read.names) == model.real_outputs
-        assert read.values.shape == (len(loaded.reference_rows), len(read.names))
-        assert np.array_equal(read.times, loaded.times[loaded.reference_rows])
-
-
 def with_value(value: str) -> Change:
     """The last value of line 5 replaced."""
     return lambda lines: [*lines[:4], ",".join([*lines[4].split(",")[:-1], value]), *lines[5:]]
