@@ -33,33 +33,24 @@ def assert_bits_of_simulation(record: np.ndarray, names: Sequence[str], run: Sce
         assert np.array_equal(record[:, i], result.values[:, result.names.index(name)])
 
 
-@pytest.mark.parametrize("name", ["hanging_swing", "sine_efforts", "irregular_steps"])
+@pytest.mark.parametrize(
+    "name", ["hanging_swing", "sine_efforts", "irregular_steps", "grasp_at_rest"]
+)
 def test_a_run_has_the_bits_of_a_simulation(name: str, tmp_path: Path) -> None:
+    """With inputs of all kinds, Boolean ones too."""
+    scenario = load(name)
     changes = [("hanging_swing", name), ("time = { stop = 1.0 }\n", "")]
+    if scenario.model == "rp_plant":
+        changes.append(('integral = ["actuator_power"]\n', ""))
+        assert any(values.dtype == bool for values in scenario.inputs.values())
     with runner(campaign(tmp_path, changes=changes), tmp_path, OUTPUTS) as (runs, job, points):
         record = rows(runs, job, points, [17]).trajectories[17]
         m2, q1 = points.of(range(17, 18))[0]
-    scenario = load(name)
     changed = dataclasses.replace(
         scenario,
         parameters=scenario.parameters | {"m2": m2},
         initial=scenario.initial | {"q1": q1},
         reference_every=1,
-    )
-    assert_bits_of_simulation(record, job.watched, changed)
-
-
-def test_boolean_inputs_are_those_of_a_simulation(tmp_path: Path) -> None:
-    text = HEAD + (
-        'scenario = "grasp_at_rest"\nsampling = "random"\nruns = 1\n[parameters.damping1]\n'
-        "values = [0.0]\n[keep]\nfinal = ['q1']\nmaximum = ['q2']\ntrajectories = [0]\n"
-    )
-    scenario = load("grasp_at_rest")
-    assert any(values.dtype == bool for values in scenario.inputs.values())
-    with runner(campaign(tmp_path, text), tmp_path) as (runs, job, points):
-        record = rows(runs, job, points, [0]).trajectories[0]
-    changed = dataclasses.replace(
-        scenario, parameters=scenario.parameters | {"damping1": 0.0}, reference_every=1
     )
     assert_bits_of_simulation(record, job.watched, changed)
 

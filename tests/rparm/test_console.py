@@ -119,24 +119,6 @@ def document(out: str) -> dict:
     return json.loads(out, parse_constant=lambda text: pytest.fail(f"{text} is no JSON"))
 
 
-def test_a_run_is_a_document(project: Path, fmu: Path, console: Console) -> None:
-    arguments = ("run", "--fmu", fmu, "--report", project / "report", "--json")
-    code, out, err = console(*arguments)
-    found = document(out)
-    assert code == found["exit_code"] == 0 and found["passed"]
-    assert [s["name"] for s in found["scenarios"]] == [LONG, SHORT]
-    for scenario in found["scenarios"]:
-        assert [run["tolerance"] for run in scenario["runs"]] == [1e-8, 1e-11]
-        assert all(0 < run["error"] <= run["bound"] and run["passed"] for run in scenario["runs"])
-        assert len(scenario["sweep"]["errors"]) == len(TOLERANCES)
-    assert Path(found["report"]).is_file()
-    assert "passed: 2 scenarios; " in err and f"{LONG}  " in err
-    code, out, err = console(*arguments, "--quiet")
-    assert code == 0 and document(out)["passed"] and err == ""
-    code, out, err = console(*arguments[:-1], "--quiet")
-    assert (code, err, out.count("\n")) == (0, "", 1) and out.startswith("passed: 2 scenarios; ")
-
-
 @pytest.mark.parametrize(("arguments", "key"), MISTAKES["document"]["rows"])
 def test_every_command_prints_a_document(console: Console, arguments: list[str], key: str) -> None:
     """Also of a mistake, which is said on standard error as ever."""
@@ -380,19 +362,32 @@ def test_every_shell_has_a_script(shell: str, tmp_path: Path, console: Console) 
 ARM = FMUS["rp_manipulator"]
 
 
-def test_run_passes(project: Path, fmu: Path, console: Console) -> None:
+def test_a_run_passes(project: Path, fmu: Path, console: Console) -> None:
+    """And says so in a table, in a document and in one line."""
     folder = project / "report"
-    code, out, err = console("run", "--fmu", fmu, "--report", folder)
+    arguments = ("run", "--fmu", fmu, "--report", folder)
+    code, out, err = console(*arguments)
     assert code == 0 and err == ""
     rows = [line.split() for line in out.splitlines() if line.endswith("passed")]
     assert [[*row[:2], row[4]] for row in rows] == [[LONG, "500", "1e-8"], [SHORT, "1", "1e-8"]]
     for row in rows:  # an error at each tolerance, in rows of one length
         assert len(row) == len(rows[0]) and float(row[2]) < 1e-6 and float(row[5]) < 1e-8
     assert "errors follow the tolerance, 1e-4 to 1e-11: 2 scenarios" in out
-    assert f"passed: 2 scenarios; {folder / 'index.html'}; open it: " in out.splitlines()[-1]
-    assert out.endswith(" --open\n")
+    verdict = f"passed: 2 scenarios; {folder / 'index.html'}; open it: "
+    assert verdict in out.splitlines()[-1] and out.endswith(" --open\n")
     for page in (f"scenarios/{SHORT}", "studies/accuracy"):
         assert (folder / f"{page}.html").is_file()
+    code, out, err = console(*arguments, "--json")
+    found = document(out)
+    assert code == found["exit_code"] == 0 and found["passed"] and Path(found["report"]).is_file()
+    assert [s["name"] for s in found["scenarios"]] == [LONG, SHORT]
+    for scenario in found["scenarios"]:
+        assert [run["tolerance"] for run in scenario["runs"]] == [1e-8, 1e-11]
+        assert all(0 < run["error"] <= run["bound"] and run["passed"] for run in scenario["runs"])
+        assert len(scenario["sweep"]["errors"]) == len(TOLERANCES)
+    assert verdict in err and f"{LONG}  " in err
+    code, out, err = console(*arguments, "--quiet")
+    assert (code, err, out.count("\n")) == (0, "", 1) and out.startswith("passed: 2 scenarios; ")
 
 
 def test_run_of_one_scenario_at_one_tolerance(project: Path, fmu: Path, console: Console) -> None:
