@@ -70,7 +70,10 @@ def test_dark_and_light_have_colours_of_their_own(browser: Browser, report: Path
 
 
 def test_the_overview_leads_to_every_page(browser: Browser, report: Path) -> None:
+    """It is in view at once: it loads a style sheet, and no script but its own."""
     browser.open(report / "index.html")
+    files = [url.rpartition("/")[2] for url in browser.loaded if url.startswith("file:")]
+    assert files == ["index.html", "page.css"]
     links = browser.run("return [...document.links].map(link => link.getAttribute('href'))")
     assert sorted(links) == sorted(quote(name) for name in PAGES[1:])
     texts = browser.run(
@@ -84,30 +87,20 @@ def test_the_overview_leads_to_every_page(browser: Browser, report: Path) -> Non
     )
     assert len(lines) == len(PAGES) - 1
     assert all("between" in text and wide > 50 and length > 50 for text, wide, length in lines)
+    names = browser.run("return [...document.querySelectorAll('.line-of')].map(x => x.innerText)")
+    names = [name.partition(":")[0].removeprefix(", ") for name in names]
+    assert len(names) == len(PAGES) - 1 and {"q1", "plant.q1"} <= set(names)
 
 
-def test_the_overview_is_in_view_at_once(browser: Browser, report: Path) -> None:
-    """It loads a style sheet, and no script but its own."""
-    browser.open(report / "index.html")
-    assert [url.rpartition("/")[2] for url in browser.loaded if url.startswith("file:")] == [
-        "index.html",
-        "page.css",
-    ]
-
-
-def test_texts_of_users_are_no_markup(browser: Browser, report: Path) -> None:
+def test_the_page_of_a_file_says_what_ran_and_texts_are_no_markup(
+    browser: Browser, report: Path
+) -> None:
     show(browser, report / f"files/{STRANGE}.html")
     title = '</script><script>alert("1")</script> "Bögen" & <b>'
     assert browser.run("return document.querySelector('h1').innerText") == title
     assert browser.run("return document.title") == title
     assert browser.run("return page.data.title") == title
     assert browser.run("return document.querySelectorAll('h1 *, main > p *').length") == 0
-    browser.open(report / "index.html")
-    assert title in browser.run("return document.body.innerText")
-
-
-def test_the_page_says_what_ran(browser: Browser, report: Path) -> None:
-    show(browser, report / f"files/{STRANGE}.html")
     browser.run("document.querySelectorAll('details').forEach(x => { x.open = true; })")
     text = re.sub(r"\s+", " ", browser.run("return document.body.innerText"))
     for part in (
@@ -119,6 +112,8 @@ def test_the_page_says_what_ran(browser: Browser, report: Path) -> None:
         "Errors are estimated from a run of the same FMU at tolerance 1e-11",
     ):
         assert part in text, part
+    browser.open(report / "index.html")
+    assert title in browser.run("return document.body.innerText")
 
 
 def test_the_page_of_a_variant_says_what_it_is_and_how_it_was_solved(
@@ -128,6 +123,15 @@ def test_the_page_of_a_variant_says_what_it_is_and_how_it_was_solved(
     assert "The path leads through a hard wall. Run by Ecos" in browser.run(
         "return document.querySelector('main > p').innerText"
     )
+    texts = browser.run(
+        "return [...document.querySelectorAll('.drawing')].map(x => x.getAttribute('aria-label'))"
+    )
+    assert len(texts) == len(set(texts)) > 8
+    assert all(re.match(r"Plot of .* from .* to .*, between .* and ", text) for text in texts)
+    width, text = browser.run("return (x => [x.naturalWidth, x.alt])(document.images[0])")
+    assert width > 100 and "signals" in text
+    texts = browser.run("return [...document.querySelectorAll('.note')].map(x => x.innerText)")
+    assert any("is held (0)" in text and "(−1)" in text for text in texts)
     titles = browser.run("return [...document.querySelectorAll('summary')].map(x => x.innerText)")
     for component in ("trajectory", "controller", "actuator", "plant", "sensor", "environment"):
         assert f"All other start values of {component}" in titles
@@ -164,16 +168,12 @@ def test_each_swatch_is_that_of_its_curve(browser: Browser, report: Path) -> Non
         assert dashes == ("" if dash == "solid" else dash.replace("px", "").replace(",", " "))
 
 
-def test_the_cursor_shows_zero_where_the_axis_has_none(browser: Browser, report: Path) -> None:
+def test_an_error_of_0_is_a_gap_in_its_line(browser: Browser, report: Path) -> None:
+    """The page says so, the cursor shows 0, and a point between two gaps has a marker."""
     show(browser, report / f"files/{STRANGE}.html")  # its start is exact
     browser.run("page.seek(0)")
     text = browser.run("return [...document.querySelectorAll('.readout li')].at(-1).innerText")
     assert text.replace("\u2212", "-").split() == ["tolerance", "1e-8", "0"], text
-
-
-def test_an_error_of_0_is_a_gap_in_its_line(browser: Browser, report: Path) -> None:
-    """The page says so; a point between two gaps has a marker."""
-    show(browser, report / f"files/{STRANGE}.html")
     drawn = (
         "const plot = page.plots.at(-1), [trace] = plot.drawing.data;"
         "return [trace.y.slice(0, 6), trace.mode, trace.marker.size, plot.figure.innerText]"
@@ -212,16 +212,6 @@ def test_the_player_stays_in_view_beside_the_plots(
     assert columns == (1 if width < 1200 else 2) and len(seen) > 8 and all(seen)
 
 
-def test_modes_are_in_words_and_thumbnails_have_names(browser: Browser, report: Path) -> None:
-    show(browser, report / f"system/{VARIANT}.html")
-    texts = browser.run("return [...document.querySelectorAll('.note')].map(x => x.innerText)")
-    assert any("is held (0)" in text and "(−1)" in text for text in texts)
-    browser.open(report / "index.html")
-    names = browser.run("return [...document.querySelectorAll('.line-of')].map(x => x.innerText)")
-    names = [name.partition(":")[0].removeprefix(", ") for name in names]
-    assert len(names) == len(PAGES) - 1 and {"q1", "plant.q1"} <= set(names)
-
-
 def test_numbers_and_units_have_one_style(browser: Browser, report: Path) -> None:
     for name in (PAGES[2], PAGES[-1]):
         show(browser, report / name)
@@ -233,17 +223,6 @@ def test_numbers_and_units_have_one_style(browser: Browser, report: Path) -> Non
         assert len(shown) > 5
         for text in shown:
             assert not re.search(r"(^|[\s(])-\d|\de-\d|N\.m|/s2", text), text
-
-
-def test_every_plot_and_picture_has_a_text(browser: Browser, report: Path) -> None:
-    show(browser, report / f"system/{VARIANT}.html")
-    texts = browser.run(
-        "return [...document.querySelectorAll('.drawing')].map(x => x.getAttribute('aria-label'))"
-    )
-    assert len(texts) == len(set(texts)) > 8
-    assert all(re.match(r"Plot of .* from .* to .*, between .* and ", text) for text in texts)
-    assert browser.run("return document.querySelector('img').naturalWidth") > 100
-    assert "signals" in browser.run("return document.querySelector('img').alt")
 
 
 def test_the_whole_report_stays_small(report: Path) -> None:

@@ -1,7 +1,7 @@
 """The master and its step-size control, on oscillators x'' = -omega^2 x + gain u."""
 
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -73,8 +73,26 @@ def recurrence(order: str, inputs: str, sequence: str = "ab") -> np.ndarray:
     return np.array(rows)
 
 
-def ring(fmu: Fmu, sequence: str = "ab", **options: str) -> Master:
-    return Master({name: fmu for name in sequence}, RING, **options)
+@contextmanager
+def ring(
+    fmu: Fmu,
+    sequence: str = "ab",
+    stop: float | None = None,
+    parameters: dict = PARAMETERS,
+    **options: str,
+) -> Iterator[Master]:
+    """Both oscillators at time 0."""
+    with Master({name: fmu for name in sequence}, RING, **options) as master:
+        master.initialize(0.0, stop, parameters)
+        yield master
+
+
+@contextmanager
+def beside(fmu: Fmu, component: PythonComponent, *ends: Connection) -> Iterator[Master]:
+    """An oscillator beside a component in Python, at time 0."""
+    with Master({"a": fmu, "pid": component}, ends or LOOP) as master:
+        master.initialize(0.0, None, {"a": PARAMETERS["a"]})
+        yield master
 
 
 def places(master: Master, *names: str) -> list[int]:
@@ -87,8 +105,7 @@ def places(master: Master, *names: str) -> list[int]:
 def test_steps_are_those_of_a_recurrence_by_hand(
     oscillator: Fmu, order: str, inputs: str, sequence: str
 ) -> None:
-    with ring(oscillator, sequence, order=order, inputs=inputs) as master:
-        master.initialize(0.0, STEPS * H, PARAMETERS)
+    with ring(oscillator, sequence, STEPS * H, order=order, inputs=inputs) as master:
         rows = master.run(np.arange(STEPS + 1) * H)
         columns = places(master, "a.x", "a.v", "b.x", "b.v")
         assert master.do_steps == 2 * STEPS
@@ -102,7 +119,6 @@ def test_steps_are_those_of_a_recurrence_by_hand(
 
 def test_rows_are_read_before_inputs_are_set(oscillator: Fmu) -> None:
     with ring(oscillator) as master:
-        master.initialize(0.0, None, PARAMETERS)
         before = master.values.copy()
         master.advance(H)
         a, x, other = places(master, "b.a", "b.x", "a.x")
@@ -149,7 +165,6 @@ def test_an_algebraic_loop_is_named(oscillator: Fmu) -> None:
 @pytest.mark.parametrize("inputs", ["held", "extrapolated"])
 def test_going_back_repeats_bit_for_bit(oscillator: Fmu, inputs: str) -> None:
     with ring(oscillator, order="gauss_seidel", inputs=inputs) as master:
-        master.initialize(0.0, None, PARAMETERS)
         master.advance(0.1)
         with Snapshot(master) as snapshot:
             snapshot.take()
@@ -167,7 +182,6 @@ def test_going_back_repeats_bit_for_bit(oscillator: Fmu, inputs: str) -> None:
 
 def test_every_snapshot_is_freed(oscillator: Fmu, monkeypatch: pytest.MonkeyPatch) -> None:
     with ring(oscillator) as master:
-        master.initialize(0.0, None, PARAMETERS)
         freed = []
         name = {"2.0": "fmi2FreeFMUstate", "3.0": "fmi3FreeFMUState"}[oscillator.model.fmi_version]
         for component in master.components.values():
@@ -189,7 +203,6 @@ def test_a_value_that_is_not_finite_is_named(
     oscillator: Fmu, monkeypatch: pytest.MonkeyPatch, value: float
 ) -> None:
     with ring(oscillator) as master:
-        master.initialize(0.0, None, PARAMETERS)
         component = master.components["b"]
         read = component.read
 
@@ -206,12 +219,11 @@ def test_a_value_that_is_not_finite_is_named(
 
 def test_a_failing_step_is_explained_with_the_message_of_the_fmu(oscillator: Fmu) -> None:
     parameters = {**PARAMETERS, "b": {**PARAMETERS["b"], "max_internal_steps": 1}}
-    with ring(oscillator) as master:
-        master.initialize(0.0, None, parameters)
-        with pytest.raises(
-            UserError, match=r"^b: fmi[23]DoStep in the step from t = 0\.0 s .*ended"
-        ):
-            master.advance(1.0)
+    with (
+        ring(oscillator, parameters=parameters) as master,
+        pytest.raises(UserError, match=r"^b: fmi[23]DoStep in the step from t = 0\.0 s .*ended"),
+    ):
+        master.advance(1.0)
 
 
 @pytest.mark.parametrize(
@@ -233,13 +245,13 @@ def test_wrong_connections_are_named(
 
 @pytest.mark.parametrize(("parameters", "message"), MISTAKES["parameters_of_systems"]["rows"])
 def test_wrong_parameters_are_named(oscillator: Fmu, parameters: dict, message: str) -> None:
-    with ring(oscillator) as master, pytest.raises(UserError, match=message):
-        master.initialize(0.0, None, parameters)
+    with pytest.raises(UserError, match=message), ring(oscillator, parameters=parameters):
+        pass
 
 
 def test_unknown_orders_are_refused(oscillator: Fmu) -> None:
-    with pytest.raises(UserError, match="jacobi"):
-        ring(oscillator, order="random")
+    with pytest.raises(UserError, match="jacobi"), ring(oscillator, order="random"):
+        pass
 
 
 # ---- Step-size control --------------------------------------------------------------------------
@@ -261,16 +273,14 @@ def test_a_controlled_run_is_one_of_half_steps(
     oscillator: Fmu, inputs: str, tolerance: float
 ) -> None:
     """What was tried and rolled back leaves no trace."""
-    with ring(oscillator, order="gauss_seidel", inputs=inputs) as master:
-        master.initialize(0.0, 3.0, PARAMETERS)
+    with ring(oscillator, stop=3.0, order="gauss_seidel", inputs=inputs) as master:
         run = step_control.run(master, 3.0, control(tolerance=tolerance, corners=(1.25,)))
     assert run.rejected >= 1
     assert run.do_steps == 6 * (run.accepted + run.rejected)
     assert run.times[-1] == 3.0
     assert 1.25 in run.times
     assert run.estimates.max() <= tolerance
-    with ring(oscillator, order="gauss_seidel", inputs=inputs) as master:
-        master.initialize(0.0, 3.0, PARAMETERS)
+    with ring(oscillator, stop=3.0, order="gauss_seidel", inputs=inputs) as master:
         for i, (begin, end) in enumerate(zip(run.times[:-1], run.times[1:], strict=True)):
             master.advance(begin + (end - begin) / 2)
             master.advance(end)
@@ -282,8 +292,7 @@ def test_the_local_error_is_what_is_asked_for(
     oscillator: Fmu, inputs: str, tolerance: float
 ) -> None:
     """Against the matrix exponential of the coupled system, from each accepted state on."""
-    with ring(oscillator, order="gauss_seidel", inputs=inputs) as master:
-        master.initialize(0.0, 3.0, PARAMETERS)
+    with ring(oscillator, stop=3.0, order="gauss_seidel", inputs=inputs) as master:
         run = step_control.run(master, 3.0, control(tolerance=tolerance))
         columns = places(master, "a.x", "a.v", "b.x", "b.v")
     (a, b), (ga, gb) = OMEGA.values(), GAIN.values()
@@ -299,18 +308,21 @@ def test_the_local_error_is_what_is_asked_for(
     assert np.median(errors[~run.limited]) >= 1 / 3
 
 
-def test_a_step_that_would_be_too_short_is_refused(oscillator: Fmu) -> None:
-    with ring(oscillator, order="gauss_seidel") as master:
-        master.initialize(0.0, 3.0, PARAMETERS)
-        with pytest.raises(UserError, match=r"from t = 0\.0 s would have to be below 0\.5 s"):
-            step_control.run(master, 3.0, control(shortest=0.5))
-
-
-def test_an_unknown_signal_is_refused(oscillator: Fmu) -> None:
-    with ring(oscillator) as master:
-        master.initialize(0.0, 3.0, PARAMETERS)
-        with pytest.raises(UserError, match=r"a\.y: the system has no such value"):
-            step_control.run(master, 3.0, control(scales={"a.y": 1.0}))
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"shortest": 0.5}, r"from t = 0\.0 s would have to be below 0\.5 s"),
+        ({"scales": {"a.y": 1.0}}, r"a\.y: the system has no such value"),
+    ],
+)
+def test_control_that_cannot_be_is_refused(
+    oscillator: Fmu, change: dict[str, object], message: str
+) -> None:
+    with (
+        ring(oscillator, stop=3.0, order="gauss_seidel") as master,
+        pytest.raises(UserError, match=message),
+    ):
+        step_control.run(master, 3.0, control(**change))
 
 
 # ---- Signals and components in Python -----------------------------------------------------------
@@ -377,26 +389,24 @@ def test_python_steps_by_its_law_with_a_delay_of_one_step(oscillator: Fmu, tmp_p
 def test_python_goes_back_where_it_can_and_is_refused_elsewhere(
     oscillator: Fmu, tmp_path: Path
 ) -> None:
-    with Master({"a": oscillator, "pid": python(tmp_path, PID + SAVES)}, LOOP) as master:
-        master.initialize(0.0, None, {"a": PARAMETERS["a"]})
+    with beside(oscillator, python(tmp_path, PID + SAVES)) as master:
         master.advance(0.1)
         with Snapshot(master) as snapshot:
             snapshot.take()
             first = master.run([0.1, 0.15, 0.3])
             snapshot.restore()
             np.testing.assert_array_equal(master.run([0.1, 0.15, 0.3]), first)
-    settings = control(scales={"a.x": 1.0})
-    with Master({"a": oscillator, "pid": python(tmp_path, PID)}, LOOP) as master:
-        master.initialize(0.0, None, {"a": PARAMETERS["a"]})
-        with pytest.raises(UserError, match=r"^pid: .*code\.py has no save\(\) and restore"):
-            step_control.run(master, 1.0, settings)
+    with (
+        beside(oscillator, python(tmp_path, PID)) as master,
+        pytest.raises(UserError, match=r"^pid: .*code\.py has no save\(\) and restore"),
+    ):
+        step_control.run(master, 1.0, control(scales={"a.x": 1.0}))
 
 
 def test_a_function_has_the_names_of_its_connections(oscillator: Fmu, tmp_path: Path) -> None:
     text = "def step(t, h, inputs):\n    return {'u': -2.0 * inputs['x'] + t}\n"
     law = python(tmp_path, text, inputs=["x"], outputs=["u"])
-    with Master({"a": oscillator, "pid": law}, [LOOP[0], LOOP[2]]) as master:
-        master.initialize(0.0, None, {"a": PARAMETERS["a"]})
+    with beside(oscillator, law, LOOP[0], LOOP[2]) as master:
         rows = master.run(np.arange(3) * H)
         x, u = rows[:, places(master, "a.x", "pid.u")].T
     assert u.tolist() == [0.0, -2.0 * x[0], -2.0 * x[1] + H]
