@@ -14,6 +14,7 @@ from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP, edited, replace
 
 LIMIT = 120.0  # s, far above what an end takes
+SILENCE = "30"  # s, above what processes take to start on a busy machine
 Process = subprocess.Popen
 Start = Callable[..., Process]  # by arguments of the command line, and the host
 

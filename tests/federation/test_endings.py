@@ -21,6 +21,7 @@ from rparm.federation.network import KEY, Broker, Federate
 from rparm.systems import ssp
 from tests.federation.processes import (
     LIMIT,
+    SILENCE,
     Process,
     Start,
     ended,
@@ -30,8 +31,6 @@ from tests.federation.processes import (
 )
 from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP, edited, replace
-
-SILENCE = "10"  # s, above what a step takes on a busy machine
 
 
 def federate(start: Start, system: Path, variant: str, address: str) -> Process:
@@ -128,7 +127,7 @@ def test_a_component_that_is_silent_is_named(start: Start) -> None:
     silent = next(c for c in components(here, 3) if "controller" in c.cmdline())
     silent.suspend()
     said = ended(here, 2).splitlines()[-1]
-    assert said == "error: controller has been silent for 10 s (--silence)"
+    assert said == "error: controller has been silent for 30 s (--silence)"
 
 
 def test_a_broker_that_is_silent_is_named(start: Start, tmp_path: Path) -> None:
@@ -138,7 +137,7 @@ def test_a_broker_that_is_silent_is_named(start: Start, tmp_path: Path) -> None:
     there = start("federate", str(system), "nominal", "arm", *given)
     wait_for_steps(here)
     here.send_signal(signal.SIGSTOP)
-    assert f"arm: the broker at {address} has been silent for 10 s" in ended(there, 2)
+    assert f"arm: the broker at {address} has been silent for 30 s" in ended(there, 2)
 
 
 def test_a_standstill_is_ended() -> None:
@@ -155,8 +154,8 @@ def test_a_standstill_is_ended() -> None:
             arm.exchange()
 
         Thread(target=begin_only, daemon=True).start()
-        with pytest.raises(UserError, match="all answer, but nothing has moved for 10 s"):
-            run(system, "nominal", address, elsewhere=["arm"], silence=5.0)
+        with pytest.raises(UserError, match="all answer, but nothing has moved for 40 s"):
+            run(system, "nominal", address, elsewhere=["arm"], silence=20.0)
 
 
 def test_a_component_that_cannot_join_ends_the_federation(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ from rparm.errors import UserError
 from rparm.federation import network
 from rparm.federation.network import Broker, Federate
 
-LIMIT = 30.0  # s
+LIMIT = 120.0  # s
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from rparm.federation import network
 from rparm.federation.network import KEY
 from tests.federation.processes import (
     LIMIT,
+    SILENCE,
     Process,
     Start,
     ended,
@@ -111,11 +112,11 @@ def test_two_hosts_give_the_values_of_one(start: Start, apart: Network) -> None:
 
 
 def test_a_lost_link_ends_both(start: Start, apart: Network, tmp_path: Path) -> None:
-    here, there = apart_from_the_arm(start, apart, long(tmp_path), "--silence", "10")
+    here, there = apart_from_the_arm(start, apart, long(tmp_path), "--silence", SILENCE)
     wait_for_steps(here)
     apart.cut()
     for process, words in ((here, "arm has been silent"), (there, "23404 has been silent")):
-        assert f"{words} for 10 s" in ended(process, 2).splitlines()[-1]
+        assert f"{words} for 30 s" in ended(process, 2).splitlines()[-1]
 
 
 def test_what_a_host_without_a_network_lacks_is_said(start: Start, apart: Network) -> None:

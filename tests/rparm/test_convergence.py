@@ -188,9 +188,21 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize("versions", ["2", "23"])
 def test_run_of_all_measures_the_order(
-    project: Path, fmu: Path, updated: Fmu, console: Console, versions: str
+    project: Path,
+    fmu: Path,
+    updated: Fmu,
+    study: Convergence,
+    console: Console,
+    monkeypatch: pytest.MonkeyPatch,
+    versions: str,
 ) -> None:
     """Intermediate update only with the FMU of FMI 3.0."""
+
+    def known(fmu: Fmu, problem: Problem, _: object, other: Fmu | None) -> Convergence:
+        assert [x.model.fmi_version[0] for x in (fmu, other) if x] == list(versions)
+        return Convergence(problem, study.errors[: 3 + len(versions)])
+
+    monkeypatch.setattr(convergence, "study", known)
     build, report = project / "build", project / "report"
     (build / "fmi3").mkdir(parents=True)
     shutil.copy(MODEL / "variables.toml", project / "models" / MODEL.name)
