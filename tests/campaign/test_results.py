@@ -31,6 +31,11 @@ class Folder:
         self.given, self.job, self.points = given, job, points
         self.results = Results(folder, given, job, "text")
 
+    def write_all(self) -> None:
+        """Write the five blocks."""
+        for block in range(5):
+            self.write(block)
+
     def write(self, block: int, changed: str = "") -> None:
         """Write a block, with a change in what is given by name."""
         runs = self.given.block_range(block)
@@ -69,8 +74,7 @@ def test_a_table_is_in_the_order_of_the_runs(folder: Folder) -> None:
 
 
 def test_the_hash_is_that_of_all_values(folder: Folder) -> None:
-    for block in range(5):
-        folder.write(block)
+    folder.write_all()
     before = folder.results.digest()
     folder.write(2)
     assert folder.results.digest() == before
@@ -79,7 +83,7 @@ def test_the_hash_is_that_of_all_values(folder: Folder) -> None:
         assert folder.results.digest() != before
 
 
-def test_what_is_missing_or_damaged_is_run_again(folder: Folder) -> None:
+def test_what_is_missing_or_another_block_is_run_again(folder: Folder) -> None:
     assert folder.results.missing() == [0, 1, 2, 3, 4]
     for block in (0, 2, 3, 4):
         folder.write(block)
@@ -87,20 +91,14 @@ def test_what_is_missing_or_damaged_is_run_again(folder: Folder) -> None:
     path.write_bytes(path.read_bytes()[:-40])
     pq.write_table(folder.results.block(2).slice(0, 7), folder.results.block_path(2))
     assert folder.results.missing() == [1, 2, 3]
-
-
-def test_another_block_by_the_name_of_one_is_run_again(folder: Folder) -> None:
-    for block in range(5):
-        folder.write(block)
     shutil.copy(folder.results.block_path(0), folder.results.block_path(1))
-    assert folder.results.missing() == [1]
+    assert folder.results.missing() == [1, 2, 3]
     with pytest.raises(UserError, match=r"block_0000000001\.parquet: is missing or damaged"):
         folder.results.table(["m2"])
 
 
 def test_damage_is_found_by_each_reading(folder: Folder) -> None:
-    for block in range(5):
-        folder.write(block)
+    folder.write_all()
     right = folder.results.block(2)
     path = folder.results.block_path(2)
     content = path.read_bytes()
@@ -123,8 +121,7 @@ def test_damage_is_found_by_each_reading(folder: Folder) -> None:
 
 
 def test_a_block_without_its_trajectories_is_run_again(folder: Folder) -> None:
-    for block in range(5):
-        folder.write(block)
+    folder.write_all()
     assert folder.results.missing() == []
     folder.results.trajectory_path(3).unlink()
     path = folder.results.trajectory_path(17)

@@ -47,7 +47,8 @@ def starting(temporary: Path) -> Iterator[Start]:
         for process in started:
             with _left_of(process) as children:
                 process.kill()
-                process.communicate()
+                process.wait()
+                process.stdout.close()
             for child in children:
                 child.kill()
 
