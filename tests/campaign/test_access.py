@@ -73,7 +73,7 @@ def listening(process: psutil.Process) -> set[tuple[str, int]]:
 def shows_pages(port: int) -> bool:
     """Whether a server of pages listens at a port."""
     try:
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/status", timeout=10) as answer:
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/status", timeout=60) as answer:
             return answer.status == 200
     except urllib.error.HTTPError:  # it has another one
         return True

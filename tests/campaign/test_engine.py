@@ -331,7 +331,7 @@ def test_its_replay_ends_with_a_message(crashing: Path, tmp_path: Path, console:
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Programs that soon take a connection for dead; 11 s are the least that Dask takes."""
     monkeypatch.setitem(ENVIRONMENT, "DASK_DISTRIBUTED__COMM__TIMEOUTS__TCP", "11s")
-    monkeypatch.setitem(ENVIRONMENT, "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT", "5s")
+    monkeypatch.setitem(ENVIRONMENT, "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT", "10s")
 
 
 @pytest.fixture(params=["loopback", "namespaces"])

@@ -15,7 +15,7 @@ from typing import Any
 from tests.support.missing import missing
 
 PROGRAMS = ("chromium", "chromedriver")
-TIMEOUT = 60  # s, for a page or a browser on a busy machine
+TIMEOUT = 300  # s, for a page or a browser on a busy machine
 # what a page may load: files beside it and what it holds itself
 LOCAL = ("file:", "data:", "blob:", "about:")
 OPTIONS = (

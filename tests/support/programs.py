@@ -9,7 +9,7 @@ from typing import Any
 
 from tests.support.paths import ROOT
 
-TIMEOUT = 120  # s
+TIMEOUT = 600  # s, far above what a program takes on a busy machine
 # on small matrices, threads only wait for each other
 ENVIRONMENT = {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
 RPARM = ("-P", "-m", "rparm")  # arguments of Python
