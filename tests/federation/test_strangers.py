@@ -24,6 +24,7 @@ from tests.federation.processes import (
 from tests.support.hosts import DEVICE, Network
 from tests.support.paths import ROOT
 from tests.support.programs import run
+from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP
 
 # ---- On this machine -----------------------------------------------------------------------------
@@ -73,21 +74,21 @@ def test_a_federation_has_one_port_on_loopback(start: Start) -> None:
 
 
 @pytest.mark.parametrize("wrong", ["", "short", "with blanks and more", "**"])
-def test_keys_that_can_be_guessed_are_refused(start: Start, wrong: str) -> None:
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setenv(KEY, wrong)
-        here = federation(start)
-    assert (
-        ended(here, 2)
-        == f"error: {KEY}: expected 16 to 128 letters and digits in the environment\n"
-    )
+def test_keys_that_can_be_guessed_are_refused(
+    console: Console, monkeypatch: pytest.MonkeyPatch, wrong: str
+) -> None:
+    monkeypatch.setenv(KEY, wrong)
+    said = f"error: {KEY}: expected 16 to 128 letters and digits in the environment\n"
+    assert console.refused("federation", "nominal", "--ssp", SSP) == said
 
 
-def test_a_component_elsewhere_needs_the_key(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_component_elsewhere_needs_the_key(
+    console: Console, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.delenv(KEY)
-    there = start("federate", str(SSP), "nominal", "arm", "--broker", "tcp://127.0.0.1:1")
     said = f"error: {KEY}: not in the environment, copy the whole line of the federation\n"
-    assert ended(there, 2) == said
+    arguments = ("federate", SSP, "nominal", "arm", "--broker", "tcp://127.0.0.1:1")
+    assert console.refused(*arguments) == said
 
 
 # ---- Two hosts -----------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ import pytest
 
 from rparm import command_line, project, result_tables
 from rparm import project as project_folders
+from rparm.__main__ import main
 from rparm.command_line import COMMANDS
 from rparm.commands import run as run_command
 from rparm.commands.completion import SCRIPT, SHELLS
@@ -23,7 +24,7 @@ from rparm.result_tables import RunTable, SweepTable
 from rparm.runs.comparison import TOLERANCES, Run, Runs, Sweep
 from rparm.units import seconds, short, shortened
 from tests.support.paths import ROOT
-from tests.support.programs import RPARM, python, run
+from tests.support.programs import python, run
 from tests.support.rparm_project import (
     FMUS,
     LONG,
@@ -335,9 +336,9 @@ printf '%s\\n' "${COMPREPLY[@]}"
 
 @pytest.fixture(scope="module")
 def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    file = tmp_path_factory.mktemp("completion") / "script"
-    file.write_text(python(*RPARM, "completion", "bash", check=True).stdout, encoding="utf-8")
-    return file
+    folder = tmp_path_factory.mktemp("completion")
+    assert main(["completion", "bash", "--output", str(folder)]) == 0
+    return folder / SHELLS["bash"]
 
 
 @pytest.mark.parametrize(
