@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rparm.models.closed_loop.coupling import loop as closed_loop
 from rparm.models.closed_loop.coupling import report, study
-from rparm.models.closed_loop.coupling.loop import METHODS, REFERENCE_AHEAD, ClosedLoop
+from rparm.models.closed_loop.coupling.loop import METHODS, REFERENCE_AHEAD, REFERENCES, ClosedLoop
 from rparm.models.closed_loop.coupling.study import (
     FAST_STOP,
     FastAndSlow,
@@ -23,6 +23,7 @@ from rparm.errors import UserError
 from rparm.systems.master import Master
 from rparm.systems.opened import opened
 from tests.support.paths import ROOT
+from tests.support.systems import CLOSED_LOOP
 
 STEP = 1e-3  # s, of the sampled references
 BOUND = 1e-7  # relative, at the relative tolerance of the variants, 1e-11
@@ -99,6 +100,40 @@ def test_every_law_meets_its_reference_at_the_limits_of_its_efforts(
     finer, _ = loop.run(METHODS[3], STEP, "limited_effort", 0.2, changes)
     continuous = monolithic(parameters, finer["time"])
     assert max(deviation(finer[name], continuous[name]) for name in STATE) <= 1e-3
+
+
+@pytest.mark.parametrize("variant", CLOSED_LOOP.variants)
+def test_references_made_again_are_the_same(variant: str) -> None:
+    from rparm.models.closed_loop.references import make_references
+    from rparm.models.closed_loop.references.closed_loop import COLUMNS
+
+    made = make_references.make(make_references.variants()[variant])
+    assert {path.name for path in (REFERENCES / variant).iterdir()} == set(made)
+    for file, (times, columns) in made.items():
+        path = REFERENCES / variant / file
+        kept = closed_loop.read_reference(path)
+        assert list(kept) == ["time", *COLUMNS]
+        old = np.array([*kept.values()])
+        assert path.stat().st_size < 1_000_000 and path.read_text().startswith('"time","traj')
+        new = np.array([times, *(columns[name] for name in COLUMNS)], float)
+        assert old.shape == new.shape and np.array_equal(old[0], times)
+        scale = np.maximum(1, np.max(np.abs(old), axis=1, keepdims=True))
+        assert np.max(np.abs(new - old) / scale) < 1e-12, file
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"arm.m9": 1.0}, "no parameter 'arm.m9'"),
+        ({"arm.m2": np.nan}, "arm.m2: nan is no finite number"),
+        ({"trajectory.motion": "spiral"}, "trajectory.motion: no 'spiral'"),
+    ],
+)
+def test_parameters_that_references_do_not_have_are_refused(parameters: dict, message: str) -> None:
+    from rparm.models.closed_loop.references.closed_loop import monolithic
+
+    with pytest.raises(UserError, match=message):
+        monolithic(parameters, [0.0, 1.0])
 
 
 # ---- The study -----------------------------------------------------------------------------------
