@@ -14,7 +14,6 @@ from rparm.campaign.page import Index
 from rparm.campaign.planning import Points
 from rparm.report import charts
 from tests.campaign.files import ARM, campaign
-from tests.campaign.runners import rows, runner
 
 # ---- Measures of a run ---------------------------------------------------------------------------
 
@@ -135,26 +134,6 @@ def test_what_does_not_vary_has_no_indices(tmp_path: Path) -> None:
     given = campaign(tmp_path, TEXT, [("sobol", "indices"), ("40", "8")])
     assert page.sobol_indices(given, np.full(given.count, 3.0)) == []
     assert page.sobol_indices(given, np.full(given.count, np.nan)) == []
-
-
-def test_indices_of_the_arm_agree_with_a_regression(tmp_path: Path) -> None:
-    # a narrow box: the arm's response is nearly a quadric, whose indices follow from coefficients
-    text = ARM.replace("normal = [-2.0, 0.2]", "uniform = [-2.1, -1.9]")
-    text = text.replace("[1.0, 3.0]", "[1.9, 2.1]").replace("trajectories = [3, 17]\n", "")
-    given = campaign(tmp_path, text, [("sobol", "indices"), ("40", "64")])
-    with runner(given, tmp_path) as (runs, job, points):
-        values = rows(runs, job, points, range(given.count)).measures[:, 0]
-        unit = (points.of(range(given.count)) - [2.0, -2.0]) / 0.1
-    x, y = unit.T
-    # Legendre polynomials are orthogonal on the box
-    basis = [x, (3 * x**2 - 1) / 2, y, (3 * y**2 - 1) / 2, x * y]
-    columns = np.column_stack([np.ones_like(x), *basis])
-    coefficients, *_ = np.linalg.lstsq(columns, values, rcond=None)
-    assert np.std(columns @ coefficients - values) < 0.02 * np.std(values)
-    parts = coefficients[1:] ** 2 * [1 / 3, 1 / 5, 1 / 3, 1 / 5, 1 / 9]
-    first = [parts[0] + parts[1], parts[2] + parts[3]] / parts.sum()
-    for row, other in zip(page.sobol_indices(given, values), first, strict=True):
-        assert abs(row.first - other) <= row.first_confidence + 1e-3
 
 
 def test_the_worst_runs_come_first() -> None:

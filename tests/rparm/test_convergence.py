@@ -8,8 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import sympy as sp
-from rparm.models.rp_manipulator.references.make_references import final_state
 
 from rparm import result_tables
 from rparm.errors import UserError
@@ -22,7 +20,6 @@ from rparm.runs.convergence import (
     Convergence,
     Problem,
 )
-from rparm.runs.inputs import Sines
 from tests.support.paths import ROOT
 from tests.support.rparm_project import MISTAKES, Console, declared, load, repacked
 
@@ -52,29 +49,6 @@ def made_up(problem: Problem, *coefficients: float, floor: float = 1e-13) -> Con
     powers = zip(coefficients, POWERS, strict=False)
     errors = [c * problem.steps**power + floor for c, power in powers]
     return Convergence(problem, np.array(errors))
-
-
-# ---- The exact final state ---------------------------------------------------------------------
-
-
-def test_exact_state_does_not_depend_on_the_precision(problem: Problem) -> None:
-    final, largest = final_state(problem.scenario, np.float64)
-    assert problem.final_error(final) < 1e-12
-    assert largest == pytest.approx(problem.largest, rel=1e-12)
-
-
-def test_derivatives_of_the_inputs_are_exact() -> None:
-    t = sp.Symbol("t")
-    sines = Sines(0.3, ((2.0, 0.4, 0.1), (-0.7, 1.3, -2.0)))
-    value = sp.Float("0.3", 30) + sum(
-        sp.Rational(a) * sp.sin(2 * sp.pi * sp.Rational(f) * t + sp.Rational(p))
-        for a, f, p in sines.terms
-    )
-    times = np.array([0.0, 0.125, 3.5])
-    for order in range(4):
-        found = sines.derivative(times, order)
-        expected = [float(sp.diff(value, t, order).subs(t, x).evalf(25)) for x in times.tolist()]
-        assert found == pytest.approx(expected, rel=1e-14)
 
 
 # ---- The FMU -----------------------------------------------------------------------------------
