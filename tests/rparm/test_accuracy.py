@@ -129,13 +129,15 @@ def test_error_follows_the_tolerance(sweeps: dict[str, Sweep], name: str) -> Non
 def test_errors_of_the_other_methods_stay_within_the_same_bounds(
     opened: Fmu, name: str, method: int
 ) -> None:
-    assert comparison.sweep(*changed(opened, name, solver_method=method)).violations == []
+    runs, scenario = changed(opened, name, solver_method=method)
+    for tolerance in comparison.TOLERANCES[1::3]:  # 1e-5, 1e-8, 1e-11
+        assert runs.run(scenario, tolerance).passed, tolerance
 
 
 @pytest.mark.parametrize("method", [1, *OTHER_METHODS])
 def test_a_limit_of_the_step_keeps_the_bounds(opened: Fmu, method: int) -> None:
     runs, limited = changed(opened, "constant_effort", solver_method=method, max_step=1e-3)
-    for tolerance in comparison.TOLERANCES:
+    for tolerance in comparison.TOLERANCES[::7]:  # 1e-4, 1e-11
         run = runs.run(limited, tolerance)
         assert run.passed, run.worst
         assert run.result.solver_steps >= 5000  # 5 s

@@ -120,15 +120,13 @@ def unusable(names: list[str]) -> list[str]:
     return bad + [name for name in names if folded.count(name.casefold()) > 1]
 
 
-def test_names_in_the_archives_suit_every_system() -> None:
+def test_names_in_archives_and_in_the_project_suit_every_system() -> None:
     for path in (*FMUS.values(), *(BUILD / f"{name}.ssp" for name in SYSTEMS)):
         with zipfile.ZipFile(path) as archive:
             assert unusable(archive.namelist()) == []
-
-
-@pytest.mark.parametrize("top", ["rparm", "fmu", "models", "src", "tests"])
-def test_names_in_the_project_suit_every_system(top: str) -> None:
-    assert unusable([path.relative_to(ROOT).as_posix() for path in (ROOT / top).rglob("*")]) == []
+    for top in ("rparm", "fmu", "models", "src", "tests"):
+        names = [path.relative_to(ROOT).as_posix() for path in (ROOT / top).rglob("*")]
+        assert unusable(names) == []
 
 
 # ---- Runs ----------------------------------------------------------------------------------------
