@@ -24,6 +24,7 @@ from rparm.systems.opened import opened
 from tests.support.paths import ROOT
 from tests.support.programs import python
 from tests.support.rparm_project import MISTAKES, Console, check_near, repacked
+from tests.support.ssp_files import SSP, edited, replace
 
 RUN = {"stop_time": 1.0, "step": 0.01}
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -325,8 +326,9 @@ def test_what_stands_on_the_page_runs(tmp_path: Path) -> None:
 # ---- Many runs -----------------------------------------------------------------------------------
 
 
-def test_a_system_runs_by_all_engines() -> None:
-    loop = rparm.System("closed_loop")
+def test_a_system_runs_by_all_engines(tmp_path: Path) -> None:
+    short = {"SystemStructure.ssd": replace('stopTime="6"', 'stopTime="0.5"')}
+    loop = rparm.System(edited(SSP, tmp_path / "Short.ssp", short))
     assert "nominal" in loop.variants
     ours, *others = (loop.run("nominal", engine=name) for name in ("master", "ecos", "helics"))
     assert ours.units["arm.q1"] == "rad"
