@@ -1,4 +1,4 @@
-"""What the drawing shows is what was recorded: places, lengths, angles, marks."""
+"""What the drawing shows is what was recorded: places, lengths, angles, marks, to scale."""
 
 import cmath
 import math

@@ -1,4 +1,4 @@
-"""What the player gets of a run: rows of its CSV file, inputs, parameters."""
+"""What the player gets of a run: rows of its CSV file, inputs, parameters; its recording."""
 
 import base64
 import io

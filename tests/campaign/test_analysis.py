@@ -1,4 +1,4 @@
-"""Measures of motions where they are known; Sobol' indices, quantiles, worst cases, failures."""
+"""Measures of motions where they are known; Sobol' indices, quantiles, worst cases, charts."""
 
 import json
 import math

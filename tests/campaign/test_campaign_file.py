@@ -1,4 +1,4 @@
-"""Campaign files: mistakes with place and reason; values with units; scenarios with logs."""
+"""Campaign files: mistakes, values with units, logs; the points that follow from them."""
 
 import math
 import re

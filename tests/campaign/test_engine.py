@@ -1,4 +1,4 @@
-"""Campaigns that were stopped or killed resume, and give the table of an undisturbed one."""
+"""Campaigns that were stopped, killed or cut off give the table of an undisturbed one."""
 
 import errno
 import os

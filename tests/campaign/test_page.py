@@ -1,4 +1,4 @@
-"""The page of a campaign in a browser: it fits, is quiet and readable, and says what is missing."""
+"""The page of a campaign in a browser, and the command that writes and replays."""
 
 import argparse
 import json

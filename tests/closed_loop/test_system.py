@@ -1,4 +1,4 @@
-"""Systems in Ecos are what the references say, of FMUs of both versions; failures leave nothing."""
+"""Systems in Ecos are what the references say; failures leave nothing; names of variants."""
 
 import html
 import shutil

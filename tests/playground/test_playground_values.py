@@ -1,4 +1,4 @@
-"""Values in the playground: what the FMUs refuse changes nothing, and the page says why."""
+"""Values in the playground: the bits of the native FMUs; what they refuse changes nothing."""
 
 import math
 

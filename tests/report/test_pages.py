@@ -1,4 +1,4 @@
-"""The pages of a report in a browser: quiet, readable, complete."""
+"""The pages of a report in a browser, from the start page on: quiet, readable, complete."""
 
 import random
 import re

@@ -1,4 +1,4 @@
-"""What of a run a page holds: no peak is lost, and rounding is no number."""
+"""What of a run a page holds: no peak is lost, rounding is no number, colours are apart."""
 
 import re
 from itertools import combinations

@@ -1,4 +1,4 @@
-"""Errors against the references, their bounds, and the report that shows them."""
+"""Errors against the references, their bounds, and the report that shows them; bad references."""
 
 import lzma
 import math

@@ -1,4 +1,4 @@
-"""What commands print: no line of a table above 80 columns, one document for programs."""
+"""What commands print, and what all of them have: --json, --quiet, --output, --open, completion."""
 
 import argparse
 import json

@@ -1,4 +1,4 @@
-"""The master and its step-size control, on oscillators x'' = -omega^2 x + gain u."""
+"""The master, on oscillators x'' = -omega^2 x + gain u; its step-size control; Booleans."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager

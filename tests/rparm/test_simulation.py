@@ -1,4 +1,4 @@
-"""One run of an FMU on fmpy, and FMUs that cannot be run."""
+"""One run of an FMU by both loops, and FMUs that cannot be run."""
 
 import re
 import sys
