@@ -425,7 +425,7 @@ def test_run_with_a_worse_reference_fails(project: Path, fmu: Path, console: Con
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        *((mistake["arguments"], mistake["message"]) for mistake in MISTAKES["command"]),
+        *MISTAKES["command"]["rows"],
         (["run", "--fmi", "2", "--fmu", fmi3_fmu(ARM)], "is an FMU of FMI 3.0, --fmi wants 2.0"),
         (["run", "--fmi", "3", "--fmu", ARM], "is an FMU of FMI 2.0, --fmi wants 3.0"),
     ],
