@@ -11,7 +11,7 @@ import numpy as np
 from by_heyoka import compiled
 
 from tests.equations.compiled import read
-from tests.equations.examples import FOLDER, METHODS, initializing, made
+from tests.equations.examples import FOLDER, METHODS, build, initializing, made
 
 HERE = Path(__file__).resolve().parent
 COLUMN = "one step of 2 s, free motion, error <= 1e-8"
@@ -115,7 +115,7 @@ def by_hand(folder: Path, turns: int, loops: Path, exact: dict[str, np.ndarray])
     """Measure against loops at the same tolerance: the largest ratio and errors of all models."""
 
     def race(name: str, method: str, limit: float, step: float, forces: Sequence[float]) -> dict:
-        fmu = made(folder, MODELS[name][0])
+        fmu = made(folder, MODELS[name][0], build)
         own, start = by_fmu(fmu, method, step, forces)
         loop = by_loop(loops, fmu.with_suffix(".toml"), method, step, start, forces)
         whose, true = (name, loop(1e-11)[1]) if len(forces) > 1 else ("own equations", exact[name])
@@ -135,7 +135,7 @@ def rows(folder: Path, turns: int, loops: Path) -> list[dict]:
     """Measure; heyoka has an error no larger than the FMU's. loops: the library of loops.c."""
     found, solutions = [], {}
     for name, (text, step, tolerance) in MODELS.items():
-        fmu = made(folder, text)
+        fmu = made(folder, text, build)
         own, start = by_fmu(fmu, "taylor", step)
         peer = by_heyoka(PAIRS.get(name, fmu.with_suffix(".toml")), step, start)
         named, of_peer = f"{name}, taylor to heyoka", 10.0 * tolerance
@@ -145,7 +145,7 @@ def rows(folder: Path, turns: int, loops: Path) -> list[dict]:
             of_peer *= 10.0**-0.25
         found.append(row(named, turns, *judged, (peer, of_peer)))
     full = CHAIN.replace("Chain", "FullChain").replace("\n[where]", FULL)
-    band, dense = (by_fmu(made(folder, text), "cvode_bdf", 2.0)[0] for text in (CHAIN, full))
+    band, dense = (by_fmu(made(folder, text, build), "cvode_bdf", 2.0)[0] for text in (CHAIN, full))
     exact = band(1e-9)[1]
     chain = "300 masses, cvode_bdf to full matrices", turns, exact, 0.2
     found.append(row(*chain, (band, 1e-6), (dense, 1e-6)))

@@ -1,20 +1,27 @@
-"""FMUs of the examples, built once by the command `build`."""
+"""FMUs of files with equations: built once by the command `build`, or quickly for their values."""
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from shutil import copy
+from tempfile import TemporaryDirectory
 
 import fmpy
 import numpy as np
 from fmpy.fmi2 import FMU2Slave
 from scipy.linalg import expm
 
+from tests.equations.compiled import BUILD, building, declaration, lock, read
 from tests.support.instances import Instance, LoadedFmu
 from tests.support.paths import ROOT
 from tests.support.programs import RPARM, python
 from tests.support.tables import tables
+
+from fmi3.model_description import model_description as fmi3_description  # isort: skip
+from package import pack  # isort: skip; compiled.py knows where it is
+from program import Provenance  # isort: skip
 
 FOLDER = ROOT / "examples" / "models"
 # by test module and name
@@ -32,13 +39,42 @@ def build(path: Path, output: Path, *options: str) -> Path:
 
 
 @cache
-def example(name: str, folder: Path) -> Path:
+def runtime(level: str) -> building.Runtime:
+    """What FMUs are linked to; the model's own C is compiled at this level."""
+    made = building.Runtime.load(BUILD / "runtime" / "runtime.json", True)
+    options = [level if option == "-O3" else option for option in made.content["options"]]
+    return replace(made, content=made.content | {"options": options})
+
+
+def quick(path: Path, output: Path) -> Path:
+    """The FMU of FMI 2.0, and that of 3.0 below fmi3: only what a run needs, with the same bits."""
+    file = read(path, declaration.solver_names())
+    references = lock.references(lock.path_of(path), declaration.keys(file))
+    made, versions = runtime("-O1"), {"fmi2": output, "fmi3": output / "fmi3"}
+    describe = {"fmi2": building.fmi2_description, "fmi3": fmi3_description}
+    with TemporaryDirectory() as folder:
+        work = Path(folder).resolve()
+        declared = building.write_c(file, references, work)
+        objects = made.compile([work / name for name in building.C_FILES], work)
+        for version, place in versions.items():
+            library = work / f"{file.name}{made.content['suffix']}"
+            made.link(version, objects, library)
+            description = work / "modelDescription.xml"
+            description.write_text(describe[version](declared, Provenance("0")), encoding="utf-8")
+            binary = f"{made.content['versions'][version]['folder']}/{library.name}"
+            parts = [(binary, library), (description.name, description)]
+            pack(place / f"{file.name}.fmu", [*parts, (f"resources/{file.name}.toml", path)])
+    return output / f"{file.name}.fmu"
+
+
+@cache
+def example(name: str, folder: Path, make: Callable[[Path, Path], Path] = quick) -> Path:
     """The FMU of an example."""
     output, path = folder / name.replace("/", "_"), FOLDER / f"{name}.toml"
     output.mkdir(exist_ok=True)
     for file in (path, path.with_suffix(".lock.toml")):
         copy(file, output)
-    return build(output / path.name, output)
+    return make(output / path.name, output)
 
 
 def axis(h: float, *values: float) -> tuple[np.ndarray, np.ndarray]:
@@ -69,7 +105,7 @@ def simulated(
     )
 
 
-def made(folder: Path, text: str) -> Path:
+def made(folder: Path, text: str, make: Callable[[Path, Path], Path] = quick) -> Path:
     """The FMU of a text, in a folder where each is built once."""
     name = text.split('"')[1]
     own = folder / f"{zlib.crc32(text.encode()):08x}"
@@ -77,7 +113,7 @@ def made(folder: Path, text: str) -> Path:
     if not path.with_suffix(".fmu").exists():
         own.mkdir(exist_ok=True)
         path.write_text(text, encoding="utf-8")
-        build(path, own)
+        make(path, own)
     return path.with_suffix(".fmu")
 
 

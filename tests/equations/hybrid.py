@@ -1,17 +1,14 @@
 """Judges runs of random models with impacts by an event loop that shares nothing with them.
 
 build/venv/bin/python -m tests.equations.hybrid 7            # all runs of seed 7
-build/venv/bin/python -m tests.equations.hybrid 0-99         # a line for each failure
 build/venv/bin/python -m tests.equations.hybrid 7 --only co_simulation:erk:1e-07:0.01
 """
 
 import argparse
-import collections
 import math
 import sys
 import tempfile
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -66,7 +63,6 @@ class Judge:
         if is_outside:
             self.errors += OF_LOCATION * self.motion.lateness
         sure = self.errors <= LARGEST_ERROR
-        self.worst = 0.0  # error of the states, of what is allowed
         self.known = len(sure) if sure.all() else int(np.argmin(sure))
 
     def steps(self, step: float) -> int:
@@ -104,7 +100,6 @@ class Judge:
             if count != expected:
                 found.setdefault("event_count", f"{count} for {expected} at {t:.6g}")
             far = float(np.max(np.abs(np.array(x) - motion.x[k]))) / unit
-            self.worst = max(self.worst, far / error)
             if not far <= error:
                 found.setdefault("state", f"{far:.3g} away at {t:.6g}, {error:.3g} allowed")
         if not run.failure and run.times and motion.count(run.times[-1]):
@@ -141,15 +136,13 @@ def run(unit: Unit, model: Hybrid, label: str, count: int) -> Run:
     return co_simulation(*numbers, model.inputs, [i.t for i in model.motion.impacts])
 
 
-def failures(
-    seed: int, is_full: bool = True, only: str = "", form: str = "", verbose: bool = False
-) -> list[Failure]:
+def failures(seed: int, is_full: bool = True, only: str = "") -> list[Failure]:
     """What the runs of a seed do wrong."""
     model, found = hybrid(seed), []
     chosen = [label for label in labels(model, is_full) if label.startswith(only)]
     with tempfile.TemporaryDirectory() as folder:
         try:
-            unit = Unit(Path(folder), model.text(form or None))
+            unit = Unit(Path(folder), model.text())
         except ModelFileError as error:
             return [Failure(seed, model.kind, only or "-", "build", str(error))]
         for label in chosen:
@@ -168,44 +161,23 @@ def failures(
             if kind == "early_return" and events != model.motion.count(count * float(step)):
                 text = f"{events} for {model.motion.count(count * float(step))}"
                 wrong.append(Failure(seed, model.kind, label, "early returns", text))
-            if verbose:
-                print(f"{label}: {judge.worst:.3g} of the error that is allowed", flush=True)
             found += wrong
     return found
 
 
-def seeds_of(text: str) -> range:
-    first, _, last = text.partition("-")
-    return range(int(first), int(last or first) + 1)
-
-
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("seeds", type=seeds_of, help="7 or 0-99")
+    parser.add_argument("seed", type=int)
     parser.add_argument("--only", default="", help="how the labels of runs begin")
-    parser.add_argument("--form", default="", help="how conditions are written")
-    parser.add_argument("--short", action="store_true", help="a few runs of each model")
-    parser.add_argument("--verbose", action="store_true", help="a line for each run")
-    parser.add_argument("-j", type=int, default=1, dest="processes")
     arguments = parser.parse_args()
-    common = (not arguments.short, arguments.only, arguments.form, arguments.verbose)
-    found = collections.Counter()
-    if len(arguments.seeds) == 1:
-        model = hybrid(arguments.seeds[0])
-        motion = model.motion
-        print(model.text(arguments.form or None))
-        print(f"unit {model.unit}, inputs {model.inputs}")
-        print(f"horizon {motion.horizon}: {motion.reason}; growth {motion.growth[-1]:.3g}")
-        print("impacts:", *(f"{i.t:.9g} ({i.event}, {i.speed:.3g})" for i in motion.impacts))
-    with ProcessPoolExecutor(arguments.processes) as pool:
-        jobs = [pool.submit(failures, seed, *common) for seed in arguments.seeds]
-        for job in jobs:
-            for failure in job.result():
-                print(failure, flush=True)
-                found[(*failure.label.split(":")[:2], failure.oracle)] += 1
-    if len(arguments.seeds) > 1:
-        for key, number in sorted(found.items()):
-            print(f"{number:6} {' '.join(key)}")
+    model = hybrid(arguments.seed)
+    motion = model.motion
+    print(model.text())
+    print(f"unit {model.unit}, inputs {model.inputs}")
+    print(f"horizon {motion.horizon}: {motion.reason}; growth {motion.growth[-1]:.3g}")
+    print("impacts:", *(f"{i.t:.9g} ({i.event}, {i.speed:.3g})" for i in motion.impacts))
+    found = failures(arguments.seed, only=arguments.only)
+    print(*found, sep="\n")
     return int(bool(found))
 
 

@@ -1,13 +1,11 @@
-"""Models from files with equations against those that are written by hand: the arm, the spring."""
+"""The arm from a file with equations against the one that is written by hand."""
 
 from pathlib import Path
-from shutil import copy
 
 import numpy as np
 import pytest
 
-from tests.equations.examples import FOLDER as EXAMPLES
-from tests.equations.examples import METHODS, build, initializing, simulated
+from tests.equations.examples import METHODS, initializing, quick, simulated
 from tests.support.instances import Instance, LoadedFmu
 
 FOLDER = Path(__file__).parent
@@ -28,14 +26,7 @@ def found(unit: Instance, point: np.ndarray, direction: np.ndarray) -> tuple[lis
 
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("arm")
-    return build(copy(FOLDER / "arm.toml", folder), folder)
-
-
-@pytest.fixture(scope="module")
-def own_spring(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("spring")
-    return build(copy(FOLDER / "oscillator.toml", folder), folder)
+    return quick(FOLDER / "arm.toml", tmp_path_factory.mktemp("arm"))
 
 
 def test_values_and_directional_derivatives_have_the_same_bits(
@@ -56,32 +47,3 @@ def test_motions_are_the_same(arm: Path, fmu: Path, method: int) -> None:
     bound = 0.0 if method == METHODS["erk"] else 1e-11 if method == METHODS["taylor"] else 1e-8
     for name in STATES:
         assert np.max(np.abs(runs[0][name] - runs[1][name])) <= bound
-
-
-@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
-def test_the_spring_is_that_by_hand(own_spring: Path, fmu: Path, method: int) -> None:
-    """And both are the closed form."""
-    hand = fmu.parent / "tests" / "oscillator" / "Oscillator.fmu"
-    start = {"omega": 3.0, "gain": 2.0, "x": 0.2, "v": -1.0, "u": 5.0, "solver_method": method}
-    runs = [
-        simulated(path, 4.0, 0.01, start, relative_tolerance=1e-10) for path in (own_spring, hand)
-    ]
-    t, middle = runs[0]["time"], 2.0 * 5.0 / 9.0
-    exact = middle + (0.2 - middle) * np.cos(3 * t) - np.sin(3 * t) / 3
-    for run in runs:
-        np.testing.assert_allclose(run["x"], exact, rtol=0, atol=1e-8)
-    for name in ("x", "v", "a", "energy"):
-        np.testing.assert_allclose(runs[0][name], runs[1][name], rtol=0, atol=1e-10)
-
-
-@pytest.mark.parametrize(
-    ("path", "most"),
-    [
-        (FOLDER / "oscillator.toml", 15),
-        (EXAMPLES / "bouncing_ball.toml", 20),
-        (FOLDER / "arm.toml", 50),
-    ],
-    ids=lambda value: getattr(value, "stem", ""),
-)
-def test_a_model_is_short(path: Path, most: int) -> None:
-    assert len(path.read_text().splitlines()) <= most

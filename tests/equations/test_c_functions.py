@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tests.equations.compiled import Model, ModelFileError, c_model, declaration, read_text
-from tests.equations.examples import METHODS, MISTAKES, MODELS, build, simulated
+from tests.equations.examples import MISTAKES, MODELS
 from tests.support.tables import cases
 
 import equations_to_fmu  # isort: skip; compiled.py knows where it is
@@ -27,34 +27,6 @@ def files(folder: Path, text: str, code: str) -> Path:
     path.write_text(text, encoding="utf-8")
     (folder / text.split('code = "')[1].split('"')[0]).write_text(code, encoding="utf-8")
     return path
-
-
-@pytest.fixture(scope="module")
-def hoist(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("hoist")
-    return build(files(folder, TEXTS["HOIST"], TEXTS["CRANE"]), folder)
-
-
-def stretch(times: np.ndarray) -> np.ndarray:
-    """z - l of the hoist without damping: parabolas of a slack rope, and parts of harmonic ones."""
-    g, w, speed = 9.81, np.sqrt(2e5 / 500), 1.0
-    rest = g / w**2
-    slack, taut = 2 * speed / g, 2 * (np.pi - np.arctan(speed / (w * rest))) / w
-    t = np.mod(times, slack + taut)
-    after = w * (t - slack)
-    harmonic = rest * (1 - np.cos(after)) + speed / w * np.sin(after)
-    return np.where(t < slack, -speed * t + g * t**2 / 2, harmonic)
-
-
-@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
-def test_a_rope_is_slack_and_taut_in_turn(hoist: Path, method: int) -> None:
-    options = {"solver_method": method}
-    run = simulated(hoist, 2.0, 0.01, options, relative_tolerance=1e-11, also=["event_count"])
-    exact = stretch(run["time"])
-    assert np.max(np.abs(run["z"] - run["l"] - exact)) < 1e-8
-    assert np.max(np.abs(run["rope"] - 2e5 * np.maximum(exact, 0.0))) < 2e-3
-    turns = np.count_nonzero(np.diff(exact > 0))
-    assert turns > 8 and turns <= run["event_count"][-1] <= 2 * turns + 2
 
 
 def test_calls_are_what_expressions_are(tmp_path: Path) -> None:

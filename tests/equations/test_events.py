@@ -56,45 +56,9 @@ def test_the_ball_bounces_eleven_times_and_rests(folder: Path, method: int) -> N
     assert run["last_event_time"][-1] == pytest.approx(flights(1.0)[-1][0], abs=1e-11)
 
 
-@EACH_METHOD
-def test_the_thermostat_switches_when_its_exponentials_do(folder: Path, method: int) -> None:
-    run = simulated(
-        example("thermostat", folder), 7200.0, 10.0, {"solver_method": method},
-        relative_tolerance=1e-10, also=["event_count", "last_event_time"],
-    )  # fmt: skip
-    rate, warm, cold = 80 / 4e5, 278 + 2000 / 80, 278.0
-    t, room, goal, limit, times = 0.0, 293.0, warm, 294.0, []
-    while t < 7200:
-        t += np.log((room - goal) / (limit - goal)) / rate
-        room = limit
-        times.append(t)
-        goal, limit = (cold, 292.0) if goal == warm else (warm, 294.0)
-    assert run["event_count"][-1] == len(times) - 1
-    assert run["last_event_time"][-1] == pytest.approx(times[-2], abs=1e-4)
-
-
 def named(folder: Path, text: str) -> Path:
     """The FMU of a text without a name."""
     return made(folder, 'name = "Made"\n' + text)
-
-
-@EACH_METHOD
-def test_a_one_sided_spring_swings_in_two_halves(folder: Path, method: int) -> None:
-    """On one side with sqrt(101) rad/s, on the other with 1 rad/s."""
-    run = simulated(
-        named(folder, TEXTS["SPRING"]), 12.0, 0.05, {"solver_method": method},
-        relative_tolerance=1e-12, also=["event_count"],
-    )  # fmt: skip
-    stiff = np.sqrt(101.0)
-    halves = np.array([np.pi / stiff, np.pi])
-    phase = np.mod(run["time"] + halves[0] / 2, halves.sum())
-    above = np.sin(stiff * phase)
-    below = -stiff * np.sin(phase - halves[0])
-    expected = np.where(phase < halves[0], above, below)
-    assert np.max(np.abs(run["x"] - expected)) < 1e-9 * stiff
-    np.testing.assert_array_equal(run["size"], np.abs(run["x"]))
-    crossings = 2 * int((12.0 + halves[0] / 2) // halves.sum()) + int(phase[-1] > halves[0])
-    assert run["event_count"][-1] == crossings
 
 
 @pytest.mark.parametrize("pump", [0.0, 0.05])

@@ -15,7 +15,10 @@ from scipy.optimize import brentq
 
 from rparm.fmi.fmu_file import read_model
 from rparm.runs import scenario
-from tests.equations.examples import FOLDER, METHODS, MODELS, example, simulated
+from tests.equations import examples
+from tests.equations.examples import FOLDER, METHODS, MODELS, build, simulated
+
+example = partial(examples.example, make=build)
 
 
 @pytest.fixture(scope="module")

@@ -7,15 +7,13 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from rparm import api
-from tests.equations.examples import METHODS, MODELS, build, initializing, simulated
+from tests.equations.examples import METHODS, MODELS, initializing, made, simulated
 from tests.support.rparm_project import Console
 
 
 @pytest.fixture(scope="module")
 def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("following")
-    (folder / "Spring.toml").write_text(MODELS["following_values"]["SPRING"])
-    return build(folder / "Spring.toml", folder)
+    return made(tmp_path_factory.mktemp("following"), MODELS["following_values"]["SPRING"])
 
 
 @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])

@@ -7,14 +7,13 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.equations.examples import MODELS
 from tests.equations.hybrid import failures
-from tests.equations.hybrid_models import FORMS, KINDS, Polynomial, hybrid
+from tests.equations.hybrid_models import KINDS, Polynomial, hybrid
 from tests.equations.hybrid_runs import (
     METHODS,
     Run,
@@ -50,12 +49,6 @@ def test_random_models_follow_the_event_loop() -> None:
     lines = [f"{failure}\n    {failure.command}" for failure in found]
     texts = [hybrid(seed).text() for seed in sorted({failure.seed for failure in found})]
     assert not found, "\n".join([*lines, *texts])
-
-
-@pytest.mark.parametrize("form", FORMS)
-def test_forms_of_a_condition_make_the_same_events(form: str) -> None:
-    found = failures(1, is_full=False, form=form)
-    assert not found, "\n".join(map(str, found))
 
 
 @pytest.fixture(scope="module")
@@ -267,14 +260,3 @@ def test_conditions_behind_a_guard_switch(unit: Callable, kind: str, step: float
     assert not run.failure
     w = 0.7 * 0.49 + (2**1.5 - 0.7**3) / 1.5
     assert run.x[-1] == pytest.approx([2.0, 1.75, w, 2 - np.exp(-1)], abs=1e-5)
-
-
-def test_what_a_motion_is(tmp_path: Path) -> None:
-    """The event loop itself, against the closed form of the rising floor."""
-    from tests.equations.event_loop import EventLoop
-
-    motion = EventLoop(TEXTS["RISING"].format(floor="g")).run(np.linspace(0.0, 3.0, 31))
-    speed = np.sqrt(0.1**2 + 2 * G)
-    impacts = [(speed - 0.1) / G + 2 * speed / G * k for k in range(3)]
-    assert [i.t for i in motion.impacts] == pytest.approx(impacts, abs=1e-11)
-    assert motion.horizon == 3.0 and motion.x[-1][0] == pytest.approx(0.857995, abs=1e-6)

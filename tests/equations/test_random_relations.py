@@ -15,14 +15,14 @@ import pytest
 
 from rparm.expressions.expression import Node, parse
 from tests.equations.compiled import Model
-from tests.equations.examples import METHODS, build, simulated
+from tests.equations.examples import METHODS, made, simulated
 
 SEEDS = range(int(os.environ.get("EXPRESSIONS", "2")))
 NAMES = ("x", "y", "u", "p", "time")
 GRID = (-1.0, -0.5, 0.0, 0.5, 1.0)  # where values tie
 SMOOTH = ("sin({})", "atan({})", "exp(-abs({}))", "-{}", "{0} / (2 + {0} * {0})", "{}**2")
 # defined for a part of all numbers, with infinite slopes at its end
-PARTIAL = ("sqrt({})", "asin({})", "{}**1.5", "log({} + 0.03)")
+PARTIAL = ("sqrt({})", "asin({})", "{}**1.5", "log({} + 0.03)", "cbrt({})")
 # the same with guards: defined for all numbers
 GUARDED = (
     "sqrt(abs({}))", "asin(max(-1, min({}, 1)))", "sqrt(max({}, 0))", "abs({})**1.5",
@@ -31,7 +31,7 @@ GUARDED = (
     "(1 / {0} if {0} > 1 else 1)", "(asin({0}) if abs({0}) <= 1 else 2)",
 )  # fmt: skip
 FUNCTIONS: dict[str, Callable[..., float]] = {
-    name: getattr(math, name) for name in ("sin", "atan", "exp", "sqrt", "asin", "log")
+    name: getattr(math, name) for name in ("sin", "atan", "exp", "sqrt", "asin", "log", "cbrt")
 } | {
     "**": math.pow,
     "+": operator.add,
@@ -150,9 +150,9 @@ def model_text(texts: Mapping[str, str]) -> str:
 @pytest.fixture(scope="module", params=SEEDS)
 def case(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple:
     """Compiled expressions, their texts, and chance for points."""
-    made = Texts(request.param, NAMES, only_total=False)
-    texts = {f"z{i}": made.number(4) for i in range(25)}
-    return Model(tmp_path_factory.mktemp("model"), model_text(texts)), texts, made.chance
+    random_texts = Texts(request.param, NAMES, only_total=False)
+    texts = {f"z{i}": random_texts.number(4) for i in range(25)}
+    return Model(tmp_path_factory.mktemp("model"), model_text(texts)), texts, random_texts.chance
 
 
 def points(chance: random.Random, count: int) -> list[dict[str, float]]:
@@ -232,16 +232,14 @@ def changes(text: str, point: Callable[[float], dict[str, float]]) -> list[float
 @pytest.fixture(scope="module", params=SEEDS)
 def fmu_case(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple:
     """An FMU whose states are integrals of expressions, which are outputs too."""
-    made = Texts(1000 + request.param, ("x", "p", "time"), only_total=True)
-    texts = {f"z{i}": made.number(4) for i in range(10)}
+    random_texts = Texts(1000 + request.param, ("x", "p", "time"), only_total=True)
+    texts = {f"z{i}": random_texts.number(4) for i in range(10)}
     text = 'name = "Random"\n[parameters]\np = { start = 0.4 }\n'
     text += f'[states]\nx = {{ start = -1, derivative = "{RATE}" }}\n'
     text += "".join(f'i{name} = {{ derivative = "{rate}" }}\n' for name, rate in texts.items())
     text += "[outputs]\n"
     text += "".join(f'{name} = {{ value = "{rate}" }}\n' for name, rate in texts.items())
-    folder = tmp_path_factory.mktemp("fmu")
-    (folder / "model.toml").write_text(text)
-    return build(folder / "model.toml", folder), texts
+    return made(tmp_path_factory.mktemp("fmu"), text), texts
 
 
 @pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)

@@ -1,5 +1,6 @@
 """Tables of files with equations: interpolation, what lies outside, stops at the rows, files."""
 
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
 
 from tests.equations.compiled import Model, ModelFileError, read_text
-from tests.equations.examples import METHODS, MISTAKES, MODELS, build, made, simulated
+from tests.equations.examples import METHODS, MISTAKES, MODELS, made, quick, simulated
 from tests.support.tables import cases
 
 TEXTS = MODELS["tables"]
@@ -97,59 +98,38 @@ def test_a_table_of_an_input_follows_at_once(folder: Path) -> None:
     assert np.max(np.abs(run["now"][rows] - exact[rows])) < 1e-12
 
 
-@EACH_METHOD
-def test_a_ball_bounces_by_a_table_of_its_speed(folder: Path, method: int) -> None:
-    """Parabolas from impact to impact; the speed after one is e(speed) times that before."""
-    run = simulated(
-        made(folder, TEXTS["BOUNCING"]),
-        3.0,
-        0.1,
-        {"solver_method": method},
-        relative_tolerance=1e-10,
-    )
-    speed, begin = np.sqrt(2 * 9.81), -np.sqrt(2 / 9.81)  # as if thrown up before
-    for t, h in zip(run["time"], run["h"], strict=True):
-        while t > begin + 2 * speed / 9.81:
-            begin += 2 * speed / 9.81
-            speed *= np.interp(speed, [0.0, 2.0, 5.0], [0.9, 0.8, 0.5])
-        s = t - begin
-        assert h == pytest.approx(speed * s - 9.81 * s * s / 2, abs=1e-9)
-
-
-@pytest.mark.parametrize("kind", ["linear", "previous", "pchip"])
-@pytest.mark.parametrize("outside", ["hold", "extend", "error"])
-def test_values_without_states_are_scipys(tmp_path: Path, kind: str, outside: str) -> None:
-    text = f'name = "M"\n[tables.T]\n{LISTS}interpolation = "{kind}"\noutside = "{outside}"\n'
-    model = Model(tmp_path, text + '[inputs]\nu = {}\n[outputs]\ny = { value = "T(u)" }\n')
-    curve = PchipInterpolator(X, Y) if kind == "pchip" else None
+def test_values_without_states_are_scipys(tmp_path: Path) -> None:
+    """Of each interpolation, with each rule for what lies outside; of two arguments, bilinear."""
+    cases = [*product(("linear", "previous", "pchip"), ("hold", "extend", "error"))]
+    x, y = [0.0, 1.0, 3.0], [-1.0, 0.5, 2.0, 4.0]
+    z = np.random.default_rng(3).normal(size=(3, 4)).tolist()
+    text = f'name = "M"\n[tables.Z]\nx = {x}\ny = {y}\nz = {z}\n'
+    for i, (kind, outside) in enumerate(cases):
+        text += f'[tables.T{i}]\n{LISTS}interpolation = "{kind}"\noutside = "{outside}"\n'
+    text += '[inputs]\nu = {}\na = {}\nb = {}\n[outputs]\nv = { value = "Z(a, b)" }\n'
+    text += "".join(f'y{i} = {{ value = "T{i}(u)" }}\n' for i in range(len(cases)))
+    model, curve = Model(tmp_path, text), PchipInterpolator(X, Y)
     for u in (-3.0, -0.0, 0.0, 4.0, 10.0, 13.3, 20.0, 39.999, 40.0, 47.0):
         values = model.values(u=u)
         model.outputs(values, 0.0)
-        found = values[model.names.index("y")]
         held = float(np.clip(u, 0.0, 40.0))
-        where = u if outside == "extend" and kind != "previous" else held
-        if kind == "pchip":
-            exact = curve(where, extrapolate=True)
-        elif kind == "previous":
-            exact = Y[int(np.searchsorted(X, where, side="right")) - 1]
-        else:
-            i = int(np.clip(np.searchsorted(X, where, side="right") - 1, 0, 2))
-            exact = Y[i] + (Y[i + 1] - Y[i]) / (X[i + 1] - X[i]) * (where - X[i])
-        if outside == "error" and not 0.0 <= u <= 40.0:
-            exact = np.nan
-        assert found == pytest.approx(float(exact), rel=1e-14, abs=1e-14, nan_ok=True), u
-
-
-def test_a_table_of_two_arguments_is_bilinear(tmp_path: Path) -> None:
-    x, y = [0.0, 1.0, 3.0], [-1.0, 0.5, 2.0, 4.0]
-    z = np.random.default_rng(3).normal(size=(3, 4)).tolist()
-    text = f'name = "M"\n[tables.Z]\nx = {x}\ny = {y}\nz = {z}\n[inputs]\na = {{}}\nb = {{}}\n'
-    model = Model(tmp_path, text + '[outputs]\nv = { value = "Z(a, b)" }\n')
-    exact = RegularGridInterpolator((x, y), np.array(z))
+        for i, (kind, outside) in enumerate(cases):
+            where = u if outside == "extend" and kind != "previous" else held
+            k = int(np.clip(np.searchsorted(X, where, side="right") - 1, 0, 2))
+            exact = {
+                "pchip": float(curve(where, extrapolate=True)),
+                "previous": Y[int(np.searchsorted(X, where, side="right")) - 1],
+                "linear": Y[k] + (Y[k + 1] - Y[k]) / (X[k + 1] - X[k]) * (where - X[k]),
+            }[kind]
+            if outside == "error" and not 0.0 <= u <= 40.0:
+                exact = np.nan
+            found = values[model.names.index(f"y{i}")]
+            assert found == pytest.approx(exact, rel=1e-14, abs=1e-14, nan_ok=True), (kind, u)
+    surface = RegularGridInterpolator((x, y), np.array(z))
     for a, b in ((0.3, 0.7), (2.9, 3.9), (1.0, 0.5), (3.0, 4.0), (-5.0, 1.0), (2.0, 9.0)):
         values = model.values(a=a, b=b)
         model.outputs(values, 0.0)
-        held = exact((np.clip(a, 0.0, 3.0), np.clip(b, -1.0, 4.0)))
+        held = surface((np.clip(a, 0.0, 3.0), np.clip(b, -1.0, 4.0)))
         assert values[model.names.index("v")] == pytest.approx(float(held), rel=1e-13)
 
 
@@ -160,7 +140,7 @@ def test_a_hundred_thousand_rows_of_a_file(tmp_path: Path) -> None:
     rows = "".join(f"{a!r}, {b!r}\n" for a, b in zip(way.tolist(), height.tolist(), strict=True))
     (tmp_path / "road.csv").write_text("way, height\n" + rows)
     (tmp_path / "Long.toml").write_text(TEXTS["LONG"])
-    fmu = build(tmp_path / "Long.toml", tmp_path)
+    fmu = quick(tmp_path / "Long.toml", tmp_path)
     run = simulated(fmu, 0.5, 0.1, {"max_events": 10**6}, also=["event_count"])
     t = run["time"]
     s = 20 * t + 10 * (1 - np.cos(t))

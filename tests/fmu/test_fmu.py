@@ -9,7 +9,6 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from fmpy.util import create_plotly_figure
 from fmpy.validation import validate_fmu
 
 from tests.support.paths import EVERY, FOLDERS, ROOT
@@ -93,13 +92,6 @@ def test_the_sample_of_the_readme_runs(fmu: Path, monkeypatch: pytest.MonkeyPatc
     exec(blocks[0].replace("build/RPManipulator.fmu", str(fmu)), known)
     assert shown[0] is known["result"] and known["result"]["time"][-1] == 2.0
     check_near(known["result"])
-
-
-def test_fmpy_can_plot(fmu: Path) -> None:
-    """`fmpy simulate --show-plot` draws with plotly, which fmpy does not bring by itself."""
-    result = fmpy.simulate_fmu(str(fmu), stop_time=0.1)
-    figure = create_plotly_figure(result)
-    assert len(figure.data) >= 14
 
 
 def test_the_page_names_the_fraction_of_the_tolerance_that_is_used(fmu: Path) -> None:

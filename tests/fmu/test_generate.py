@@ -61,19 +61,6 @@ def test_flags_are_those_that_work(description: ET.Element) -> None:
     assert description.find("CoSimulation").attrib == flags["of_both"] | flags["of_co_simulation"]
 
 
-def test_derivatives_point_at_their_states(description: ET.Element) -> None:
-    variables = list(scalars(description))
-    derivatives = {
-        name: variables[int(v[0].get("derivative")) - 1]
-        for name, v in scalars(description).items()
-        if v[0].get("derivative")
-    }
-    aliases = {"der_q1": "q1", "der_q2": "q2"}
-    accelerations = {"ddq1": "dq1", "ddq2": "dq2"}
-    assert derivatives == aliases | accelerations
-    assert unknowns(description, "Derivatives") == [*aliases, *accelerations]
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_each_state_has_one_derivative(fmu: Path, name: str) -> None:
     """The one in Derivatives, an initial unknown: fmi4c counts the attributes."""
@@ -102,13 +89,6 @@ def test_states_that_are_derivatives_have_aliases(description: ET.Element) -> No
     assert len(references) - len(set(references)) == 2
 
 
-def test_outputs_are_listed_in_order(description: ET.Element) -> None:
-    variables = scalars(description)
-    expected = [n for n, v in variables.items() if v.get("causality") == "output"]
-    assert unknowns(description, "Outputs") == expected
-    assert unknowns(description, "InitialUnknowns") == ["der_q1", "der_q2", *expected[4:]]
-
-
 def test_units_are_defined_and_angles_have_degrees(description: ET.Element) -> None:
     units = {u.get("name"): u for u in description.iterfind("UnitDefinitions/Unit")}
     for variable in scalars(description).values():
@@ -119,12 +99,6 @@ def test_units_are_defined_and_angles_have_degrees(description: ET.Element) -> N
     assert degree.get("name") == "deg"
     assert float(degree.get("factor")) * 3.141592653589793 == pytest.approx(180, rel=1e-15)
     assert scalars(description)["q1"][0].get("displayUnit") == "deg"
-
-
-def test_log_categories_are_explained(description: ET.Element) -> None:
-    categories = description.findall("LogCategories/Category")
-    assert len(categories) == 6
-    assert all(category.get("description") for category in categories)
 
 
 def test_where_the_fmu_comes_from(tmp_path: Path) -> None:

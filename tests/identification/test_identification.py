@@ -45,22 +45,6 @@ def test_exact_logs_give_exact_parameters(tmp_path: Path) -> None:
         assert found.estimates[name].value == pytest.approx(true, rel=1e-6)
 
 
-def test_fmi_3_finds_the_same(tmp_path: Path) -> None:
-    log = write(replace(ARM, duration=2.0), tmp_path / "log.csv", 3)
-    both = [
-        rparm.identify(
-            rparm.fmu("RPManipulator", version),
-            log,
-            parameters=["m2", "a"],
-            inputs=INPUTS,
-            measured=MEASURED,
-            settings={name: ARM.true[name] for name in ("I1z", "l1")},
-        ).values
-        for version in (2, 3)
-    ]
-    assert both[0] == both[1]
-
-
 def test_several_logs_tell_more_than_one(tmp_path: Path) -> None:
     short = replace(ARM, duration=3.0)
     logs = [write(short, tmp_path / f"{seed}.csv", seed) for seed in (4, 5, 6)]
@@ -70,23 +54,6 @@ def test_several_logs_tell_more_than_one(tmp_path: Path) -> None:
         assert narrow.high - narrow.low < 0.8 * (wide.high - wide.low)
         assert abs(narrow.value - true) < narrow.high - narrow.low
     assert len(three.segments) == 3 * len(one.segments)
-
-
-def test_missing_rows_and_irregular_times(tmp_path: Path) -> None:
-    whole = write(replace(ARM, duration=4.0), tmp_path / "whole.csv", 7)
-    table = np.loadtxt(whole, delimiter=",", skiprows=1)
-    random = np.random.default_rng(7)
-    kept = random.random(len(table)) > 0.02  # single rows are missing
-    kept[2000:2300] = False  # and a whole part
-    kept[2500:3000:2] = False  # half of the rows: other steps
-    path = tmp_path / "log.csv"
-    names = whole.read_text().splitlines()[0]
-    np.savetxt(path, table[kept], fmt="%.17g", delimiter=",", header=names, comments="")
-    found = identified(ARM, path, 7)
-    assert found.has_converged and 0.8 < found.chi2 < 1.2
-    for name, true in ARM.true.items():
-        estimate = found.estimates[name]
-        assert abs(estimate.value - true) < estimate.high - estimate.low
 
 
 def test_times_that_are_never_the_same_step(tmp_path: Path) -> None:

@@ -69,26 +69,6 @@ def test_pages_say_what_is_predicted(fmu: Path) -> None:
             assert f"| {name} | {1e3 * step:.3f} ms |" in page
 
 
-def test_the_closed_loop_is_stable_up_to_21_ms_in_jacobi_order(fmu: Path) -> None:
-    """Without gravity by another path: two integrators, and efforts for s^2 + 40 s + 400, late."""
-
-    def largest(h: float) -> float:
-        # x, v and the effort that the next step holds
-        free = expm(np.array([[0, 1, 0], [0, 0, 1], [0, 0, 0]]) * h)
-        free[2] = [-400.0, -40.0, 0.0]
-        return np.abs(np.linalg.eigvals(free)).max()
-
-    low, high = 0.001, 0.1
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (middle, high) if largest(middle) < 1 else (low, middle)
-    way = "jacobi", "held"
-    with opened(fmu, "ClosedLoop", variant="horizontal_plane") as system:
-        assert system.predicted(way).step == pytest.approx(low, rel=1e-9)
-    with opened(fmu, "ClosedLoop") as system:  # gravity is compensated late, too
-        assert system.predicted(way).step == pytest.approx(21.297e-3, abs=1e-6)
-
-
 @pytest.mark.parametrize("way", WAYS, ids=", ".join)
 @pytest.mark.parametrize("step", [1e-3, 2e-2])
 def test_a_mass_at_a_sampled_wall_grows_as_its_theory_says(

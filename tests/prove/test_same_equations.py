@@ -7,7 +7,6 @@ it.
 from __future__ import annotations
 
 import random
-import shutil
 import subprocess
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from pathlib import Path
 import pytest
 from flint import arb
 
-from tests.prove.faults import COMPILE, Fault
+from tests.prove.faults import COMPILE
 from tests.prove.problems import SOURCES, motion_series, operands
 from tests.support.paths import ROOT
 from tests.support.plain_equations import (
@@ -107,10 +106,10 @@ RANDOM = [random_arm(DRAW) for _ in range(ARMS)]
 # ---- The same equations in balls -----------------------------------------------------------------
 
 
-def balls(folder: Path, program: Path) -> list[list[arb]]:
-    """What the headers in a folder make of each arm; the program is compiled."""
+def balls(program: Path) -> list[list[arb]]:
+    """What the headers make of each arm; the program is compiled."""
     source = Path(__file__).with_name("arm_values.c")
-    subprocess.run([*COMPILE, f"-I{folder}", source, "-o", program, "-lm"], check=True)
+    subprocess.run([*COMPILE, f"-I{SOURCES}", source, "-o", program, "-lm"], check=True)
     text = "".join(arm.line for arm in RANDOM)
     answer = subprocess.run([program], input=text, capture_output=True, text=True, check=True)
     found = []
@@ -134,13 +133,6 @@ def of_checker(arm: Arm) -> list[arb]:
 Expected = Sequence[Sequence[tuple[arb, arb]]]  # of each arm
 
 
-def expected_of(folder: Path, arms: Sequence[Arm]) -> Expected:
-    """What the plain headers in a folder say."""
-    header, includes = folder / "rp_calculated.h", [folder, ROOT / "models"]
-    plain = PlainEquations(header, includes, "rp_calculate")
-    return [arm.expected(plain) for arm in arms]
-
-
 def wrong(expected: Expected, found: Sequence[Sequence[arb]]) -> set[Place]:
     """Numbers whose ball does not contain what the graph says, or is too wide."""
     names = [(*name, k) for k in range(1, LAST + 1) for name in STATES] + OUTPUTS
@@ -155,57 +147,14 @@ def wrong(expected: Expected, found: Sequence[Sequence[arb]]) -> set[Place]:
 @pytest.fixture(scope="module")
 def expected() -> Expected:
     with precision(LAST):
-        return expected_of(PLAIN, RANDOM)
+        header, includes = PLAIN / "rp_calculated.h", [PLAIN, ROOT / "models"]
+        plain = PlainEquations(header, includes, "rp_calculate")
+        return [arm.expected(plain) for arm in RANDOM]
 
 
 def test_balls_are_those_of_the_plain_equations(expected: Expected, tmp_path: Path) -> None:
-    assert wrong(expected, balls(SOURCES, tmp_path / "values")) == set()
+    assert wrong(expected, balls(tmp_path / "values")) == set()
 
 
 def test_so_are_those_of_the_checker(expected: Expected) -> None:
     assert wrong(expected, [of_checker(arm) for arm in RANDOM]) == set()
-
-
-# ---- Faults --------------------------------------------------------------------------------------
-
-
-def with_fault(fault: Fault, folder: Path, copy: Path) -> Path:
-    """A copy of the headers in a folder, one of them with the fault."""
-    shutil.copytree(folder, copy, ignore=shutil.ignore_patterns("scenarios", "references"))
-    file = copy / fault.file
-    file.write_text(fault.source(file.read_text(encoding="utf-8")), encoding="utf-8")
-    return copy
-
-
-IN_PLAIN = (
-    Fault("Coriolis term", "rp_equations.h", "- 2.0 * dq2", "- 1.0 * dq2"),
-    Fault("offset of the slide", "rp_equations.h", "+ arm->a * ddq[0]", "- arm->a * ddq[0]"),
-    Fault("inertia", "rp_equations.h", "p->I1z + p->I2z;", "p->I1z;"),
-    Fault("power", "rp_calculated.h", "tau[0] * dq[0] +", "tau[0] * dq[0] -"),
-)
-IN_BALLS = (
-    Fault(
-        "centrifugal", "arm_series.h", "convolution(s, P, 0, W, i))", "convolution(s, P, 0, V, i))"
-    ),
-    Fault("weight", "arm_series.h", "times(s->offset, coefficient(s, C, i))", "s->offset"),
-    Fault("Coriolis term", "arm_outputs.h", "v)), 2.0)", "v)), 1.0)"),
-    Fault("height", "arm_outputs.h", "ball_product(m2, y))", "ball_product(m2, x))"),
-)
-
-
-def named(fault: Fault) -> str:
-    return fault.name
-
-
-@pytest.mark.parametrize("fault", IN_PLAIN, ids=named)
-def test_a_fault_in_the_plain_equations_is_seen(fault: Fault, tmp_path: Path) -> None:
-    few = RANDOM[:20]
-    faulty = expected_of(with_fault(fault, PLAIN, tmp_path / "headers"), few)
-    assert wrong(faulty, [of_checker(arm) for arm in few])
-
-
-@pytest.mark.parametrize("fault", IN_BALLS, ids=named)
-def test_a_fault_in_the_balls_is_seen(fault: Fault, expected: Expected, tmp_path: Path) -> None:
-    assert wrong(
-        expected, balls(with_fault(fault, SOURCES, tmp_path / "proof"), tmp_path / "values")
-    )
