@@ -46,11 +46,11 @@ def runtime(level: str) -> building.Runtime:
     return replace(made, content=made.content | {"options": options})
 
 
-def quick(path: Path, output: Path) -> Path:
+def quick(path: Path, output: Path, level: str = "-O1") -> Path:
     """The FMU of FMI 2.0, and that of 3.0 below fmi3: only what a run needs, with the same bits."""
     file = read(path, declaration.solver_names())
     references = lock.references(lock.path_of(path), declaration.keys(file))
-    made, versions = runtime("-O1"), {"fmi2": output, "fmi3": output / "fmi3"}
+    made, versions = runtime(level), {"fmi2": output, "fmi3": output / "fmi3"}
     describe = {"fmi2": building.fmi2_description, "fmi3": fmi3_description}
     with TemporaryDirectory() as folder:
         work = Path(folder).resolve()

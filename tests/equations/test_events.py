@@ -1,13 +1,33 @@
-"""Events of files with equations: the ball, the thermostat, relations that switch."""
+"""Events of files with equations: the ball, relations that switch, samplers and their ticks.
 
+SAMPLERS in the environment: how many random models with samplers.
+"""
+
+import ctypes
+import os
+import random
+from fractions import Fraction
+from itertools import product
+from math import ceil, floor
 from pathlib import Path
 
 import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi2 import FMU2Model
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Model, FMU2Slave
 
-from tests.equations.examples import METHODS, MODELS, example, initializing, loaded, made, simulated
+from tests.equations.compiled import Model
+from tests.equations.examples import (
+    METHODS,
+    MODELS,
+    axis,
+    example,
+    initializing,
+    loaded,
+    made,
+    simulated,
+)
 from tests.support.instances import OK, Instance
 
 TEXTS = MODELS["events"]
@@ -234,3 +254,222 @@ def test_a_step_that_is_tried_again_and_succeeds_sends_no_message(folder: Path) 
         unit.initialize(0.0, None, 1e-9).step(0.0, 200.0)
         assert unit.count("event_count") == 3
         assert [m.text for m in unit.messages if m.status != OK] == []
+
+
+# ---- Samplers ------------------------------------------------------------------------------------
+
+
+OF_SAMPLERS = MODELS["sampled"]
+SEEDS = range(int(os.environ.get("SAMPLERS", "2")))
+
+
+@pytest.mark.parametrize("begin", [0.0, -0.3, -0.6, 1e6])
+def test_samplers_of_one_instant_run_in_the_order_of_the_file(folder: Path, begin: float) -> None:
+    """3 * 0.1 and 1 * 0.3 are two doubles and one instant, at 0 too; the first is at the start."""
+    run = simulated(made(folder, OF_SAMPLERS["COUNTERS"]), begin + 30.0, 0.1, {}, start_time=begin)
+    k = np.arange(len(run))
+    assert np.array_equal(run["a"], k + 1)
+    assert np.array_equal(run["b"], k // 3 * 3 + 1)
+    assert np.array_equal(run["c"], 5 + np.maximum(0, k - 2))
+
+
+def test_ticks_do_not_drift_in_a_thousand_million(tmp_path: Path) -> None:
+    """Time of the next tick: start + (offset + k every), rounded three times."""
+    model = Model(tmp_path, OF_SAMPLERS["COUNTERS"])
+    for start, every, k in ((0.0, 0.1, 10**9), (3.7, 1 / 3, 123456789), (1.7e9, 0.01, 10**6)):
+        given = {"T": every, "start": start, "ticks_fast": k, "ticks_slow": 1e12}
+        values = model.values(**given, ticks_late=1e12)
+        values.view(np.int32)[2 * len(model.names)] = 1  # is_begun
+        assert model.next_time(values) == start + (0.0 + k * every)
+
+
+def on_axis(stop: float) -> np.ndarray:
+    """x, v, y, w, u at the ticks until a time, just after each."""
+    tick, motion = axis(0.002, 1.3, 2.5, 9e3, 25.0, 900.0, 60.0, 3000.0)
+    rows = [tick @ [0, 0, 0, 0, 0, 0, 0, 0.1, 0]]
+    for _ in range(round(stop / 0.002)):
+        rows.append(tick @ motion @ rows[-1])
+    return np.array(rows)[:, :5]
+
+
+@EACH_METHOD
+@pytest.mark.parametrize("step", [0.002, 0.02, 0.005])
+def test_a_sampled_pid_controller_moves_an_axis(folder: Path, method: int, step: float) -> None:
+    options = {"solver_method": method}
+    run = simulated(example("axis", folder), 1.0, step, options, relative_tolerance=1e-11)
+    rows = np.round(run["time"] / 0.002, 6)
+    at_ticks = rows == np.round(rows)
+    found = np.stack([run[name] for name in "xvywu"], axis=1)[at_ticks]
+    differences = np.abs(found - on_axis(1.0)[rows[at_ticks].astype(int)]).max(axis=0)
+    assert np.all(differences < [1e-9, 1e-9, 1e-9, 1e-9, 1e-6])
+
+
+PERIODS = (  # s; doubles have the first ones exactly
+    [Fraction(n, 16) for n in (1, 4, 5, 6, 12)],
+    [Fraction(*ratio) for ratio in ((1, 10), (3, 10), (7, 10), (1, 3), (11, 100))],
+)
+# what jumps by the time, and its value at s = {t} / {T}
+JUMPS = {
+    "floor({t} / {T})": floor,
+    "floor(-{t} / {T})": lambda s: floor(-s),
+    "ceil({t} / {T})": ceil,
+    "round({t} / {T})": lambda s: floor(s + Fraction(1, 2)),
+    "(1 if mod({t}, {T}) > 0.9 * {T} else 0)": lambda s: s % 1 > Fraction(9, 10),
+    "(1 if mod({t}, {T}) >= {T} / 2 else 0)": lambda s: s % 1 >= Fraction(1, 2),
+    "(1 if {t} > 4 * {T} else 0)": lambda s: s > 4,
+    "(1 if sin(2 * pi * {t} / {T}) > 0 else 0)": lambda s: s % 1 < Fraction(1, 2),
+    "(floor({t} / {T}) if mod({t}, 2 * {T}) < {T} else 0)": lambda s: floor(s) * (s % 2 < 1),
+    "quarters(mod({t}, {T}) / {T})": lambda s: floor(4 * (s % 1)),
+}
+QUARTERS = """[tables.quarters]
+x = [-0.25, 0, 0.25, 0.5, 0.75, 1]
+y = [-1, 0, 1, 2, 3, 4]
+interpolation = "previous"
+"""
+
+
+def written(number: Fraction) -> str:
+    """As files have it, with as many digits as a double."""
+    is_short = Fraction(repr(float(number))) == number
+    return repr(float(number)) if is_short else f"({number.numerator} / {number.denominator})"
+
+
+@pytest.mark.parametrize("has_state", [True, False])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_tick_sees_what_switches_at_its_time_switched(
+    tmp_path: Path, seed: int, has_state: bool
+) -> None:
+    """Directly and through [where], with each method, in one step or many."""
+    chance, periods = random.Random(seed), PERIODS[seed % 2]
+    every = chance.choice(periods) / chance.choice([1, 2])
+    offset, start = chance.choice([0, every / 2, every]), chance.choice([0, 0, -3 * every, 10])
+    multiples = [every * n for n in (1, 2, 3, 4, 5, Fraction(1, 2), Fraction(3, 2))]
+    expressions = []
+    for text, value in JUMPS.items():
+        T, since = chance.choice([*periods, *multiples]), chance.choice([0, offset, every, 10])
+        t = f"(time - {written(since)})" if since else "time"
+        expressions.append((text.format(t=t, T=written(T)), value, T, since))
+    numbers = range(len(expressions))
+    where = "".join(f'w{i} = "{expressions[i][0]}"\n' for i in numbers)
+    new = [f'd{i} = "d{i} + (n + 1) * {expressions[i][0]}"' for i in numbers]
+    new += [f'v{i} = "v{i} + (n + 1) * w{i}"' for i in numbers]
+    held = "".join(f"{kind}{i} = {{}}\n" for kind in "dv" for i in numbers)
+    state = '[states]\ny = { derivative = "w4 - y" }\n' if has_state else ""
+    fmu = made(
+        tmp_path,
+        f'name = "Jumps"\n{state}{QUARTERS}[where]\n{where}[discrete]\nn = {{}}\n{held}'
+        f'[sampled.s]\nevery = "{written(every)}"\noffset = "{written(Fraction(offset))}"\n'
+        f'set = {{ n = "n + 1", {", ".join(new)} }}\n',
+    )
+    later = Fraction(1, 10**9)
+    ticks = [start + offset + k * every for k in range(25)]
+    stops = (ticks[-1], 24), (ticks[-1] + every * Fraction(3, 10), 1), (ticks[-1] + every / 3, 61)
+    for (stop, steps), method in product(stops, METHODS.values() if has_state else [None]):
+        options = {"solver_method": method} if method else {}
+        last = simulated(
+            fmu, float(stop), float((stop - start) / steps), options, start_time=float(start)
+        )[-1]
+        assert last["n"] == len(ticks)
+        for i, (text, value, T, since) in enumerate(expressions):
+            expected = sum((k + 1) * value((t + later - since) / T) for k, t in enumerate(ticks))
+            assert (last[f"d{i}"], last[f"v{i}"]) == (expected, expected), (text, every, method)
+
+
+@EACH_METHOD
+def test_events_set_discrete_variables_and_their_own_next_time(folder: Path, method: int) -> None:
+    run = simulated(made(folder, OF_SAMPLERS["TIMER"]), 2.0, 0.01, {"solver_method": method})
+    t = run["time"]
+    times = 0.25 * np.cumsum([1, 1, 2, 3, 4, 5, 6])  # the alarm sets the time of the next one
+    assert np.array_equal(run["alarms"], np.sum(t[:, None] >= times, axis=1))
+    speed, falls = np.sqrt(20.0), [np.sqrt(0.2)]
+    while falls[-1] < 2.0:
+        speed *= 0.8
+        falls.append(falls[-1] + speed / 5)
+    assert np.array_equal(run["bounces"], np.sum(t[:, None] >= np.array(falls), axis=1))
+    assert run["fastest"][-1] == pytest.approx(np.sqrt(20.0), abs=1e-9)
+
+
+def test_a_digital_filter_has_no_states(folder: Path) -> None:
+    """A tick at the end of a step sees the input of the step."""
+    fmu = made(folder, OF_SAMPLERS["FILTER"])
+    signal = np.array(
+        [(0.0, 1.0), (0.45, 1.0), (0.45, 3.0), (2.0, 3.0)], [("time", "f8"), ("u", "f8")]
+    )
+    run = simulated(fmu, 2.0, 0.1, {}, input=signal, also=["event_count"])
+    assert run["event_count"][-1] == 20  # ticks after the one at the start
+    y, before = 1.0, 0.0
+    for k, row in enumerate(run):
+        y, before = y + 0.2 * ((1.0 if k <= 5 else 3.0) - y), y
+        assert (row["y"], row["z"]) == (
+            pytest.approx(y, abs=1e-15),
+            pytest.approx(before, abs=1e-15),
+        )
+
+
+def test_an_importer_that_moves_the_axis_itself_gets_all_ticks(folder: Path) -> None:
+    """Model Exchange: tick k is due at k Ts, and the force, a sum of terms of 3 kN, follows."""
+    begun, rows = initializing(example("axis", folder), FMU2Model), on_axis(0.2)
+    instance, reference = begun.fmi, begun.loaded.references["u"]
+    instance.exitInitializationMode()
+    for k, (*_, force) in enumerate(rows[:-1]):
+        needed, terminates, _, changed, is_defined, time = instance.newDiscreteStates()
+        assert (needed, terminates, changed, is_defined) == (False, False, False, True)
+        assert time == 0.002 * (k + 1)
+        assert instance.getReal([reference])[0] == pytest.approx(force, abs=1e-11)
+        instance.enterContinuousTimeMode()
+        instance.setTime(time)
+        instance.setContinuousStates((ctypes.c_double * 4)(*rows[k + 1, :4]), 4)
+        assert instance.getReal([reference])[0] == pytest.approx(force, abs=1e-11)
+        instance.enterEventMode()
+    instance.terminate()
+    instance.freeInstance()
+
+
+def test_ticks_survive_a_rollback_and_a_move_to_another_instance(folder: Path) -> None:
+    fmu = example("axis", folder)
+    begun = initializing(fmu), initializing(fmu)
+    first, second = (instance.fmi for instance in begun)
+    names = begun[0].loaded.references
+    references = [names[name] for name in ("x", "v", "y", "w", "u", "sum", "last")]
+    for instance in (first, second):
+        instance.exitInitializationMode()
+    at = [0.0]
+
+    def advance(instance: FMU2Slave, steps: int) -> list[float]:
+        for _ in range(steps):
+            instance.doStep(at[0], 0.0037)
+            at[0] += 0.0037
+        return instance.getReal(references)
+
+    advance(first, 31)
+    then, saved = at[0], first.getFMUstate()
+    ahead = advance(first, 23)
+    content = first.serializeFMUstate(saved)
+    second.setFMUstate(second.deSerializeFMUstate(content))
+    first.setFMUstate(saved)
+    for instance in (first, second):
+        at[0] = then
+        assert advance(instance, 23) == ahead
+
+
+def test_start_values_of_discrete_variables_and_periods_can_be_set(folder: Path) -> None:
+    run = simulated(made(folder, OF_SAMPLERS["COUNTERS"]), 1.0, 0.1, {"a": 10.0, "T": 0.2})
+    assert run["a"][-1] == 16.0 and run["c"][0] == 5.0 and run["c"][-1] == 10.0
+
+
+@pytest.mark.parametrize(
+    ("start", "message"),
+    [
+        ({"Ts": 1e-6, "time": 1e9}, "sampler control: every = 1e-06 s is refused"),
+        ({"Kp": 1e308, "target": 1e308}, "sampler control: u = Kp * (target - x) + sum - Kd"),
+    ],
+)
+def test_a_sampler_that_fails_is_named(folder: Path, start: dict[str, float], message: str) -> None:
+    fmu, logged = example("axis", folder), []
+    options = {"start_time": start.pop("time", 0.0)}
+    with pytest.raises(FMICallException):
+        fmpy.simulate_fmu(
+            str(fmu), start_values=start, stop_time=options["start_time"] + 1,
+            logger=lambda *given: logged.append(str(given)), **options,
+        )  # fmt: skip
+    assert any(message in line for line in logged)

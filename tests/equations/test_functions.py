@@ -1,4 +1,4 @@
-"""Functions of files with equations: further ones, the file's own, derivatives, compound events."""
+"""Functions of files with equations, compound events, and values that follow from parameters."""
 
 from math import comb
 from pathlib import Path
@@ -6,14 +6,15 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
 
+from rparm import api
 from rparm.expressions import expression
-from tests.equations.compiled import BUILD, Model
-from tests.equations.examples import METHODS, MODELS, made, simulated
-from tests.support.paths import ROOT
-from tests.support.programs import python
+from tests.equations.compiled import Model
+from tests.equations.examples import METHODS, MODELS, initializing, made, quick, simulated
+from tests.support.rparm_project import Console
 
 TEXTS = MODELS["functions"]
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
@@ -199,13 +200,7 @@ def test_every_function_stands_in_every_place(tmp_path: Path) -> None:
     for section, lines in new.items():
         text = text.replace(f"[{section}]\n", "\n".join([f"[{section}]", *lines, ""]))
     (tmp_path / "Places.toml").write_text(text + "\n" + "\n".join(changes))
-    runtime = (BUILD / "runtime" / "runtime.json").read_text().replace('"-O3"', '"-O0"')
-    (tmp_path / "runtime.json").write_text(runtime)
-    (tmp_path / "fmi3").mkdir()
-    options = ("--output", tmp_path, "--runtime", tmp_path / "runtime.json")
-    ended = python(ROOT / "fmu" / "equations_to_fmu.py", tmp_path / "Places.toml", *options)
-    assert ended.returncode == 0, ended.stderr
-    run = simulated(tmp_path / "Places.fmu", 5.0, 1.0, {})
+    run = simulated(quick(tmp_path / "Places.toml", tmp_path, "-O0"), 5.0, 1.0, {})
     for name, value in exact.items():
         assert run[name][-1] == pytest.approx(float(value), rel=1e-12, abs=1e-12), name
 
@@ -239,3 +234,105 @@ def test_what_vanishes_at_both_ends_of_a_step_is_seen(folder: Path, step: float)
     run = simulated(made(folder, TEXTS["VANISHING"]), 4.0, step, method)
     for name, value in {"swing": comb(6, 3) / 2**4, "pulse": comb(64, 32) / 2**62}.items():
         assert run[name][-1] == pytest.approx(value, rel=0, abs=1e-8), name
+
+
+# ---- Values that follow from parameters ----------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def spring(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made(tmp_path_factory.mktemp("following"), MODELS["following_values"]["SPRING"])
+
+
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_a_state_starts_where_its_parameters_say(spring: Path, method: int, kind: str) -> None:
+    if kind == "ModelExchange" and method > 1:
+        pytest.skip("the importer integrates")
+    start = {"solver_method": method, "l0": 2.0, "phi0": 1.1}
+    run = simulated(
+        spring, 3.0, 0.05, start, also=["k", "weight"], fmi_type=kind, relative_tolerance=1e-10
+    )
+    w, x0 = np.sqrt(9.81 / 2.0), 2.0 * np.cos(1.1)
+    bound = 1e-8 if kind == "CoSimulation" else 1e-4
+    assert np.max(np.abs(run["x"] - x0 * np.cos(w * run["time"]))) < bound
+    assert set(run["k"]) == {2.0 * 9.81 / 2.0} and set(run["weight"]) == {2.0 * 9.81}
+    assert run["energy"][0] == pytest.approx(9.81 / 2 * x0**2, rel=1e-14)
+    assert set(run["largest"]) == {4.0}
+
+
+def test_values_follow_while_parameters_are_set(spring: Path) -> None:
+    """In initialization mode all values and their derivatives follow at once, later k does."""
+    begun = initializing(spring)
+    instance, at = begun.fmi, begun.loaded.references
+    for l0, phi0 in ((1.0, 0.5), (3.0, -0.2)):
+        instance.setReal([at["l0"], at["phi0"]], [l0, phi0])
+        x, largest, k = instance.getReal([at["x"], at["largest"], at["k"]])
+        assert (x, largest, k) == pytest.approx(
+            (l0 * np.cos(phi0), 2 * l0, 2 * 9.81 / l0), rel=1e-15
+        )
+        by_l0 = instance.getDirectionalDerivative(
+            [at[n] for n in ("x", "k", "energy")], [at["l0"]], [1.0]
+        )
+        expected = np.cos(phi0), -2 * 9.81 / l0**2, 9.81 * np.cos(phi0) ** 2
+        assert by_l0 == pytest.approx(expected, rel=1e-13)
+    instance.exitInitializationMode()
+    instance.setReal([at["l0"]], [1.0])
+    assert instance.getReal([at["k"], at["x"]]) == pytest.approx([2 * 9.81, 3.0 * np.cos(-0.2)])
+    instance.reset()
+    instance.setupExperiment(startTime=0.0)
+    instance.enterInitializationMode()
+    assert instance.getReal([at["x"]])[0] == pytest.approx(1.5 * np.cos(0.3))
+
+
+def test_an_importer_cannot_set_a_start_that_follows(spring: Path) -> None:
+    begun = initializing(spring)
+    instance, at = begun.fmi, begun.loaded.references
+    with pytest.raises(FMICallException):
+        instance.setReal([at["x"]], [1.0])
+
+
+def test_a_start_that_follows_survives_serialization(spring: Path) -> None:
+    begun = initializing(spring), initializing(spring)
+    first, second = (instance.fmi for instance in begun)
+    at = begun[0].loaded.references
+    first.setReal([at["l0"]], [2.5])
+    first.exitInitializationMode()
+    for i in range(7):
+        first.doStep(i * 0.1, 0.1)
+    content = first.serializeFMUstate(first.getFMUstate())
+    second.exitInitializationMode()
+    second.setFMUstate(second.deSerializeFMUstate(content))
+    for instance in (first, second):
+        instance.doStep(0.7, 0.1)
+    names = [at[name] for name in ("x", "v", "largest")]
+    assert first.getReal(names) == second.getReal(names)
+
+
+@pytest.mark.parametrize(
+    ("section", "name", "message"),
+    [
+        ("parameters", "k", "'k' follows from m, l0, g: set these"),
+        ("initial", "x", "'x' follows from l0, phi0: set these"),
+    ],
+)
+def test_a_scenario_does_not_set_it(
+    spring: Path, tmp_path: Path, console: Console, section: str, name: str, message: str
+) -> None:
+    path = tmp_path / "spring.toml"
+    path.write_text(
+        f'fmu = "{spring}"\ntitle = "t"\ndescription = "d"\ntolerance = 1e-8\n'
+        f"[time]\nstart = 0.0\nstop = 1.0\nstep = 0.1\n[{section}]\n{name} = 1.0\n"
+    )
+    code, _, err = console(str(path))
+    assert code == 2 and message in err and err.count("\n") == 1
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_a_linear_model_is_made_at_states_that_are_given(spring: Path, version: str) -> None:
+    path = spring if version == "2.0" else spring.parent / "fmi3" / spring.name
+    found = api.linearize(path, at={"x": 0.7, "v": 0.1, "l0": 2.0})
+    assert found.at["x"] == 0.7 and found.at["v"] == 0.1
+    assert found.between.A[:2, :2].tolist() == [[0.0, 1.0], [-9.81 / 2.0, 0.0]]
+    energy = found.C[found.outputs.index("energy")]
+    assert energy == pytest.approx([2 * 9.81 / 2.0 * 0.7, 2.0 * 0.1, 0.0], rel=1e-14)

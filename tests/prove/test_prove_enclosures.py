@@ -1,8 +1,12 @@
-"""Balls that contain the arm's motion, against references and other arithmetic; certificates."""
+"""Balls that contain the arm's motion, against references and other arithmetic; certificates.
+
+And the program that makes them: the same bits from every compiler, and faults in it.
+"""
 
 import json
 import random
 import re
+import shutil
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from itertools import product
@@ -16,11 +20,13 @@ from flint import arb
 from rparm import project
 from rparm.fmi.fmu_file import read_model
 from rparm.runs import convergence
+from tests.prove import faults
 from tests.prove.problems import (
     BUILD,
     PARAMETERS,
     PROGRAM,
     SMALL,
+    SOURCES,
     TOO_BROAD,
     ZERO,
     Problem,
@@ -30,6 +36,7 @@ from tests.prove.problems import (
     motion_series,
     run,
 )
+from tests.support.missing import missing
 
 STATES = ("q1", "q2", "dq1", "dq2")
 NAMES = ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g")
@@ -283,3 +290,48 @@ def test_a_number_that_is_finite_but_too_large_is_called_so() -> None:
     answer = run(re.sub(r"^states \S+", "states 1e200", SMALL["free"].text, flags=re.MULTILINE))
     assert answer.returncode == 2
     assert "numbers up to 1.2e30" in answer.stderr
+
+
+# ---- Compilers and faults ------------------------------------------------------------------------
+
+
+FLAGS = ["-std=c17", "-ffp-contract=off"]  # those of the build; later ones of a compiler prevail
+
+
+@pytest.mark.parametrize(
+    ("compiler", "emulator"),
+    [
+        ("gcc -O0", ""),
+        ("gcc -O3 -march=native", ""),
+        ("gcc -O3 -march=native -ffp-contract=fast", ""),
+        ("clang -O2 -march=native", ""),
+        ("aarch64-linux-gnu-gcc -O2 -static", "qemu-aarch64-static"),
+        ("aarch64-linux-gnu-gcc -O2 -static -ffp-contract=fast", "qemu-aarch64-static"),
+    ],
+)
+def test_every_compiler_gives_the_same_bits(compiler: str, emulator: str, tmp_path: Path) -> None:
+    command, *options = compiler.split()
+    if shutil.which(command) is None or (emulator and shutil.which(emulator) is None):
+        missing(f"{command}, {emulator}: ./setup.sh --platforms")
+    program = tmp_path / "prove"
+    sources = sorted(SOURCES.glob("*.c"))
+    subprocess.run([command, *FLAGS, *options, *sources, "-o", program, "-lm"], check=True)
+    started = [emulator, program] if emulator else [program]
+    for problem in SMALL.values():
+        there = subprocess.run(
+            started, input=problem.text, capture_output=True, text=True, check=False
+        )
+        assert there.stdout == run(problem.text).stdout != ""
+
+
+def test_fast_mathematics_is_refused(tmp_path: Path) -> None:
+    """It would calculate the errors of operations as 0."""
+    command = ["gcc", *FLAGS, "-ffast-math", SOURCES / "prove.c", "-o", tmp_path / "prove", "-lm"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode != 0 and "-ffast-math" in done.stderr
+
+
+@pytest.mark.parametrize("fault", faults.PLANTED, ids=lambda fault: fault.name)
+def test_planted_faults_are_noticed(fault: faults.Fault) -> None:
+    how = faults.verdict(fault)
+    assert how not in (None, faults.UNCOMPILABLE)
