@@ -15,15 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from tests.equations.compiled import ModelFileError
+from tests.equations.examples import METHODS
 from tests.equations.hybrid_models import Hybrid, hybrid
-from tests.equations.hybrid_runs import (
-    METHODS,
-    Run,
-    Unit,
-    co_simulation,
-    early_return,
-    model_exchange,
-)
+from tests.equations.hybrid_runs import Run, Unit, co_simulation, early_return, model_exchange
 
 TOLERANCES = (1e-5, 1e-7, 1e-10)
 # error of states before it grows, over the tolerance; BDF adds up the most: 26 were seen

@@ -14,10 +14,10 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 
-from tests.equations.compiled import BUILD, building, declaration, lock, read_text
+from tests.equations.compiled import building, declaration, lock, read_text
+from tests.equations.examples import METHODS, runtime
 from tests.equations.hybrid_models import Polynomial
 
-METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3, "taylor": 4}
 MASTER_STEP = 1e-3  # s, of Model Exchange
 MOST_EVENTS = 300
 
@@ -42,7 +42,7 @@ class Unit:
         file = read_text(folder, text)
         keys = lock.references(Path("no-such-file"), declaration.keys(file))
         declared = building.write_c(file, keys, folder)
-        self.made = building.Runtime.load(BUILD / "runtime" / "runtime.json", True)
+        self.made = runtime("-O1")
         self.objects = self.made.compile([folder / name for name in building.C_FILES], folder)
         self.folder = folder
         self.guids = {"fmi2": declared.guid, "fmi3": declared.token("fmi3")}

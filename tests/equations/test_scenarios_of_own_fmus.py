@@ -99,20 +99,3 @@ def test_new_writes_one(scenario: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert call(capsys, "new", path, "--model", fmu_of(scenario))[0] == 0
     assert 'fmu = "../dahlquist/Dahlquist.fmu"' in path.read_text(encoding="utf-8")
     assert rparm.Scenario(path).run()["x"][-1] == pytest.approx(np.exp(-10.0), rel=1e-6)
-
-
-def test_it_is_linearized_and_identified(
-    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    fmu = fmu_of(scenario)
-    linear = rparm.linearize(fmu, at={"k": 1.5})
-    np.testing.assert_array_equal(linear.A, [[-1.5]])
-    log, times = tmp_path / "log.csv", np.arange(0.0, 3.0, 0.01)
-    noise = 1e-3 * np.random.default_rng(1).standard_normal(len(times))
-    rows = np.column_stack([times, np.exp(-0.8 * times) + noise])
-    np.savetxt(log, rows, delimiter=",", header="time,x", comments="")
-    given = ("--parameters", "k", "--measured", "x", "--output", tmp_path)
-    code, out, _ = call(capsys, "identify", fmu, log, *given, "--json")
-    k = json.loads(out)["parameters"]["k"]
-    assert code == 0 and abs(k["value"] - 0.8) < 3.0 * (k["high"] - k["low"])
-    assert rparm.Scenario(tmp_path / "scenario.toml").run()["x"][0] == pytest.approx(1.0, abs=0.01)

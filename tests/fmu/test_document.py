@@ -132,12 +132,6 @@ def test_the_contents_lead_to_every_chapter(page: lxml.html.HtmlElement) -> None
     assert len(links) > 10
 
 
-def test_images_lie_next_to_the_page(page: lxml.html.HtmlElement, folder: Path) -> None:
-    images = page.xpath("//img/@src")
-    assert images == ["model.svg"]
-    assert (folder / "model.svg").read_bytes() == (MODEL / "model.svg").read_bytes()
-
-
 def test_page_needs_no_script_and_no_network(page: lxml.html.HtmlElement) -> None:
     assert page.xpath("//script | //link | //a[not(starts-with(@href, '#'))]") == []
     drawing = (MODEL / "model.svg").read_text(encoding="utf-8")

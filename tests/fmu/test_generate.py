@@ -205,35 +205,6 @@ def test_the_guid_follows_the_interface_and_not_the_texts(model_copy: Path, tmp_
     assert re.fullmatch(r"\{[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}\}", guids["same"])
 
 
-def test_an_enumeration_in_the_model_description(trajectory: Path, tmp_path: Path) -> None:
-    root = generated(trajectory, tmp_path / "out")
-    types = {t.get("name"): t for t in root.iterfind("TypeDefinitions/SimpleType")}
-    assert list(types) == ["MotionType", "BranchType"]
-    items = types["MotionType"].findall("Enumeration/Item")
-    names = [(item.get("name"), item.get("value")) for item in items]
-    assert names == [("point_to_point", "1"), ("line", "2"), ("circle", "3")]
-    assert all(item.get("description") for item in items)
-    # the order that the schema asks for
-    tags = [child.tag for child in root]
-    assert tags.index("TypeDefinitions") == tags.index("UnitDefinitions") + 1
-    assert tags.index("TypeDefinitions") < tags.index("LogCategories")
-
-    motion, branch = (scalars(root)[name] for name in ("motion", "branch"))
-    assert [(v[0].tag, v[0].attrib) for v in (motion, branch)] == [
-        ("Enumeration", {"declaredType": "MotionType", "start": "3", "min": "1", "max": "3"}),
-        ("Enumeration", {"declaredType": "BranchType", "start": "1", "min": "1", "max": "2"}),
-    ]
-
-
-def test_an_enumeration_in_the_table(trajectory: Path, tmp_path: Path) -> None:
-    generated(trajectory, tmp_path / "out")
-    table = (tmp_path / "out" / "variables.c").read_text()
-    row = table.partition('{1, "motion", ')[2].partition("}")[0]
-    assert row.startswith("VARIABLE_ENUMERATION, VARIABLE_OF_MODEL, ")
-    assert "3.0, 1.0, 3.0, 1.0" in row  # start, min, max, nominal
-    compile_table(tmp_path / "out", "rp_trajectory")
-
-
 def test_items_belong_to_the_guid_and_their_texts_do_not(trajectory: Path, tmp_path: Path) -> None:
     guids = [generated(trajectory, tmp_path / "same").get("guid")]
     change(trajectory, "The end effector moves along a circle", "Round and round")
@@ -259,24 +230,3 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     result = generate(VARIABLES, tmp_path / "out")
     assert result.returncode == 2
     assert str(tmp_path) in result.stderr
-
-
-@pytest.mark.parametrize("fmi", ["fmi2", "fmi3"])
-def test_a_description_of_sources_names_each_c_file(tmp_path: Path, fmi: str) -> None:
-    sources = tmp_path / "sources"
-    sources.mkdir()
-    for name in ("b.c", "a.c", "a.h"):
-        (sources / name).touch()
-    root = generated(VARIABLES, tmp_path, "--sources", sources, "--fmi", fmi)
-    if fmi == "fmi2":
-        files = root.iterfind("CoSimulation/SourceFiles/File")
-        schema = "fmi2/fmi2ModelDescription.xsd"
-        path = tmp_path / "modelDescription.xml"
-    else:
-        path = sources / "buildDescription.xml"
-        files = ET.parse(path).iterfind("BuildConfiguration/SourceFileSet/SourceFile")
-        schema = "fmi3/fmi3BuildDescription.xsd"
-    assert [file.get("name") for file in files] == ["a.c", "b.c"]
-    etree.XMLSchema(file=Path(fmpy.__file__).parent / "schema" / schema).assertValid(
-        etree.parse(path)
-    )

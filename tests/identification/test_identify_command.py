@@ -183,13 +183,6 @@ def test_a_wrong_variable_is_one_line(given: Sequence[str], message: str, identi
     assert_one_line(error)
 
 
-def test_a_discrete_output_is_refused(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    measured = "--parameters", "m2", "--inputs", "tau1", "--measured", "impact_loss"
-    code, _, error = call(capsys, "identify", FMUS["rp_plant"], log, *measured)
-    assert code == 2 and "'impact_loss' is no continuous output" in error
-    assert_one_line(error)
-
-
 @pytest.mark.parametrize(("row", "column", "text", "message"), MISTAKES["identify_log"]["rows"])
 def test_a_mistake_in_a_log_is_one_line(
     row: int, column: int, text: str, message: str, identify, log: Path, tmp_path: Path
@@ -217,30 +210,34 @@ def test_short_and_constant_logs_are_refused(identify, log: Path, tmp_path: Path
         assert_one_line(error)
 
 
-def test_a_log_counts_once(identify, log: Path) -> None:
-    # a copy would make the intervals too narrow
-    code, _, error = identify("--parameters", "m2", given=(str(log), *GIVEN))
-    assert code == 2 and "is there twice" in error
+ARM_FMU = FMUS["rp_manipulator"]
+TWICE = ("--parameters", "m2", *GIVEN)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        # a copy would make the intervals too narrow
+        ((ARM_FMU, "LOG", "LOG", *TWICE), "is there twice"),
+        ((ARM_FMU, "LOG", *TWICE, "--validate", "LOG"), "is fitted, expected another log"),
+        ((ARM_FMU, "LOG", *TWICE, "--segment", "1e-9"), "has 20 rows in 0.019 s, expected at"),
+        ((ARM_FMU, "LOG", *TWICE, "--segment", "0.018"), "has 20 rows in 0.019 s, expected at"),
+        (("LOG", ARM_FMU), "log.csv: expected an FMU (.fmu)"),
+        (("rp_manipulatr", "LOG"), "did you mean 'rp_manipulator'?"),
+        ((), ""),
+        ((ARM_FMU,), ""),
+        (("--demo", ARM_FMU), ""),
+        (("--demo", "--set", "m2=1"), ""),
+        (
+            (FMUS["rp_plant"], "LOG", *TWICE[:4], "--measured", "impact_loss"),
+            "'impact_loss' is no continuous output",
+        ),
+    ],
+)
+def test_what_does_not_fit_together_is_one_line(
+    arguments: tuple, message: str, log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = [log if argument == "LOG" else argument for argument in arguments]
+    code, _, error = call(capsys, "identify", *given)
+    assert code == 2 and message in error
     assert_one_line(error)
-    code, _, error = identify("--parameters", "m2", "--validate", log)
-    assert code == 2 and "is fitted, expected another log" in error
-    assert_one_line(error)
-
-
-@pytest.mark.parametrize("length", ["1e-9", "0.018"])
-def test_a_segment_of_few_rows_is_refused_before_the_log_is_cut(identify, length: str) -> None:
-    code, _, error = identify("--parameters", "m2", "--segment", length)
-    assert code == 2 and "has 20 rows in 0.019 s, expected at least that" in error
-    assert_one_line(error)
-
-
-def test_fmu_and_log_are_needed(capsys: pytest.CaptureFixture[str], log: Path) -> None:
-    demo = ("--demo", FMUS["rp_manipulator"]), ("--demo", "--set", "m2=1")
-    for arguments in ((), (FMUS["rp_manipulator"],), *demo):
-        code, _, error = call(capsys, "identify", *arguments)
-        assert code == 2
-        assert_one_line(error)
-    code, _, error = call(capsys, "identify", log, FMUS["rp_manipulator"])
-    assert code == 2 and f"{log}: expected an FMU (.fmu)" in error
-    code, _, error = call(capsys, "identify", "rp_manipulatr", log)
-    assert code == 2 and "did you mean 'rp_manipulator'?" in error
