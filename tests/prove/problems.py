@@ -14,6 +14,7 @@ from tests.support.paths import ROOT
 BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).parent
 PROGRAM = BUILD / "proof" / "rp_manipulator" / "prove"
 SOURCES = ROOT / "models" / "rp_manipulator" / "proof"
+COMPILE = ("cc", "-std=c17", "-O1", "-ffp-contract=off", "-w")
 sys.path.insert(0, str(SOURCES))
 import check as check  # noqa: E402
 import check_operations as check_operations  # noqa: E402

@@ -20,9 +20,9 @@ from flint import arb
 from rparm import project
 from rparm.fmi.fmu_file import read_model
 from rparm.runs import convergence
-from tests.prove import faults
 from tests.prove.problems import (
     BUILD,
+    COMPILE,
     PARAMETERS,
     PROGRAM,
     SMALL,
@@ -37,6 +37,7 @@ from tests.prove.problems import (
     run,
 )
 from tests.support.missing import missing
+from tests.support.tables import tables
 
 STATES = ("q1", "q2", "dq1", "dq2")
 NAMES = ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g")
@@ -331,7 +332,51 @@ def test_fast_mathematics_is_refused(tmp_path: Path) -> None:
     assert done.returncode != 0 and "-ffast-math" in done.stderr
 
 
-@pytest.mark.parametrize("fault", faults.PLANTED, ids=lambda fault: fault.name)
-def test_planted_faults_are_noticed(fault: faults.Fault) -> None:
-    how = faults.verdict(fault)
-    assert how not in (None, faults.UNCOMPILABLE)
+# ---- Faults --------------------------------------------------------------------------------------
+
+WIDEST = 1e-26  # radius of free motion
+FAULTS = tables(str(Path(__file__).with_name("faults")))["fault"]
+
+
+def wrong_of(problem: Problem, program: Path) -> str | None:
+    """What is wrong with a program's certificate; None if it has none."""
+    certificate = program.with_name("certificate")
+    try:
+        answer = run(problem.text, certificate, program)
+        if answer.returncode != 0:
+            return None
+        lines = certificate.read_text().splitlines()
+        check.check(problem.text.splitlines(), answer.stdout.splitlines(), lines)
+    except subprocess.TimeoutExpired:
+        return None
+    except check.WrongClaim as error:
+        return str(error)
+    return ""
+
+
+def is_noticed(program: Path) -> bool:
+    """Whether the checkers notice that something is wrong with a program."""
+    if any(wrong_of(problem, program) != "" for problem in SMALL.values()):
+        return True
+    try:
+        check_operations.check(program)
+    except (check_operations.WrongAnswer, subprocess.TimeoutExpired):
+        return True
+    is_wide = not enclosures(SMALL["free"].text, program)[:, :, 2].max() < WIDEST
+    return is_wide or bool(wrong_of(TOO_BROAD, program))
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault[0])
+def test_planted_faults_are_noticed(fault: list[str], tmp_path: Path) -> None:
+    """A text is replaced in a file, which has it once."""
+    _, file, before, after = fault
+    for path in SOURCES.glob("*.[ch]"):
+        text = path.read_text()
+        if path.name == file:
+            assert text.count(before) == 1
+            text = text.replace(before, after)
+        (tmp_path / path.name).write_text(text)
+    program = tmp_path / "prove"
+    command = [*COMPILE, *sorted(tmp_path.glob("*.c")), "-o", program, "-lm"]
+    subprocess.run(command, check=True)
+    assert is_noticed(program)

@@ -15,8 +15,7 @@ from pathlib import Path
 import pytest
 from flint import arb
 
-from tests.prove.faults import COMPILE
-from tests.prove.problems import SOURCES, motion_series, operands
+from tests.prove.problems import COMPILE, SOURCES, motion_series, operands
 from tests.support.paths import ROOT
 from tests.support.plain_equations import (
     ACCELERATIONS,

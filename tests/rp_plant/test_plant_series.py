@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 
 from tests.equations.compiled import LENGTH, Origin
-from tests.prove.faults import COMPILE
+from tests.prove.problems import COMPILE
 from tests.support.paths import ROOT
 from tests.support.plain_equations import (
     STATES,
