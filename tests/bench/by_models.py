@@ -111,11 +111,11 @@ def row(name: str, turns: int, exact: np.ndarray, limit: float, *peers: tuple[Ru
     }  # fmt: skip
 
 
-def by_hand(folder: Path, turns: int, loops: Path, exact: dict[str, np.ndarray]) -> list[dict]:
+def by_hand(turns: int, loops: Path, exact: dict[str, np.ndarray]) -> list[dict]:
     """Measure against loops at the same tolerance: the largest ratio and errors of all models."""
 
     def race(name: str, method: str, limit: float, step: float, forces: Sequence[float]) -> dict:
-        fmu = made(folder, MODELS[name][0], build)
+        fmu = made(MODELS[name][0], build)
         own, start = by_fmu(fmu, method, step, forces)
         loop = by_loop(loops, fmu.with_suffix(".toml"), method, step, start, forces)
         whose, true = (name, loop(1e-11)[1]) if len(forces) > 1 else ("own equations", exact[name])
@@ -131,11 +131,11 @@ def by_hand(folder: Path, turns: int, loops: Path, exact: dict[str, np.ndarray])
     return [*found, restarts | {"work": RESTARTS, "column": RESTARTS}]
 
 
-def rows(folder: Path, turns: int, loops: Path) -> list[dict]:
+def rows(turns: int, loops: Path) -> list[dict]:
     """Measure; heyoka has an error no larger than the FMU's. loops: the library of loops.c."""
     found, solutions = [], {}
     for name, (text, step, tolerance) in MODELS.items():
-        fmu = made(folder, text, build)
+        fmu = made(text, build)
         own, start = by_fmu(fmu, "taylor", step)
         peer = by_heyoka(PAIRS.get(name, fmu.with_suffix(".toml")), step, start)
         named, of_peer = f"{name}, taylor to heyoka", 10.0 * tolerance
@@ -145,8 +145,8 @@ def rows(folder: Path, turns: int, loops: Path) -> list[dict]:
             of_peer *= 10.0**-0.25
         found.append(row(named, turns, *judged, (peer, of_peer)))
     full = CHAIN.replace("Chain", "FullChain").replace("\n[where]", FULL)
-    band, dense = (by_fmu(made(folder, text, build), "cvode_bdf", 2.0)[0] for text in (CHAIN, full))
+    band, dense = (by_fmu(made(text, build), "cvode_bdf", 2.0)[0] for text in (CHAIN, full))
     exact = band(1e-9)[1]
     chain = "300 masses, cvode_bdf to full matrices", turns, exact, 0.2
     found.append(row(*chain, (band, 1e-6), (dense, 1e-6)))
-    return [*found, *by_hand(folder, turns, loops, solutions)]
+    return [*found, *by_hand(turns, loops, solutions)]

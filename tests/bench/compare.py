@@ -312,7 +312,7 @@ def main() -> None:
         "machine": about | first["machine"],
         "rounds": options.rounds,
         "repeats": options.repeats,
-        "rows": judge(rows + by_models.rows(output, options.repeats, loops) + rest["rows"]),
+        "rows": judge(rows + by_models.rows(options.repeats, loops) + rest["rows"]),
     }
     (output / "benchmark.json").write_text(
         json.dumps(result, indent=1) + "\n", encoding="utf-8", newline="\n"

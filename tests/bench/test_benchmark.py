@@ -140,9 +140,9 @@ def test_program_refuses_nonsense() -> None:
             compare.run_bench(BENCH, *options)
 
 
-def test_models_in_equations_do_the_same_as_their_peers(tmp_path: Path) -> None:
+def test_models_in_equations_do_the_same_as_their_peers() -> None:
     loops = BUILD / "tests/bench/libbench_loops.so"
-    stars, *others, chain, adams, bdf, restarts = by_models.rows(tmp_path, 1, loops)
+    stars, *others, chain, adams, bdf, restarts = by_models.rows(1, loops)
     assert stars["error_of_peer"] <= stars["error"] < 1e-10
     assert all(row["error_of_peer"] <= row["error"] < 1e-8 for row in others)
     assert max(chain["error"], chain["error_of_peer"]) < 1e-3

@@ -27,6 +27,7 @@ FOLDER = ROOT / "examples" / "models"
 # by test module and name
 MODELS = tables(str(Path(__file__).with_name("models")))
 MISTAKES = tables(str(Path(__file__).with_name("mistakes")))
+BUILT = TemporaryDirectory(prefix="rparm-models-")  # in it a folder for each FMU
 METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3, "taylor": 4}
 
 
@@ -68,10 +69,11 @@ def quick(path: Path, output: Path, level: str = "-O1") -> Path:
 
 
 @cache
-def example(name: str, folder: Path, make: Callable[[Path, Path], Path] = quick) -> Path:
+def example(name: str, make: Callable[[Path, Path], Path] = quick) -> Path:
     """The FMU of an example."""
-    output, path = folder / name.replace("/", "_"), FOLDER / f"{name}.toml"
-    output.mkdir(exist_ok=True)
+    output, path = Path(BUILT.name) / name.replace("/", "_"), FOLDER / f"{name}.toml"
+    output = output / make.__name__
+    output.mkdir(parents=True)
     for file in (path, path.with_suffix(".lock.toml")):
         copy(file, output)
     return make(output / path.name, output)
@@ -105,16 +107,14 @@ def simulated(
     )
 
 
-def made(folder: Path, text: str, make: Callable[[Path, Path], Path] = quick) -> Path:
-    """The FMU of a text, in a folder where each is built once."""
-    name = text.split('"')[1]
-    own = folder / f"{zlib.crc32(text.encode()):08x}"
-    path = own / f"{name}.toml"
-    if not path.with_suffix(".fmu").exists():
-        own.mkdir(exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-        make(path, own)
-    return path.with_suffix(".fmu")
+@cache
+def made(text: str, make: Callable[[Path, Path], Path] = quick) -> Path:
+    """The FMU of a text, built once."""
+    folder = Path(BUILT.name) / f"{zlib.crc32(text.encode()):08x}" / make.__name__
+    folder.mkdir(parents=True)
+    path = folder / (text.split('"')[1] + ".toml")
+    path.write_text(text, encoding="utf-8")
+    return make(path, folder)
 
 
 @cache

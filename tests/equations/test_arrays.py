@@ -39,11 +39,6 @@ def written_out(n: int) -> str:
     return "\n".join(lines)
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("arrays")
-
-
 @pytest.mark.parametrize("ranges, flat, rows", [
     ("i = 1..2, j = 1..3", [1, 2, 3, 4, 5, 6], [[1, 2, 3], [4, 5, 6]]),
     ("i = 1..3, j = 1..i", ["p", 2, 3, 4, 5, 6], [["p"], [2, 3], [4, 5, 6]]),
@@ -64,9 +59,9 @@ def test_starts_of_two_indexes_are_rows_or_one_list(
     assert found[0] == found[1] and [*found[0].values()] == flat
 
 
-def test_loops_have_the_bits_of_statements_written_out(folder: Path) -> None:
+def test_loops_have_the_bits_of_statements_written_out() -> None:
     """All functions of a model: right side, Jacobian, series, outputs, derivatives of outputs."""
-    loops, plain = made(folder, chain(COUNT)), made(folder, written_out(COUNT))
+    loops, plain = made(chain(COUNT)), made(written_out(COUNT))
     elements = [f"{base}[{i}]" for base in "xv" for i in range(1, COUNT + 1)]
     for method in METHODS.values():
         first = simulated(loops, 0.5, 0.1, {"solver_method": method})
@@ -103,8 +98,8 @@ def test_the_text_of_a_model_does_not_grow_with_its_arrays(tmp_path: Path) -> No
     assert first == second
 
 
-def test_a_check_holds_for_each_element(folder: Path) -> None:
-    instance = initializing(made(folder, chain(COUNT)))
+def test_a_check_holds_for_each_element() -> None:
+    instance = initializing(made(chain(COUNT)))
     (m,) = (v for v in instance.loaded.description.modelVariables if v.name == "m[17]")
     instance.fmi.setReal([m.valueReference], [-1.0])
     with pytest.raises(FMICallException):
@@ -113,9 +108,9 @@ def test_a_check_holds_for_each_element(folder: Path) -> None:
 
 
 @EACH_METHOD
-def test_a_rod_follows_its_modes(method: int, folder: Path) -> None:
+def test_a_rod_follows_its_modes(method: int) -> None:
     n, d, t = 100, 1 / 101, 0.05
-    run = simulated(made(folder, TEXTS["HEAT"]), t, t, {"solver_method": method})
+    run = simulated(made(TEXTS["HEAT"]), t, t, {"solver_method": method})
     found = np.array([run[f"T[{i}]"][-1] for i in range(1, n + 1)])
     at = np.arange(1, n + 1) * d
     modes = np.array([np.sin(np.pi * k * at) for k in range(1, n + 1)])
@@ -126,7 +121,7 @@ def test_a_rod_follows_its_modes(method: int, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_a_band_has_the_solution_of_a_full_matrix(seed: int, folder: Path) -> None:
+def test_a_band_has_the_solution_of_a_full_matrix(seed: int, tmp_path: Path) -> None:
     """Of random sparse equations in any order; a state that follows all others has a full row."""
     chance, n = np.random.default_rng(seed), 64
     order, near = chance.permutation(n), np.tri(n, k=2) * np.tri(n, k=2).T
@@ -138,31 +133,31 @@ def test_a_band_has_the_solution_of_a_full_matrix(seed: int, folder: Path) -> No
     full = f'y = {{ derivative = "p * ({" + ".join(f"x{i}" for i in range(n))})" }}'
     works = []
     for own in (text, text.replace("Sparse", "Full") + full):
-        assert ("struct band band" in c_model.source(read_text(folder, own))) == (own is text)
+        assert ("struct band band" in c_model.source(read_text(tmp_path, own))) == (own is text)
         counted = ["solver_steps", "solver_rhs_evaluations"]
-        run = simulated(made(folder, own), 1.0, 1.0, {"solver_method": 2}, also=counted)
+        run = simulated(made(own), 1.0, 1.0, {"solver_method": 2}, also=counted)
         found = [run[f"x{i}"][-1] for i in range(n)]
         assert found == pytest.approx(expm(matrix) @ np.ones(n), abs=1e-8)
         works.append([run[name][-1] for name in counted])
     assert works[0] == pytest.approx(works[1], rel=0.05)
 
 
-def test_a_plate_has_two_indexes(folder: Path) -> None:
+def test_a_plate_has_two_indexes() -> None:
     n = 6
-    run = simulated(made(folder, TEXTS["PLATE"]), 1.0, 1.0, {"solver_method": 4})
+    run = simulated(made(TEXTS["PLATE"]), 1.0, 1.0, {"solver_method": 4})
     line = np.diag(-2.0 * np.ones(n)) + np.diag(np.ones(n - 1), 1) + np.diag(np.ones(n - 1), -1)
     matrix = np.kron(line, np.eye(n)) + np.kron(np.eye(n), line)
     exact = expm(matrix) @ np.outer(np.arange(1, n + 1), np.arange(1, n + 1)).ravel()
     names = [f"T[{i},{j}]" for i in range(1, n + 1) for j in range(1, n + 1)]
     assert [run[name][-1] for name in names] == pytest.approx(exact, abs=1e-10)
-    description = fmpy.read_model_description(made(folder, TEXTS["PLATE"]))
+    description = fmpy.read_model_description(made(TEXTS["PLATE"]))
     assert description.variableNamingConvention == "structured"
     assert {"T[6,6]", "der_T[6,6]"} <= {v.name for v in description.modelVariables}
 
 
 @EACH_METHOD
-def test_each_ball_bounces_by_itself(method: int, folder: Path) -> None:
-    run = simulated(made(folder, TEXTS["BALLS"]), 6.0, 0.01, {"solver_method": method})
+def test_each_ball_bounces_by_itself(method: int) -> None:
+    run = simulated(made(TEXTS["BALLS"]), 6.0, 0.01, {"solver_method": method})
     for i, e in enumerate((0.5, 0.6, 0.7), 1):
         impacts, time, speed = 0, np.sqrt(2 * i / 9.81), e * np.sqrt(2 * i * 9.81)
         while time <= 6.0:
@@ -177,8 +172,8 @@ def test_each_ball_bounces_by_itself(method: int, folder: Path) -> None:
     assert run["saw"][~jumps] == pytest.approx(run["time"][~jumps] % 0.25, abs=1e-12)
 
 
-def test_numbers_of_other_units_are_declared_in_si(folder: Path) -> None:
-    description = fmpy.read_model_description(made(folder, TEXTS["MACHINE"]))
+def test_numbers_of_other_units_are_declared_in_si() -> None:
+    description = fmpy.read_model_description(made(TEXTS["MACHINE"]))
     shown = {v.name: (v.unit, v.displayUnit, float(v.start)) for v in description.modelVariables
              if v.displayUnit and v.causality == "parameter"}  # fmt: skip
     assert shown == {
@@ -199,8 +194,8 @@ def test_numbers_of_other_units_are_declared_in_si(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("version", ["", "fmi3"])
-def test_types_of_similar_names_are_told_apart(version: str, folder: Path) -> None:
-    fmu = made(folder, TEXTS["MACHINE"])
+def test_types_of_similar_names_are_told_apart(version: str) -> None:
+    fmu = made(TEXTS["MACHINE"])
     description = fmpy.read_model_description(fmu.parent / version / fmu.name)
     items = {v.name: [item.name for item in v.declaredType.items]
              for v in description.modelVariables if v.name in ("drive", "Drive")}  # fmt: skip
@@ -212,8 +207,8 @@ def test_types_of_similar_names_are_told_apart(version: str, folder: Path) -> No
 
 
 @pytest.mark.parametrize("drive", [1, 2])
-def test_what_is_counted_and_named_changes_at_ticks(drive: int, folder: Path) -> None:
-    fmu = made(folder, TEXTS["MACHINE"])
+def test_what_is_counted_and_named_changes_at_ticks(drive: int) -> None:
+    fmu = made(TEXTS["MACHINE"])
     run = simulated(fmu, 0.6, 0.1, {"drive": drive})
     ticks = np.arange(len(run["time"]))
     assert np.array_equal(run["count"], 3 * (ticks + 1))
@@ -224,8 +219,8 @@ def test_what_is_counted_and_named_changes_at_ticks(drive: int, folder: Path) ->
     assert np.array_equal(run["same"], (run["is_odd"] != 0) == (run["count"] == 3))
 
 
-def test_a_count_that_no_integer_holds_is_named(folder: Path) -> None:
-    instance = initializing(made(folder, TEXTS["MACHINE"]))
+def test_a_count_that_no_integer_holds_is_named() -> None:
+    instance = initializing(made(TEXTS["MACHINE"]))
     by_name = {v.name: v.valueReference for v in instance.loaded.description.modelVariables}
     instance.fmi.setInteger([by_name["gain"]], [2_000_000_000])  # a tick at the start adds it
     with pytest.raises(FMICallException):
@@ -233,9 +228,9 @@ def test_a_count_that_no_integer_holds_is_named(folder: Path) -> None:
     assert "count is beyond 2147483647" in instance.messages[-1].text
 
 
-def test_a_moving_number_beyond_all_counts_has_no_whole_part(folder: Path) -> None:
+def test_a_moving_number_beyond_all_counts_has_no_whole_part() -> None:
     text = 'name = "Far"\n[states]\nx = { derivative = "1" }\n[outputs]\ny = { value = "floor(x)" }'
-    fmu = made(folder, text)
+    fmu = made(text)
     for x in (-2.5, 7.0, 1e6 + 0.5):
         run = simulated(fmu, 0.1, 0.1, {"x": x})
         assert np.array_equal(run["y"], np.floor(run["x"]))

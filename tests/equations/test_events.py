@@ -35,11 +35,6 @@ EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 G, E, V_MIN = 9.81, 0.7, 0.1
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("events")
-
-
 def flights(height: float) -> list[tuple[float, float, float]]:
     """Time, height and speed at which each flight begins; then those at rest."""
     found, t, h, v = [], 0.0, height, 0.0
@@ -64,9 +59,9 @@ def ball(times: np.ndarray) -> np.ndarray:
 
 
 @EACH_METHOD
-def test_the_ball_bounces_eleven_times_and_rests(folder: Path, method: int) -> None:
+def test_the_ball_bounces_eleven_times_and_rests(method: int) -> None:
     run = simulated(
-        example("bouncing_ball", folder), 3.0, 0.013, {"solver_method": method},
+        example("bouncing_ball"), 3.0, 0.013, {"solver_method": method},
         relative_tolerance=1e-10, also=["resting", "event_count", "last_event_time"],
     )  # fmt: skip
     assert run["event_count"][-1] == 11 == len(flights(1.0)) - 1
@@ -76,17 +71,17 @@ def test_the_ball_bounces_eleven_times_and_rests(folder: Path, method: int) -> N
     assert run["last_event_time"][-1] == pytest.approx(flights(1.0)[-1][0], abs=1e-11)
 
 
-def named(folder: Path, text: str) -> Path:
+def named(text: str) -> Path:
     """The FMU of a text without a name."""
-    return made(folder, 'name = "Made"\n' + text)
+    return made('name = "Made"\n' + text)
 
 
 @pytest.mark.parametrize("pump", [0.0, 0.05])
 @EACH_METHOD
-def test_tanks_run_empty(folder: Path, method: int, pump: float) -> None:
+def test_tanks_run_empty(method: int, pump: float) -> None:
     """By Torricelli's law, whose root ends where the guard does; s is the root of the height."""
     run = simulated(
-        named(folder, TEXTS["TANKS"]), 24.0, 0.7, {"solver_method": method, "pump": pump},
+        named(TEXTS["TANKS"]), 24.0, 0.7, {"solver_method": method, "pump": pump},
         relative_tolerance=1e-9, also=["event_count", "last_event_time"],
     )  # fmt: skip
     s = np.linspace(1, 0, 100001)
@@ -106,10 +101,10 @@ def test_tanks_run_empty(folder: Path, method: int, pump: float) -> None:
     [(1.5, {"guarded": 2, "either": 1}), (2.5, {"large": 3, "both": 1, "guarded": 1, "either": 2})],
 )
 def test_what_follows_from_an_undefined_relation_is_not_finite(
-    folder: Path, x: float, defined: dict[str, float]
+    x: float, defined: dict[str, float]
 ) -> None:
     """A relation that is not looked at need not be defined."""
-    with initializing(named(folder, TEXTS["UNDEFINED"])) as unit:
+    with initializing(named(TEXTS["UNDEFINED"])) as unit:
         unit.set(x=x)
         unit.fmi.exitInitializationMode()
         for name in ("small", "sign", "large", "both", "guarded", "either"):
@@ -120,16 +115,16 @@ def test_what_follows_from_an_undefined_relation_is_not_finite(
                     unit.get(name)
 
 
-def test_a_check_that_is_not_defined_is_broken(folder: Path) -> None:
-    with initializing(named(folder, TEXTS["UNDEFINED"])) as unit:
+def test_a_check_that_is_not_defined_is_broken() -> None:
+    with initializing(named(TEXTS["UNDEFINED"])) as unit:
         unit.set(p=-1.0)
         with pytest.raises(fmpy.fmi1.FMICallException, match="error"):
             unit.fmi.exitInitializationMode()
 
 
 @EACH_METHOD
-def test_relations_in_branches_that_are_not_taken_make_no_events(folder: Path, method: int) -> None:
-    fmu = named(folder, TEXTS["BRANCHES"])
+def test_relations_in_branches_that_are_not_taken_make_no_events(method: int) -> None:
+    fmu = named(TEXTS["BRANCHES"])
     run = simulated(
         fmu, 12.0, 0.5, {"solver_method": method}, relative_tolerance=1e-10, also=["event_count"]
     )
@@ -139,16 +134,16 @@ def test_relations_in_branches_that_are_not_taken_make_no_events(folder: Path, m
 
 
 @EACH_METHOD
-def test_a_relation_of_time_switches_at_its_time(folder: Path, method: int) -> None:
-    fmu = named(folder, TEXTS["PULSE"])
+def test_a_relation_of_time_switches_at_its_time(method: int) -> None:
+    fmu = named(TEXTS["PULSE"])
     run = simulated(fmu, 2.0, 0.2, {"solver_method": method}, relative_tolerance=1e-8)
     expected = np.clip(run["time"] - 0.73, 0.0, 0.73)
     np.testing.assert_allclose(run["x"], expected, rtol=0, atol=1e-14)
     np.testing.assert_allclose(run["y"], 1.0 - np.cos(run["time"]), rtol=0, atol=1e-7)
 
 
-def test_a_relation_of_inputs_switches_where_they_are_set(folder: Path) -> None:
-    with initializing(named(folder, TEXTS["PULSE"])) as unit:
+def test_a_relation_of_inputs_switches_where_they_are_set() -> None:
+    with initializing(named(TEXTS["PULSE"])) as unit:
         unit.fmi.exitInitializationMode()
         for value, expected in ((0.5, 0.0), (0.5 + 1e-15, 1.0), (0.5, 0.0), (3.0, 1.0)):
             unit.set(u=value)
@@ -157,12 +152,12 @@ def test_a_relation_of_inputs_switches_where_they_are_set(folder: Path) -> None:
         assert unit.get("y") == pytest.approx([0.5], abs=1e-14)
 
 
-def test_relations_that_decide_each_other_switch_in_one_event(folder: Path) -> None:
+def test_relations_that_decide_each_other_switch_in_one_event() -> None:
     """An input decides the first one, each the next."""
     text = '[inputs]\nu = {}\n[where]\na0 = "u"\n'
     text += "".join(f'a{i} = "u if a{i - 1} > 0 else -1"\n' for i in range(1, 9))
     text += '[states]\nx = { derivative = "a8" }\n[outputs]\ny = { value = "a8" }\n'
-    with initializing(named(folder, text), FMU2Model) as unit:
+    with initializing(named(text), FMU2Model) as unit:
         unit.fmi.exitInitializationMode()
         for value in (-1.0, 1.0):
             unit.fmi.enterEventMode()
@@ -172,10 +167,8 @@ def test_relations_that_decide_each_other_switch_in_one_event(folder: Path) -> N
 
 
 @EACH_METHOD
-def test_events_at_one_instant_run_in_order_and_see_what_the_others_left(
-    folder: Path, method: int
-) -> None:
-    fmu = named(folder, TEXTS["CHAIN"])
+def test_events_at_one_instant_run_in_order_and_see_what_the_others_left(method: int) -> None:
+    fmu = named(TEXTS["CHAIN"])
     run = simulated(fmu, 2.4, 0.3, {"solver_method": method}, also=["a", "b"])
     # at 1 both; at 2 the first clears a, so that the second does not run
     np.testing.assert_array_equal(run["n"], [0, 0, 0, 0, 12, 12, 12, 121, 121])
@@ -186,18 +179,18 @@ def test_events_at_one_instant_run_in_order_and_see_what_the_others_left(
     assert at_once["n"][0] == 12
 
 
-def test_right_sides_of_an_event_see_the_values_before_it(folder: Path) -> None:
-    run = simulated(named(folder, TEXTS["SWAP"]), 0.5, 0.5, {}, also=["a", "b"])
+def test_right_sides_of_an_event_see_the_values_before_it() -> None:
+    run = simulated(named(TEXTS["SWAP"]), 0.5, 0.5, {}, also=["a", "b"])
     assert [run[name][-1] for name in ("x", "y", "a", "b")] == [2.0, 1.0, True, False]
 
 
 @pytest.mark.parametrize("most", [3, 4])
-def test_events_follow_each_other_max_events_times(folder: Path, most: int) -> None:
+def test_events_follow_each_other_max_events_times(most: int) -> None:
     """Four of them do, each because of the one before."""
     text = '[states]\nx = { start = 0, derivative = "0" }\n'
     for i in range(4, 0, -1):
         text += f'[events.e{i}]\nwhen = "x > {i}.5"\nreinit = {{ x = "{i + 1}.75" }}\n'
-    fmu = named(folder, text)
+    fmu = named(text)
     if most < 4:
         with pytest.raises(fmpy.fmi1.FMICallException):
             simulated(fmu, 1.0, 0.5, {"x": 1.75, "max_events": most})
@@ -205,9 +198,9 @@ def test_events_follow_each_other_max_events_times(folder: Path, most: int) -> N
         assert simulated(fmu, 1.0, 0.5, {"x": 1.75, "max_events": most})["x"][-1] == 5.75
 
 
-def test_a_model_without_states_has_modes(folder: Path) -> None:
+def test_a_model_without_states_has_modes() -> None:
     found = []
-    with initializing(named(folder, TEXTS["LATCH"])) as unit:
+    with initializing(named(TEXTS["LATCH"])) as unit:
         unit.fmi.exitInitializationMode()
         for step, value in enumerate((0.0, 2.0, 3.0, 1.0, 2.0, 0.5)):
             unit.set(u=value)
@@ -218,18 +211,16 @@ def test_a_model_without_states_has_modes(folder: Path) -> None:
 
 @pytest.mark.parametrize("version", ["", "fmi3"])
 @pytest.mark.parametrize("steps", [1, 18, 40])
-def test_events_of_a_model_without_states_are_located(
-    folder: Path, version: str, steps: int
-) -> None:
-    fmu = named(folder, TEXTS["SAW"])
+def test_events_of_a_model_without_states_are_located(version: str, steps: int) -> None:
+    fmu = named(TEXTS["SAW"])
     run = simulated(fmu.parent / version / fmu.name, 1.26, 1.26 / steps, {})
     t = run["time"][1:]
     np.testing.assert_array_equal(run["n"][1:], np.floor(10 * t) + 1)
     np.testing.assert_allclose(run["saw"], np.mod(run["time"], 0.5), rtol=0, atol=1e-14)
 
 
-def test_an_input_that_moves_is_located_without_states(folder: Path) -> None:
-    with initializing(named(folder, TEXTS["SAW"])) as unit:
+def test_an_input_that_moves_is_located_without_states() -> None:
+    with initializing(named(TEXTS["SAW"])) as unit:
         unit.fmi.exitInitializationMode()
         reference = [unit.loaded.references["u"]]
         unit.fmi.setRealInputDerivatives(reference, [1], [3.0])
@@ -237,8 +228,8 @@ def test_an_input_that_moves_is_located_without_states(folder: Path) -> None:
         assert unit.get("stamp") == pytest.approx([1 / 3], abs=1e-12)
 
 
-def test_events_that_contradict_each_other_are_named(folder: Path) -> None:
-    fmu = named(folder, TEXTS["CONTRADICTION"])
+def test_events_that_contradict_each_other_are_named() -> None:
+    fmu = named(TEXTS["CONTRADICTION"])
     with Instance(loaded(fmu), logging_on=True) as unit:
         unit.initialize(0.0, None, 1e-9).step(0.0, 0.9)
         with pytest.raises(fmpy.fmi1.FMICallException):
@@ -247,9 +238,9 @@ def test_events_that_contradict_each_other_are_named(folder: Path) -> None:
         assert "the step ended at t = 1.0" in last and "event up (b > 0), the same" in last
 
 
-def test_a_step_that_is_tried_again_and_succeeds_sends_no_message(folder: Path) -> None:
+def test_a_step_that_is_tried_again_and_succeeds_sends_no_message() -> None:
     """Long steps of `erk` go where the tank is emptier than empty."""
-    with Instance(loaded(named(folder, TEXTS["SIPHON"])), logging_on=True) as unit:
+    with Instance(loaded(named(TEXTS["SIPHON"])), logging_on=True) as unit:
         unit.fmi.setInteger([unit.loaded.references["solver_method"]], [METHODS["erk"]])
         unit.initialize(0.0, None, 1e-9).step(0.0, 200.0)
         assert unit.count("event_count") == 3
@@ -264,9 +255,9 @@ SEEDS = range(int(os.environ.get("SAMPLERS", "2")))
 
 
 @pytest.mark.parametrize("begin", [0.0, -0.3, -0.6, 1e6])
-def test_samplers_of_one_instant_run_in_the_order_of_the_file(folder: Path, begin: float) -> None:
+def test_samplers_of_one_instant_run_in_the_order_of_the_file(begin: float) -> None:
     """3 * 0.1 and 1 * 0.3 are two doubles and one instant, at 0 too; the first is at the start."""
-    run = simulated(made(folder, OF_SAMPLERS["COUNTERS"]), begin + 30.0, 0.1, {}, start_time=begin)
+    run = simulated(made(OF_SAMPLERS["COUNTERS"]), begin + 30.0, 0.1, {}, start_time=begin)
     k = np.arange(len(run))
     assert np.array_equal(run["a"], k + 1)
     assert np.array_equal(run["b"], k // 3 * 3 + 1)
@@ -294,9 +285,9 @@ def on_axis(stop: float) -> np.ndarray:
 
 @EACH_METHOD
 @pytest.mark.parametrize("step", [0.002, 0.02, 0.005])
-def test_a_sampled_pid_controller_moves_an_axis(folder: Path, method: int, step: float) -> None:
+def test_a_sampled_pid_controller_moves_an_axis(method: int, step: float) -> None:
     options = {"solver_method": method}
-    run = simulated(example("axis", folder), 1.0, step, options, relative_tolerance=1e-11)
+    run = simulated(example("axis"), 1.0, step, options, relative_tolerance=1e-11)
     rows = np.round(run["time"] / 0.002, 6)
     at_ticks = rows == np.round(rows)
     found = np.stack([run[name] for name in "xvywu"], axis=1)[at_ticks]
@@ -336,9 +327,7 @@ def written(number: Fraction) -> str:
 
 @pytest.mark.parametrize("has_state", [True, False])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_tick_sees_what_switches_at_its_time_switched(
-    tmp_path: Path, seed: int, has_state: bool
-) -> None:
+def test_a_tick_sees_what_switches_at_its_time_switched(seed: int, has_state: bool) -> None:
     """Directly and through [where], with each method, in one step or many."""
     chance, periods = random.Random(seed), PERIODS[seed % 2]
     every = chance.choice(periods) / chance.choice([1, 2])
@@ -356,7 +345,6 @@ def test_a_tick_sees_what_switches_at_its_time_switched(
     held = "".join(f"{kind}{i} = {{}}\n" for kind in "dv" for i in numbers)
     state = '[states]\ny = { derivative = "w4 - y" }\n' if has_state else ""
     fmu = made(
-        tmp_path,
         f'name = "Jumps"\n{state}{QUARTERS}[where]\n{where}[discrete]\nn = {{}}\n{held}'
         f'[sampled.s]\nevery = "{written(every)}"\noffset = "{written(Fraction(offset))}"\n'
         f'set = {{ n = "n + 1", {", ".join(new)} }}\n',
@@ -376,8 +364,8 @@ def test_a_tick_sees_what_switches_at_its_time_switched(
 
 
 @EACH_METHOD
-def test_events_set_discrete_variables_and_their_own_next_time(folder: Path, method: int) -> None:
-    run = simulated(made(folder, OF_SAMPLERS["TIMER"]), 2.0, 0.01, {"solver_method": method})
+def test_events_set_discrete_variables_and_their_own_next_time(method: int) -> None:
+    run = simulated(made(OF_SAMPLERS["TIMER"]), 2.0, 0.01, {"solver_method": method})
     t = run["time"]
     times = 0.25 * np.cumsum([1, 1, 2, 3, 4, 5, 6])  # the alarm sets the time of the next one
     assert np.array_equal(run["alarms"], np.sum(t[:, None] >= times, axis=1))
@@ -389,9 +377,9 @@ def test_events_set_discrete_variables_and_their_own_next_time(folder: Path, met
     assert run["fastest"][-1] == pytest.approx(np.sqrt(20.0), abs=1e-9)
 
 
-def test_a_digital_filter_has_no_states(folder: Path) -> None:
+def test_a_digital_filter_has_no_states() -> None:
     """A tick at the end of a step sees the input of the step."""
-    fmu = made(folder, OF_SAMPLERS["FILTER"])
+    fmu = made(OF_SAMPLERS["FILTER"])
     signal = np.array(
         [(0.0, 1.0), (0.45, 1.0), (0.45, 3.0), (2.0, 3.0)], [("time", "f8"), ("u", "f8")]
     )
@@ -406,9 +394,9 @@ def test_a_digital_filter_has_no_states(folder: Path) -> None:
         )
 
 
-def test_an_importer_that_moves_the_axis_itself_gets_all_ticks(folder: Path) -> None:
+def test_an_importer_that_moves_the_axis_itself_gets_all_ticks() -> None:
     """Model Exchange: tick k is due at k Ts, and the force, a sum of terms of 3 kN, follows."""
-    begun, rows = initializing(example("axis", folder), FMU2Model), on_axis(0.2)
+    begun, rows = initializing(example("axis"), FMU2Model), on_axis(0.2)
     instance, reference = begun.fmi, begun.loaded.references["u"]
     instance.exitInitializationMode()
     for k, (*_, force) in enumerate(rows[:-1]):
@@ -425,8 +413,8 @@ def test_an_importer_that_moves_the_axis_itself_gets_all_ticks(folder: Path) -> 
     instance.freeInstance()
 
 
-def test_ticks_survive_a_rollback_and_a_move_to_another_instance(folder: Path) -> None:
-    fmu = example("axis", folder)
+def test_ticks_survive_a_rollback_and_a_move_to_another_instance() -> None:
+    fmu = example("axis")
     begun = initializing(fmu), initializing(fmu)
     first, second = (instance.fmi for instance in begun)
     names = begun[0].loaded.references
@@ -452,8 +440,8 @@ def test_ticks_survive_a_rollback_and_a_move_to_another_instance(folder: Path) -
         assert advance(instance, 23) == ahead
 
 
-def test_start_values_of_discrete_variables_and_periods_can_be_set(folder: Path) -> None:
-    run = simulated(made(folder, OF_SAMPLERS["COUNTERS"]), 1.0, 0.1, {"a": 10.0, "T": 0.2})
+def test_start_values_of_discrete_variables_and_periods_can_be_set() -> None:
+    run = simulated(made(OF_SAMPLERS["COUNTERS"]), 1.0, 0.1, {"a": 10.0, "T": 0.2})
     assert run["a"][-1] == 16.0 and run["c"][0] == 5.0 and run["c"][-1] == 10.0
 
 
@@ -464,8 +452,8 @@ def test_start_values_of_discrete_variables_and_periods_can_be_set(folder: Path)
         ({"Kp": 1e308, "target": 1e308}, "sampler control: u = Kp * (target - x) + sum - Kd"),
     ],
 )
-def test_a_sampler_that_fails_is_named(folder: Path, start: dict[str, float], message: str) -> None:
-    fmu, logged = example("axis", folder), []
+def test_a_sampler_that_fails_is_named(start: dict[str, float], message: str) -> None:
+    fmu, logged = example("axis"), []
     options = {"start_time": start.pop("time", 0.0)}
     with pytest.raises(FMICallException):
         fmpy.simulate_fmu(

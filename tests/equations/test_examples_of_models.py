@@ -21,18 +21,13 @@ from tests.equations.examples import FOLDER, METHODS, MODELS, build, simulated
 example = partial(examples.example, make=build)
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("examples")
-
-
 @pytest.mark.parametrize(
     "path",
     sorted(set(FOLDER.glob("*.toml")) - set(FOLDER.glob("*.lock.toml"))),
     ids=lambda p: p.stem,
 )
-def test_importers_find_no_problem(path: Path, folder: Path) -> None:
-    fmu = example(path.stem, folder)
+def test_importers_find_no_problem(path: Path) -> None:
+    fmu = example(path.stem)
     assert validate_fmu(str(fmu)) == []
     assert validate_fmu(str(fmu.parent / "fmi3" / fmu.name)) == []
     assert len(path.read_text().splitlines()) <= 30
@@ -134,12 +129,12 @@ CASES = {
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", CASES)
-def test_an_example_follows_its_reference(folder: Path, name: str, method: str) -> None:
+def test_an_example_follows_its_reference(name: str, method: str) -> None:
     reference, stop, step, tolerance, start, relative, absolute = CASES[name]
     if name == "lorenz" and method != "taylor":
         return  # chaos takes the best one
     values = start | {"solver_method": METHODS[method]}
-    fmu = example(name.partition(" ")[0], folder)
+    fmu = example(name.partition(" ")[0])
     run = simulated(fmu, stop, step, values, relative_tolerance=tolerance)
     for column, exact in reference(run["time"]).items():
         np.testing.assert_allclose(run[column], exact, rtol=relative, atol=absolute)
@@ -148,19 +143,19 @@ def test_an_example_follows_its_reference(folder: Path, name: str, method: str) 
 
 
 @pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
-def test_the_cart_and_its_pole_take_the_work_of_the_force(folder: Path, method: int) -> None:
+def test_the_cart_and_its_pole_take_the_work_of_the_force(method: int) -> None:
     force = 0.7
     start = {"force": force, "phi": 2.0, "omega": 0.3, "solver_method": method}
-    run = simulated(example("cart_and_pole", folder), 10.0, 0.1, start, relative_tolerance=1e-11)
+    run = simulated(example("cart_and_pole"), 10.0, 0.1, start, relative_tolerance=1e-11)
     kept = run["energy"] - force * run["x"]
     np.testing.assert_allclose(kept, kept[0], rtol=0, atol=1e-8)
     assert np.ptp(run["energy"]) > 1
 
 
-def test_a_thousand_turns_keep_energy_and_momentum(folder: Path) -> None:
+def test_a_thousand_turns_keep_energy_and_momentum() -> None:
     start = {"solver_method": METHODS["taylor"], "max_internal_steps": 10**6}
     run = simulated(
-        example("two_body_orbit", folder), 1000 * PERIOD, PERIOD, start, relative_tolerance=1e-15
+        example("two_body_orbit"), 1000 * PERIOD, PERIOD, start, relative_tolerance=1e-15
     )
     for name in ("energy", "momentum"):
         assert np.max(np.abs(run[name] / run[name][0] - 1)) < 1e-12
@@ -168,11 +163,9 @@ def test_a_thousand_turns_keep_energy_and_momentum(folder: Path) -> None:
 
 @pytest.mark.parametrize("case", range(6))
 @pytest.mark.parametrize("name", ["controller", "encoder"])
-def test_files_have_the_bits_and_references_of_c(
-    folder: Path, fmu: Path, name: str, case: int
-) -> None:
+def test_files_have_the_bits_and_references_of_c(fmu: Path, name: str, case: int) -> None:
     chance, given = np.random.default_rng(case), MODELS["rp"][name]
-    paths = fmu.with_name(given["fmu"]), example(f"rp/{name}", folder)
+    paths = fmu.with_name(given["fmu"]), example(f"rp/{name}")
     theirs, own = (read_model(path).variables for path in paths)
     assert all(own[n].reference == theirs[n].reference for n in theirs.keys() & own.keys())
     start = {n: v[chance.integers(3)] for n, v in given["values"].items()}
@@ -188,7 +181,7 @@ def test_files_have_the_bits_and_references_of_c(
         )
 
 
-def test_a_new_scenario_can_set_elements(folder: Path) -> None:
-    text = scenario.template("a", "fmu", "Masses.fmu", read_model(example("masses", folder)))
+def test_a_new_scenario_can_set_elements() -> None:
+    text = scenario.template("a", "fmu", "Masses.fmu", read_model(example("masses")))
     given = tomllib.loads(re.sub(r"^# (?=\S+ = [0-9.e-]+(  #|$))", "", text, flags=re.MULTILINE))
     assert given["parameters"]["d[20]"] == 0.0 and given["parameters"]["m"] == 0.25

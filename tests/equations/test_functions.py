@@ -21,11 +21,6 @@ EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("functions")
-
-
-@pytest.fixture(scope="module")
 def length(tmp_path_factory: pytest.TempPathFactory) -> Model:
     return Model(tmp_path_factory.mktemp("length"), TEXTS["LENGTH"])
 
@@ -52,9 +47,9 @@ def test_a_length_has_no_square_that_overflows_or_vanishes(length: Model, power:
 
 
 @EACH_METHOD
-def test_sign_of_a_velocity_switches_where_it_turns(folder: Path, method: int) -> None:
+def test_sign_of_a_velocity_switches_where_it_turns(method: int) -> None:
     """Half a swing about k x = F after the other, each shorter by 4 F / k in its range."""
-    fmu = made(folder, TEXTS["FRICTION"].replace("start = 2.0", "start = 0.3"))
+    fmu = made(TEXTS["FRICTION"].replace("start = 2.0", "start = 0.3"))
     run = simulated(fmu, 6.0, 0.01, {"solver_method": method}, relative_tolerance=1e-11)
     w, center, half = np.sqrt(3.0 / 0.5), 0.1, np.pi / np.sqrt(3.0 / 0.5)
     n = np.floor(run["time"] / half)
@@ -65,11 +60,9 @@ def test_sign_of_a_velocity_switches_where_it_turns(folder: Path, method: int) -
 
 
 @EACH_METHOD
-def test_an_event_of_several_relations_happens_when_the_whole_comes_true(
-    folder: Path, method: int
-) -> None:
+def test_an_event_of_several_relations_happens_when_the_whole_comes_true(method: int) -> None:
     """x = sin t: armed above 0.5, left above 0.95; armed again below 0.9, left below -0.5."""
-    fmu = made(folder, TEXTS["GATE"])
+    fmu = made(TEXTS["GATE"])
     run = simulated(fmu, 12.0, 0.01, {"solver_method": method}, also=["armed", "open"])
     assert np.all(run["open"])
     t = run["time"]
@@ -110,8 +103,8 @@ def room(stop: float, is_enabled: bool) -> np.ndarray:
 
 @EACH_METHOD
 @pytest.mark.parametrize("is_enabled", [True, False])
-def test_a_thermostat_sees_an_open_window(folder: Path, method: int, is_enabled: bool) -> None:
-    fmu = made(folder, TEXTS["ROOM"])
+def test_a_thermostat_sees_an_open_window(method: int, is_enabled: bool) -> None:
+    fmu = made(TEXTS["ROOM"])
     times = [(0.0, 0), (30.0, 0), (30.0, 1), (40.0, 1), (40.0, 0), (100.0, 0)]
     run = simulated(
         fmu, 100.0, 1.0, {"solver_method": method, "enabled": is_enabled},
@@ -122,9 +115,9 @@ def test_a_thermostat_sees_an_open_window(folder: Path, method: int, is_enabled:
 
 @EACH_METHOD
 @pytest.mark.parametrize("version", ["", "fmi3"])
-def test_a_clutch_locks_slips_and_opens(folder: Path, version: str, method: int) -> None:
+def test_a_clutch_locks_slips_and_opens(version: str, method: int) -> None:
     """Speeds are straight lines. Closed from 1 s to 8 s; too strong a drive from 3 s to 5 s."""
-    fmu = made(folder, TEXTS["CLUTCH"])
+    fmu = made(TEXTS["CLUTCH"])
     given = [(0, 0, 4), (1, 0, 4), (1, 1, 4), (3, 1, 4), (3, 1, 20), (5, 1, 20), (5, 1, 4)]
     given += [(8, 1, 4), (8, 0, 4), (9, 0, 4)]
     run = simulated(
@@ -219,19 +212,17 @@ def charging() -> np.ndarray:
 
 @EACH_METHOD
 @pytest.mark.parametrize("step", [1e-3, 5e-3])
-def test_a_diode_opens_within_a_step(
-    charging: np.ndarray, folder: Path, method: int, step: float
-) -> None:
+def test_a_diode_opens_within_a_step(charging: np.ndarray, method: int, step: float) -> None:
     """At the begin of the step its current is exp(-300)."""
-    found = simulated(made(folder, TEXTS["DIODE"]), 0.1, step, {"solver_method": method})
+    found = simulated(made(TEXTS["DIODE"]), 0.1, step, {"solver_method": method})
     np.testing.assert_allclose(found["u"][:: round(5e-3 / step)], charging, rtol=0, atol=1e-7)
 
 
 @pytest.mark.parametrize("step", [0.01, 0.1, 1.0])
-def test_what_vanishes_at_both_ends_of_a_step_is_seen(folder: Path, step: float) -> None:
+def test_what_vanishes_at_both_ends_of_a_step_is_seen(step: float) -> None:
     """Even powers of the sine have a binomial coefficient as their mean."""
     method = {"solver_method": METHODS["taylor"]}
-    run = simulated(made(folder, TEXTS["VANISHING"]), 4.0, step, method)
+    run = simulated(made(TEXTS["VANISHING"]), 4.0, step, method)
     for name, value in {"swing": comb(6, 3) / 2**4, "pulse": comb(64, 32) / 2**62}.items():
         assert run[name][-1] == pytest.approx(value, rel=0, abs=1e-8), name
 
@@ -240,8 +231,8 @@ def test_what_vanishes_at_both_ends_of_a_step_is_seen(folder: Path, step: float)
 
 
 @pytest.fixture(scope="module")
-def spring(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return made(tmp_path_factory.mktemp("following"), MODELS["following_values"]["SPRING"])
+def spring() -> Path:
+    return made(MODELS["following_values"]["SPRING"])
 
 
 @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])

@@ -19,8 +19,8 @@ CASES = MISTAKES["messages"]["rows"]
 
 
 @pytest.fixture(scope="module")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return made(tmp_path_factory.mktemp("messages"), MODELS["messages"]["FAILING"])
+def fmu() -> Path:
+    return made(MODELS["messages"]["FAILING"])
 
 
 def refusal(fmu: Path, stop: float, **start: float) -> str:

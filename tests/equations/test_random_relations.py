@@ -230,7 +230,7 @@ def changes(text: str, point: Callable[[float], dict[str, float]]) -> list[float
 
 
 @pytest.fixture(scope="module", params=SEEDS)
-def fmu_case(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple:
+def fmu_case(request: pytest.FixtureRequest) -> tuple:
     """An FMU whose states are integrals of expressions, which are outputs too."""
     random_texts = Texts(1000 + request.param, ("x", "p", "time"), only_total=True)
     texts = {f"z{i}": random_texts.number(4) for i in range(10)}
@@ -239,7 +239,7 @@ def fmu_case(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     text += "".join(f'i{name} = {{ derivative = "{rate}" }}\n' for name, rate in texts.items())
     text += "[outputs]\n"
     text += "".join(f'{name} = {{ value = "{rate}" }}\n' for name, rate in texts.items())
-    return made(tmp_path_factory.mktemp("fmu"), text), texts
+    return made(text), texts
 
 
 @pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)

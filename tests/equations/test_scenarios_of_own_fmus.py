@@ -11,7 +11,7 @@ import pytest
 import rparm
 from rparm.fmi.fmu_file import read_model
 from rparm.runs import scenario as scenarios
-from tests.equations.examples import MODELS, example
+from tests.equations.examples import FOLDER, MODELS, quick
 from tests.support.rparm_project import assert_one_line, call, repacked
 
 TEXTS = MODELS["scenarios_of_own_fmus"]
@@ -21,7 +21,7 @@ TEXTS = MODELS["scenarios_of_own_fmus"]
 def scenario(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A scenario in another folder than its FMU."""
     folder = tmp_path_factory.mktemp("own")
-    fmu = example("dahlquist", folder)
+    fmu = quick(FOLDER / "dahlquist.toml", folder / "dahlquist")
     path = folder / "runs" / "decay.toml"
     path.parent.mkdir()
     path.write_text(TEXTS["SCENARIO"].format(fmu=f"../{fmu.relative_to(folder).as_posix()}"))

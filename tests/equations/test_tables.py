@@ -17,11 +17,6 @@ X, Y = [0.0, 10.0, 20.0, 40.0], [3.0, 2.5, 1.0, 0.25]
 LISTS = f"x = {X}\ny = {Y}\n"
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("tables")
-
-
 def segments(outside: str) -> list[tuple[float, float, float, float]]:
     """Begin and end of each line of the table, and the line a + b w."""
     slopes = np.diff(Y) / np.diff(X)
@@ -55,10 +50,8 @@ def speed(times: np.ndarray, outside: str, load: float) -> np.ndarray:
 @EACH_METHOD
 @pytest.mark.parametrize("outside", ["hold", "extend"])
 @pytest.mark.parametrize("load", [0.0, -4.0])
-def test_a_motor_runs_up_along_its_curve(
-    folder: Path, method: int, outside: str, load: float
-) -> None:
-    fmu = made(folder, TEXTS["MOTOR"].replace("OUTSIDE", outside))
+def test_a_motor_runs_up_along_its_curve(method: int, outside: str, load: float) -> None:
+    fmu = made(TEXTS["MOTOR"].replace("OUTSIDE", outside))
     start = {"solver_method": method, "load": load}
     run = simulated(fmu, 3.0, 0.01, start, relative_tolerance=1e-11, also=["event_count"])
     exact = speed(run["time"], outside, load)
@@ -71,8 +64,8 @@ ROWS = np.array([0.5, 1.0, 1.7, 3.0]), np.array([1.0, -2.0, 0.5, 4.0])
 
 
 @EACH_METHOD
-def test_integrals_over_tables_of_the_time_are_exact(folder: Path, method: int) -> None:
-    fmu = made(folder, TEXTS["SIGNALS"])
+def test_integrals_over_tables_of_the_time_are_exact(method: int) -> None:
+    fmu = made(TEXTS["SIGNALS"])
     run = simulated(fmu, 4.0, 0.1, {"solver_method": method}, relative_tolerance=1e-11)
     x, y = ROWS
     grid = np.unique(np.concatenate([x, run["time"]]))
@@ -87,11 +80,11 @@ def test_integrals_over_tables_of_the_time_are_exact(folder: Path, method: int) 
     assert np.max(np.abs(run["c"] - (primitive(run["time"]) - primitive(0.0)))) < 1e-8
 
 
-def test_a_table_of_an_input_follows_at_once(folder: Path) -> None:
+def test_a_table_of_an_input_follows_at_once() -> None:
     times = np.array([0.0, 0.4, 0.4, 1.0, 3.0])
     u = np.array([0.0, 0.9, 2.9, 1.2, 5.0])
     signal = np.array(list(zip(times, u, strict=True)), [("time", "f8"), ("u", "f8")])
-    run = simulated(made(folder, TEXTS["SIGNALS"]), 3.0, 0.05, {}, input=signal)
+    run = simulated(made(TEXTS["SIGNALS"]), 3.0, 0.05, {}, input=signal)
     # a step holds the input of its begin
     exact = np.interp(np.interp(run["time"] - 0.05, times[2:], u[2:]), *ROWS)
     rows = run["time"] > 0.46

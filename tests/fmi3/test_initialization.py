@@ -119,16 +119,11 @@ def random_values(chance: random.Random, point: Point) -> dict[ModelVariable, fl
     return values
 
 
-def fmu_of(fmu: Path, version: str, name: str, tmp: Path) -> Path:
+def fmu_of(fmu: Path, version: str, name: str) -> Path:
     if name in EVERY:
         return (fmu.parent if version == "fmi2" else fmu.parent / version) / f"{name}.fmu"
-    built = example(name, tmp)
+    built = example(name)
     return built if version == "fmi2" else built.parent / version / built.name
-
-
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("built")
 
 
 OTHERS = sorted(p.stem for p in FOLDER.glob("*.toml") if not p.stem.endswith(".lock"))
@@ -138,10 +133,10 @@ OTHERS = [n for n in OTHERS if n not in ("bouncing_ball", "dc_motor")]
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("name", [*EVERY, *OTHERS])
 def test_calculated_values_are_those_after_it(
-    fmu: Path, name: str, version: str, built: Path, tmp_path: Path
+    fmu: Path, name: str, version: str, tmp_path: Path
 ) -> None:
     chance = random.Random(f"{name} {version}")
-    path = fmu_of(fmu, version, name, built)
+    path = fmu_of(fmu, version, name)
     for kind in KINDS:
         compared = 0
         with opened(path, kind, tmp_path / kind) as point:
@@ -272,10 +267,10 @@ class Dependence:
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("name", [*EVERY, *OTHERS])
 def test_the_model_structure_lists_what_acts_and_nothing_else(
-    fmu: Path, name: str, version: str, built: Path, tmp_path: Path
+    fmu: Path, name: str, version: str, tmp_path: Path
 ) -> None:
     chance = random.Random(f"structure {name}")
-    path = fmu_of(fmu, version, name, built)
+    path = fmu_of(fmu, version, name)
     with opened(path, "ModelExchange", tmp_path) as point:
         dependence = Dependence(point)
         for _ in range(5 * POINTS):

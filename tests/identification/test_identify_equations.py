@@ -45,11 +45,6 @@ set = { u = "gain * (r - y) + sum", sum = "sum + 0.2 * (r - y)" }
 NOISE = 2e-3, 1e-2
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("fmus")
-
-
 def room(times: np.ndarray, outside: np.ndarray) -> np.ndarray:
     """Return exact temperatures (rows,) in K: exponentials between switches at 292 and 294 K."""
     found, is_cooling = [293.0], False
@@ -150,7 +145,7 @@ def test_modes_are_carried_through_a_log(
     assert code == 0 and 0.018 < scenario["runs"][0]["measured"]["room"]["rms"] < 0.022
 
 
-def test_samplers_are_carried_through_a_log(folder: Path, tmp_path: Path) -> None:
+def test_samplers_are_carried_through_a_log(tmp_path: Path) -> None:
     """A law with an integral every 0.3 s; 1 s of a segment is no multiple of it."""
     random, h = np.random.default_rng(2), 0.05
     times = h * np.arange(801)
@@ -165,7 +160,7 @@ def test_samplers_are_carried_through_a_log(folder: Path, tmp_path: Path) -> Non
     log = tmp_path / "log.csv"
     log.write_text("\n".join(["time,r,y", *(f"{t:.17g},{r},{x}" for t, r, x in rows)]))
     found = rparm.identify(
-        made(folder, SAMPLED), log, parameters=["tau", "gain"], inputs=["r"], measured=["y"],
+        made(SAMPLED), log, parameters=["tau", "gain"], inputs=["r"], measured=["y"],
         start={"tau": 2.4, "gain": 2.4}, segment=1.0,
     )  # fmt: skip
     assert found.is_one_run and 0.85 < found.chi2 < 1.15
@@ -177,9 +172,9 @@ def test_samplers_are_carried_through_a_log(folder: Path, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("missing", ["dropped", "lost", "empty"])
-def test_intervals_hold_where_logs_have_gaps(missing: str, folder: Path, tmp_path: Path) -> None:
+def test_intervals_hold_where_logs_have_gaps(missing: str, tmp_path: Path) -> None:
     """18 intervals of 95 % each: fewer than 15 hold by chance once in 100, with these seeds not."""
-    fmu, inside, noted = made(folder, OSCILLATOR), 0, 0
+    fmu, inside, noted = made(OSCILLATOR), 0, 0
     for seed in range(6):
         versions = fmu, fmu.parent / "fmi3" / fmu.name
         log = random_log(tmp_path / "log.csv", seed, **{missing: 0.05})
@@ -192,13 +187,13 @@ def test_intervals_hold_where_logs_have_gaps(missing: str, folder: Path, tmp_pat
     assert (noted > 0) == (missing == "lost")  # a smooth input is better linear in lost rows
 
 
-def test_a_channel_may_have_fewer_rows(folder: Path, tmp_path: Path) -> None:
+def test_a_channel_may_have_fewer_rows(tmp_path: Path) -> None:
     """Every tenth row has a velocity: all of the position counts."""
     log = random_log(tmp_path / "log.csv", 3)
     head, names, *rows = log.read_text().splitlines()
     slow = [row if i % 10 == 0 else f"{row.rpartition(';')[0]};NaN" for i, row in enumerate(rows)]
     log.write_text("\n".join([head, names, *slow[:-1]]))
-    found = oscillator(made(folder, OSCILLATOR), log, 3)
+    found = oscillator(made(OSCILLATOR), log, 3)
     counted = sum(segment.counts.sum(axis=0) for segment in found.segments)
     assert counted.tolist() == [501, 51] and found.chi2 < 1.3
     assert all(holds(found, name, true) for name, true in TRUE.items())

@@ -248,7 +248,7 @@ def test_small_units_are_shown_and_what_is_missing_in_charts_is_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Names with indexes between commas; a flow of 5e-6 m3/s beside 200 bar."""
-    command = [str(made(tmp_path, PRESS)), "--output", str(tmp_path), "--trim", "p[1,1],p[1,2]"]
+    command = [str(made(PRESS)), "--output", str(tmp_path), "--trim", "p[1,1],p[1,2]"]
     command += ["p[2,1], p[2,2]", "--outputs", "p[1,2],leak,fixed"]
     found = document(command, capsys)
     assert found["outputs"] == ["p[1,2]", "leak", "fixed"]

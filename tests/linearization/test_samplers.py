@@ -25,17 +25,12 @@ WAY = ("jacobi", "held")
 TEXTS |= {n.upper(): (FOLDER / f"{n}.toml").read_text(encoding="utf-8") for n in ("axis", "pwm")}
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("samplers")
-
-
 def assert_close(found: np.ndarray, exact: np.ndarray) -> None:
     np.testing.assert_allclose(found, exact, rtol=0, atol=2e-13 * np.abs(exact).max())
 
 
-def test_deadbeat_control_of_a_double_integrator_settles_in_two_samples(folder: Path) -> None:
-    found = rparm.linearize(made(folder, TEXTS["DEADBEAT"]))
+def test_deadbeat_control_of_a_double_integrator_settles_in_two_samples() -> None:
+    found = rparm.linearize(made(TEXTS["DEADBEAT"]))
     plant, input_ = np.array([[1, 1], [0, 1]]), np.array([[0.5], [1]])
     gain = np.array([[1, 1.5]])
     assert_close(found.A, np.block([[plant - input_ @ gain, np.zeros((2, 1))], [-gain, 0]]))
@@ -46,8 +41,8 @@ def test_deadbeat_control_of_a_double_integrator_settles_in_two_samples(folder: 
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_a_sampled_pid_controller_of_an_axis(folder: Path, fmi: int) -> None:
-    path, h = example("axis", folder), 0.03
+def test_a_sampled_pid_controller_of_an_axis(fmi: int) -> None:
+    path, h = example("axis"), 0.03
     at = {"M": 0.7, "m": 1.9, "k": 400.0, "c": 11.0, "Kp": 11.0, "Kd": 2.0, "Ki": 4.0}
     path = path if fmi == 2 else path.parent / "fmi3" / path.name
     point = {"Ts": h, "target": 0.2}
@@ -74,12 +69,10 @@ def crane(z: np.ndarray, h: float, r: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("shift", [{"skipped": 3}, {"begin": 0.05}, {"begin": 1.0, "skipped": 5}])
-def test_samplers_with_offsets_compose_in_the_order_of_time(
-    folder: Path, shift: dict[str, float]
-) -> None:
+def test_samplers_with_offsets_compose_in_the_order_of_time(shift: dict[str, float]) -> None:
     """A shift of all offsets, or of one by periods, changes nothing: the first tick begins."""
     point = {"phi": 0.5, "w": -0.1, "u": 0.2, "e": 0.3}  # phi follows from p0
-    found = rparm.linearize(made(folder, TEXTS["CRANE"]), at=point | shift | {"r": 0.4, "h": 0.5})
+    found = rparm.linearize(made(TEXTS["CRANE"]), at=point | shift | {"r": 0.4, "h": 0.5})
     assert found.states == tuple(point) and found.left_out == ("extra",)
     assert_close(np.hstack([found.A, found.B]), crane(np.array([*point.values()]), 0.5, 0.4))
     assert found.x.tolist() == [*point.values()]
@@ -88,11 +81,11 @@ def test_samplers_with_offsets_compose_in_the_order_of_time(
 
 
 @pytest.mark.parametrize("offset", [0, 23, 103, 140])
-def test_the_period_of_several_rates_begins_with_the_slowest(folder: Path, offset: int) -> None:
+def test_the_period_of_several_rates_begins_with_the_slowest(offset: int) -> None:
     """Of 1, 4 and 10 ms it is 20 ms; at one instant samplers run in the order of the file."""
     w, begin = 0.3, offset % 100  # 0.1 ms
     at = {"offset": offset * 1e-4, "w": w}
-    found = rparm.linearize(made(folder, TEXTS["CASCADE"]), at=at)
+    found = rparm.linearize(made(TEXTS["CASCADE"]), at=at)
     assert found.states == ("i", "w", "u", "e", "ref", "seen")
     assert found.dt == pytest.approx(0.02)
     whole, rates, seen = np.eye(7), np.zeros((7, 7)), []  # of states and r
@@ -109,8 +102,8 @@ def test_the_period_of_several_rates_begins_with_the_slowest(folder: Path, offse
     assert_close(np.hstack([found.C, found.D]), seen[0][:6])
 
 
-def test_samplers_with_indexes_have_names_with_indexes(folder: Path) -> None:
-    found = rparm.linearize(made(folder, TEXTS["TWO"]))
+def test_samplers_with_indexes_have_names_with_indexes() -> None:
+    found = rparm.linearize(made(TEXTS["TWO"]))
     assert found.states == ("x[1]", "x[2]", "u[1]", "u[2]") and found.outputs == found.states
     first, second = np.eye(4), np.eye(4)
     first[3] = second[2] = [3, 3, 0, 0]
@@ -119,8 +112,8 @@ def test_samplers_with_indexes_have_names_with_indexes(folder: Path) -> None:
     assert_close(found.C, first)
 
 
-def test_a_filter_is_discrete_without_continuous_states(folder: Path) -> None:
-    found = rparm.linearize(made(folder, TEXTS["FILTER"]), at={"a": 0.25})
+def test_a_filter_is_discrete_without_continuous_states() -> None:
+    found = rparm.linearize(made(TEXTS["FILTER"]), at={"a": 0.25})
     whole = np.hstack([found.A, found.B])
     assert_close(whole, np.array([[0.75, 0, 0.25], [1, 0, 0]]))
     assert_close(np.hstack([found.C, found.D]), whole)
@@ -130,9 +123,9 @@ def test_a_filter_is_discrete_without_continuous_states(folder: Path) -> None:
     np.testing.assert_allclose(frequency_response(one)(w), system(np.exp(0.1j * w)), rtol=1e-9)
 
 
-def test_a_state_that_no_tick_moves_is_held(folder: Path) -> None:
+def test_a_state_that_no_tick_moves_is_held() -> None:
     """A brake holds both masses, but a tick moves one."""
-    found = rparm.linearize(made(folder, TEXTS["BRAKE"]))
+    found = rparm.linearize(made(TEXTS["BRAKE"]))
     assert found.held == ("v",) and found.states == ("w", "x", "u")
     assert_close(np.diag(found.A), np.array([0.5, np.exp(-0.5), 0.0]))
 
@@ -154,22 +147,22 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_no_linear_model_is_made(folder: Path, case: str) -> None:
+def test_no_linear_model_is_made(case: str) -> None:
     name, options, message = REFUSED[case]
     with pytest.raises(UserError, match=message) as raised:
-        rparm.linearize(made(folder, TEXTS[name]), **options).zoh(0.1)
+        rparm.linearize(made(TEXTS[name]), **options).zoh(0.1)
     assert "\n" not in str(raised.value)
 
 
-def test_a_condition_is_taken_as_it_is_at_the_point(folder: Path) -> None:
+def test_a_condition_is_taken_as_it_is_at_the_point() -> None:
     """The tick does nothing here, so that its new value need not be defined."""
-    found = rparm.linearize(made(folder, TEXTS["LIMITED"]), at={"x": 0.5})
+    found = rparm.linearize(made(TEXTS["LIMITED"]), at={"x": 0.5})
     assert_close(found.A, block_diag(np.exp(-1), 1))
 
 
-def test_what_has_no_discrete_model_says_what_to_do(folder: Path) -> None:
+def test_what_has_no_discrete_model_says_what_to_do() -> None:
     with pytest.raises(UserError, match="has samplers: linearize it in model exchange"):
-        study(Request(made(folder, TEXTS["DEADBEAT"]), kind=CO_SIMULATION))
+        study(Request(made(TEXTS["DEADBEAT"]), kind=CO_SIMULATION))
 
 
 def loop(folder: Path, old: str = "", new: str = "") -> Path:
@@ -213,9 +206,9 @@ def test_the_largest_step_of_samplers_is_a_multiple_of_their_period(tmp_path: Pa
 
 
 @pytest.mark.parametrize("version", ["", "fmi3"])
-def test_functions_without_slope_and_counts_are_named(folder: Path, version: str) -> None:
+def test_functions_without_slope_and_counts_are_named(version: str) -> None:
     """r acts once, not twice, and x not at all; n counts, but nothing follows from it."""
-    fmu = made(folder, TEXTS["STEPS"])
+    fmu = made(TEXTS["STEPS"])
     found = rparm.linearize(fmu.parent / version / fmu.name)
     assert found.flat == ("sign in y", "round in u") and found.left_out == ("n",)
     assert_close(found.A, np.array([[np.exp(-0.1), 0], [0, 0]]))
@@ -223,11 +216,11 @@ def test_functions_without_slope_and_counts_are_named(folder: Path, version: str
 
 
 def test_files_and_page_say_that_it_is_sampled(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     saved = tmp_path / "m.csv"
     options = ["--save", str(saved), "--output", str(tmp_path), "--json", "--at", "x1=0.5"]
-    assert cli.main(["linearize", str(made(folder, TEXTS["DEADBEAT"])), *options]) == 0
+    assert cli.main(["linearize", str(made(TEXTS["DEADBEAT"])), *options]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["dt"] == 1.0 and found["poles"] == [[0, 0]] * 3
     rows = [row[0] for row in csv.reader(saved.open(newline=""))]

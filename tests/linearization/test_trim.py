@@ -150,8 +150,8 @@ EXACT = {"x": 2e-9, "y": 1.0, "p": 2e7, "q": 5e-6, "flow": 0.0}
 
 
 @pytest.fixture(scope="module")
-def scales(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FmuSubject]:
-    path = made(tmp_path_factory.mktemp("scales"), SCALES)
+def scales() -> Iterator[FmuSubject]:
+    path = made(SCALES)
     with Fmu(path, kind=MODEL_EXCHANGE) as opened, FmuSubject(opened) as subject:
         yield subject
 
