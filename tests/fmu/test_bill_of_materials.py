@@ -1,7 +1,6 @@
 """The program that writes a release's checksums and its bill of materials, on two small files."""
 
 import json
-import subprocess
 import sys
 from contextlib import redirect_stderr
 from io import StringIO
@@ -35,30 +34,6 @@ def release(tmp_path: Path) -> Path:
     (folder / "One.fmu").write_bytes(b"one")
     (folder / "below" / "Two.fmu").write_bytes(b"two")
     return folder
-
-
-def test_sha256sum_accepts_the_checksums_until_a_file_changes(release: Path) -> None:
-    assert write(release) == (0, "")
-    check = ["sha256sum", "--check", "--quiet", "--strict", "SHA256SUMS"]
-    assert subprocess.run(check, cwd=release, check=False).returncode == 0
-    (release / "One.fmu").write_bytes(b"two")
-    assert subprocess.run(check, cwd=release, check=False, capture_output=True).returncode == 1
-
-
-def test_the_bill_gives_checksums_and_parts(release: Path) -> None:
-    assert write(release, "--part", PART) == (0, "")
-    bill = json.loads((release / "sbom.cdx.json").read_text())
-    components = {component["name"]: component for component in bill["components"]}
-    assert set(components) == {"One.fmu", "below/Two.fmu", "Solver"}
-    assert components["Solver"]["version"] == "1.2.3"
-    assert components["Solver"]["licenses"] == [{"license": {"id": "BSD-3-Clause"}}]
-    sums = dict(
-        reversed(line.split("  ")) for line in (release / "SHA256SUMS").read_text().splitlines()
-    )
-    uses = {each["ref"]: each.get("dependsOn") for each in bill["dependencies"]}
-    for name, checksum in sums.items():
-        assert components[name]["hashes"] == [{"alg": "SHA-256", "content": checksum}]
-        assert uses[name] == ["Solver"]
 
 
 def test_the_same_files_give_the_same_bytes_and_others_another_number(release: Path) -> None:

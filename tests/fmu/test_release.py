@@ -85,6 +85,8 @@ def test_the_bill_of_materials_names_what_is_compiled_in(release: Path, archive)
     assert bill["bomFormat"] == "CycloneDX"
     components = {component["name"]: component for component in bill["components"]}
     file = Path(archive.filename).relative_to(release).as_posix()
+    checksum = hashlib.sha256(Path(archive.filename).read_bytes()).hexdigest()
+    assert components[file]["hashes"] == [{"alg": "SHA-256", "content": checksum}]
     used = next(d["dependsOn"] for d in bill["dependencies"] if d["ref"] == file)
     assert set(used) == {"SUNDIALS", "musl", "zig", "mingw-w64"}
     for name in used:
