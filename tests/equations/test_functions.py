@@ -146,6 +146,7 @@ CALLS |= {"abs(Y)": 0.25, "min(X, Y)": -0.25, "max(Y, X)": 0.6, "floor(Y)": -1, 
 CALLS |= {"round(X)": 1, "mod(Y, X)": 0.35, "hypot(X, Y)": 0.65, "X**3": 0.216, "X / Y": -2.4}
 CALLS |= {"atan2(Y, X)": mpmath.atan2(-0.25, 0.6), "X**Y": mpmath.mpf(0.6) ** -0.25, "-X": -0.6}
 CALLS |= {"sum(i = 1..n, i * X)": 3.6, "1 if X > 0 and not Y > 0 else 2": 1, "own(X)": 0.375}
+CALLS |= {"twice(X)": 0.75}
 CALLS |= {"line(X)": 3 - 0.2 / 0.6, "steps(X)": 3, "inside(X)": 3 - 0.2 / 0.6, "in_c(X, Y)": 3.85}
 CALLS |= {"curve(X)": PchipInterpolator([0, 0.4, 1], [1, 3, 2])(0.6), "plane(X, Y)": 3.025}
 CALLS |= {"floor(1e8 * X - 0.5)": 59999999}  # no float has it
@@ -157,7 +158,10 @@ def test_every_function_stands_in_every_place(tmp_path: Path) -> None:
     (tmp_path / "Places.c").write_text(TEXTS["PLACES_C"])
     new: dict[str, list[str]] = {section: [] for section in SECTIONS.split()}
     new["functions"] += ["own = { arguments = ['X'], value = 'X / (1 + abs(X))' }"]
-    changes, exact = [], {}
+    new["functions"] += ["twice = { arguments = ['X'], value = 'own(X) + own(X)' }"]
+    new["where"] += ["hypot = '5 * x'"]  # a name is no call
+    new["outputs"] += ["named = { value = 'hypot + hypot(x, y)' }"]
+    changes, exact = [], {"named": 3.65}
     for i, (call, value) in enumerate(CALLS.items()):
         own, fixed = (call.replace("X", x).replace("Y", y) for x, y in ("xy", "pq"))
         size, whole = abs(float(value)), int(np.floor(float(value)))

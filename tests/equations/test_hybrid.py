@@ -111,17 +111,25 @@ def stays_above(run: Run) -> None:
     assert run.failure or run.counts[-1] > 10
 
 
-TOUCHES = """h < 0; 0 > h; h <= 0; 0 >= h; 2 - h > 2; h < low; h < -f; rises + falls < 0
-h + ramp < ramp; h + time < time; ramp**2 < 0; 1 + ramp**2 < 1; rises < 3 * time + f
-3 * time**2 - 3 * time + 0.75 < 0""".replace("\n", "; ").split("; ")
+TOUCHES = """h < 0; 0 > h; h <= 0; 0 >= h; 2 - h > 2
+h < low; h < -f; rises + falls < 0; h + ramp < ramp; h + time < time
+ramp**2 < 0; 1 + ramp**2 < 1; 3 * time**2 - 3 * time + 0.75 < 0
+rises < 3 * time + f""".splitlines()
 
 
-@pytest.mark.parametrize("when", TOUCHES)
+def touch(conditions: str) -> str:
+    """The file with an event for each condition."""
+    head, event = TEXTS["TOUCH"].split("[events.touch]")
+    events = (event.format(when=when) for when in conditions.split("; "))
+    return head.format() + "".join(f"[events.touch{k}]{text}" for k, text in enumerate(events))
+
+
+@pytest.mark.parametrize("conditions", TOUCHES)
 @EACH_KIND
-def test_a_touch_is_no_event(unit: Callable, kind: str, when: str) -> None:
+def test_a_touch_is_no_event(unit: Callable, kind: str, conditions: str) -> None:
     """h = 3 (t - 0.5)**2 is 0 at 0.5 s, up to errors that decide what is below 0."""
-    f = Polynomial(-0.75 if "rises <" in when else 0.0, 0.0, 0.0)
-    makes_no_event(unit(TEXTS["TOUCH"].format(when=when)), kind, f)
+    f = Polynomial(-0.75 if "rises <" in conditions else 0.0, 0.0, 0.0)
+    makes_no_event(unit(touch(conditions)), kind, f)
 
 
 @pytest.mark.parametrize(("a", "m"), [(0.7, 0.5), (1.3, 0.3), (0.7e-9, 0.5)])
@@ -130,7 +138,7 @@ def test_an_input_may_touch_up_to_its_rounding(
     unit: Callable, kind: str, a: float, m: float
 ) -> None:
     """As a sum, f = a (t - m)**2 falls up to 1e-16 a below 0; 1e-9 a below 0 it is an event."""
-    touching = unit(TEXTS["TOUCH"].format(when="f < 0"))
+    touching = unit(touch("f < 0"))
     makes_no_event(touching, kind, Polynomial(a * m**2, -2 * a * m, 2 * a))
     below = Polynomial(a * m**2 - 1e-9 * a, -2 * a * m, 2 * a)
     assert run_of(touching, kind, 0.01, 100, {"f": below}).x[-1][-1] == 1.0
