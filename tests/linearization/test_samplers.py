@@ -166,8 +166,13 @@ def test_what_has_no_discrete_model_says_what_to_do() -> None:
 
 
 def loop(folder: Path, old: str = "", new: str = "") -> Path:
-    for name, text in MODELS["loop"]["files"].items():
-        (folder / name).write_text(text.replace(old, new), encoding="utf-8")
+    """A system of FMUs, and of one in Python."""
+    files = {name: text.replace(old, new) for name, text in MODELS["loop"]["files"].items()}
+    system = files.pop("loop.toml")
+    (folder / "sensor.py").write_text(files.pop("sensor.py"), encoding="utf-8")
+    for name, text in files.items():
+        system = system.replace(f'"{name}"', f'"{made(text).as_posix()}"')
+    (folder / "loop.toml").write_text(system, encoding="utf-8")
     return folder / "loop.toml"
 
 

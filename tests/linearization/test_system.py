@@ -16,7 +16,7 @@ from rparm.linearization.system import SystemSubject, connected, looped
 from rparm.systems import ssp
 from rparm.systems.opened import opened as open_system
 from rparm.systems.structure import Connection
-from tests.equations.examples import MODELS
+from tests.equations.examples import MODELS, made
 
 
 @contextmanager
@@ -191,9 +191,9 @@ class Pid:
 
 def sampled_loop(fmu: Path, folder: Path, code: str = PID, step: float = 0.05) -> Path:
     """A file with the arm that lies flat: its slider alone is a double integrator."""
-    law = "pid.py" if "class" in code else "pid.toml"
+    law = "pid.py" if "class" in code else made(code).as_posix()
     gains = 'file = "gains.json"\n' if "class" in code else ""
-    (folder / law).write_text(code, encoding="utf-8")
+    (folder / "pid.py").write_text(code, encoding="utf-8")
     (folder / "gains.json").write_text(f'{{"pid": {{"gains": [{KP}, {KI}, {KD}]}}}}')
     file = folder / "loop.toml"
     file.write_text(
