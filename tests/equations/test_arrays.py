@@ -92,8 +92,8 @@ def test_the_text_of_a_model_does_not_grow_with_its_arrays(tmp_path: Path) -> No
         parts = [source.split(f" {name}(")[-1].split("\n}\n")[0] for name in names] or [source]
         return sum(line[:5] != "    {" for part in parts for line in part.splitlines())
 
-    assert lines(chain(410)) == lines(chain(500)) < 1500
-    cells = [TEXTS["CELLS"].replace("300", n) for n in ("150", "300")]
+    assert lines(chain(210)) == lines(chain(260)) < 1500
+    cells = [TEXTS["CELLS"].replace("300", n) for n in ("100", "150")]
     first, second = (lines(text, "describe", "propagate", "indicators") for text in cells)
     assert first == second
 
