@@ -39,9 +39,11 @@ endforeach()
 # All shared objects, without their archives.
 add_custom_target(libraries)
 
-# The shared object of one version: exports what its FMI header marks, and hides all of SUNDIALS.
+# The shared object of one version: exports what its FMI header marks, and hides all of SUNDIALS. What is the same in all is
+# compiled once (runtime.cmake); its files are still the sources of the FMU (source_code.cmake).
 function(add_fmu_library name target version description folder)
-  add_library(${target} SHARED ${FMU_SHARED_SOURCES} ${${version}_SOURCES})
+  add_library(${target} SHARED $<TARGET_OBJECTS:runtime_${version}>)
+  set_target_properties(${target} PROPERTIES OWN_SOURCES "${FMU_SHARED_SOURCES};${${version}_SOURCES}")
   if(OWN_LIBM)
     # as objects: from an archive, not every linker prefers them to those of the system
     target_sources(${target} PRIVATE $<TARGET_OBJECTS:elementary_functions>)

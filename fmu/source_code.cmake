@@ -28,6 +28,10 @@ function(manifest_entry target result)
   get_target_property(files ${target} SOURCES)
   get_target_property(folder ${target} SOURCE_DIR)
   list(FILTER files EXCLUDE REGEX "^\\$<TARGET_OBJECTS:") # of another library in the list
+  get_target_property(own ${target} OWN_SOURCES) # of a shared object: package.cmake
+  if(own)
+    list(APPEND files ${own})
+  endif()
   set(sources "")
   foreach(file IN LISTS files)
     cmake_path(ABSOLUTE_PATH file BASE_DIRECTORY ${folder} NORMALIZE)
