@@ -2,70 +2,66 @@
 # Sets up, builds and runs the tests, all by ctest.
 #
 #   ./test.sh               optimized, C and Python, and C with gcc's sanitizers
-#   ./test.sh --all         then slow tests, clang's warnings, threads, analysers, other platforms, other importers, browsers
+#   ./test.sh --all         then slow tests, threads, analysers, other platforms, other importers, browsers
 #   ./test.sh --long        all, then C tests by clang, on Arm and in valgrind, fuzzing, mutants and long campaigns: several hours, with a list of figures
 #   ./test.sh ARGUMENTS     optimized only; of all tests those that ctest chooses by ARGUMENTS: ./test.sh -R instance
 #
 # Each installs what it needs. Tests for which something is missing nevertheless are skipped and named; in CI they fail.
+# Then build/venv/bin/python -m tests.support.times shows where the time went.
 set -euo pipefail
 unset PYTHONPATH PYTHONHOME  # they may lead to other modules than those tested here
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
-step() { printf '\n== %s\n' "$*"; }
+# timed NAME COMMAND ...: runs it; build/times.csv gets the name, seconds, and seconds of processors (user, system)
+timed() {
+  local TIMEFORMAT="$1,%R,%U,%S"
+  printf '\n== %s\n' "$1"
+  mkdir -p build/times
+  { time "${@:2}" 2>&3; } 3>&2 2>>build/times.csv
+}
 build() { # build PRESET [TARGET]
   local log="build/${2-$1}.log"
   { cmake --preset "$1" && cmake --build --preset "$1" ${2+--target "$2"}; } >"$log" 2>&1 || { cat "$log"; return 1; }
 }
+tests() { # tests NAME PRESET [OPTION ...]: of ctest; its times go to build/times/NAME.xml
+  ctest --preset "$2" -j 2 --output-junit "$PWD/build/times/$1.xml" "${@:3}"
+}
 
 short() {
-  ./setup.sh --dev
-
-  step "AddressSanitizer and UndefinedBehaviorSanitizer; C tests"
-  build asan
-  ctest --preset asan --progress -j 2
-
-  step "gcc, optimized; all tests but those that --all adds"
-  build default
-  ctest --preset default -j 2 -LE '^more$'
+  timed "set-up" ./setup.sh --dev
+  timed "build: AddressSanitizer and UndefinedBehaviorSanitizer" build asan
+  timed "tests: sanitizers, C" tests asan asan --progress
+  timed "build: gcc, optimized" build default
+  timed "tests: all but those that --all adds" tests default default -LE '^more$'
 }
 
 more() {
-  ./setup.sh --platforms
-
-  step "clang, all warnings are errors"
-  build clang
-
-  step "ThreadSanitizer; the test with many threads"
-  build tsan
-  ctest --preset tsan --progress
-
-  step "other importers, each in its own environment"
+  timed "set-up: platforms" ./setup.sh --platforms
+  timed "build: ThreadSanitizer" build tsan
+  timed "tests: ThreadSanitizer, many threads" tests tsan tsan --progress
   # without network the tests of those that are missing are skipped; CI must have them
-  tests/importers/install.sh || [ -z "${CI-}" ]
-
-  step "releases, playground, analysers, importers, browsers"
-  build default
-  build default release
-  build default playground
-  ctest --preset default -j 2 -L '^more$'
+  timed "set-up: other importers" tests/importers/install.sh || [ -z "${CI-}" ]
+  timed "build: gcc, what needs other programs" build default
+  timed "build: releases" build default release
+  timed "build: playground" build default playground
+  timed "tests: releases, playground, analysers, importers, browsers" tests more default -L '^more$'
 }
 
 long() {
   local failed=0
-  step "C tests: clang; 64-bit Arm in qemu, those of src and models"
-  ctest --preset clang --progress -j 2 || failed=1
-  build qemu
-  ctest --preset qemu --progress -j 2 || failed=1
-
-  step "long campaigns, fuzzing, mutants"
-  build fuzz
-  ctest --preset tsan -C Long || failed=1
-  ctest --preset fuzz -C Long -j 2 || failed=1
-  ctest --preset default -C Long -R '^(long_|test_faults_)' || failed=1
-  grep -h '^figures: ' build/{tsan/,fuzz/,}Testing/Temporary/LastTest.log || failed=1
+  timed "build: clang" build clang
+  timed "tests: clang, C" tests clang clang --progress || failed=1
+  timed "build: 64-bit Arm" build qemu
+  timed "tests: C of src and models in qemu" tests qemu qemu --progress || failed=1
+  timed "build: fuzzing" build fuzz
+  timed "tests: threads, long" tests long_threads tsan -C Long || failed=1
+  timed "tests: fuzzing" tests long_fuzz fuzz -C Long || failed=1
+  timed "tests: long campaigns, mutants" tests long default -C Long -R '^(long_|test_faults_)' || failed=1
+  grep -h '^figures: ' build/{tsan/,fuzz/,}Testing/Temporary/LastTest.log | tee build/times/figures.txt || failed=1
   return "$failed"
 }
 
+[[ "${1-}" != "" && "${1-}" != --all && "${1-}" != --long ]] || rm -rf build/times build/times.csv
 case "${1-}" in
   "") short ;;
   --all) short; more ;;
