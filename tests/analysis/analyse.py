@@ -1,7 +1,7 @@
 """Lets an analyser read the C files of a build: analyse.py TOOL BUILD [--only REGEX] [OPTION ...].
 
-TOOL: warnings (clang's), tidy or cppcheck; OPTIONs are passed on. Each own file is read once for
-each set of macros with which targets compile it. Two processes work. Exit code 1: it finds something.
+TOOL: warnings (of clang), tidy or cppcheck; OPTIONs are passed on. Each own file is read once for
+each set of macros with which targets compile it. Two processes work. Exit code 1: findings.
 """
 
 import argparse

@@ -51,7 +51,10 @@ OPERATORS = {
     "==": "!=", "!=": "==", "&&": "||", "||": "&&",
 }  # fmt: skip
 NAMES = {"true": "false", "false": "true", "INFINITY": "(-INFINITY)"}
-OPTIONS = ("-DCMAKE_BUILD_TYPE=Mutants", "-DCMAKE_C_FLAGS=-O1 -w", "-DBUILD_TESTING=ON")
+OPTIONS = ["-DCMAKE_BUILD_TYPE=Mutants", "-DCMAKE_C_FLAGS=-O1 -w", "-DBUILD_TESTING=ON"]
+if shutil.which("ld.gold"):  # half the time of a link, and a mutant needs up to 130
+    OPTIONS += [f"-DCMAKE_{kind}_LINKER_FLAGS=-fuse-ld=gold" for kind in ("EXE", "SHARED")]
+MOST_KILLING = 8  # programs that run first, with those of the mutant's folder
 LIMITS = {"plain": "ulimit -c 0 -f 400000 -v 8000000; ", "sanitized": "ulimit -c 0 -f 400000; "}
 TEST_LIMIT = 100  # s, after which a test hangs; the slowest takes a tenth
 UNCOMPILABLE, SAME_CODE, LIVES = "do not compile", "same code", "lives"
@@ -142,7 +145,8 @@ class Build:
 
     folder: Path
     kind: str  # plain or sanitized
-    targets: list[str] = field(default_factory=list)
+    tests: dict[str, tuple[str, str]] = field(default_factory=dict)  # program and folder of each
+    kills: Counter[str] = field(default_factory=Counter)  # by program
 
     def prepare(self, copy: Path, settings: list[str]) -> None:
         """Build everything without a mutant; all tests pass."""
@@ -151,18 +155,28 @@ class Build:
         options = [*generator, *OPTIONS, sanitize, *settings]
         run_checked("cmake", "-S", copy, "-B", self.folder, *options)
         run_checked("cmake", "--build", self.folder, "--parallel", "2")
-        self.targets = self.programs()
-        if failed := self.failed():
+        listed = run_checked("ctest", "--show-only=json-v1", "-L", "^c$", folder=self.folder)
+        for test in json.loads(listed)["tests"]:
+            properties = {each["name"]: each["value"] for each in test["properties"]}
+            program = Path(test["command"][0]).name
+            self.tests[test["name"]] = program, properties["LABELS"][-1]
+        if failed := self.failed(self.programs()):
             raise RuntimeError(f"{failed} fails without any mutant ({self.kind})")
 
-    def programs(self) -> list[str]:
-        """Targets of all tests; ctest knows the commands of those that are built."""
-        listed = run_checked("ctest", "--show-only=json-v1", "-L", "^c$", folder=self.folder)
-        return sorted({Path(test["command"][0]).name for test in json.loads(listed)["tests"]})
+    def programs(self) -> set[str]:
+        """Targets of all tests."""
+        return {program for program, _ in self.tests.values()}
 
-    def make(self) -> bool:
-        """Build the tests; whether that succeeds."""
-        command = ["cmake", "--build", self.folder, "--parallel", "2", "--target", *self.targets]
+    def rounds(self, mutant: Mutant) -> Iterator[set[str]]:
+        """The programs that probably kill a mutant, then all."""
+        folder = Path(mutant.file).parent.name
+        near = {program for program, its in self.tests.values() if its == folder}
+        yield near | {program for program, _ in self.kills.most_common(MOST_KILLING)}
+        yield self.programs()
+
+    def make(self, programs: set[str]) -> bool:
+        """Build these; whether that succeeds."""
+        command = ["cmake", "--build", self.folder, "--parallel", "2", "--target", *programs]
         return subprocess.run(command, capture_output=True, check=False).returncode == 0
 
     def code(self) -> dict[str, bytes]:
@@ -170,9 +184,11 @@ class Build:
         objects = sorted(self.folder.rglob("*.o"))
         return {str(path): hashlib.sha256(path.read_bytes()).digest() for path in objects}
 
-    def failed(self) -> str:
-        """The first test that does not pass, or nothing."""
-        tests = ["ctest", "-L", "^c$", "--stop-on-failure", "--timeout", str(TEST_LIMIT), "-j", "2"]
+    def failed(self, programs: set[str]) -> str:
+        """The first test of these programs that does not pass, or nothing."""
+        names = "|".join(name for name, (program, _) in self.tests.items() if program in programs)
+        tests = ["ctest", "-R", f"^({names})$", "--stop-on-failure", "-j", "2"]
+        tests += ["--timeout", str(TEST_LIMIT)]
         command = ["sh", "-c", LIMITS[self.kind] + 'exec "$@"', "sh", *tests]
         done = subprocess.run(command, cwd=self.folder, capture_output=True, text=True, check=False)
         failed = re.search(r"Test +#\d+: (\S+) .*\*\*\*", done.stdout)
@@ -202,12 +218,15 @@ class Workshop:
         for kind in LIMITS:
             build = self.build(kind)
             with self.broken(mutant):
-                if not build.make():
-                    return UNCOMPILABLE
-                if kind == "plain" and build.code() == self.code:
-                    return SAME_CODE
-                if failed := build.failed():
-                    return f"dies by {failed} ({kind})"
+                for programs in filter(None, build.rounds(mutant)):
+                    if not build.make(programs):
+                        return UNCOMPILABLE
+                    is_last = programs == build.programs()
+                    if is_last and kind == "plain" and build.code() == self.code:
+                        return SAME_CODE
+                    if failed := build.failed(programs):
+                        build.kills[build.tests.get(failed, (failed,))[0]] += 1
+                        return f"dies by {failed} ({kind})"
         return LIVES
 
     @contextlib.contextmanager
