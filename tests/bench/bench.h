@@ -1,87 +1,101 @@
-/* The measurements, the report and races. bench.c chooses and reports. */
+/* What compare.py and by_models.py call of libbench.so: each solver takes all steps of a work. */
 #ifndef BENCH_H
 #define BENCH_H
 
-#include "solvers.h"
+#include <cvode/cvode.h>
+#include <cvode/cvode_ls.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
 
-/* ---- bench.c: a JSON object on stdout */
+/* ---- loops.c */
 
-/* The object begins with compiler and libraries, and the repeats. */
-void report_open(int repeats);
-void report_close(void);
+/* Returns the s that a processor has worked for this thread: other programs disturb it less than
+ * the time of day. */
+double processor_time(void);
 
-/* A row: which measurement, of what work, done by whom. Its numbers follow; they must be finite. */
-void report_row(const char *group, const char *work, const char *run);
-void report_number(const char *name, double value);
-void report_row_end(void);
-
-/* Writes a number and its target: the largest value it may have, or 0 if it has none. */
-void report_judged(const char *name, double value, double most);
-
-/* ---- race.c: several solvers do the same work in turns, again and again */
-
-enum { MOST_RUNS = 10, MOST_REPEATS = 101 };
-
-enum solver { PLAIN_LOOP, FMU, FMU3, MUJOCO };
-
-struct run {
-    const char *name;
-    enum solver solver;
-    enum method method; /* of an FMU */
-    double tolerance;   /* of the plain loop, or requested from an FMU */
-    enum mujoco_integrator integrator;
-    int substeps;                      /* of MuJoCo in a communication step */
-    const struct fmu3_functions *fmu3; /* of FMU3: the FMU of FMI 3.0 */
+/* A loop of CVODE on N_Vector_Serial, as a user would write it. */
+struct loop {
+    CVRhsFn rhs;           /* user data: the inputs */
+    CVLsJacFn jacobian;    /* for BDF; NULL: Adams */
+    int n;                 /* states */
+    double tolerance;      /* relative; absolute ones are a hundredth of it, times nominal values */
+    const double *nominal; /* NULL: 1 */
+    double step;           /* s */
+    int steps;
+    int input_count;
+    const double *inputs; /* of each step */
+    bool restarts;        /* CVodeReInit at every step; else CV_NORMAL interpolates */
+    double *states;       /* at the end of each step; may be NULL */
 };
 
-struct race {
-    int count;
-    int repeats;
-    struct run runs[MOST_RUNS];
-    double seconds[MOST_RUNS][MOST_REPEATS]; /* of one communication step */
-    double error[MOST_RUNS];
-    struct fmu_counts counts[MOST_RUNS]; /* where the solver is an FMU */
+/* Makes all steps from x, which becomes the last state. Returns the processor time of them, s. */
+double loop_run(const struct loop *loop, double x[]);
+
+/* Runs a model of loops.c by its number; with restarts if there is more than one step. forces: of
+ * each step, N. */
+double loop_run_model(int index, bool is_stiff, int n, int steps, double tolerance, double step,
+                      const double nominal[], const double forces[], double x[]);
+
+/* ---- solvers.c; solvers.py has the same structures */
+
+enum solver { PLAIN_LOOP, RUNGE_KUTTA, FMU2, FMU3, MUJOCO_RK4, MUJOCO_IMPLICITFAST };
+
+/* Value references, and what is set before the first step. */
+struct fmu {
+    void *functions; /* bench_open */
+    const char *token;
+    int real_count;
+    const unsigned *reals;
+    const double *real_values;
+    int choice_count; /* enumerations */
+    const unsigned *choices;
+    const int *choice_values;
+    unsigned inputs[2];
+    unsigned states[4];
+    unsigned effective_tolerance;
+    unsigned totals[3]; /* internal steps, evaluations of the right-hand side, events */
+    int total_count;    /* 2 without events */
 };
 
-void race_add(struct race *race, struct run run);
-void race_add_method(struct race *race, enum method method, double tolerance);
-
-/* The plain loop at the tolerance at which the FMU runs with CVODE, and the FMU with each method.
- */
-void race_add_usual(struct race *race, const struct fmu_functions *fmu, double tolerance);
-
-void race_run(struct race *race, const struct fmu_functions *fmu, const struct problem *problem,
-              int repeats);
-
-/* Median over the repeats: us of a communication step. */
-double race_us(const struct race *race, int run);
-
-/* Writes a row for each run. */
-void race_report(const struct race *race, const char *group, const char *work,
-                 const struct problem *problem);
-
-/* The largest tolerance, in quarter decades from 1e-3 down, such that no error from there to a
- * ten-thousandth of the bound, or 1e-14, is above the bound. MuJoCo: sets the substeps instead. */
-void race_tune(struct run *run, const struct fmu_functions *fmu, const struct problem *problem,
-               double bound);
-
-/* ---- The measurements */
-
-struct bench {
-    struct fmu_functions fmu;
-    struct fmu3_functions fmu3;
-    struct fmu_functions plant; /* RPPlant */
-    int repeats;
+/* The arm from one start, with inputs held over each communication step. */
+struct task {
+    int solver;       /* enum solver */
+    double tolerance; /* of the plain loop, or requested from an FMU */
+    int substeps;     /* of MuJoCo in a communication step */
+    const struct fmu *fmu;
+    double step; /* s */
+    int steps;
+    bool changes;              /* inputs differ from step to step */
+    double start[4];           /* q1, q2, dq1, dq2 */
+    const double (*inputs)[2]; /* tau1 in N.m and f2 in N of each step */
+    double (*states)[4];       /* at the end of each step; filled */
+    double effective_tolerance;
+    double totals[3];
 };
 
-/* steps.c: communication steps against the plain loop and MuJoCo; free motion at equal errors */
-void measure_steps(struct bench *bench);
-void measure_free_motion(struct bench *bench);
+/* Returns the functions of a shared object, of FMI 2.0 or 3.0. */
+void *bench_open(const char *path, int version);
 
-/* plant.c: friction and stops, against the arm without them */
-void measure_plant(struct bench *bench);
+/* Runs a task so many times. Returns the processor time of a communication step, a mean, s. */
+double bench_run(struct task *task, int passes);
 
-/* steps.c: from fmi2Instantiate to fmi2FreeInstance, and memory */
-void measure_life(struct bench *bench);
+/* Returns the processor time from fmi2Instantiate to fmi2FreeInstance, a mean, s; kib: memory of an
+ * instance after a step. */
+double bench_life(struct task *task, int lives, double *kib);
+
+/* "" where it was built without MuJoCo; then no task may ask for it. */
+const char *bench_mujoco_version(void);
+
+/* Compiler, and SUNDIALS of the loops. */
+const char *bench_made_by(void);
+
+/* Ends the program with a line on stderr where the condition does not hold. */
+static inline void require(bool condition, const char *what) {
+    if (!condition) {
+        fprintf(stderr, "bench: %s\n", what);
+        exit(1);
+    }
+}
 
 #endif

@@ -1,6 +1,7 @@
-"""The problem of problem.c in heyoka: timed runs, and errors against an exact run."""
+"""Works of the arm, their exact runs by heyoka, and peers: heyoka, and whoever else does a work."""
 
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
 from operator import add, mul, neg, sub, truediv
@@ -22,7 +23,9 @@ ARM = ROOT / "tests/equations/arm.toml"
 START = (0.3, 0.2, 0.0, 0.0)  # q1, q2, dq1, dq2
 STATES = ("q1", "q2", "dq1", "dq2")
 
-Run = tuple[float, np.ndarray]  # s of the stepping; states at the end of each step, (steps, 4)
+# s of a step, a mean; states at the end of each step, shape (steps, 4); other figures of a row
+Run = tuple[float, np.ndarray, dict[str, float]]
+EXACT = np.finfo(np.longdouble).eps
 
 
 @dataclass(frozen=True)
@@ -32,11 +35,18 @@ class Work:
     name: str
     step: float  # s
     steps: int
-    kind: str  # changing: sines sampled at the communication points; constant; zero: free motion
+    # changing: sines sampled at the communication points; constant; zero: free motion; push: of f2
+    kind: str
+    start: tuple[float, ...] = START
+    tolerance: float = 1e-8
 
     @cached_property
     def inputs(self) -> np.ndarray:
         """Values of tau1 (N.m) and f2 (N), shape (steps, 2)."""
+        if self.kind == "push":
+            return np.column_stack(
+                (np.zeros(self.steps), 0.1 * np.sin(40.0 * np.arange(self.steps)))
+            )
         t = self.step * np.arange(self.steps) * (self.kind == "changing")
         sines = np.column_stack((12.0 + 3.0 * np.sin(5.0 * t), 4.0 + 2.0 * np.cos(7.0 * t)))
         return sines * (self.kind != "zero")
@@ -44,9 +54,9 @@ class Work:
     @cached_property
     def reference(self) -> np.ndarray:
         """States at the end of each step, shape (steps, 4), in extended precision."""
-        taylor = compiled(ARM, START, np.finfo(np.longdouble).eps, np.longdouble)
+        taylor = compiled(ARM, self.start, EXACT, np.longdouble)
         states = np.empty((self.steps, 4), np.longdouble)
-        taylor.time, taylor.state[:] = np.longdouble(0.0), START
+        taylor.time, taylor.state[:] = np.longdouble(0.0), self.start
         for i, u in enumerate(self.inputs):
             taylor.pars[:] = u.astype(np.longdouble)
             taylor.propagate_until(np.longdouble(self.step) * (i + 1))
@@ -79,21 +89,23 @@ def compiled(file: Path, start: tuple, tolerance: float, real: type = float) -> 
     return hy.taylor_adaptive(equations_of(file), begin, tol=tol, fp_type=real)
 
 
-def run_heyoka(work: Work, tolerance: float) -> Run:
+def run_heyoka(work: Work, tolerance: float, passes: int = 1) -> Run:
     """Make all steps: set the parameters, propagate_until, read the state. Setup is not timed."""
     taylor = compiled(ARM, START, tolerance)
-    taylor.time = 0.0
-    taylor.state[:] = START
     pars, state, propagate, size = taylor.pars, taylor.state, taylor.propagate_until, work.step
     inputs = work.inputs.tolist()
-    states = []
-    begin = thread_time()  # the processor's for this thread, as in bench
-    for i, u in enumerate(inputs):
-        pars[0], pars[1] = u
-        propagate(size * (i + 1))
-        states.append(state.copy())
-    elapsed = thread_time() - begin
-    return max(elapsed - clock_cost(), 1e-9), np.array(states)
+    elapsed = 0.0
+    for _ in range(passes):
+        taylor.time = 0.0
+        taylor.state[:] = START
+        states = []
+        begin = thread_time()  # the processor's for this thread, as in loops.c
+        for i, u in enumerate(inputs):
+            pars[0], pars[1] = u
+            propagate(size * (i + 1))
+            states.append(state.copy())
+        elapsed += thread_time() - begin - clock_cost()
+    return max(elapsed, 1e-9) / passes / work.steps, np.array(states), {}
 
 
 @cache
@@ -104,25 +116,27 @@ def clock_cost() -> float:
 
 @dataclass
 class Peer:
-    """heyoka at a tolerance for a work, with the name of its rows."""
+    """A solver for a work, heyoka or another one, at a tolerance, with the name of its rows."""
 
     name: str
     work: Work
     tolerance: float
+    solver: Callable[[Work, float, int], Run] = run_heyoka
+    least: float = sys.float_info.epsilon  # tolerance that it takes
 
     def error(self) -> float:
         """Return the error of a run."""
-        return self.work.error(run_heyoka(self.work, self.tolerance)[1])
+        return self.work.error(self.solver(self.work, self.tolerance, 1)[1])
 
     def row(self) -> dict:
-        """Return the row of one turn: time of a step, a mean over 2 ms or more, and error."""
+        """Return the row of one turn: time of a step, a mean over 2 ms or more, and figures."""
         work = self.work
-        seconds, states = run_heyoka(work, self.tolerance)
-        passes = max(1, min(200, round(2e-3 / seconds)))
-        for _ in range(passes - 1):
-            seconds += run_heyoka(work, self.tolerance)[0]
+        seconds, states, figures = self.solver(work, self.tolerance, 1)
+        passes = min(200, round(2e-3 / (seconds * work.steps)))
+        if passes > 1:
+            seconds = self.solver(work, self.tolerance, passes)[0]
         return {
             "group": "steps", "work": work.name, "run": self.name, "step": work.step,
             "steps": work.steps, "error": work.error(states), "tolerance": self.tolerance,
-            "us": 1e6 * seconds / passes / work.steps,
+            "us": 1e6 * seconds, **figures,
         }  # fmt: skip

@@ -75,7 +75,7 @@ def by_heyoka(file: Path, step: float, start: tuple) -> Run:
 
 
 def by_loop(
-    program: Path,
+    library: ctypes.CDLL,
     file: Path,
     method: str,
     step: float,
@@ -83,7 +83,7 @@ def by_loop(
     forces: Sequence[float] = NONE,
 ) -> Run:
     """Return what makes the same steps by a loop of CVODE (loops.c)."""
-    loop = ctypes.CDLL(str(program)).loop_run_model
+    loop = library.loop_run_model
     loop.restype, loop.argtypes = ctypes.c_double, TYPES
     model, held = read(file), np.array(forces)
     which = NAMES.index(model.name), method == "cvode_bdf", len(start), len(held)
@@ -111,7 +111,7 @@ def row(name: str, turns: int, exact: np.ndarray, limit: float, *peers: tuple[Ru
     }  # fmt: skip
 
 
-def by_hand(turns: int, loops: Path, exact: dict[str, np.ndarray]) -> list[dict]:
+def by_hand(turns: int, loops: ctypes.CDLL, exact: dict[str, np.ndarray]) -> list[dict]:
     """Measure against loops at the same tolerance: the largest ratio and errors of all models."""
 
     def race(name: str, method: str, limit: float, step: float, forces: Sequence[float]) -> dict:
@@ -131,8 +131,8 @@ def by_hand(turns: int, loops: Path, exact: dict[str, np.ndarray]) -> list[dict]
     return [*found, restarts | {"work": RESTARTS, "column": RESTARTS}]
 
 
-def rows(turns: int, loops: Path) -> list[dict]:
-    """Measure; heyoka has an error no larger than the FMU's. loops: the library of loops.c."""
+def rows(turns: int, loops: ctypes.CDLL) -> list[dict]:
+    """Measure; heyoka has an error no larger than the FMU's. loops: libbench.so."""
     found, solutions = [], {}
     for name, (text, step, tolerance) in MODELS.items():
         fmu = made(text, build)

@@ -1,9 +1,9 @@
-"""The benchmark: the program bench and heyoka in turns, tables and a JSON file.
+"""The benchmark: the FMUs and their peers in turns, tables and a JSON file.
 
     cmake --build build --target benchmark
 
-Every figure is the median of rounds, or of the repeats of bench, and ratios are formed within a
-round. Exits with 0 where targets are missed too: the table shows them.
+Every figure is the median of rounds, and ratios are formed within a round. Exits with 0 where
+targets are missed too: the table shows them.
 """
 
 import argparse
@@ -12,14 +12,17 @@ import math
 import os
 import re
 import statistics
-import subprocess
 import sys
 from collections import defaultdict
+from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
 
 import by_models
 from by_heyoka import Peer, Work
+from solvers import MUJOCO_IMPLICITFAST, MUJOCO_RK4, PLAIN_LOOP, Solvers
+
+from tests.equations.examples import METHODS
 
 ROOT = Path(__file__).resolve().parents[2]
 FREE = {
@@ -34,13 +37,17 @@ CHANGING = (
 OTHERS = (
     Work("1 ms steps, inputs constant", 1e-3, 2000, "constant"),
     Work("10 ms steps, inputs constant", 1e-2, 200, "constant"),
-    Work("1 ms steps, inputs changing, tolerance 1e-5", 1e-3, 2000, "changing"),
-    Work("1 ms steps, inputs changing, tolerance 1e-11", 1e-3, 2000, "changing"),
+    Work("1 ms steps, inputs changing, tolerance 1e-5", 1e-3, 2000, "changing", tolerance=1e-5),
+    Work("1 ms steps, inputs changing, tolerance 1e-11", 1e-3, 2000, "changing", tolerance=1e-11),
     Work("one step of 2 s, inputs constant", 2.0, 1, "constant"),
 )
 ROUNDING = 1e-14  # an error that no peer need stay below
 PACKAGES = ("heyoka", "mujoco")  # peers
-TURNS = 5  # of free motion in a round: its targets are near, and bench and the peers take turns
+TURNS = 5  # of free motion in a round: its targets are near
+LEAST = 1e-14  # tolerance that solvers of C are asked for
+LIVES = 100
+OF_FMI3 = ("cvode_adams", "erk", "taylor")  # methods that are compared with FMI 2.0
+MUJOCO = {"MuJoCo RK4": MUJOCO_RK4, "MuJoCo implicitfast": MUJOCO_IMPLICITFAST}
 
 
 C1, C10, C100 = (work.name for work in CHANGING)
@@ -100,7 +107,7 @@ def tuned(peer: Peer, bound: float) -> Peer:
     All tolerances below it, to a ten-thousandth of the bound, are within the bound, too.
     """
     best = None
-    lowest = max(1e-4 * bound, sys.float_info.epsilon)
+    lowest = max(1e-4 * bound, peer.least)
     for quarter in range(math.ceil(4.0 * math.log10(lowest) - 1e-6), -11):
         peer.tolerance = 10.0 ** (quarter / 4)
         if peer.error() > bound:
@@ -112,10 +119,12 @@ def tuned(peer: Peer, bound: float) -> Peer:
     return peer
 
 
-def run_bench(program: list[str], *options: str) -> dict:
-    """Figures of bench."""
-    output = subprocess.run([*program, *options], check=True, capture_output=True, text=True).stdout
-    return json.loads(output)
+def with_substeps(peer: Peer, bound: float) -> Peer:
+    """MuJoCo at its largest step with an error within the bound."""
+    peer.tolerance = 10
+    while peer.error() > bound:
+        peer.tolerance += peer.tolerance // 4 + 1
+    return peer
 
 
 def find(rows: list[dict], work: str, run: str) -> dict:
@@ -123,14 +132,59 @@ def find(rows: list[dict], work: str, run: str) -> dict:
     return next(row for row in rows if (row["work"], row["run"]) == (work, run))
 
 
+# ---- Who takes part
+
+
+def usual(solvers: Solvers, work: Work) -> list[Peer]:
+    """The plain loop at the tolerance at which the FMU runs CVODE, and the FMU with each method."""
+    one_step = Work("a step", 1e-3, 1, "zero")
+    effective = solvers.fmu("cvode_adams")(one_step, work.tolerance, 1)[2]["effective_tolerance"]
+    loop = Peer(PLAIN, work, effective, solvers.plain(PLAIN_LOOP), LEAST)
+    return [loop, *(by_method(solvers, method, work) for method in METHODS)]
+
+
+def by_method(solvers: Solvers, method: str, work: Work) -> Peer:
+    """The FMU of FMI 2.0 with a method."""
+    return Peer(method, work, work.tolerance, solvers.fmu(method), LEAST)
+
+
+def in_steps(solvers: Solvers) -> list[Peer]:
+    """All that do communication steps, but for heyoka."""
+    peers = []
+    for work in (*CHANGING, *OTHERS):
+        peers += usual(solvers, work)
+        if work in CHANGING and solvers.mujoco_version:
+            peers += [Peer(name, work, 1, solvers.plain(kind)) for name, kind in MUJOCO.items()]
+        if work.tolerance == 1e-8 and work.steps > 1:
+            peers += [
+                Peer(f"{method}, FMI 3.0", work, 1e-8, solvers.fmu(method, 3)) for method in OF_FMI3
+            ]
+    return peers
+
+
+def in_free_motion(solvers: Solvers) -> list[Peer]:
+    """Each at its largest tolerance or step with the error; heyoka is left out."""
+    peers = [tuned(peer, 1e-8) for peer in usual(solvers, FREE[1e-8])]
+    if solvers.mujoco_version:  # the other method, of first order, needs millions of steps
+        mujoco = Peer("MuJoCo RK4", FREE[1e-8], 1, solvers.plain(MUJOCO_RK4))
+        peers.append(with_substeps(mujoco, 1e-8))
+    # the others here do not come so near
+    return [*peers, tuned(by_method(solvers, "taylor", FREE[1e-14]), 1e-14)]
+
+
+def rows_of(peers: Iterable[Peer]) -> list[dict]:
+    """One turn."""
+    return [peer.row() for peer in peers]
+
+
 def heyoka_like(run: str, work: Work, first: list[dict]) -> Peer:
-    """Return heyoka with an error no larger than a run of bench has, or ROUNDING."""
+    """Return heyoka with an error no larger than another run has, or ROUNDING."""
     peer = Peer(f"heyoka, error no larger than {run}'s", work, 0.0)
     return tuned(peer, max(find(first, work.name, run)["error"], ROUNDING))
 
 
 def make_peers(first: list[dict]) -> list[Peer]:
-    """Return heyoka for all works, at its tolerances; first: rows of bench, for their errors."""
+    """Return heyoka for all works; first: rows of the others, for their errors."""
     free = [tuned(Peer("heyoka", work, 0.0), bound) for bound, work in FREE.items()]
     free += [heyoka_like(run, FREE[1e-8], first) for run in ("erk", "taylor")]
     changing = [Peer("heyoka", work, 1e-8) for work in CHANGING]
@@ -179,16 +233,15 @@ def judge(rows: list[dict]) -> list[dict]:
     return rows
 
 
-def take_rounds(program: list[str], peers: list[Peer], rounds: int, repeats: int) -> list[dict]:
-    """Run communication steps of bench and heyoka in rounds; return rows with medians of turns."""
+def take_rounds(peers: list[Peer], rounds: int) -> list[dict]:
+    """Let all take turns; return rows with medians of turns."""
     found = defaultdict(list)  # rows of all turns, by key
     free = [peer for peer in peers if peer.work in FREE.values()]
     others = [peer for peer in peers if peer not in free]
-    turns = [("steps", others), *[("free-motion", free)] * TURNS] * rounds
-    for number, (group, group_peers) in enumerate(turns):
+    turns = [others, *[free] * TURNS] * rounds
+    for number, of_turn in enumerate(turns):
         print(f"turn {number + 1} of {len(turns)}", file=sys.stderr)
-        c_rows = run_bench(program, "--only", group, "--repeats", str(repeats))["rows"]
-        for row in compared(c_rows + [peer.row() for peer in group_peers]):
+        for row in compared(rows_of(of_turn)):
             found[row["group"], row["work"], row["run"]].append(row)
     return [
         of_turns[-1]
@@ -196,6 +249,74 @@ def take_rounds(program: list[str], peers: list[Peer], rounds: int, repeats: int
            for figure in ("us", "ratio") if figure in of_turns[-1]}
         for of_turns in found.values()
     ]  # fmt: skip
+
+
+# ---- Friction and stops, the life of an instance
+
+
+def motions(coulomb: tuple[float, float], **more: float | int) -> dict[str, float | int]:
+    """Parameters of RPPlant with this friction in the joints, N.m and N."""
+    return {"coulomb_friction1": coulomb[0], "coulomb_friction2": coulomb[1], **more}
+
+
+MOVING = Work("", 1e-3, 1000, "changing", (0.3, 0.2, 3.0, 2.0))
+HELD = Work("", 1e-3, 1000, "changing")
+STRIBECK = {"breakaway_friction1": 0.6, "breakaway_friction2": 0.5}
+STRIBECK |= {"stribeck_velocity1": 0.1, "stribeck_velocity2": 0.1}
+# Joint 1 is held, the slide points upwards. From the vertex of a flight that takes one step, it
+# bounces in the middle of each on a stop that gives all of its speed back; or it is pushed above
+# the stop. The arm has no offset: impacts would move joint 1.
+BOUNCING = motions((100.0, 0.0), a=0.0, lower2=0.0, upper2=5.0, restitution2=1.0, stops2=2)
+BOUNCE = Work("", 1e-3, 1000, "zero", (math.pi / 2, (9.81 * 1e-3 / 2) ** 2 / (2 * 9.81), 0.0, 0.0))
+PUSH = Work("", 1e-3, 1000, "push", (math.pi / 2, 0.3, 0.0, 0.0))
+# by work: the plant's parameters and motion; its peer's (None: RPManipulator); the largest ratio
+# for each method
+PLANT = {
+    "without friction and stops": ({}, MOVING, None, MOVING, [None] * 4),
+    "Coulomb friction": (motions((0.4, 0.3)), MOVING, None, MOVING, [1.6, 1.7, 1.7, 1.7]),
+    "Stribeck friction": (
+        motions((0.4, 0.3), **STRIBECK), MOVING, None, MOVING, [1.6, 1.7, 1.6, 1.6],
+    ),
+    "held by friction": (
+        motions((100.0, 100.0), breakaway_friction1=100.0, breakaway_friction2=100.0),
+        HELD, None, HELD, [0.55, 0.55, 0.55, 0.45],
+    ),
+    "a bounce in each step": (BOUNCING, BOUNCE, BOUNCING, PUSH, [1.5, 1.5, 2.0, 2.0]),
+}  # fmt: skip
+
+
+def plant_rows(solvers: Solvers, repeats: int) -> list[dict]:
+    """RPPlant against the arm without friction and stops, or against itself without a bounce."""
+    found = []
+    for work, (values, motion, other, other_motion, limits) in PLANT.items():
+        for method, limit in zip(METHODS, limits, strict=True):
+            plant = solvers.fmu(method, name="RPPlant", **values)
+            peer = (
+                solvers.fmu(method)
+                if other is None
+                else solvers.fmu(method, name="RPPlant", **other)
+            )
+            turns = [
+                (plant(motion, 1e-8, 1), peer(other_motion, 1e-8, 1)[0]) for _ in range(repeats)
+            ]
+            row = {"group": "plant", "work": work, "run": method}
+            row["us"] = 1e6 * statistics.median(own[0] for own, _ in turns)
+            row["events"] = turns[0][0][2]["events"] * motion.steps
+            row["ratio"] = statistics.median(own[0] / peers for own, peers in turns)
+            found.append(judged(row, "ratio", limit))
+    return found
+
+
+def life_rows(solvers: Solvers, repeats: int) -> list[dict]:
+    """An instance of the arm: its life without a step, and its memory after one."""
+    found = []
+    for method in METHODS:
+        lives = [solvers.life(method, LIVES) for _ in range(repeats)]
+        row = {"group": "life", "work": "instantiate to free", "run": method}
+        found.append(judged(row | {"us": 1e6 * statistics.median(x for x, _ in lives)}, "us", 30.0))
+        row = {"group": "life", "work": "memory of an instance after a step", "run": method}
+        found.append(judged(row | {"kib": lives[0][1]}, "kib", 32.0))
+    return found
 
 
 # ---- Tables
@@ -266,13 +387,6 @@ def with_figures(page: str, tables: str) -> str:
     return f"{before}{heading}\n{tables}{following}{after}"
 
 
-def libraries(build: Path) -> list[Path]:
-    """Of FMI 2.0, FMI 3.0, and of RPPlant."""
-    names = ("fmu/RPManipulator/RPManipulator.so", "fmu/RPManipulator/fmi3/RPManipulator.so",
-             "fmu/RPPlant/RPPlant.so")  # fmt: skip
-    return [build / name for name in names]
-
-
 def machine() -> dict:
     """What the figures were measured on."""
     names = re.findall(r"^model name\s*: (.*)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
@@ -287,32 +401,28 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--build", type=Path, default=ROOT / "build", help="where it was built")
     parser.add_argument("--output", type=Path, help="default: report/benchmark there")
-    parser.add_argument("--rounds", type=int, default=5, help="of bench and heyoka")
-    parser.add_argument("--repeats", type=int, default=11, help="within bench")
+    parser.add_argument("--rounds", type=int, default=5, help="of communication steps")
+    parser.add_argument("--repeats", type=int, default=11, help="of all others")
     parser.add_argument("--readme", action="store_true", help="put the ratios into the page")
     options = parser.parse_args()
-    loops = options.build / "tests/bench/libbench_loops.so"
-    needed = [options.build / "tests/bench/bench", *libraries(options.build), loops]
     output = options.output or options.build / "report/benchmark"
-    for path in needed:
-        if not path.exists():
-            sys.exit(f"{path}: no such file. Build it and run this with\n"
-                     "    ./setup.sh --platforms && cmake --preset default && "
-                     "cmake --build build --target benchmark")  # fmt: skip
+    if not (options.build / "tests/bench/libbench.so").exists():
+        sys.exit(f"{options.build} has no libbench.so. Build it and run this with\n"
+                 "    ./setup.sh --platforms && cmake --preset default && "
+                 "cmake --build build --target benchmark")  # fmt: skip
     output.mkdir(parents=True, exist_ok=True)
     about = machine()  # with the load before
-    program = [str(path) for path in needed[:-1]]
-
-    first = run_bench(program, "--only", "steps,free-motion", "--repeats", "1")
-    peers = make_peers(first["rows"])
-    rows = take_rounds(program, peers, options.rounds, min(3, options.repeats))
-    print("an instance, friction and stops", file=sys.stderr)
-    rest = run_bench(program, "--only", "life,plant", "--repeats", str(options.repeats))
+    solvers = Solvers(options.build)
+    peers = [*in_steps(solvers), *in_free_motion(solvers)]
+    rows = take_rounds([*peers, *make_peers(rows_of(peers))], options.rounds)
+    print("an instance, friction and stops, models in equations", file=sys.stderr)
+    rows += by_models.rows(options.repeats, solvers.library)
+    rows += plant_rows(solvers, options.repeats) + life_rows(solvers, options.repeats)
     result = {
-        "machine": about | first["machine"],
+        "machine": about | {"loops": solvers.made_by, "MuJoCo": solvers.mujoco_version},
         "rounds": options.rounds,
         "repeats": options.repeats,
-        "rows": judge(rows + by_models.rows(options.repeats, loops) + rest["rows"]),
+        "rows": judge(rows),
     }
     (output / "benchmark.json").write_text(
         json.dumps(result, indent=1) + "\n", encoding="utf-8", newline="\n"

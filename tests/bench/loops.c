@@ -2,7 +2,7 @@
  * hand, which are also FMUs from equations (by_models.py). */
 #define _POSIX_C_SOURCE 199309L // clock_gettime
 
-#include "solvers.h"
+#include "bench.h"
 
 #include <math.h>
 #include <nvector/nvector_serial.h>
