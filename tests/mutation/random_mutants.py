@@ -154,7 +154,7 @@ class Build:
         sanitize = f"-DSANITIZE={'ON' if self.kind == 'sanitized' else 'OFF'}"
         options = [*generator, *OPTIONS, sanitize, *settings]
         run_checked("cmake", "-S", copy, "-B", self.folder, *options)
-        run_checked("cmake", "--build", self.folder, "--parallel", "2")
+        run_checked("cmake", "--build", self.folder, "--parallel", "2", "--target", "c_tests")
         listed = run_checked("ctest", "--show-only=json-v1", "-L", "^c$", folder=self.folder)
         for test in json.loads(listed)["tests"]:
             properties = {each["name"]: each["value"] for each in test["properties"]}
