@@ -8,7 +8,6 @@ call each other in a circle.
 import ast
 import os
 import re
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -218,7 +217,10 @@ def test_no_circle_of_c_files() -> None:
     sources = [path for path in c_files(ROOT) if path.suffix == ".c" and path in compiled]
     assert len(sources) > 50, "build the project first"
     symbols = {path.relative_to(ROOT).as_posix(): read_symbols(compiled[path]) for path in sources}
-    assert circles(graph_of_c_files(ROOT, symbols)) == []
+    graph = graph_of_c_files(ROOT, symbols)
+    reasons = {reason for needed in graph.values() for each in needed.values() for reason in each}
+    assert {"include", "instance_continuation", "integrator_advance"} <= reasons
+    assert circles(graph) == []
 
 
 def test_imports_follow_the_architecture() -> None:
@@ -236,6 +238,43 @@ def test_what_is_not_needed_is_not_loaded(code: str, unneeded: set[str]) -> None
     run = python("-P", "-c", code)
     assert run.returncode == 0, run.stderr
     assert run.stdout.splitlines()[-1] == ""
+
+
+# ---- Folders and files
+
+# named by CONTRIBUTING.md only where they are in models
+WITHOUT_A_WORD = {"assets", "templates", "references", "scenarios", "variants", "campaigns"}
+LONGEST = 650  # lines
+LONGER = {"rparm/expressions/expression.py"}  # the graph with all of its operations
+
+
+def test_every_folder_is_in_a_table() -> None:
+    def folders(*patterns: str) -> set[str]:
+        found = {path for pattern in patterns for path in ROOT.glob(pattern)}
+        return {path.name for path in found if path.is_dir()} - {"__pycache__"}
+
+    page = (ROOT / "tests" / "README.md").read_text(encoding="utf-8")
+    cells = " ".join(line.split("|")[1] for line in page.splitlines() if line.startswith("|"))
+    models = folders("models/*")
+    assert folders("tests/*") - models <= set(re.findall(r"\w+", cells))
+    sources = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"\w+", sources)) | WITHOUT_A_WORD
+    assert folders("src/*", "fmu/*", "rparm/*", "rparm/*/*") <= named
+
+
+def test_no_file_is_too_long_to_read() -> None:
+    tops = ("src", "fmu", "models", "rparm", "playground", "tests")
+    files = [path for top in tops for path in (ROOT / top).rglob("*.*")]
+    files = [path for path in files if path.suffix in (".c", ".h", ".py", ".js")]
+    long = {path.relative_to(ROOT).as_posix() for path in files if len_of(path) > LONGEST}
+    assert long <= LONGER
+
+
+def len_of(path: Path) -> int:
+    return path.read_bytes().count(b"\n")
+
+
+# ---- What these tests notice
 
 
 @pytest.fixture
@@ -265,20 +304,11 @@ def write(project: Path, name: str, text: str) -> None:
     [
         ("src/model/status.c", "ode.h"),
         ("src/integrator/workspace.c", "sched.h"),
-        ("src/integrator/method_cvode.c", "instance.h"),
         ("src/instance/settings.c", "method.h"),
-        ("src/instance/values.c", "method.h"),
-        ("fmu/fmi2/fmi2.c", "state.h"),
-        ("src/instance/values.c", "component.h"),
         ("src/instance/values.c", "cvode/cvode.h"),
-        ("src/instance/values.c", "rp_manipulator.h"),
         ("fmu/component/component.c", "state.h"),
-        ("fmu/component/component.c", "fmi2_functions.h"),
-        ("fmu/component/component.h", "fmi2Functions.h"),
-        ("fmu/fmi2/fmi2.c", "ode.h"),
         ("fmu/fmi2/fmi2.c", "fmi3_calls.h"),
         ("fmu/fmi2/fmi2.c", "fmi3Functions.h"),
-        ("models/rp_plant/rp_plant.c", "instance.h"),
         ("models/rp_plant/equations/rp_plant.c", "rp_plant_model.h"),
         ("models/rp_trajectory/rp_trajectory.c", "rp_manipulator.h"),
         ("models/rp_plant/rp_plant.c", "nowhere.h"),
@@ -287,12 +317,6 @@ def write(project: Path, name: str, text: str) -> None:
 def test_what_may_not_be_included(project: Path, name: str, header: str) -> None:
     write(project, name, f"  #  include <{header}>\n")
     assert list(wrong_includes(project)) == [f"{name} includes {header}"]
-
-
-def test_a_folder_without_a_rule_is_noticed(project: Path) -> None:
-    write(project, "src/other/other.c", '#include "model.h"\n')
-    with pytest.raises(AssertionError, match="src/other has no place"):
-        list(wrong_includes(project))
 
 
 def test_a_circle_of_headers_is_noticed(project: Path) -> None:
@@ -329,16 +353,6 @@ def test_a_header_that_calls_up_is_noticed(text: str) -> None:
     ]
 
 
-def test_symbols_are_those_that_other_files_see(tmp_path: Path) -> None:
-    source = tmp_path / "a.c"
-    source.write_text(
-        "extern int used; int own(void); int shared; static int hidden(void) { return used; }\n"
-        "int own(void) { return hidden(); }\n"
-    )
-    subprocess.run(["cc", "-c", source, "-o", tmp_path / "a.o"], check=True)
-    assert read_symbols(tmp_path / "a.o") == Symbols({"own", "shared"}, {"used"})
-
-
 def test_a_circle_of_imports_is_noticed(project: Path) -> None:
     write(project, "rparm/unit.py", "def late():\n    from rparm import pages\n")
     write(project, "rparm/pages/__init__.py", "")
@@ -356,11 +370,7 @@ def test_a_circle_of_imports_is_noticed(project: Path) -> None:
         ("rparm/run.py", "    from rparm.models.rp_plant.references import make", "models"),
         ("rparm/run.py", "    import generate", "generate"),
         ("rparm/run.py", "    from rparm.fmu_tools.generate import header", "fmu"),
-        ("rparm/run.py", "    from tests.support import paths", "tests"),
         ("fmu/document.py", "    from rparm.unit import Fmu", "rparm"),
-        ("fmu/document.py", "    import rparm.models", "models"),
-        ("models/rp_plant/references/more.py", "    from fmu import generate", "fmu"),
-        ("models/rp_plant/references/more.py", "    import generate", "generate"),
         ("models/rp_plant/references/more.py", "    import tests", "tests"),
     ],
 )
