@@ -63,6 +63,7 @@ if [ "${1-}" = --platforms ]; then
   need clang-tidy-14 command -v clang-tidy-14
   need cppcheck command -v cppcheck
   need valgrind command -v valgrind
+  need ninja-build command -v ninja  # of the mutants: make looks at 130 targets for seconds
   # what a user's own loop of CVODE links, to compare with: for the benchmark only
   need libsundials-dev test -e /usr/include/cvode/cvode.h
   need wine64 test -e /usr/lib/wine/wine64

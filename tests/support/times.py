@@ -36,6 +36,12 @@ FILES = {
     "tests: long campaigns, mutants": "long",
 }
 
+ENDS = {
+    "tests: all but those that --all adds": "./test.sh",
+    "tests: releases, playground, analysers, importers, browsers": "./test.sh --all",
+    "tests: long campaigns, mutants": "./test.sh --long",
+}
+
 
 def group_of(name: str) -> str:
     """The group of a test of ctest."""
@@ -54,15 +60,18 @@ def slowest(file: Path) -> str:
 
 
 def table(rows: list[list[str]]) -> list[str]:
-    """Lines of Markdown: each part and their sum."""
+    """Lines of Markdown: each part, and the sums so far where a form of ./test.sh ends."""
     lines = ["| part | s | processor s | longest, s |", "|---|--:|--:|---|"]
-    numbers = [[float(number) for number in row[1:]] for row in rows]
-    for (name, *_), (clock, user, system) in zip(rows, numbers, strict=True):
+    clock = processors = 0.0
+    for name, *numbers in rows:
+        seconds, user, system = map(float, numbers)
+        clock, processors = clock + seconds, processors + user + system
         file = BUILD / "times" / f"{FILES.get(name)}.xml"
         longest = slowest(file) if file.is_file() else ""
-        lines.append(f"| {name} | {clock:.0f} | {user + system:.0f} | {longest} |")
-    clock, user, system = map(sum, zip(*numbers, strict=True))
-    return [*lines, f"| in all | {clock:.0f} | {user + system:.0f} | |"]
+        lines.append(f"| {name} | {seconds:.0f} | {user + system:.0f} | {longest} |")
+        if name in ENDS:
+            lines.append(f"| **{ENDS[name]}** | {clock:.0f} | {processors:.0f} | |")
+    return lines
 
 
 def section(rows: list[list[str]]) -> tuple[str, list[str]]:
