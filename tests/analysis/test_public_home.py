@@ -4,7 +4,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-import pytest
 import yaml
 
 from rparm.needs import COMMANDS
@@ -18,16 +17,10 @@ def read(path: Path) -> Any:
     return yaml.safe_load(path.read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("path", FORMS, ids=lambda path: path.stem)
-def test_a_form_asks_for_what_is_needed(path: Path) -> None:
-    form = read(path)
-    assert form["name"] and form["description"]
-    fields = {field["id"]: field for field in form["body"]}
-    assert len(fields) == len(form["body"]) >= 4
-    for field in fields.values():
-        assert field["type"] in ("input", "textarea", "dropdown")
-        assert field["attributes"]["label"]
-    assert any(field.get("validations", {}).get("required") for field in fields.values())
+def test_each_form_names_its_fields() -> None:
+    for form in map(read, FORMS):
+        assert form["name"] and form["description"]
+        assert len({field["id"] for field in form["body"]}) == len(form["body"]) >= 4
 
 
 def test_the_workflow_calls_what_there_is_and_may_only_read() -> None:

@@ -39,7 +39,7 @@ double loop_run_model(int index, bool is_stiff, int n, int steps, double toleran
 
 /* ---- solvers.c; solvers.py has the same structures */
 
-enum solver { PLAIN_LOOP, RUNGE_KUTTA, FMU2, FMU3, MUJOCO_RK4, MUJOCO_IMPLICITFAST };
+enum solver { PLAIN_LOOP, FMU2, FMU3, MUJOCO_RK4, MUJOCO_IMPLICITFAST };
 
 /* Value references, and what is set before the first step. */
 struct fmu {

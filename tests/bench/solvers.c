@@ -42,47 +42,6 @@ static double run_plain_loop(struct task *task) {
     return loop_run(&loop, x);
 }
 
-/* ---- A second reference: the classical method in steps of 0.05 ms at most, whose error, h^4 of
- * some units, is below the rounding; summed after Kahan */
-
-static void runge_kutta_step(double h, const double u[2], double x[4], double lost[4]) {
-    static const double at[4] = {0.0, 0.5, 0.5, 1.0};
-    static const double weight[4] = {1.0 / 6, 1.0 / 3, 1.0 / 3, 1.0 / 6};
-    double k[4] = {0.0};
-    double sum[4] = {0.0};
-    for (int stage = 0; stage < 4; stage++) {
-        double xs[4];
-        for (int j = 0; j < 4; j++) {
-            xs[j] = x[j] + h * at[stage] * k[j];
-        }
-        arm(xs, u, k);
-        for (int j = 0; j < 4; j++) {
-            sum[j] += weight[stage] * k[j];
-        }
-    }
-    for (int j = 0; j < 4; j++) {
-        const double change = h * sum[j] - lost[j];
-        const double moved = x[j] + change;
-        lost[j] = (moved - x[j]) - change;
-        x[j] = moved;
-    }
-}
-
-static double run_runge_kutta(struct task *task) {
-    const int parts = (int)ceil(task->step / 5e-5 - 1e-6);
-    double x[4];
-    double lost[4] = {0.0};
-    memcpy(x, task->start, sizeof x);
-    const double begin = processor_time();
-    for (int i = 0; i < task->steps; i++) {
-        for (int part = 0; part < parts; part++) {
-            runge_kutta_step(task->step / parts, task->inputs[i], x, lost);
-        }
-        memcpy(task->states[i], x, sizeof x);
-    }
-    return processor_time() - begin;
-}
-
 /* ---- FMI 2.0 */
 
 static void log_text(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
@@ -283,7 +242,6 @@ static double clock_cost(void) {
 
 double bench_run(struct task *task, int passes) {
     static double (*const solvers[])(struct task *) = {[PLAIN_LOOP] = run_plain_loop,
-                                                       [RUNGE_KUTTA] = run_runge_kutta,
                                                        [FMU2] = run_fmu2,
                                                        [FMU3] = run_fmu3,
                                                        [MUJOCO_RK4] = run_mujoco,

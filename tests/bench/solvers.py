@@ -1,4 +1,4 @@
-"""The solvers in libbench.so: a plain loop of CVODE, the FMUs, MuJoCo, and a second reference."""
+"""The solvers in libbench.so: a plain loop of CVODE, the FMUs, MuJoCo."""
 
 import ctypes
 from collections.abc import Callable, Mapping
@@ -11,7 +11,7 @@ from fmpy import read_model_description
 
 from tests.equations.examples import METHODS
 
-PLAIN_LOOP, RUNGE_KUTTA, FMU2, FMU3, MUJOCO_RK4, MUJOCO_IMPLICITFAST = range(6)  # bench.h
+PLAIN_LOOP, FMU2, FMU3, MUJOCO_RK4, MUJOCO_IMPLICITFAST = range(5)  # bench.h
 TOTALS = ("solver_steps", "solver_rhs_evaluations", "event_count")
 FIGURES = ("internal_steps", "evaluations", "events")
 Solver = Callable[[Work, float, int], Run]
