@@ -43,7 +43,7 @@ OTHERS = (
 )
 ROUNDING = 1e-14  # an error that no peer need stay below
 PACKAGES = ("heyoka", "mujoco")  # peers
-TURNS = 5  # of free motion in a round: its targets are near
+TURNS = 3  # of free motion in a round: its targets are near
 LEAST = 1e-14  # tolerance that solvers of C are asked for
 LIVES = 100
 OF_FMI3 = ("cvode_adams", "erk", "taylor")  # methods that are compared with FMI 2.0
@@ -401,7 +401,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--build", type=Path, default=ROOT / "build", help="where it was built")
     parser.add_argument("--output", type=Path, help="default: report/benchmark there")
-    parser.add_argument("--rounds", type=int, default=5, help="of communication steps")
+    parser.add_argument("--rounds", type=int, default=15, help="of communication steps")
     parser.add_argument("--repeats", type=int, default=11, help="of all others")
     parser.add_argument("--readme", action="store_true", help="put the ratios into the page")
     options = parser.parse_args()
