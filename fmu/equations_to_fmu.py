@@ -48,7 +48,7 @@ def main() -> int:
         print(f"{error!s:.2000}", file=sys.stderr)
         return 2
     for warning in _warnings(file):
-        print(f"warning: {arguments.file}: {warning}", file=sys.stderr)
+        print(f"warning: {warning}", file=sys.stderr)
     print("\n".join(names))
     return 0
 

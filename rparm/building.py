@@ -1,4 +1,4 @@
-"""FMUs of own equations: runs the program that makes them, and keeps all of its files or none."""
+"""FMUs of own equations, from the cache or by the program that makes them: all files or none."""
 
 import errno
 import os
@@ -10,12 +10,13 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from rparm import project
+from rparm import build_cache, project
 from rparm.errors import UserError, one_line
 from rparm.files import read_toml, whole, written
 from rparm.interruption import run_group, temporary_folder, uninterrupted
 
 EQUATIONS = ".toml"  # suffix of their files
+WARNINGS, WARNING = "warnings", "warning: "  # what is kept beside the files, and how a line begins
 
 # packages that the program imports
 NEEDED = ("latex2mathml", "markdown_it", "mdit_py_plugins", "pycparser", "pydantic")
@@ -57,7 +58,7 @@ def build(
         project.refuse_other(Path(file), tomllib.loads(text), "build")
     runtimes = project.runtimes(platforms, web)
     with temporary_folder() as work:
-        kept, *fmus = _made(Path(file), runtimes, not (platforms or web), work)
+        kept, *fmus = _kept(Path(file), runtimes, not (platforms or web), work)
         paths = Path(output) / fmus[0], Path(output) / fmus[1]
         made = {Path(file).with_name(kept): work / kept} if lock else {}
         _put(made | dict(zip(paths, (work / name for name in fmus), strict=True)))
@@ -80,8 +81,38 @@ def archive(file: Path, version: str = project.VERSIONS[0]) -> Iterator[Path]:
         yield build(file, output=folder, lock=False)[project.VERSIONS.index(version)]
 
 
-def _made(file: Path, runtimes: list[Path], of_this_machine: bool, work: Path) -> list[str]:
-    """Make the lock file and the FMUs in the folder `work`; their names."""
+def _kept(file: Path, runtimes: list[Path], of_this_machine: bool, work: Path) -> list[str]:
+    """Make the lock file and the FMUs in the folder `work`, or take them from the cache."""
+    cache = build_cache.of_user()
+
+    def parts() -> list[object]:
+        return build_cache.parts_of(file, runtimes, of_this_machine, NEEDED) if cache.folder else []
+
+    lock = file.with_suffix(".lock.toml")
+    origin = parts()
+    key = build_cache.key(origin, lock)
+    found = cache.get(key) if origin else None
+    if found is None:
+        names, warnings = _made(file, runtimes, of_this_machine, work)
+        found = {WARNINGS: warnings.encode("utf-8", "surrogateescape")}
+        found |= {name: (work / name).read_bytes() for name in names}
+        # a file may have changed in between
+        if origin and build_cache.key(parts(), lock) == key:
+            for of_lock in {key, build_cache.key(origin, work / names[0])}:
+                cache.put(of_lock, found)
+    warnings = found.pop(WARNINGS).decode("utf-8", "surrogateescape")
+    for line in warnings.splitlines():
+        print(line.replace(WARNING, f"{WARNING}{file}: ", 1), file=sys.stderr)
+    for name, content in found.items():
+        (work / name).parent.mkdir(exist_ok=True)
+        (work / name).write_bytes(content)
+    return list(found)
+
+
+def _made(
+    file: Path, runtimes: list[Path], of_this_machine: bool, work: Path
+) -> tuple[list[str], str]:
+    """Make the lock file and the FMUs in the folder `work`; their names, and warnings."""
     tool = project.model_builder()
     command = [sys.executable, tool, "--output", work, "--runtime", *runtimes]
     command += ["--of-this-machine"] if of_this_machine else []
@@ -96,8 +127,7 @@ def _made(file: Path, runtimes: list[Path], of_this_machine: bool, work: Path) -
     if ended.returncode:
         lines = ended.stderr.strip().splitlines() or [f"{tool} ended with {ended.returncode}"]
         raise UserError(one_line(lines[-1]))
-    sys.stderr.write(ended.stderr)  # warnings
-    return ended.stdout.splitlines()
+    return ended.stdout.splitlines(), ended.stderr
 
 
 def _put(files: dict[Path, Path]) -> None:

@@ -33,11 +33,8 @@ import re
 import subprocess
 from collections.abc import Iterable
 from contextlib import suppress
-from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
-
-import platformdirs
 
 from rparm import fmu_tools, shipped
 from rparm.errors import UserError, did_you_mean, reason
@@ -60,6 +57,7 @@ PROOF = "proof"  # folder of a model with the program that encloses its motions
 SCENARIO_FOLDERS = ("scenarios", "convergence")
 BUILD_FOLDERS = {"2.0": "build", "3.0": "build/fmi3"}  # by version of FMI
 VERSIONS = tuple(BUILD_FOLDERS)
+NO_CACHE = "RPARM_NO_CACHE"  # variable of the environment, which --no-cache sets
 
 
 EQUATIONS = {"states", "discrete", "sampled", "where", "outputs", "experiment", "modes"}
@@ -367,6 +365,8 @@ def plotly_script() -> Path:
 
 def version() -> str:
     if INSTALLED:
+        from importlib import metadata  # takes long
+
         return metadata.version("rparm")
     text = (PACKAGE.parent / "CMakeLists.txt").read_text(encoding="utf-8")
     found = re.search(r"^project\(\w+ VERSION (\S+)", text, re.MULTILINE)
@@ -416,8 +416,19 @@ def cache_folder(part: str) -> Path:
     """Return the folder for `part` of the files that can be made again."""
     if not INSTALLED:
         return ROOT / "build" / part
+    return _user_cache() / part
+
+
+def builds_folder() -> Path | None:
+    """Return the user's folder for models that were built; None: nothing is kept."""
+    return None if os.environ.get(NO_CACHE) else _user_cache() / "builds"
+
+
+def _user_cache() -> Path:
+    from platformdirs import user_cache_path  # takes long
+
     given = os.environ.get("RPARM_CACHE")
-    return Path(given or platformdirs.user_cache_path("rparm", appauthor=False)).absolute() / part
+    return Path(given or user_cache_path("rparm", appauthor=False)).absolute()
 
 
 def set_library_caches() -> None:
