@@ -47,15 +47,23 @@ build() {
     { cat "$log" >&2; fail "the build failed, build/build.log says why"; }
 }
 
-# without a Python that can tell, the set-up says which one is needed
-plan=$(python3 -P "$root/rparm/needs.py" "$@") || plan="- - no no -"
-read -r lock target quiet json default <<<"$plan"
+# the environment's Python starts quicker than some that find one; without any, the set-up says which is needed
+python="$root/build/venv/bin/python"
+[ -x "$python" ] || python=python3
+plan=$("$python" -P "$root/rparm/needs.py" "$@") || plan="- - no no - - -"
+read -r lock target quiet json default sources made <<<"$plan"
 if [ "$target" = overview ]; then
   echo "${plan#*$'\n'}"
   exit
 fi
-if [ "$lock" = - ]; then set_up; else set_up "--$lock"; fi
-[ "$target" = - ] || build "$target"
+# what there was after the last time: nothing is asked where nothing has changed since
+ready="$root/build/ready$lock.$target"
+if [ ! -f "$ready" ] || [ "$(<"$ready")" != "$sources $made" ]; then
+  if [ "$lock" = - ]; then set_up; else set_up "--$lock"; fi
+  [ "$target" = - ] || build "$target"
+  plan=$("$python" -P "$root/rparm/needs.py" "$@") && read -r _ _ _ _ _ _ made <<<"$plan" &&
+    echo "$sources $made" >"$ready" || true
+fi
 [ "$default" = - ] || set -- "$default" "$@"
 export PYTHONPATH="$root"
 exec "$root/build/venv/bin/python" -P -m rparm "$@"  # -P: no modules from the current folder

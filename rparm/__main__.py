@@ -4,7 +4,6 @@ import os
 import shlex
 import signal
 import sys
-import webbrowser
 from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import suppress
@@ -51,6 +50,8 @@ def _ended(arguments: Sequence[str]) -> Ended:
     try:
         project.check_current_folder()
         options = command_line.parsed(arguments)
+        if getattr(options, "no_cache", False):
+            os.environ[project.NO_CACHE] = "1"  # for processes that it starts, too
         # imported here because it takes long: so Ctrl-C during the import leaves no traceback
         ended = command_line.function(options.command, "do_{}")(options)
         _keep_document(options, ended)
@@ -93,6 +94,8 @@ def _show_page(options: Namespace, ended: Ended) -> None:
         if ended.error is None:
             print(f"--open: {options.command} has written no page", file=sys.stderr)
         return
+    import webbrowser  # takes long
+
     page = ended.page.absolute()
     try:
         opened = webbrowser.open_new_tab(page.as_uri())

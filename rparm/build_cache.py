@@ -100,7 +100,9 @@ def digest(parts: Iterable[object]) -> str:
     """Return a hash of texts, bytes and other values, in their order."""
     found = hashlib.sha256()
     for part in parts:
-        content = part if isinstance(part, bytes) else repr(part).encode("utf-8", "backslashreplace")
+        content = (
+            part if isinstance(part, bytes) else repr(part).encode("utf-8", "backslashreplace")
+        )
         found.update(b"%d:" % len(content) + content)
     return found.hexdigest()
 

@@ -12,9 +12,8 @@ from typing import Any, NoReturn
 
 from rparm import needs, project
 from rparm.errors import UserError, WrongValueError, did_you_mean
-from rparm.needs import COMMANDS, COMMON, DEFAULT, EXIT_CODES, HELP, VERSION
+from rparm.needs import BUILDING, COMMANDS, COMMON, DEFAULT, EXIT_CODES, HELP, VERSION
 from rparm.project import PROGRAM, VERSIONS
-from rparm.units import SECONDS, typed_quantity
 
 SHORTEST = 1e-9  # s, of steps
 EPILOG = f"""With --json, standard output has one JSON document and nothing else. "exit_code" is in
@@ -89,6 +88,8 @@ def parser(command: str) -> argparse.ArgumentParser:
     made = _Parser(prog=f"{PROGRAM} {command}", epilog=EPILOG, allow_abbrev=False)
     function(command, "add_{}_options")(made)
     add_common(made)
+    if command in BUILDING:
+        add_flag(made, "--no-cache", "build models again, and keep nothing of them")
     return made
 
 
@@ -251,6 +252,8 @@ def relative_tolerance(text: str) -> float:
 
 
 def seconds(text: str) -> float:
+    from rparm.units import SECONDS, typed_quantity  # takes long
+
     try:
         return typed_quantity(text, SECONDS)
     except WrongValueError as error:
@@ -265,10 +268,10 @@ def positive_seconds(text: str) -> float:
 
 
 def _silence(text: str) -> float:
-    with suppress(WrongValueError):
-        seconds = typed_quantity(text, SECONDS)
-        if seconds >= 1:
-            return seconds
+    with suppress(argparse.ArgumentTypeError):
+        found = seconds(text)
+        if found >= 1:
+            return found
     form = "a number, or one with s, ms, cs or ks"
     raise argparse.ArgumentTypeError(f"expected 1 s or more: {form}, got {text!r}")
 

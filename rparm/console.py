@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, redire
 from pathlib import Path
 from typing import Any, TextIO
 
-from rparm.units import counted, shortened
+from rparm.errors import counted, shortened
 
 _quiet = False
 WIDTH = 80  # columns that a terminal has, if it has no fewer

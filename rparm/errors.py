@@ -2,10 +2,11 @@
 
 import difflib
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence, Sized
 from contextlib import contextmanager
 from typing import Any
 
+GAP = ".."  # in a text that is shortened
 SHORTEST_PART = 3  # letters of a longer name that may be meant
 
 
@@ -89,3 +90,16 @@ def reason(error: Exception) -> str:
 def one_line(text: object) -> str:
     """Replace each run of white space by a single space."""
     return " ".join(str(text).split())
+
+
+def shortened(text: str, width: int) -> str:
+    """Return at most `width` characters: the begin and the end of a longer text."""
+    if len(text) <= width:
+        return text
+    begin = (width - len(GAP) + 1) // 2
+    return text[:begin] + GAP + text[len(text) - (width - len(GAP) - begin) :]
+
+
+def counted(things: Sized, name: str) -> str:
+    """Write 1 scenario, 2 scenarios."""
+    return f"{len(things)} {name}" + ("s" if len(things) != 1 else "")

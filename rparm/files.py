@@ -31,6 +31,7 @@ LARGEST_TOML = 10_000_000  # bytes: some seconds of parsing
 MOST_GUESSED = 1000  # files of a folder that are compared with a name: milliseconds
 # the parser's time grows with the square of a key's parts: a.b.c
 LONG_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){32}""")
+NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 # names that Windows keeps for devices, with any suffix
 DEVICES = {"CON", "PRN", "AUX", "NUL", "CONIN$", "CONOUT$"}
 DEVICES |= {f"{port}{number}" for port in ("COM", "LPT") for number in "123456789\xb9\xb2\xb3"}

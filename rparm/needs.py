@@ -1,17 +1,17 @@
 """The commands: what each is for, where its code is, and what has to be there before it runs.
 
 `run.sh` asks this file before there is an environment: `python3 -P rparm/needs.py ARGUMENT ...`.
-So it imports the standard library only.
+So it imports the standard library only, and little of it.
 """
 
+import os
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class Command:
+class Command(NamedTuple):
     """A command of `rparm` or `run.sh`."""
 
     text: str  # for help
@@ -24,8 +24,8 @@ class Command:
 COMMANDS = {
     "run": Command("simulate scenarios, check them, write a report; the default", "run"),
     "new": Command("write a scenario to start from", "files", target=""),
-    "build": Command("make FMUs of a file with equations", "files"),
-    "new-model": Command("write a file with equations to start from", "files", target=""),
+    "build": Command("make FMUs of a file with equations", "equations"),
+    "new-model": Command("write a file with equations to start from", "equations", target=""),
     "new-system": Command("write a file of a system to start from", "files", target=""),
     "schema": Command("print a JSON Schema by which editors check files", "files", target=""),
     "list": Command("name the scenarios", "files", target=""),
@@ -63,6 +63,12 @@ COMMANDS = {
         "print what makes a shell complete these commands", "completion", target=""
     ),
 }  # fmt: skip
+BUILDING = ("run", "new", "new-system", "build", "system", "coupling", "linearize", "identify")
+BUILDING += (
+    "campaign",
+    "ssp",
+    "federation",
+)  # commands that build models, if their files ask for it
 DEFAULT = "run"  # the command of names and options without one
 COMMON = ("--json", "--quiet")  # may stand in front of the command
 HELP = ("help", "--help", "-h")
@@ -105,7 +111,7 @@ def is_scenario(name: str, models: Path) -> bool:
 
 
 def plan(arguments: Sequence[str], models: Path) -> list[str]:
-    """Return the words that run.sh reads, "-" for none.
+    """Return the words that run.sh reads first, "-" for none.
 
     They are the lock to install, the target to build ("overview": help on everything), "yes" or
     "no" for --quiet and for --json, and the command to put in front of the arguments.
@@ -125,8 +131,53 @@ def plan(arguments: Sequence[str], models: Path) -> list[str]:
     return [lock or "-", target or "-", *flags, "-" if first else DEFAULT]
 
 
+# ---- What the set-up and a build depend on -------------------------------------------------------
+SOURCES = ("CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "cmake", "fmu", "models")
+SOURCES += ("playground", "pyproject.toml", "requirements", "rparm", "run.sh", "setup.sh", "src")
+SYSTEM = ("/usr/include", "/usr/bin/cc", "/usr/bin/gcc", "/usr/bin/clang", "/usr/bin/cmake")
+MADE = ("CMakeCache.txt", "Makefile", "deps/sundials/LICENSE", "deps/musl/COPYRIGHT", "fmi3", "fmu")
+MADE += ("models", "musl", "playground", "proof", "runtime", "src", "sundials", "venv/bin/python")
+MADE += ("CMakeFiles/elementary_functions.dir", "CMakeFiles/runtime_fmi2.dir")
+MADE += ("CMakeFiles/runtime_fmi3.dir", "platforms/wasm32-wasi/runtime")
+PATTERNS = ("*.a", "*.fmu", "*.ssp", "venv/*.installed")
+
+
+def state(root: Path) -> tuple[str, str]:
+    """Return hashes of names, times and sizes: of what is built from, and of what was built."""
+    build = root / "build"
+    made = [build / name for name in MADE]
+    made += [path for pattern in PATTERNS for path in sorted(build.glob(pattern))]
+    sources = [*(root / name for name in SOURCES), *map(Path, SYSTEM)]
+    return _hash(root, sources), _hash(build, made)
+
+
+def _hash(place: Path, paths: Sequence[Path]) -> str:
+    from hashlib import sha256
+
+    found = sha256(str(place).encode(errors="backslashreplace"))
+    for path in paths:
+        for line in _listed(str(path)):
+            found.update(line.encode(errors="backslashreplace"))
+    return found.hexdigest()
+
+
+def _listed(path: str) -> Iterator[str]:
+    try:
+        status = os.stat(path)
+        is_folder = os.path.isdir(path) and path not in SYSTEM
+        if not is_folder:
+            yield f"{path}\0{os.path.realpath(path)}\0{status.st_mtime_ns}\0{status.st_size}\n"
+            return
+        for name in sorted(os.listdir(path)):
+            if name != "__pycache__":
+                yield from _listed(f"{path}/{name}")
+    except OSError:  # not there
+        yield f"{path}\n"
+
+
 if __name__ == "__main__":
-    words = plan(sys.argv[1:], Path(__file__).parents[1] / "models")
-    print(*words)
+    root = Path(__file__).absolute().parents[1]
+    words = plan(sys.argv[1:], root / "models")
+    print(*words, *(state(root) if "overview" not in words else ()))
     if "overview" in words:
         print(overview("./run.sh"))

@@ -15,7 +15,6 @@ import hashlib
 import io
 import json
 import lzma
-import tarfile
 from pathlib import Path, PurePosixPath
 
 from rparm.errors import UserError, reason
@@ -51,6 +50,8 @@ def file(name: str, cache: Path) -> Path:
 @functools.cache
 def unpacked(archive: Path, cache: Path) -> Path:
     """Unpack an archive into a folder below `cache`; UserError if it cannot be written."""
+    import tarfile  # takes long
+
     try:
         content = archive.read_bytes()
         folder = cache / _digest(content)[:16]

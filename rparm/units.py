@@ -7,7 +7,7 @@ Conversions are exact and rounded once; degrees are converted as by `math.radian
 
 import math
 import re
-from collections.abc import Mapping, Sequence, Sized
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, Context
@@ -36,7 +36,6 @@ TYPED = str.maketrans({"·": ".", "²": "2", "³": "3"})  # as pages write units
 PREFIXABLE = re.compile(r"(m|s|rad|N|J|W|V|A|Hz|Pa|H)(?!\w)")
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6}  # s
 SMALLEST = 1e-99  # smaller numbers are shown as ~0
-GAP = ".."  # in a text that is shortened
 
 
 @dataclass(frozen=True)
@@ -199,14 +198,6 @@ def rounded_up(value: float, digits: int) -> str:
     return exponents(f"{float(upwards.create_decimal_from_float(value)):.{digits}e}")
 
 
-def shortened(text: str, width: int) -> str:
-    """Return at most `width` characters: the begin and the end of a longer text."""
-    if len(text) <= width:
-        return text
-    begin = (width - len(GAP) + 1) // 2
-    return text[:begin] + GAP + text[len(text) - (width - len(GAP) - begin) :]
-
-
 def seconds(time: float) -> str:
     """Write a time as 0.123 s, 12.3 s or 1234 s."""
     return f"{time:.3f} s" if time < 10 else f"{time:.1f} s" if time < 100 else f"{time:.0f} s"
@@ -243,11 +234,6 @@ def prefixed(text: str, largest: float) -> tuple[str, float]:
         return text, 1.0
     thousands = min(math.ceil(-(math.log10(largest) + 1) / 3), 4)
     return " mµnp"[thousands] + text, 1e3**thousands
-
-
-def counted(things: Sized, name: str) -> str:
-    """Write 1 scenario, 2 scenarios."""
-    return f"{len(things)} {name}" + ("s" if len(things) != 1 else "")
 
 
 def bits(differing: Sequence[str]) -> str:

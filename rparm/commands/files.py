@@ -1,4 +1,4 @@
-"""`new`, `new-model`, `new-system`, `build`, `ssp`, `schema`, `fmu`, `list`, ...: files."""
+"""`new`, `new-system`, `ssp`, `schema`, `fmu`, `list`, ...: files."""
 
 import argparse
 import json
@@ -7,56 +7,25 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
 from itertools import count
 from pathlib import Path
 from zipfile import ZipFile
 
 from rparm import console, project, schemas
-from rparm.building import EQUATIONS, NEEDED
-from rparm.command_line import Ended, add_document, add_flag, add_fmi, add_output
+from rparm.building import EQUATIONS
+from rparm.command_line import Ended, add_document, add_fmi, add_output
+from rparm.commands.equations import SUFFIX, own_file
 from rparm.errors import UserError, closest, placed
-from rparm.files import check_for_windows, copied, create, from_folder, read_toml, written
+from rparm.files import NAME, copied, create, from_folder, read_toml, written
 from rparm.fmi.model import INPUTS, Model, Variable
 from rparm.interruption import temporary_folder
 from rparm.project import START, VERSIONS
 from rparm.runs import scenario
-from rparm.systems.loop_file import NAME
 from rparm.systems.structure import times
 from rparm.units import NONE
 
-SUFFIX = ".toml"
 TOOLS = project.page("docs/use-in-your-tool.md")
-MODELS_PAGE, TUTORIAL = "examples/models/README.md", "docs/tutorial.md"
-MODEL_FILE = """\
-# A body on a spring: change it to what you simulate. examples/models/README.md explains the file.
-name = "{name}"
-description = "Body on a spring"
-experiment = {{ stop = 10.0, step = 0.01, tolerance = 1e-8 }}
-
-[parameters]                    # may be changed while the model runs
-mass = {{ start = 1.0, unit = "kg", min = 1e-6, description = "Mass of the body" }}
-k = {{ start = 4.0, unit = "N/m", description = "Of the spring" }}
-c = {{ start = 0.2, unit = "N.s/m", min = 0, description = "Of the damper" }}
-
-[inputs]                        # set from outside, 0 at the start unless given
-force = {{ unit = "N" }}
-
-[states]                        # derivative: by the time; states are outputs
-x = {{ start = 1.0, unit = "m", derivative = "v" }}
-v = {{ unit = "m/s", derivative = "(force - spring - c * v) / mass" }}
-
-[where]                         # results that others use, in any order
-spring = "k * x"
-
-[outputs]
-energy = {{ value = "(mass * v**2 + spring * x) / 2", unit = "J" }}
-
-[check]                         # of parameters; the text is the message if it does not hold
-"a body with neither spring nor damper drifts away" = "k > 0 or c > 0"
-"""
-
-
+TUTORIAL = "docs/tutorial.md"
 SYSTEM_FILE = """\
 # A system of FMUs. Run it by {program} system FILE.toml.
 name = {name}
@@ -144,39 +113,6 @@ def _usual_model() -> Path:
     return max(folders, key=lambda folder: len(list(folder.glob("scenarios/*.toml"))))
 
 
-def add_new_model_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        f"Writes NAME.toml, a model of one's own with comments: {project.PROGRAM} build NAME.toml "
-        "makes FMUs of it. Beside it model.schema.json lets editors complete and check such files."
-    )
-    parser.add_argument("name", metavar="NAME", help="of the FMU: letters, digits and _")
-    add_output(parser, "folder for the file (default: the current one)")
-
-
-def do_new_model(options: argparse.Namespace) -> Ended:
-    path = _own_file(options, "model")
-    of_schema = path.with_name("model.schema.json")
-    # the packages that make it come with the compiler of `build`: without them there is none
-    text = schemas.text("model") if all(map(find_spec, NEEDED)) else ""
-    with written(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-    first = f"#:schema ./{of_schema.name}\n" if text else ""
-    create(path, first + MODEL_FILE.format(name=options.name))
-    if text and not of_schema.exists():
-        create(of_schema, text)
-    verdict = f"{path}: written; {project.PROGRAM} build {shlex.quote(str(path))} makes FMUs of it"
-    return Ended(0, verdict, {"file": path.absolute()}, page=path.absolute())
-
-
-def _own_file(options: argparse.Namespace, kind: str) -> Path:
-    """Return the file for a new model or system; UserError for an impossible name."""
-    if not NAME.fullmatch(options.name):
-        wrong = f"{options.name!r} is no name for a {kind}"
-        raise UserError(f"{wrong}: a letter, then letters, digits, _")
-    check_for_windows(options.name)
-    return (options.output or Path()) / f"{options.name}{SUFFIX}"
-
-
 def add_new_system_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Writes NAME.toml, a system of FMUs that runs as it is. Connections that names and units "
@@ -190,7 +126,7 @@ def add_new_system_options(parser: argparse.ArgumentParser) -> None:
 
 
 def do_new_system(options: argparse.Namespace) -> Ended:
-    path = _own_file(options, "system")
+    path = own_file(options, "system")
     found = _components(options.fmus, path.parent)
     text = _system_file(path.stem, found)
     with written(path):
@@ -291,29 +227,6 @@ def do_schema(options: argparse.Namespace) -> Ended:
         return Ended(0, text.rstrip(), {"schema": json.loads(text)})
     file = schemas.write(options.output / f"{options.kind}.schema.json", text)
     return Ended(0, f"{file}: written", {"file": file.absolute()}, page=file)
-
-
-def add_build_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Makes FMUs of the equations in FILE.toml, for FMI 2.0 and 3.0: NAME.fmu and "
-        f"fmi3/NAME.fmu. {project.page(MODELS_PAGE)} explains the file. Beside it FILE.lock.toml "
-        "keeps the value references."
-    )
-    parser.add_argument("file", metavar="FILE.toml", type=Path, help="the file with the equations")
-    add_flag(parser, "--platforms", "for all platforms, by zig, not for this machine")
-    add_flag(parser, "--web", "as WebAssembly, by zig, to drop on the playground")
-    add_output(parser, "folder for the FMUs (default: the current one)")
-
-
-def do_build(options: argparse.Namespace) -> Ended:
-    from rparm.building import build
-
-    to, where = options.output or Path(), {"platforms": options.platforms, "web": options.web}
-    paths = build(options.file, output=to, **where)
-    then = f"a scenario of it: {project.PROGRAM} new my_run --model {shlex.quote(str(paths[0]))}"
-    then = f"drop one on the page: {project.PROGRAM} playground --open" if options.web else then
-    verdict = f"{' and '.join(map(str, paths))}: built; {then}"
-    return Ended(0, verdict, {"fmus": [path.absolute() for path in paths]})
 
 
 def add_ssp_options(parser: argparse.ArgumentParser) -> None:

@@ -15,7 +15,16 @@ from typing import Any
 
 from rparm import building, project
 from rparm.errors import CodeError, UserError, did_you_mean, hint
-from rparm.files import LARGEST_TOML, UnreadableError, is_file, missing, read_text, read_toml, show
+from rparm.files import (
+    LARGEST_TOML,
+    NAME,
+    UnreadableError,
+    is_file,
+    missing,
+    read_text,
+    read_toml,
+    show,
+)
 from rparm.fmi.fmu_file import read_model
 from rparm.fmi.model import INPUTS, PARAMETERS, Model, Variable
 from rparm.interruption import temporary_folder
@@ -41,7 +50,6 @@ COMPONENTS, CONNECTIONS, VARIANTS, KEEP = "components", "connections", "variants
 TIMES = ("start", "stop", "step")
 REQUIRED = ("name", COMPONENTS)
 OPTIONAL = ("description", *TIMES, KEEP, CONNECTIONS, INPUTS, PARAMETERS, VARIANTS)
-NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 VARIANT = re.compile(r"\w[\w-]{0,99}", re.ASCII)
 FMU, EQUATIONS, SSP = ".fmu", ".toml", ".ssp"
 RESOURCES = "resources"  # folder of the FMUs, as in an SSP

@@ -1,0 +1,98 @@
+"""`build` and `new-model`: files with equations."""
+
+import argparse
+import shlex
+from importlib.util import find_spec
+from pathlib import Path
+
+from rparm import project
+from rparm.building import NEEDED, build
+from rparm.command_line import Ended, add_flag, add_output
+from rparm.errors import UserError
+from rparm.files import NAME, check_for_windows, create, written
+
+SUFFIX = ".toml"
+MODELS_PAGE = "examples/models/README.md"
+MODEL_FILE = """\
+# A body on a spring: change it to what you simulate. examples/models/README.md explains the file.
+name = "{name}"
+description = "Body on a spring"
+experiment = {{ stop = 10.0, step = 0.01, tolerance = 1e-8 }}
+
+[parameters]                    # may be changed while the model runs
+mass = {{ start = 1.0, unit = "kg", min = 1e-6, description = "Mass of the body" }}
+k = {{ start = 4.0, unit = "N/m", description = "Of the spring" }}
+c = {{ start = 0.2, unit = "N.s/m", min = 0, description = "Of the damper" }}
+
+[inputs]                        # set from outside, 0 at the start unless given
+force = {{ unit = "N" }}
+
+[states]                        # derivative: by the time; states are outputs
+x = {{ start = 1.0, unit = "m", derivative = "v" }}
+v = {{ unit = "m/s", derivative = "(force - spring - c * v) / mass" }}
+
+[where]                         # results that others use, in any order
+spring = "k * x"
+
+[outputs]
+energy = {{ value = "(mass * v**2 + spring * x) / 2", unit = "J" }}
+
+[check]                         # of parameters; the text is the message if it does not hold
+"a body with neither spring nor damper drifts away" = "k > 0 or c > 0"
+"""
+
+
+def own_file(options: argparse.Namespace, kind: str) -> Path:
+    """Return the file for a new model or system; UserError for an impossible name."""
+    if not NAME.fullmatch(options.name):
+        wrong = f"{options.name!r} is no name for a {kind}"
+        raise UserError(f"{wrong}: a letter, then letters, digits, _")
+    check_for_windows(options.name)
+    return (options.output or Path()) / f"{options.name}{SUFFIX}"
+
+
+def add_new_model_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        f"Writes NAME.toml, a model of one's own with comments: {project.PROGRAM} build NAME.toml "
+        "makes FMUs of it. Beside it model.schema.json lets editors complete and check such files."
+    )
+    parser.add_argument("name", metavar="NAME", help="of the FMU: letters, digits and _")
+    add_output(parser, "folder for the file (default: the current one)")
+
+
+def do_new_model(options: argparse.Namespace) -> Ended:
+    from rparm import schemas  # takes long
+
+    path = own_file(options, "model")
+    of_schema = path.with_name("model.schema.json")
+    # the packages that make it come with the compiler of `build`: without them there is none
+    text = schemas.text("model") if all(map(find_spec, NEEDED)) else ""
+    with written(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    first = f"#:schema ./{of_schema.name}\n" if text else ""
+    create(path, first + MODEL_FILE.format(name=options.name))
+    if text and not of_schema.exists():
+        create(of_schema, text)
+    verdict = f"{path}: written; {project.PROGRAM} build {shlex.quote(str(path))} makes FMUs of it"
+    return Ended(0, verdict, {"file": path.absolute()}, page=path.absolute())
+
+
+def add_build_options(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Makes FMUs of the equations in FILE.toml, for FMI 2.0 and 3.0: NAME.fmu and "
+        f"fmi3/NAME.fmu. {project.page(MODELS_PAGE)} explains the file. Beside it FILE.lock.toml "
+        "keeps the value references."
+    )
+    parser.add_argument("file", metavar="FILE.toml", type=Path, help="the file with the equations")
+    add_flag(parser, "--platforms", "for all platforms, by zig, not for this machine")
+    add_flag(parser, "--web", "as WebAssembly, by zig, to drop on the playground")
+    add_output(parser, "folder for the FMUs (default: the current one)")
+
+
+def do_build(options: argparse.Namespace) -> Ended:
+    to, where = options.output or Path(), {"platforms": options.platforms, "web": options.web}
+    paths = build(options.file, output=to, **where)
+    then = f"a scenario of it: {project.PROGRAM} new my_run --model {shlex.quote(str(paths[0]))}"
+    then = f"drop one on the page: {project.PROGRAM} playground --open" if options.web else then
+    verdict = f"{' and '.join(map(str, paths))}: built; {then}"
+    return Ended(0, verdict, {"fmus": [path.absolute() for path in paths]})
