@@ -10,13 +10,14 @@ in their own way, and a program that links the FMU statically has them already.
 """
 
 import argparse
+import functools
 import json
 import os
 import posixpath
 import re
 import shutil
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -48,7 +49,7 @@ COMMENT_OR_LITERAL = re.compile(
 )
 COPYRIGHT = re.compile(r"copyright|licen[sc]e", re.IGNORECASE)
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
-WORD = re.compile(r"\w+(?=\s*\(|\.h\")")  # called, or in a header's name: log_data.h
+WORD = re.compile(r"\b\w++(?=\s*+\(|\.h\")")  # called, or in a header's name: log_data.h
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"\n]+)[>"]', re.MULTILINE)
 
 
@@ -80,13 +81,22 @@ class Include:
     name: str
 
 
-def includes(text: str) -> Iterator[Include]:
+# FMUs of two versions have most of their files from the same texts
+@functools.cache
+def includes(text: str) -> list[Include]:
     """Return directives that are not in a comment."""
     code = COMMENT.sub(lambda comment: re.sub(r"[^\n]", " ", comment[0]), text)
-    for line in INCLUDE.finditer(code):
-        yield Include(line.start(), line.end(), line[1] == '"', line[2])
+    lines = INCLUDE.finditer(code)
+    return [Include(line.start(), line.end(), line[1] == '"', line[2]) for line in lines]
 
 
+@functools.cache
+def words_of(text: str) -> frozenset[str]:
+    """Return names of functions and headers that are not in a comment."""
+    return frozenset(WORD.findall(COMMENT.sub("", text)))
+
+
+@functools.cache
 def without_comments(text: str) -> str:
     """Text whose comments are spaces, but those about its copyright."""
 
@@ -250,8 +260,7 @@ def named_in(texts: Iterable[str], sources: list[Path]) -> list[Path]:
     left = {source.stem: source for source in sources}
     todo = list(texts)
     while todo:
-        words = set(WORD.findall(COMMENT.sub("", todo.pop())))
-        todo += [read(left.pop(name)) for name in words & left.keys()]
+        todo += [read(left.pop(name)) for name in words_of(todo.pop()) & left.keys()]
     return [source for source in sources if source.stem not in left]
 
 

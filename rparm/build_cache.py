@@ -1,8 +1,8 @@
 """A cache of builds: files by a hash of all that they are made from.
 
-An entry is one file: the SHA-256 of what follows, a line of JSON with its key and the names and sizes
-of its files, and their bytes. What is damaged, or is another's, is built again. Where the folder
-cannot be written, builds go on without it.
+An entry is one file: the SHA-256 of what follows, a line of JSON with its key and the names and
+sizes of its files, and their bytes. What is damaged or another's is built again. Where the folder
+cannot be written, builds do without it.
 """
 
 import hashlib
@@ -22,7 +22,7 @@ from typing import Any
 from rparm import fmu_tools, project
 from rparm.files import whole
 
-LARGEST = 2**29  # bytes of all entries
+LARGEST = 2**30  # bytes of all entries
 LARGEST_NAMED = 10**7  # bytes of a file that a model names: a larger one is refused
 COMPILERS = ("gcc", "clang", "zig", "as", "ld")
 # variables that lead compilers to other files, or change what they write
@@ -86,7 +86,7 @@ class BuildCache:
             if left <= self.largest:
                 break
             with suppress(OSError):
-                os.unlink(path)
+                Path(path).unlink()
             left -= size
 
 
@@ -142,7 +142,7 @@ def _parts(
 
 
 def compilers(first: str) -> Iterator[object]:
-    """Yield what the output of compilers depends on: their files, variables, the first's version."""
+    """Yield what the output of compilers depends on: files, variables, the first's version."""
     found = [path for path in map(shutil.which, (first, *COMPILERS)) if path]
     for path in (Path(name).resolve() for name in found):
         yield str(path), path.stat().st_size, path.stat().st_mtime_ns

@@ -5,6 +5,7 @@ So it imports the standard library only, and little of it.
 """
 
 import os
+import stat
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -163,12 +164,12 @@ def _hash(place: Path, paths: Sequence[Path]) -> str:
 
 def _listed(path: str) -> Iterator[str]:
     try:
-        status = os.stat(path)
-        is_folder = os.path.isdir(path) and path not in SYSTEM
+        status = os.stat(path)  # noqa: PTH116 (pathlib takes thrice as long)
+        is_folder = stat.S_ISDIR(status.st_mode) and path not in SYSTEM
         if not is_folder:
             yield f"{path}\0{os.path.realpath(path)}\0{status.st_mtime_ns}\0{status.st_size}\n"
             return
-        for name in sorted(os.listdir(path)):
+        for name in sorted(os.listdir(path)):  # noqa: PTH208
             if name != "__pycache__":
                 yield from _listed(f"{path}/{name}")
     except OSError:  # not there

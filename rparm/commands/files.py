@@ -16,7 +16,7 @@ from rparm.building import EQUATIONS
 from rparm.command_line import Ended, add_document, add_fmi, add_output
 from rparm.commands.equations import SUFFIX, own_file
 from rparm.errors import UserError, closest, placed
-from rparm.files import NAME, copied, create, from_folder, read_toml, written
+from rparm.files import NAME, check_for_windows, copied, create, from_folder, read_toml, written
 from rparm.fmi.model import INPUTS, Model, Variable
 from rparm.interruption import temporary_folder
 from rparm.project import START, VERSIONS
