@@ -88,13 +88,13 @@ def _libraries(name: str, runtime: Runtime, work: Path) -> dict[str, tuple[str, 
     folder = work / runtime.content["platform"]
     folder.mkdir()
     objects = runtime.compile([work / source for source in C_FILES], folder)
-    built = {}
+    file = f"{name}{runtime.content['suffix']}"
     for version in PLACES:
-        library = folder / f"{name}{runtime.content['suffix']}"
-        runtime.link(version, objects, library)
-        kept = library.rename(folder / f"{version}{library.suffix}")
-        built[version] = (f"{runtime.content['versions'][version]['folder']}/{library.name}", kept)
-    return built
+        (folder / version).mkdir()
+    with ThreadPoolExecutor(len(PLACES)) as pool:
+        [*pool.map(lambda version: runtime.link(version, objects, folder / version / file), PLACES)]
+    places = {version: runtime.content["versions"][version]["folder"] for version in PLACES}
+    return {x: (f"{place}/{file}", folder / x / file) for x, place in places.items()}
 
 
 def _write_sources(version: str, runtime: Runtime, work: Path, output: Path) -> None:
@@ -139,23 +139,25 @@ class Runtime:
         return [self.folder / item for item in listed if item]
 
     def compile(self, sources: list[Path], work: Path) -> list[Path]:
-        """Compile source files in the folder `work`; return their objects."""
+        """Compile source files in the folder `work`, all at once; return their objects."""
         # what warnings are about, the user has not written
         options = [o for o in self.content["options"] if o and not o.startswith("-W")]
         options = [str(self.folder / o) if o.endswith(".h") else o for o in options]
         folders = [f"-I{path}" for path in self.paths(self.content["include"])]
-        objects = []
-        for source in sources:
-            objects.append(work / f"{source.stem}.o")
+
+        def compiled(source: Path) -> Path:
             here = os.path.relpath(source, work)  # no folder's name gets into the object
-            self.run(work, *options, *folders, "-c", here, "-o", objects[-1].name)
-        return objects
+            self.run(work, *options, *folders, "-c", here, "-o", f"{source.stem}.o")
+            return work / f"{source.stem}.o"
+
+        with ThreadPoolExecutor(len(sources)) as pool:
+            return [*pool.map(compiled, sources)]
 
     def link(self, version: str, objects: list[Path], target: Path) -> None:
-        """Link the shared object of a version of FMI, in the folder of the objects."""
+        """Link the shared object of a version of FMI."""
         options = [option.replace("@NAME@", target.stem) for option in self.content["link"]]
         parts = [*self.content["versions"][version]["objects"], *self.content["libraries"]]
-        own = [path.name for path in objects]
+        own = [os.path.relpath(path, target.parent) for path in objects]
         self.run(target.parent, *own, *self.paths(parts), *options, "-o", target.name)
 
     def run(self, folder: Path, *arguments: object) -> None:

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from tests.support.rparm_project import Console
 
 
+# One cache of built models for all tests, which a new clone and another compiler begin empty.
+os.environ["RPARM_CACHE"] = str(ROOT / "build" / "cache")
+os.environ.pop("RPARM_NO_CACHE", None)
 # A shell that starts the tests in the background lets them, and all that they start, ignore Ctrl-C.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
