@@ -18,8 +18,8 @@ from rparm.errors import UserError
 from tests.equations.compiled import Model, ModelFileError, building, read_text
 from tests.equations.examples import FOLDER, build, simulated
 from tests.support.paths import ROOT
+from tests.support.programs import RPARM, python
 
-COMMAND = [sys.executable, "-P", "-m", "rparm"]
 TEXT = (FOLDER / "dahlquist.toml").read_text(encoding="utf-8")
 
 
@@ -37,7 +37,7 @@ def started(folder: Path, *arguments: str) -> subprocess.Popen:
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     environment |= {"TMPDIR": str(folder.parent / "temporary")}
     return subprocess.Popen(
-        [*COMMAND, *arguments],
+        [sys.executable, *RPARM, *arguments],
         cwd=folder,
         env=environment,
         stdout=subprocess.PIPE,
@@ -58,7 +58,7 @@ def test_nothing_is_left_where_it_is_interrupted(folder: Path, ending: signal.Si
     """When its temporary folder is there, and when there are objects in it."""
     temporary = folder.parent / "temporary"
     for waited in ("rparm-*", "rparm-*/*/*/*.o"):
-        with started(folder, "build", "--", "-decay.toml") as process:
+        with started(folder, "build", "--no-cache", "--", "-decay.toml") as process:
             limit = time.monotonic() + 60
             while not any(temporary.glob(waited)):
                 assert process.poll() is None and time.monotonic() < limit
@@ -182,13 +182,8 @@ def test_it_names_all_sections_and_functions(tmp_path: Path) -> None:
 
 
 def test_a_new_model_is_one(tmp_path: Path) -> None:
-    command = [sys.executable, "-P", "-m", "rparm"]
-    environment = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin"}
-
     def call(*arguments: str) -> subprocess.CompletedProcess:
-        return subprocess.run(
-            [*command, *arguments], cwd=tmp_path, env=environment, capture_output=True, text=True
-        )
+        return python(*RPARM, *arguments, folder=tmp_path)
 
     assert call("new-model", "Spring").returncode == 0
     assert call("build", "Spring.toml").returncode == 0

@@ -6,6 +6,7 @@ Set-up, CMake and Python are small scripts here that say how they are called.
 import json
 import os
 import pty
+import re
 import shlex
 import shutil
 import subprocess
@@ -15,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from rparm.needs import COMMANDS, overview, plan
+from rparm.needs import COMMANDS, SOURCES, overview, plan
 from tests.support.paths import ROOT
 from tests.support.programs import run
 from tests.support.rparm_project import MISTAKES
@@ -31,6 +32,8 @@ fi
 """
 PYTHON = """#!/usr/bin/env python3
 import json, os, sys
+if sys.argv[1:3] != ["-P", "-m"]:
+    os.execvp("python3", ["python3", *sys.argv[1:]])
 print(json.dumps({"here": os.getcwd(), "arguments": sys.argv[1:]}))
 """
 
@@ -107,6 +110,52 @@ def test_a_terminal_shows_how_far_a_build_is(root: Path, arguments: list[str]) -
         assert shown == b""
     else:
         assert b"building  50 % |####################                    |" in shown
+
+
+def test_nothing_is_asked_again_until_something_has_changed(root: Path) -> None:
+    """Set-up and CMake, for each lock and target: new, changed and removed files count."""
+    asked = ["set up", "run.sh: configuring", "run.sh: building the FMUs"]
+
+    def said(*arguments: str) -> list[str]:
+        return [line.strip() for line in call(root, *arguments).stderr.splitlines()]
+
+    assert said("power_off") == asked and said("power_off") == [] and said("prove", "x") == []
+    assert said("identify", "x")[0] == "set up --control" and said("identify", "x") == []
+    source, made = root / "src" / "model" / "a.c", root / "build" / "RPPlant.fmu"
+    source.parent.mkdir(parents=True)
+    for path in (source, root / "setup.sh", made):
+        path.open("a").write("\n")
+        assert said("power_off") == asked and said("power_off") == []
+    for path in (source, made):
+        path.unlink()
+        assert said("power_off") == asked and said("power_off") == []
+    (root / "build" / "broken").touch()
+    source.touch()
+    for _ in range(2):
+        assert said("power_off")[:3] == asked
+    (root / "build" / "broken").unlink()
+    assert said("power_off") == asked
+
+
+def test_a_change_while_something_is_built_counts(root: Path) -> None:
+    (root / "src").mkdir()
+    with (root / "bin" / "cmake").open("a") as file:
+        file.write('echo >>"$(dirname "$0")/../src/late.c"\n')
+    for _ in range(2):
+        assert "run.sh: configuring" in call(root, "power_off").stderr
+
+
+def test_all_that_make_knows_is_looked_at() -> None:
+    """Files of the project that something in build/ is made from."""
+    build = Path(os.environ.get("RP_FMU", ROOT / "build" / "x")).absolute().parent
+    rules = [*build.glob("CMakeFiles/*/build.make"), *build.glob("src/*/CMakeFiles/*/build.make")]
+    assert rules
+    found = set()
+    for path in [*rules, build / "CMakeFiles" / "Makefile.cmake"]:
+        found |= set(re.findall(rf"{ROOT}/([\w.][\w./-]*)|\.\./([\w.][\w./-]*)", path.read_text()))
+    named = {Path(a or b).parts[0] for a, b in found if (ROOT / (a or b)).is_file()}
+    assert {"fmu", "models", "src", "CMakeLists.txt"} <= named
+    assert named - {"build", "tests", "examples"} <= set(SOURCES)
 
 
 def test_a_build_that_fails_shows_its_log(root: Path) -> None:
