@@ -1,4 +1,4 @@
-"""The cache of builds: the same bytes with it and without it, and nothing taken that is not right."""
+"""The cache of builds: the same bytes with it and without it, and nothing wrong is taken."""
 
 import json
 import os
