@@ -12,7 +12,7 @@ import numpy as np
 from rparm import console, files, project
 from rparm.command_line import Ended, add_document, add_fmi, add_output, add_silence, add_system
 from rparm.console import Progress
-from rparm.errors import UserError, hint
+from rparm.errors import UserError, counted, hint
 from rparm.federation import SILENCE, component, federation, network
 from rparm.federation.component import parts, real_connections
 from rparm.federation.federation import Record
@@ -24,7 +24,6 @@ from rparm.systems import comparison, ecos
 from rparm.systems.master import Master
 from rparm.systems.opened import given_file, opened
 from rparm.systems.structure import OpenedSystem
-from rparm.units import counted
 
 BOUND = 1e-12  # on the largest difference to the master, relative to the variable's largest value
 

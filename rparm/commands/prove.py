@@ -9,14 +9,14 @@ import numpy as np
 from rparm import console, project, proof
 from rparm.command_line import Ended, add_flag, add_report, add_tolerance, retyped
 from rparm.console import Progress
-from rparm.errors import UserError, WrongValueError, placed
+from rparm.errors import UserError, WrongValueError, counted, placed
 from rparm.files import check_writable, written
 from rparm.fmi.fmu_file import Fmu
 from rparm.proof import ASSUMED, Enclosure, ProvenReference, Prover
 from rparm.report import proof_page
 from rparm.runs import scenario as scenarios
 from rparm.runs.scenario import Scenario
-from rparm.units import counted, rounded_up, short, typed_quantity, verdict
+from rparm.units import rounded_up, short, typed_quantity, verdict
 
 COLUMNS = {"values": 8, "nearest doubles": 8, "interval": 9}
 

@@ -18,7 +18,7 @@ from rparm.command_line import (
 )
 from rparm.commands.files import do_list
 from rparm.console import Progress
-from rparm.errors import UserError, did_you_mean, placed, together
+from rparm.errors import UserError, counted, did_you_mean, placed, together
 from rparm.files import check_writable, from_here, missing, written
 from rparm.fmi.fmu_file import Fmu
 from rparm.needs import COMMANDS
@@ -32,7 +32,7 @@ from rparm.runs import scenario as scenarios
 from rparm.runs.comparison import TIGHTEST, TOLERANCES, Failure, Run, Runs, Sweep, sweep
 from rparm.runs.convergence import Convergence
 from rparm.runs.scenario import Scenario
-from rparm.units import counted, short
+from rparm.units import short
 
 SUFFIX = ".toml"
 FIRST, TWIN = VERSIONS  # of FMI: the one that runs, and the one that has to give the same bits

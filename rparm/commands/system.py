@@ -9,7 +9,7 @@ from pathlib import Path
 from rparm import console, project
 from rparm.command_line import Ended, add_flag, add_other, add_report, add_step, add_system, retyped
 from rparm.console import Progress
-from rparm.errors import UserError, did_you_mean, together
+from rparm.errors import UserError, counted, did_you_mean, together
 from rparm.files import check_writable, written
 from rparm.project import PROGRAM
 from rparm.report import overlay, overview, system_page
@@ -19,7 +19,6 @@ from rparm.result_tables import VariantTable, print_differences
 from rparm.systems import comparison, ecos, master
 from rparm.systems.comparison import Outcome, Reference
 from rparm.systems.opened import given_file, opened
-from rparm.units import counted
 
 
 def add_system_options(parser: argparse.ArgumentParser) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rparm.errors import shortened
 from rparm.fmi.model import Model
 from rparm.identification import results
 from rparm.identification.fit import Whiteness
@@ -14,7 +15,7 @@ from rparm.report import charts, pages
 from rparm.report.charts import Chart
 from rparm.report.overview import FAILED, RAN
 from rparm.report.run_data import Curve, Plot, RunData, thinned
-from rparm.units import exponents, number, shortened, unit
+from rparm.units import exponents, number, unit
 
 LONGEST = 24  # characters of a name beside the correlations
 MOST_NUMBERS = 10  # parameters, whose correlations are written into their cells

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from rparm.errors import UserError, placed
+from rparm.errors import UserError, counted, placed
 from rparm.files import is_file, missing
 from rparm.report.run_data import TIME, Curve, Plot, without_rounding
 from rparm.runs.comparison import SMALLEST_SCALE
 from rparm.runs.inputs import EARLY, Log, Logged, read_log
-from rparm.units import counted, exponents, prefixed
+from rparm.units import exponents, prefixed
 
 FILED = 5e-12  # of a variable's scale: less is rounding of files, which have twelve digits
 Others = Mapping[tuple[str, str], Log]  # by section and name of results

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from rparm import proof
+from rparm.errors import counted
 from rparm.fmi.model import Model
 from rparm.proof import Enclosure, ProvenReference
 from rparm.report import charts, overview
@@ -14,7 +15,7 @@ from rparm.report.overview import FAILED, PASSED, PROOFS
 from rparm.report.pages import RunPage, Table
 from rparm.report.run_data import Curve, Plot, RunData, thinned
 from rparm.runs.scenario import Scenario
-from rparm.units import SMALLEST, counted, number, rounded_up, unit
+from rparm.units import SMALLEST, number, rounded_up, unit
 
 ASSUMES = f"The proof assumes {proof.ASSUMED}."
 

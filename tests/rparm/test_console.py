@@ -19,10 +19,11 @@ from rparm.command_line import COMMANDS
 from rparm.commands import run as run_command
 from rparm.commands.completion import SCRIPT, SHELLS
 from rparm.console import json_line, results_stream, stage, verdict_line
+from rparm.errors import shortened
 from rparm.fmi.fmu_file import Fmu
 from rparm.result_tables import RunTable, SweepTable
 from rparm.runs.comparison import TOLERANCES, Run, Runs, Sweep
-from rparm.units import seconds, short, shortened
+from rparm.units import seconds, short
 from tests.support.paths import ROOT
 from tests.support.programs import python, run
 from tests.support.rparm_project import (
