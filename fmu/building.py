@@ -33,6 +33,7 @@ from source_code import Library, Manifest, collect, manifest, write
 C_FILES = ("equations.c", "variables.c")
 PLACES = {"fmi2": "", "fmi3": "fmi3"}  # below the folder of the output
 SYSTEM_COMPILERS = ("gcc", "clang")
+LONG = 200_000  # bytes of C that a compiler optimizes with less time
 INSTALL = 'pip install "rparm[build]" installs zig'
 
 
@@ -147,7 +148,8 @@ class Runtime:
 
         def compiled(source: Path) -> Path:
             here = os.path.relpath(source, work)  # no folder's name gets into the object
-            self.run(work, *options, *folders, "-c", here, "-o", f"{source.stem}.o")
+            long = self.content["long"] if source.stat().st_size > LONG else []
+            self.run(work, *options, *filter(None, long), *folders, "-c", here, "-o", f"{source.stem}.o")
             return work / f"{source.stem}.o"
 
         with ThreadPoolExecutor(len(sources)) as pool:

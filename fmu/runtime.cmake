@@ -51,6 +51,10 @@ endif()
 separate_arguments(compiler UNIX_COMMAND "${CMAKE_C_COMPILER} ${CMAKE_C_COMPILER_ARG1}")
 separate_arguments(flags UNIX_COMMAND "${CMAKE_C_FLAGS} ${CMAKE_C_FLAGS_RELEASE}")
 set(compile ${flags} -std=c17 -fvisibility=hidden)
+set(long "") # behind the others for long files: as fast as by -O3, which takes gcc twice as long
+if(CMAKE_C_COMPILER_ID STREQUAL "GNU")
+  set(long -O2 -ftree-vectorize -fvect-cost-model=dynamic)
+endif()
 set(shared ${CMAKE_SHARED_LIBRARY_CREATE_C_FLAGS})
 if(NOT WASM)
   list(APPEND compile ${CMAKE_C_COMPILE_OPTIONS_PIC})
@@ -70,6 +74,7 @@ file(GENERATE OUTPUT ${PROJECT_BINARY_DIR}/runtime/runtime.json CONTENT "{
 \"platform\": \"${PLATFORM}\",
 \"compiler\": [\"$<JOIN:${compiler},\"$<COMMA> \">\"],
 \"options\": [\"$<JOIN:${compile};$<FILTER:$<TARGET_PROPERTY:runtime_fmi2,COMPILE_OPTIONS>,EXCLUDE,^SHELL:>,\"$<COMMA> \">\"],
+\"long\": [\"$<JOIN:${long},\"$<COMMA> \">\"],
 \"include\": [\"$<JOIN:${include},\"$<COMMA> \">\"],
 \"versions\": {${runtime_versions}},
 \"libraries\": [\"$<JOIN:${runtime_libraries},\"$<COMMA> \">\"],
