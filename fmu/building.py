@@ -148,8 +148,8 @@ class Runtime:
 
         def compiled(source: Path) -> Path:
             here = os.path.relpath(source, work)  # no folder's name gets into the object
-            long = self.content["long"] if source.stat().st_size > LONG else []
-            self.run(work, *options, *filter(None, long), *folders, "-c", here, "-o", f"{source.stem}.o")
+            long = filter(None, self.content["long"] if source.stat().st_size > LONG else [])
+            self.run(work, *options, *long, *folders, "-c", here, "-o", f"{source.stem}.o")
             return work / f"{source.stem}.o"
 
         with ThreadPoolExecutor(len(sources)) as pool:
