@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rparm import build_cache
 from tests.support.paths import ROOT
 
 sys.path.insert(0, str(ROOT / "fmu"))
@@ -71,7 +72,15 @@ class Model:
         command = ["cc", "-std=c17", level, "-ffp-contract=off", "-shared", "-fPIC", *warnings]
         shared = ROOT / "src" / "model"
         sources = [folder / "equations.c", shared / "relations.c", shared / "domains.c"]
-        subprocess.run([*command, f"-I{shared}", *sources, "-o", library, "-lm"], check=True)
+        files = [*sorted(shared.glob("*.?")), folder / "equations.h", folder / "equations.c"]
+        texts = [path.read_bytes() for path in files]
+        key = build_cache.digest([command, *build_cache.compilers("cc"), *texts])
+        found = build_cache.of_user().get(key)
+        if found is None:
+            subprocess.run([*command, f"-I{shared}", *sources, "-o", library, "-lm"], check=True)
+            build_cache.of_user().put(key, {"model.so": library.read_bytes()})
+        else:
+            library.write_bytes(found["model.so"])
         self.library = ctypes.CDLL(str(library))
         self.words = Words.in_dll(self.library, "equations_model")
         text = (folder / "equations.h").read_text()
