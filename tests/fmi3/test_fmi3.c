@@ -437,14 +437,14 @@ static void test_states_of_the_other_version_are_refused(void) {
     TEST_ASSERT_NOT_NULL(fmu_library_open(FMU2_LIBRARY, &fmu2));
     for (enum kind kind = MODEL_EXCHANGE; kind < KINDS; kind++) {
         fmi2FMUstate state = NULL;
+        fmi2Byte nothing = 0;
         struct fmu_bytes of_2 = {0};
         struct fmu_bytes of_3 = fmu_save_bytes(of_kind(kind));
         const fmi2Component c = fmu2.Instantiate("m", type_of(kind), RP_MANIPULATOR_GUID, "",
                                                  &callbacks, fmi2False, fmi2False);
         ASSERT_OK(fmu2.GetFMUstate(c, &state));
         ASSERT_OK(fmu2.SerializedFMUstateSize(c, state, &of_2.size));
-        struct fmu_bytes room = {0};
-        of_2 = fmu_bytes_copy(&room, of_2.size);
+        of_2 = fmu_bytes_copy(&(struct fmu_bytes){&nothing, 1}, of_2.size);
         ASSERT_OK(fmu2.SerializeFMUstate(c, state, of_2.data, of_2.size));
         for (enum kind to = MODEL_EXCHANGE; to < KINDS; to++) {
             assert_refused(&fmu, of_kind(to), &of_2, "it is one of FMI 2, the instance of FMI 3");
