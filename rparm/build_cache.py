@@ -43,8 +43,7 @@ class BuildCache:
             return None
         path = self.folder / key
         with suppress(OSError, ValueError, KeyError, TypeError):
-            owners = (0, os.geteuid()) if hasattr(os, "geteuid") else (path.stat().st_uid,)
-            if path.stat().st_uid not in owners:
+            if hasattr(os, "geteuid") and path.stat().st_uid not in (0, os.geteuid()):
                 return None  # others may have put anything there
             head, _, content = path.read_bytes().partition(b"\n")
             if head.decode() != hashlib.sha256(content).hexdigest():

@@ -64,12 +64,10 @@ COMMANDS = {
         "print what makes a shell complete these commands", "completion", target=""
     ),
 }  # fmt: skip
-BUILDING = ("run", "new", "new-system", "build", "system", "coupling", "linearize", "identify")
-BUILDING += (
-    "campaign",
-    "ssp",
-    "federation",
-)  # commands that build models, if their files ask for it
+BUILDING = (  # models, if their files ask for it
+    "run", "new", "new-system", "build", "system", "coupling", "linearize", "identify", "campaign",
+    "ssp", "federation",
+)  # fmt: skip
 DEFAULT = "run"  # the command of names and options without one
 COMMON = ("--json", "--quiet")  # may stand in front of the command
 HELP = ("help", "--help", "-h")
