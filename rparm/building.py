@@ -60,7 +60,8 @@ def build(
     with temporary_folder() as work:
         kept, *fmus = _kept(Path(file), runtimes, not (platforms or web), work)
         paths = Path(output) / fmus[0], Path(output) / fmus[1]
-        made = {Path(file).with_name(kept): work / kept} if lock else {}
+        # the cache may have it from a file of another name
+        made = {_lock(Path(file)): work / kept} if lock else {}
         _put(made | dict(zip(paths, (work / name for name in fmus), strict=True)))
     return paths
 
@@ -81,6 +82,11 @@ def archive(file: Path, version: str = project.VERSIONS[0]) -> Iterator[Path]:
         yield build(file, output=folder, lock=False)[project.VERSIONS.index(version)]
 
 
+def _lock(file: Path) -> Path:
+    """Return the lock file of a file with equations."""
+    return file.with_suffix(".lock.toml")
+
+
 def _kept(file: Path, runtimes: list[Path], of_this_machine: bool, work: Path) -> list[str]:
     """Make the lock file and the FMUs in the folder `work`, or take them from the cache."""
     cache = build_cache.of_user()
@@ -88,7 +94,7 @@ def _kept(file: Path, runtimes: list[Path], of_this_machine: bool, work: Path) -
     def parts() -> list[object]:
         return build_cache.parts_of(file, runtimes, of_this_machine, NEEDED) if cache.folder else []
 
-    lock = file.with_suffix(".lock.toml")
+    lock = _lock(file)
     origin = parts()
     key = build_cache.key(origin, lock)
     found = cache.get(key) if origin else None

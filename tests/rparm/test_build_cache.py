@@ -141,6 +141,11 @@ def test_what_an_fmu_is_made_from_makes_its_key(
     other = tmp_path / "another folder"
     shutil.copytree(model.parent, other)
     assert not built(other / model.name)
+    renamed = shutil.copy(model, model.with_name("renamed.toml"))
+    assert not built(renamed)
+    assert sorted(path.name for path in model.parent.glob("*.lock.toml")) == [
+        "renamed.lock.toml", "tiny.lock.toml",
+    ]  # fmt: skip
     options = json.loads((BUILD / "runtime" / "runtime.json").read_text())["options"]
     assert built(model, options=[*options, "-O1"]) and not built(model)
     for path in (model, model.with_name("k.csv")):
