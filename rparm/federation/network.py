@@ -319,7 +319,8 @@ class Federate:
     def publish(self, values: np.ndarray) -> None:
         """Publish the values that others read after the next exchange, (values,)."""
         vector = [float(self.exchanges), *values.tolist()]
-        self._h.helicsPublicationPublishVector(self._publication, vector)
+        with self._waiting(f"after exchange {self.exchanges} {ENDED}"):
+            self._h.helicsPublicationPublishVector(self._publication, vector)
 
     def read(self) -> Mapping[str, Sequence[float]]:
         """Read all values that sources published before the last exchange, or raise UserError."""

@@ -103,3 +103,18 @@ def test_a_federation_that_ended_steps_nothing() -> None:
         one.fail("for a test")
         with pytest.raises(UserError, match="at the start the federation ended"):
             one.system()
+
+
+def test_nothing_is_published_in_a_federation_that_ended(pool: ThreadPoolExecutor) -> None:
+    """HELICS lets some begin that have heard of the end; they hear again by their next value."""
+    address = network.free_address()
+    with Broker(2, address):
+        one, two = Federate("one", address, []), Federate("two", address, [])
+        one.join()
+        two.join()
+        at_once(pool, one.enter_initialization, two.enter_initialization)
+        two.fail("for a test")
+        with pytest.raises(UserError, match="in initialization the federation ended"):
+            one.exchange()
+        with pytest.raises(UserError, match="after exchange 0 the federation ended: pub"):
+            one.publish(np.array([0.5]))
