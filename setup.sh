@@ -97,25 +97,12 @@ if ! build/venv/bin/python -c 'import pip' 2>/dev/null; then
   echo "setup.sh: making a Python environment in build/venv"
   python3 -m venv --clear build/venv
 fi
-# count_packages OF: how many pip has looked at, on a terminal
-count_packages() {
-  local line done=0
-  while IFS= read -r line; do
-    [ -t 1 ] || continue
-    case "$line" in
-      Collecting* | Requirement*) done=$((done + 1)); printf '\r%d of %d packages' "$done" "$1" ;;
-      Installing*) printf '\r%-40s' "unpacking" ;;
-    esac
-  done
-  [ ! -t 1 ] || printf '\r%40s\r' ''
-}
 install_requirements() {
   local lock="requirements/$1.txt" stamp="build/venv/$1.installed" count
   cmp -s "$lock" "$stamp" && return
   count=$(grep -c '^[[:alnum:]].*==' "$lock")
   echo "setup.sh: installing the $count packages of $lock into build/venv"
-  build/venv/bin/python -m pip install --progress-bar off --disable-pip-version-check --require-hashes -r "$lock" |
-    count_packages "$count" || return 1
+  requirements/install.sh "$lock" build/venv/bin/python || return 1
   cp "$lock" "$stamp"
 }
 for list in "${lists[@]}"; do

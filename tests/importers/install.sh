@@ -69,11 +69,10 @@ is_installed() {
   [ -e "$file" ] && [ "$(stamp "$1")" = "$(cat "$file")" ]
 }
 
-with_pip() {
+with_python() {
   local tool=$1 folder=build/importers/$1
-  python3 -m venv --clear "$folder" || return 1
-  "$folder/bin/python" -m pip install --quiet --disable-pip-version-check --require-hashes \
-    -r "$(lock "$tool")" || return 1
+  python3 -m venv --clear --without-pip "$folder" || return 1
+  requirements/install.sh "$(lock "$tool")" "$folder/bin/python" || return 1
   if [ "$tool" = ecospy ]; then
     # its wheel has the programs without their run bits
     chmod +x "$folder"/lib/python3*/site-packages/ecospy/binaries/{ecos,proxyfmu} || return 1
@@ -92,7 +91,7 @@ with_cargo() {
 }
 
 install_tool() {
-  local tool=$1 log=build/importers/$1.log how=with_pip
+  local tool=$1 log=build/importers/$1.log how=with_python
   [ "$tool" != fmi-sim ] || how=with_cargo
   # Ecos links to the first and unpacks FMUs by the command of the second
   [ "$tool" != ecospy ] || { system_package libtbb12 has_libtbb && system_package unzip command -v unzip; } || return 1
