@@ -123,7 +123,8 @@ def _made(
     command = [sys.executable, tool, "--output", work, "--runtime", *runtimes]
     command += ["--of-this-machine"] if of_this_machine else []
     # zig keeps its C library in a cache; temporary files go to `work`, also of a killed program
-    environment = {"ZIG_GLOBAL_CACHE_DIR": str(project.cache_folder("zig"))}
+    kept = os.environ.get("ZIG_GLOBAL_CACHE_DIR") or str(project.cache_folder("zig"))
+    environment = {"ZIG_GLOBAL_CACHE_DIR": kept}
     environment |= dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(work))
     environment["PYTHONIOENCODING"] = "utf-8:surrogateescape"  # names of files may be no UTF-8
     environment = project.child_environment() | environment

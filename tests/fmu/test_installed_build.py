@@ -177,7 +177,7 @@ def test_what_is_not_installed_is_named(
     hidden = installed.work / "ziglang"  # a package without a compiler, in front of the other
     hidden.mkdir()
     (hidden / "__init__.py").write_text("", encoding="utf-8")
-    ran = installed.run("build", model, "--platforms", PYTHONPATH=str(installed.work))
+    ran = installed.run("build", model, "--platforms", "--no-cache", PYTHONPATH=str(installed.work))
     assert ran.returncode == 2 and ran.stderr.count("\n") == 1
     (hidden / "__init__.py").unlink()
     hidden.rmdir()
