@@ -44,7 +44,8 @@ more() {
   timed "build: gcc, what needs other programs" build default
   timed "build: releases" build default release
   timed "build: playground" build default playground
-  timed "tests: releases, playground, analysers, importers, browsers" tests more default -L '^more$'
+  # three at once: browsers and federations wait
+  timed "tests: releases, playground, analysers, importers, browsers" tests more default -L '^more$' -j 3
 }
 
 long() {
