@@ -71,12 +71,16 @@ struct model *runs_read_model(const char *path) {
     static char text[1 << 17];
     const char *at = text;
     FILE *file = fopen(path, "rb");
-    struct model *model = file != NULL ? calloc(1, sizeof *model) : NULL;
-    if (model == NULL || fread(text, 1, sizeof text - 1, file) == 0) {
+    size_t size = 0;
+    if (file != NULL) {
+        size = fread(text, 1, sizeof text - 1, file);
+        fclose(file);
+    }
+    struct model *model = size > 0 ? calloc(1, sizeof *model) : NULL;
+    if (model == NULL) {
         fprintf(stderr, "%s cannot be read\n", path);
         return NULL;
     }
-    fclose(file);
     read_word(&at, model->guid);
     read_word(&at, model->name);
     model->state_count = (size_t)read_number(&at);
