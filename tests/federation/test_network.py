@@ -115,6 +115,7 @@ def test_nothing_is_published_in_a_federation_that_ended(pool: ThreadPoolExecuto
         at_once(pool, one.enter_initialization, two.enter_initialization)
         two.fail("for a test")
         with pytest.raises(UserError, match="in initialization the federation ended"):
-            one.exchange()
-        with pytest.raises(UserError, match="after exchange 0 the federation ended: pub"):
+            while True:  # the first may still pass
+                one.exchange()
+        with pytest.raises(UserError, match=r"after exchange \d+ the federation ended: pub"):
             one.publish(np.array([0.5]))
