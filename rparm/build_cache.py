@@ -151,7 +151,7 @@ def compilers(first: str) -> Iterator[object]:
 
 
 def _named(content: Any) -> Iterator[str]:
-    """Yield what stands for files in a file with equations: its C file, and those of its tables."""
+    """Yield the files that a file with equations names: its C file, and files of its tables."""
     if isinstance(content, dict):
         for name, value in content.items():
             if name in ("code", "file") and isinstance(value, str):

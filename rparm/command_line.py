@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 from rparm import needs, project
 from rparm.errors import UserError, WrongValueError, did_you_mean
-from rparm.needs import BUILDING, COMMANDS, COMMON, DEFAULT, EXIT_CODES, HELP, VERSION
+from rparm.needs import COMMANDS, COMMON, DEFAULT, EXIT_CODES, HELP, VERSION
 from rparm.project import PROGRAM, VERSIONS
 
 SHORTEST = 1e-9  # s, of steps
@@ -88,7 +88,7 @@ def parser(command: str) -> argparse.ArgumentParser:
     made = _Parser(prog=f"{PROGRAM} {command}", epilog=EPILOG, allow_abbrev=False)
     function(command, "add_{}_options")(made)
     add_common(made)
-    if command in BUILDING:
+    if COMMANDS[command].builds:
         add_flag(made, "--no-cache", "build models again, and keep nothing of them")
     return made
 

@@ -20,35 +20,44 @@ class Command(NamedTuple):
     extra: str = ""  # of the distribution, that has its packages
     lock: str = ""  # requirements/LOCK.txt, which setup.sh installs beside run.txt
     target: str = "all"  # of CMake, that is built before; empty: nothing
+    builds: bool = False  # models, if its files ask for it
 
 
 COMMANDS = {
-    "run": Command("simulate scenarios, check them, write a report; the default", "run"),
-    "new": Command("write a scenario to start from", "files", target=""),
-    "build": Command("make FMUs of a file with equations", "equations"),
+    "run": Command(
+        "simulate scenarios, check them, write a report; the default", "run", builds=True
+    ),
+    "new": Command("write a scenario to start from", "files", target="", builds=True),
+    "build": Command("make FMUs of a file with equations", "equations", builds=True),
     "new-model": Command("write a file with equations to start from", "equations", target=""),
-    "new-system": Command("write a file of a system to start from", "files", target=""),
+    "new-system": Command(
+        "write a file of a system to start from", "files", target="", builds=True
+    ),
     "schema": Command("print a JSON Schema by which editors check files", "files", target=""),
     "list": Command("name the scenarios", "files", target=""),
-    "system": Command("run systems in Ecos, check them, write a report", "system", "system"),
+    "system": Command(
+        "run systems in Ecos, check them, write a report", "system", "system", builds=True
+    ),
     "coupling": Command(
-        "study how far co-simulation of a system is from its exact solution", "coupling", "system"
+        "study how far co-simulation of a system is from its exact solution",
+        "coupling", "system", builds=True,
     ),
     "linearize": Command(
         "find an equilibrium, a linear model, margins, the largest step",
-        "linearize", "control", "control",
+        "linearize", "control", "control", builds=True,
     ),
     "identify": Command(
-        "find parameters that fit logs of a machine", "identify", "control", "control"
+        "find parameters that fit logs of a machine",
+        "identify", "control", "control", builds=True,
     ),
     "campaign": Command(
         "run a scenario or a system many times, over parameters",
-        "campaign", "campaign", "campaign",
+        "campaign", "campaign", "campaign", builds=True,
     ),
-    "ssp": Command("write a system as an SSP, for other tools", "files", "system"),
+    "ssp": Command("write a system as an SSP, for other tools", "files", "system", builds=True),
     "federation": Command(
         "run a system with each FMU in its own process, coupled by HELICS",
-        "federation", "federation", "federation",
+        "federation", "federation", "federation", builds=True,
     ),
     "federate": Command(
         "step one component in a federation of another machine",
@@ -64,10 +73,6 @@ COMMANDS = {
         "print what makes a shell complete these commands", "completion", target=""
     ),
 }  # fmt: skip
-BUILDING = (  # models, if their files ask for it
-    "run", "new", "new-system", "build", "system", "coupling", "linearize", "identify", "campaign",
-    "ssp", "federation",
-)  # fmt: skip
 DEFAULT = "run"  # the command of names and options without one
 COMMON = ("--json", "--quiet")  # may stand in front of the command
 HELP = ("help", "--help", "-h")

@@ -176,7 +176,7 @@ def test_the_wall_is_where_its_parameters_say(browser: Browser, tmp_path: Path) 
         assert alike(call(browser, "at", [0.55, y]), stop) == expected
 
 
-# ---- The arm is that of the FMU, and drawn to scale ----------------------------------------------
+# ---- The arm has the parameters of the FMU, and is drawn to scale --------------------------------
 
 
 FORWARD = """

@@ -209,7 +209,7 @@ def test_what_moves_is_an_input_of_the_system(folder: Path, console: Console) ->
 
 
 def test_strangers_write_what_ecos_does_not_read(slide: Path, tmp_path: Path) -> None:
-    """No prefix, and sets within the structure, all of which apply; Ecos gets a copy of its own."""
+    """No prefix, and sets within the structure, all of which apply; Ecos gets another copy."""
     with zipfile.ZipFile(slide) as archive:
         sets = {name: archive.read(name) for name in archive.namelist() if name.endswith(".ssv")}
 

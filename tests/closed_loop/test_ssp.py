@@ -1,4 +1,4 @@
-"""SSPs: what one may leave out, what is refused, and what holds for that of every system."""
+"""SSPs: what one may leave out, what is refused, and what holds for the SSPs of all systems."""
 
 import re
 import sys
@@ -348,8 +348,8 @@ def test_omsimulator_finds_what_it_needs(archive: Path) -> None:
 
 
 def test_every_importer_gets_a_whole_variant(archive: Path) -> None:
-    """The first set, as libcosim reads it, is that of the first variant; so is what is left where
-    all sets apply in turn, as the standard has it; in any order the last one gives all values."""
+    """The first set, which libcosim reads, gives the values of the first variant; so do all sets
+    applied in turn, as the standard has it; in any order the last one gives all values."""
     with ssp.unpacked(archive) as opened:
         first, components = next(iter(opened.system.parameters)), list(opened.models)
         folder = opened.folder
