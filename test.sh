@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Sets up, builds and runs the tests, all by ctest.
 #
-#   ./test.sh               optimized, C and Python, and C with gcc's sanitizers
-#   ./test.sh --all         then slow tests, threads, analysers, other platforms, other importers, browsers
+#   ./test.sh               optimized, C and Python
+#   ./test.sh --all         then slow tests, gcc's sanitizers, analysers, other platforms, other importers, browsers
 #   ./test.sh --long        all, then C tests by clang, on Arm and in valgrind, fuzzing, mutants and long campaigns: several hours, with a list of figures
 #   ./test.sh ARGUMENTS     optimized only; of all tests those that ctest chooses by ARGUMENTS: ./test.sh -R instance
 #
@@ -29,14 +29,14 @@ tests() { # tests NAME PRESET [OPTION ...]: of ctest; its times go to build/time
 
 short() {
   timed "set-up" ./setup.sh --dev
-  timed "build: AddressSanitizer and UndefinedBehaviorSanitizer" build asan
-  timed "tests: sanitizers, C" tests asan asan --progress
   timed "build: gcc, optimized" build default
   timed "tests: all but those that --all adds" tests default default -LE '^more$'
 }
 
 more() {
   timed "set-up: platforms" ./setup.sh --platforms
+  timed "build: AddressSanitizer and UndefinedBehaviorSanitizer" build asan
+  timed "tests: sanitizers, C" tests asan asan --progress
   timed "build: ThreadSanitizer" build tsan
   timed "tests: ThreadSanitizer, many threads" tests tsan tsan --progress
   # without network the tests of those that are missing are skipped; CI must have them
