@@ -18,12 +18,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from compiler.read.content import ModelFileError
+from compiler.read.model_file import ModelFile
+from compiler.write import declaration, lock
 from declaration.c_tables import value_references, variable_table
 from declaration.load import Declaration, assemble, check
 from document import document
-from equations import declaration, lock
-from equations.model_file import ModelFile
-from equations_content import ModelFileError
 from fmi2.model_description import model_description as fmi2_description
 from fmi3.model_description import terminals_and_icons
 from generate import release_files

@@ -16,12 +16,10 @@ function(derive target)
     list(APPEND modes --mode ${mode})
   endforeach()
   set(folders $<TARGET_PROPERTY:${target},INCLUDE_DIRECTORIES>)
-  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/plain_c/*.py ${FMU_SOURCE_DIR}/equations/*.py ${FMU_SOURCE_DIR}/equations_tables.py
-       ${PROJECT_SOURCE_DIR}/rparm/expressions/*.py)
+  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/compiler/*/*.py)
   add_custom_command(
     OUTPUT ${output}
-    COMMAND ${CMAKE_COMMAND} -E env PYTHONPATH=${PROJECT_SOURCE_DIR}
-            ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/derive.py ${header} ${ARG_FUNCTIONS} ${modes}
+    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/derive.py ${header} ${ARG_FUNCTIONS} ${modes}
             "--include;$<JOIN:${folders},;--include;>" --ignore model.h
             --output ${output} --depfile ${output}.d
     DEPENDS ${header} ${generator} ${FMU_SOURCE_DIR}/derive.py ${FMU_SOURCE_DIR}/generate.py

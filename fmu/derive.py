@@ -9,9 +9,9 @@ import argparse
 import sys
 from pathlib import Path
 
+from compiler.plain_c.text import CTextError, read
+from compiler.write.derived import FORM, Derived, Wanted
 from generate import write_if_changed
-from plain_c.derived import FORM, Derived, Wanted
-from plain_c.text import CTextError, read
 from program import program
 from source_code import dependencies
 

@@ -11,8 +11,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from equations import c_events, declaration, lock
-from equations.model_file import ModelFileError, read
+from compiler.read.model_file import ModelFileError, read
+from compiler.write import c_events, declaration, lock
 from generate import write_if_changed
 from program import program
 

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from building import PLACES, Runtime, build
-from equations import declaration, lock
-from equations.model_file import ModelFile, ModelFileError, read
+from compiler.read.model_file import ModelFile, ModelFileError, read
+from compiler.write import declaration, lock
 from package import pack
 from program import WrongInputError
 

@@ -65,13 +65,12 @@ function(add_equations name file terminals folder)
   if(terminals)
     set(option --terminals ${terminals})
   endif()
-  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/equations/*.* ${FMU_SOURCE_DIR}/equations_*.py ${FMU_SOURCE_DIR}/plain_c/*.py
+  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/compiler/*.py ${FMU_SOURCE_DIR}/compiler/*/*
        ${FMU_SOURCE_DIR}/declaration/*
-       ${PROJECT_SOURCE_DIR}/rparm/expressions/*.py ${PROJECT_SOURCE_DIR}/src/instance/*.toml)
+       ${PROJECT_SOURCE_DIR}/src/instance/*.toml)
   add_custom_command(
     OUTPUT ${folder}/equations.c ${folder}/equations.h ${folder}/variables.toml ${folder}/README.md
-    COMMAND ${CMAKE_COMMAND} -E env PYTHONPATH=${PROJECT_SOURCE_DIR}
-            ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/equations_to_c.py ${file} ${option} --output ${folder}
+    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/equations_to_c.py ${file} ${option} --output ${folder}
     DEPENDS ${file} ${lock} ${terminals} ${generator} ${FMU_SOURCE_DIR}/equations_to_c.py ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/program.py
     COMMENT "Generating the equations of ${name}"
     VERBATIM)

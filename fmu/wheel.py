@@ -30,7 +30,7 @@ OF_FMU = ("fmu/**/*.py", "fmu/**/*.toml", "fmu/**/*.in", "fmu/*.css", "fmu/*.htm
 OF_FMU += ("src/instance/*.toml",)
 # modules that are not for a model
 OF_RELEASES = ("bill_of_materials", "built", "derive", "pieces", "references", "wheel")
-OF_RELEASES += ("blocks", "derived")  # of plain_c: they write C of models
+OF_RELEASES += ("blocks", "derived")  # of the compiler: they write C of models
 # the FMUs are there, with their pictures
 OF_DEVELOPERS = ("variables.toml", "model.svg", "make_references.py", "reference_files.py")
 FOR_TESTS = ("_in", "sampled", "tightest")  # ends of names of tables that no command reads

@@ -132,7 +132,7 @@ def _parts(
             yield path.read_bytes() if path.stat().st_size <= LARGEST_NAMED else None
     fmu = Path(fmu_tools.__path__[0])
     own = [*fmu.parent.glob("src/instance/*.toml"), *fmu.rglob("*")]
-    yield from _files([*own, *project.PACKAGE.glob("expressions/*.py")], fmu.parent)
+    yield from _files(own, fmu.parent)
     yield from (sys.version, zlib.ZLIB_RUNTIME_VERSION, of_this_machine)
     yield sorted(_packages(packages))
     for path in runtimes:

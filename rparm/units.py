@@ -1,7 +1,7 @@
 """Values with units as users write them, and as messages, tables and pages show them.
 
 Users may write "90 deg", "300 mm" or "2kN". Known for a variable are its own unit, the display
-units that its FMU declares for it, and what `rparm.expressions.units` knows of the same dimension.
+units that its FMU declares for it, and what the compiler knows of the same dimension.
 Conversions are exact and rounded once; degrees are converted as by `math.radians`.
 """
 
@@ -15,9 +15,9 @@ from fractions import Fraction
 from typing import Any
 
 from rparm.errors import WrongValueError, did_you_mean
-from rparm.expressions import expression
-from rparm.expressions.units import measured
 from rparm.files import show
+from rparm.fmu_tools.compiler.expressions import expression
+from rparm.fmu_tools.compiler.expressions.units import measured
 
 USUAL = {  # units that messages name
     "m": "mm cm km", "s": "ms us min h", "rad": "deg mrad", "Hz": "mHz kHz", "kg": "g t",

@@ -30,8 +30,8 @@ from rparm.campaign.job import (
     plain,
 )
 from rparm.errors import UserError, WrongValueError, did_you_mean, hint, one_line, placed
-from rparm.expressions.expression import Expression
 from rparm.fmi.model import INPUTS, TOLERANCE, Value, Variable
+from rparm.fmu_tools.compiler.expressions.expression import Expression
 from rparm.units import unit
 
 RUN, FAILURE = "run", "failure"  # columns of every table

@@ -27,7 +27,7 @@ MOST_TICKS = 10_000  # in a period
 STEPS_AHEAD = 50  # of a law in Python, that are compared
 SMALLEST = 1e-17  # of a sum: a term that changes nothing
 UNDEFINED = sys.float_info.max  # in place of a new value that is not finite
-# description of a local variable, as fmu/equations writes it
+# description of a local variable, as fmu/compiler writes it
 ABOUT = re.compile(r"Sampler (\d+), ([^:]+): (?:(period|offset)|(new value|change|count) of (.+))")
 
 # steps of differences: a quarter of a number's size, and halves of it, as many as this

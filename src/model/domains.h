@@ -1,4 +1,4 @@
-/* Values beyond an event, for models that are made from their equations (fmu/equations).
+/* Values beyond an event, for models that are made from their equations (fmu/compiler).
  *
  * Within a step modes stay the same, and the right-hand side is smooth: a trial state, or the end
  * of a step in which an event will be located, may be beyond the event. Values that are not finite

@@ -1,4 +1,4 @@
-/* Events of models that are made from their equations (fmu/equations): struct model_events of any
+/* Events of models that are made from their equations (fmu/compiler): struct model_events of any
  * such model.
  *
  * A relation compares two values; its mode says whether it holds, and changes at events only. An

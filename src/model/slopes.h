@@ -1,4 +1,4 @@
-/* Derivatives for models that are made from their equations (fmu/equations), where the plain rules
+/* Derivatives for models that are made from their equations (fmu/compiler), where the plain rules
  * give 0 infinity or 0 / 0 although the derivative is finite. Elsewhere they give the same bits as
  * the plain rules. */
 #pragma once

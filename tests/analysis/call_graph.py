@@ -123,14 +123,18 @@ def nodes_at_run_time(tree: ast.AST) -> Iterator[ast.AST]:
             yield from nodes_at_run_time(node)
 
 
-def imported_modules(path: Path) -> Iterator[str]:
-    """Full names of all that a file imports at run time, of modules or what is in them."""
+def imported_modules(path: Path, root: Path) -> Iterator[str]:
+    """Full names of all that a file imports at run time, of modules or what is in them.
+
+    Relative imports begin at the file; their full names begin at the root.
+    """
     for node in nodes_at_run_time(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: imports are absolute"
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+            above = path.relative_to(root).parts[: -node.level] if node.level else ()
+            module = ".".join([*above, *([node.module] if node.module else [])])
+            yield from (f"{module}.{alias.name}" for alias in node.names)
 
 
 def package_graph(package: Path, root: Path) -> Graph:
@@ -141,7 +145,7 @@ def package_graph(package: Path, root: Path) -> Graph:
     for path in sorted(package.rglob("*.py")):
         below = path.relative_to(package)
         node = Path(below.parts[0]).stem
-        for name in imported_modules(path):
+        for name in imported_modules(path, root):
             needed = name.removeprefix(prefix).split(".")[0]
             if name.startswith(prefix) and needed in own - {node}:
                 add(graph, node, needed, f"{below.as_posix()}: {name}")

@@ -72,18 +72,26 @@ LIBRARIES = {
     "FMI 3.0": (r"fmi3\w+\.h", r"fmu/fmi3"),
 }
 
-# Python, by the first part of the path, rparm.expressions by itself; tests import everything
+# Python, by the first part of the path; tests import everything
 MAY_IMPORT = {
-    "rparm": {"rparm"},
-    "fmu": {"fmu", "rparm.expressions"},
+    "rparm": {"rparm", "fmu.compiler"},
+    "fmu": {"fmu", "fmu.compiler"},
     "models": {"models", "rparm"},
 }
 
 # modules of rparm that only lead to another folder
-ELSEWHERE = {("rparm", "models"): "models", ("rparm", "fmu_tools"): "fmu"}
+ELSEWHERE = {
+    ("rparm", "models"): "models",
+    ("rparm", "fmu_tools"): "fmu",
+    ("rparm", "fmu_tools", "compiler"): "fmu.compiler",
+}
 
 # packages of Python whose modules and folders use each other in one direction
-PACKAGES = [path.parent for path in sorted(ROOT.glob("rparm/**/__init__.py"))]
+PACKAGES = [
+    path.parent
+    for top in ("rparm", "fmu/compiler")
+    for path in sorted(ROOT.glob(f"{top}/**/__init__.py"))
+]
 
 # what Python runs, and large packages that it must not load
 NOT_LOADED = {
@@ -168,10 +176,7 @@ def graph_of_c_files(root: Path, symbols: dict[str, Symbols]) -> Graph:
 
 
 def imports(path: Path) -> Iterator[str]:
-    """First parts of the names of the modules that a file imports, and where those lead to.
-
-    Of rparm.expressions both parts count.
-    """
+    """First parts of the names of the modules that a file imports, or where those lead to."""
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
@@ -181,10 +186,8 @@ def imports(path: Path) -> Iterator[str]:
             continue
         for name in names:
             parts = name.split(".")
-            if parts[:2] == ["rparm", "expressions"]:
-                yield "rparm.expressions"
-            else:
-                yield ELSEWHERE.get(tuple(parts[:2]), parts[0])
+            found = [ELSEWHERE.get(tuple(parts[:count])) for count in (3, 2)]
+            yield next(filter(None, found), parts[0])
 
 
 def wrong_imports(root: Path) -> Iterator[str]:
@@ -194,7 +197,7 @@ def wrong_imports(root: Path) -> Iterator[str]:
     for top in files:
         names[top] |= {path.parent.name for path in files[top] if path.stem == "__init__"}
     names["tests"] = {"tests"}
-    names["rparm.expressions"] = {"rparm.expressions"}
+    names["fmu.compiler"] = {"fmu.compiler"}
     for top, allowed in MAY_IMPORT.items():
         for path in files[top]:
             for name in imports(path):
@@ -245,7 +248,7 @@ def test_what_is_not_needed_is_not_loaded(code: str, unneeded: set[str]) -> None
 # named by CONTRIBUTING.md only where they are in models
 WITHOUT_A_WORD = {"assets", "templates", "references", "scenarios", "variants", "campaigns"}
 LONGEST = 650  # lines
-LONGER = {"rparm/expressions/expression.py"}  # the graph with all of its operations
+LONGER = {"fmu/compiler/expressions/expression.py"}  # the graph with all of its operations
 
 
 def test_every_folder_is_in_a_table() -> None:
@@ -259,7 +262,7 @@ def test_every_folder_is_in_a_table() -> None:
     assert folders("tests/*") - models <= set(re.findall(r"\w+", cells))
     sources = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     named = set(re.findall(r"\w+", sources)) | WITHOUT_A_WORD
-    assert folders("src/*", "fmu/*", "rparm/*", "rparm/*/*") <= named
+    assert folders("src/*", "fmu/*", "fmu/compiler/*", "rparm/*", "rparm/*/*") <= named
 
 
 def test_no_file_is_too_long_to_read() -> None:

@@ -14,7 +14,8 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT))
-from rparm.expressions.expression import in_order  # noqa: E402
+from rparm.fmu_tools.compiler.expressions.expression import in_order  # noqa: E402
+
 from tests.equations.compiled import read  # noqa: E402
 
 OPERATIONS = {"+": add, "-": sub, "*": mul, "/": truediv, "negative": neg, "pow": pow}

@@ -14,8 +14,8 @@ from tests.support.paths import ROOT
 
 sys.path.insert(0, str(ROOT / "fmu"))
 import building  # noqa: E402
-from equations import c_model, declaration, lock  # noqa: E402
-from equations.model_file import ModelFile, ModelFileError, read  # noqa: E402
+from compiler.read.model_file import ModelFile, ModelFileError, read  # noqa: E402
+from compiler.write import c_model, declaration, lock  # noqa: E402
 from equations_to_c import toml, value_of_toml  # noqa: E402
 
 __all__ = [

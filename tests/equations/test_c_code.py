@@ -21,12 +21,12 @@ from tests.support.paths import ROOT
 from tests.support.tables import cases
 
 sys.path.insert(0, str(ROOT / "fmu"))
-from equations.graph import Graph  # noqa: E402
-from plain_c.blocks import settled  # noqa: E402
-from plain_c.derived import Derived, Wanted  # noqa: E402
-from plain_c.interpreter import Interpreter  # noqa: E402
-from plain_c.text import CTextError, read  # noqa: E402
-from plain_c.values import Conditions  # noqa: E402
+from compiler.graph.graph import Graph  # noqa: E402
+from compiler.plain_c.interpreter import Interpreter  # noqa: E402
+from compiler.plain_c.text import CTextError, read  # noqa: E402
+from compiler.plain_c.values import Conditions  # noqa: E402
+from compiler.write.blocks import settled  # noqa: E402
+from compiler.write.derived import Derived, Wanted  # noqa: E402
 
 REAL = '#include "real.h"\n'
 WARNINGS = ["-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wpedantic", "-Werror"]

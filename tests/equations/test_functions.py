@@ -7,11 +7,11 @@ import mpmath
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
+from rparm.fmu_tools.compiler.expressions import expression
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
 
 from rparm import api
-from rparm.expressions import expression
 from tests.equations.compiled import Model
 from tests.equations.examples import METHODS, MODELS, initializing, made, quick, simulated
 from tests.support.rparm_project import Console

@@ -4,8 +4,7 @@ import math
 import random
 
 import pytest
-
-from rparm.expressions.expression import (
+from rparm.fmu_tools.compiler.expressions.expression import (
     CONDITION,
     FUNCTIONS,
     ExpressionError,
@@ -17,7 +16,13 @@ from rparm.expressions.expression import (
     with_kinds,
     written,
 )
-from rparm.expressions.units import ONE, exponents, shown, unit_of, unit_of_exponents
+from rparm.fmu_tools.compiler.expressions.units import (
+    ONE,
+    exponents,
+    shown,
+    unit_of,
+    unit_of_exponents,
+)
 
 VALUES = {"x": 0.75, "y": -1.25, "z": 3.0}
 PYTHON = {name: getattr(math, name) for name in FUNCTIONS if hasattr(math, name)}

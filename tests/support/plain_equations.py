@@ -16,10 +16,10 @@ from flint import arb, arb_series
 from tests.support.paths import ROOT
 
 sys.path.insert(0, str(ROOT / "fmu"))
-from equations.graph import Graph, Value  # noqa: E402
-from plain_c.interpreter import Interpreter  # noqa: E402
-from plain_c.memory import Array, Structure, is_whole  # noqa: E402
-from plain_c.text import read  # noqa: E402
+from compiler.graph.graph import Graph, Value  # noqa: E402
+from compiler.plain_c.interpreter import Interpreter  # noqa: E402
+from compiler.plain_c.memory import Array, Structure, is_whole  # noqa: E402
+from compiler.plain_c.text import read  # noqa: E402
 
 __all__ = [
     "ACCELERATIONS", "STATES", "Array", "Leaf", "Place", "PlainEquations", "Sized", "Structure",

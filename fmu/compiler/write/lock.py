@@ -8,9 +8,8 @@ import re
 import tomllib
 from pathlib import Path
 
-from equations_content import ModelFileError
-
-from equations.declaration import Key
+from ..read.content import ModelFileError
+from .declaration import Key
 
 RESERVED = (0, *range(80, 100))  # the time, the variables of the integrator
 LARGEST = 99_999

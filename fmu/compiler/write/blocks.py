@@ -13,11 +13,10 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from equations.c_code import indented, number
-from equations.graph import CONDITIONS, DERIVATIVES, LEAVES, Value
-
-from plain_c.values import RELATION, Conditions, Known
-from rparm.expressions.expression import in_order
+from ..expressions.expression import in_order
+from ..graph.graph import CONDITIONS, DERIVATIVES, LEAVES, Value
+from ..plain_c.values import RELATION, Conditions, Known
+from .c_code import indented, number
 
 COSTS = {"+": 1, "-": 1, "*": 1, "negative": 0, "/": 5, "value_of": 0, "moving_as": 0, "if": 0}
 OF_FUNCTION = 20

@@ -12,15 +12,15 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from equations.c_code import indented
-from equations.graph import STILL, Graph, Value, is_number
 from pycparser import c_ast
 
-from plain_c.blocks import WIDTH, Blocks, wrapped
-from plain_c.interpreter import Interpreter
-from plain_c.memory import Array, Pointer, Structure, is_real, is_whole
-from plain_c.text import CTextError, Program, refused
-from rparm.expressions.expression import in_order
+from ..expressions.expression import in_order
+from ..graph.graph import STILL, Graph, Value, is_number
+from ..plain_c.interpreter import Interpreter
+from ..plain_c.memory import Array, Pointer, Structure, is_real, is_whole
+from ..plain_c.text import CTextError, Program, refused
+from .blocks import WIDTH, Blocks, wrapped
+from .c_code import indented
 
 Rates = Callable[[Value], tuple[Value, Value] | None]  # of a leaf; None: it rests
 Place = tuple[str | int, ...]  # a part of an argument, from its name

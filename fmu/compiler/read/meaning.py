@@ -5,9 +5,8 @@ from collections.abc import Collection, Mapping
 from graphlib import CycleError, TopologicalSorter
 
 from declaration.load import shown
-from equations_content import FOLLOWS, OPTIONS, Expression, ModelFile, ModelFileError, placed
 
-from rparm.expressions.expression import (
+from ..expressions.expression import (
     CONSTANTS,
     ExpressionError,
     derivative_of,
@@ -16,9 +15,10 @@ from rparm.expressions.expression import (
     names,
     with_kinds,
 )
-from rparm.expressions.hints import meant
-from rparm.expressions.units import BASE, Unit, times, unit_of, unit_of_exponents
-from rparm.expressions.units import shown as unit_shown
+from ..expressions.hints import meant
+from ..expressions.units import BASE, Unit, times, unit_of, unit_of_exponents
+from ..expressions.units import shown as unit_shown
+from .content import FOLLOWS, OPTIONS, Expression, ModelFile, ModelFileError, placed
 
 SECOND = unit_of_exponents({"s": 1})
 SHORTEST = 1e-12  # s, of periods

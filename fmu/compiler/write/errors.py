@@ -7,11 +7,10 @@ derivatives are 0 or infinite, a function is evaluated at the ends of what its a
 from collections.abc import Sequence
 from itertools import product
 
-from equations_tables import Table
-
-from equations.c_code import Code, Leaves, formula
-from equations.graph import CONDITIONS, Graph, Value
-from rparm.expressions.expression import in_order
+from ..expressions.expression import in_order
+from ..graph.graph import CONDITIONS, Graph, Value
+from ..graph.tables import Table
+from .c_code import Code, Leaves, formula
 
 NONE = "0.0"
 ROUNDING = "DBL_EPSILON"  # of an operation and of a function, over its result

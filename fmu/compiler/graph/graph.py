@@ -15,9 +15,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 
-from equations_tables import FAR, Table
-
-from rparm.expressions.expression import RELATIONS, Node, in_order, parse
+from ..expressions.expression import RELATIONS, Node, in_order, parse
+from .tables import FAR, Table
 
 ENDS = ("bounds", "ends")  # arrays of a table: where segments begin and end
 

@@ -4,15 +4,14 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from equations_content import OPTIONS, ModelFile
-
-from equations.band import band
-from equations.c_code import Code, declared, filled, indented, number, shortened, text
-from equations.c_events import Events, arrays, leaves, ticks
-from equations.c_series import Series
-from equations.graph import FALLIBLE, Value, is_number
-from equations.rolled import rolled
-from rparm.expressions.expression import in_order
+from ..expressions.expression import in_order
+from ..graph.band import band
+from ..graph.graph import FALLIBLE, Value, is_number
+from ..read.content import OPTIONS, ModelFile
+from .c_code import Code, declared, filled, indented, number, shortened, text
+from .c_events import Events, arrays, leaves, ticks
+from .c_series import Series
+from .rolled import rolled
 
 STRUCTURE = "struct equations_values"
 SYMBOL = "equations_model"

@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 
-from rparm.expressions.expression import (
+from .expression import (
     EQUALITIES,
     RELATIONS,
     ExpressionError,

@@ -4,8 +4,11 @@ import math
 from collections.abc import Iterable
 from pathlib import Path
 
-import equations_file
-from equations_content import (
+from ..expressions.expression import CONDITION, RELATIONS, Node, derivative_of, written
+from ..graph.graph import Graph
+from ..names import Fields
+from . import file as file_reader
+from .content import (
     COUNTS,
     OPTIONS,
     SWITCHES,
@@ -14,10 +17,6 @@ from equations_content import (
     ModelFileError,
     placed,
 )
-
-from equations.c_code import Fields
-from equations.graph import Graph
-from rparm.expressions.expression import CONDITION, RELATIONS, Node, derivative_of, written
 
 __all__ = ["ModelFile", "ModelFileError", "read"]
 LEAVES = {
@@ -33,7 +32,7 @@ LEAVES = {
 
 def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     """Read and check a file for values of its expressions; ModelFileError if something is wrong."""
-    file = equations_file.read(path, solver_names)
+    file = file_reader.read(path, solver_names)
     # without states nothing is integrated: outputs follow at once
     has_switches = bool(file.of("states") or file.events)
     graph = file.graph = Graph(tables=file.tables, has_switches=has_switches)
@@ -53,7 +52,7 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     # right sides last: their conditions are switches of others
     for expression in sorted(file.order, key=lambda expression: expression.event == "then"):
         tree = expression.tree
-        with equations_file.located(path, file.text), placed(*expression.place):
+        with file_reader.located(path, file.text), placed(*expression.place):
             if expression.event == "when" and tree.op in RELATIONS:
                 sides = [graph.of_tree(side, known) for side in tree.arguments]
                 expression.value = graph.switch(tree.op, *sides)

@@ -8,7 +8,18 @@ from collections.abc import Callable, Collection
 from typing import Any
 
 from declaration.load import shown
-from equations_content import (
+
+from ..expressions.expression import (
+    CONDITION,
+    FUNCTIONS,
+    FURTHER,
+    NO_NAMES,
+    WHOLE,
+    Kind,
+    finite_number,
+)
+from ..expressions.units import ANGLE, BASE
+from .content import (
     BOOLEAN,
     COUNTS,
     FOLLOWS,
@@ -19,17 +30,6 @@ from equations_content import (
     instead_of,
     placed,
 )
-
-from rparm.expressions.expression import (
-    CONDITION,
-    FUNCTIONS,
-    FURTHER,
-    NO_NAMES,
-    WHOLE,
-    Kind,
-    finite_number,
-)
-from rparm.expressions.units import ANGLE, BASE
 
 MOST_ENTRIES = 1000
 MOST_SIZE = 20_000

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from equations.graph import Value
 from pycparser import c_ast
 
-from plain_c.expressions import Expressions
-from plain_c.memory import UNSET, VOID, Array, LeafOf, Pointer, Scope, State, Structure
-from plain_c.text import CTextError, check_function, refused, walk
+from ..graph.graph import Value
+from .expressions import Expressions
+from .memory import UNSET, VOID, Array, LeafOf, Pointer, Scope, State, Structure
+from .text import CTextError, check_function, refused, walk
 
 CELLS = 16  # variables that are copied in a step
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from equations.graph import Graph, Value, is_number
+from ..graph.graph import Graph, Value, is_number
 
 RELATION = {
     "==": lambda a, b: a == b,

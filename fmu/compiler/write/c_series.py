@@ -11,8 +11,8 @@ from collections.abc import Iterable, Mapping
 from functools import partial, reduce
 from itertools import combinations, groupby
 
-from equations.c_code import Code, Leaves, formula, indented
-from equations.graph import (
+from ..expressions.expression import in_order
+from ..graph.graph import (
     CONDITIONS,
     DERIVATIVES,
     GROWING,
@@ -23,8 +23,8 @@ from equations.graph import (
     unsigned,
     with_partials,
 )
-from equations.rolled import SHORTEST, rolled
-from rparm.expressions.expression import in_order
+from .c_code import Code, Leaves, formula, indented
+from .rolled import SHORTEST, rolled
 
 FACTORS = re.compile(r"row\[(\d+)\]\[i( - 1|)\] \* row\[(\d+)\]\[k - i\]")
 FEWEST_IN_PAIRS = 4  # sums of a series that gains by adding up two at once

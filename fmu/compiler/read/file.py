@@ -12,12 +12,25 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import equations_code
-import equations_keys as keys
-import equations_tables
 from declaration.load import shown
-from equations_arrays import FOR, elements, every, target
-from equations_content import (
+
+from ..expressions.expression import (
+    CONDITION,
+    CONSTANTS,
+    NUMBER,
+    WHOLE,
+    ExpressionError,
+    Function,
+    Lookup,
+    in_order,
+    with_kinds,
+)
+from ..expressions.units import ANGLE, BASE, Measure, table_unit, unit_of, unit_of_exponents
+from ..graph.tables import read as table_of
+from . import keys
+from .arrays import FOR, elements, every, target
+from .code import read as read_code
+from .content import (
     BOOLEAN,
     COUNTS,
     FOLLOWS,
@@ -31,20 +44,7 @@ from equations_content import (
     Variable,
     placed,
 )
-from equations_meaning import check
-
-from rparm.expressions.expression import (
-    CONDITION,
-    CONSTANTS,
-    NUMBER,
-    WHOLE,
-    ExpressionError,
-    Function,
-    Lookup,
-    in_order,
-    with_kinds,
-)
-from rparm.expressions.units import ANGLE, BASE, Measure, table_unit, unit_of, unit_of_exponents
+from .meaning import check
 
 LARGEST = 10**6  # bytes
 MOST_VARIABLES = 20_000
@@ -105,7 +105,7 @@ def read_tables(
         _read_table(file, name, entry)
     if "code" in head:
         with placed("code"):
-            file.code = equations_code.read(path.parent / head["code"])
+            file.code = read_code(path.parent / head["code"])
             for name, function in file.code.functions.items():
                 if function.is_helper and name in keys.TAKEN:
                     continue
@@ -189,7 +189,7 @@ def _read_table(file: ModelFile, name: str, entry: object) -> None:
             measures[key] = file.measured(units[key])
             axis = "" if key == columns[-1] else columns.index(key)
             file.table_units[table_unit(name, axis)] = measures[key].exponents
-        file.tables[name] = equations_tables.read(name, given, file.path.parent, measures)
+        file.tables[name] = table_of(name, given, file.path.parent, measures)
         file.functions[name] = Lookup(name, arguments)
 
 

@@ -7,14 +7,14 @@ from typing import Any
 
 from declaration.load import UNITS
 from declaration.load import read as read_declaration
-from equations_content import COUNTS, FOLLOWS, OPTIONS, SWITCHES, ModelFile, Variable, placed
-from equations_keys import NUMBERS
 
-from equations import c_events, c_model
-from equations.c_events import INDICATOR
-from equations.graph import MOVING, Relation, Value
-from rparm.expressions.expression import CONDITION, WHOLE, in_order
-from rparm.expressions.units import shown
+from ..expressions.expression import CONDITION, WHOLE, in_order
+from ..expressions.units import shown
+from ..graph.graph import MOVING, Relation, Value
+from ..read.content import COUNTS, FOLLOWS, OPTIONS, SWITCHES, ModelFile, Variable, placed
+from ..read.keys import NUMBERS
+from . import c_events, c_model
+from .c_events import INDICATOR
 
 INSTANCE = UNITS.parents[2] / "src" / "instance"
 TIME = INSTANCE / "time_variable.toml"

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from equations.graph import Graph, Value
 from pycparser import c_ast
 
-from plain_c.text import NO_TYPES, Program, refused
-from plain_c.values import Choice, Conditions, Known, Table
+from ..graph.graph import Graph, Value
+from .text import NO_TYPES, Program, refused
+from .values import Choice, Conditions, Known, Table
 
 REAL, DOUBLE, INT, BOOL, VOID = "real", "double", "int", "bool", "void"
 NAMES = {"double": DOUBLE, "int": INT, "_Bool": BOOL, "void": VOID}

@@ -6,14 +6,12 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from itertools import groupby
 from pathlib import Path
 
-from equations_content import Expression
-from equations_tables import Table
-
-from equations.graph import CONDITIONS, LEAVES, MOST_COUNTED, Value
-from rparm.expressions.expression import RELATIONS, in_order, written
+from ..expressions.expression import RELATIONS, in_order, written
+from ..graph.graph import CONDITIONS, LEAVES, MOST_COUNTED, Value
+from ..graph.tables import Table
+from ..read.content import Expression
 
 # operations as C writes them; a function is written as its call
 FORMULAS = {op: f"{{}} {op} {{}}" for op in ("+", "-", "*", "/", "==", *RELATIONS)}
@@ -22,37 +20,6 @@ FORMULAS |= {"negative": "-{}", "if": "{} ? {} : {}", "hypot": "slopes_hypot({},
 
 LONGEST = 200  # characters of a text with indexes
 Leaves = Mapping[tuple[str, str], str]  # where C has a leaf, by its operation and name
-
-
-def c_name(prefix: str, name: str) -> str:
-    """Return the name in C of a variable or of an element, which no other has with the prefix."""
-    base, *indexes = re.findall(r"\w+", name)
-    return "_".join([f"{prefix}{len(indexes) or ''}", base, *indexes])
-
-
-class Fields:
-    """Names in C of variables: elements of one array that follow each other share an array of C."""
-
-    def __init__(self, sections: Iterable[Iterable[str]]) -> None:
-        self.suffixes: dict[str, str] = {}
-        for names in sections:
-            for base, run in groupby(names, lambda name: name.partition("[")[0]):
-                elements = [*run]
-                for i, name in enumerate(elements):
-                    place = f"[{i}]" if "[" in name else ""
-                    self.suffixes[name] = c_name("", elements[0] if place else base) + place
-
-    def value(self, name: str) -> str:
-        """A number."""
-        return f"v{self.suffixes[name]}"
-
-    def count(self, name: str) -> str:
-        """A condition, whole number or enumeration."""
-        return f"m{self.suffixes[name]}"
-
-    def rate(self, name: str) -> str:
-        """The derivative of a state."""
-        return f"d{self.suffixes[name]}"
 
 
 def declared(c_type: str, fields: Iterable[str]) -> list[str]:

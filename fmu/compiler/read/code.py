@@ -11,14 +11,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from equations.graph import DERIVATIVES, Graph, Value
-from plain_c.expressions import ROUNDING
-from plain_c.interpreter import Interpreter
-from plain_c.memory import DOUBLE, is_real
-from plain_c.text import CTextError, Program, check_function, parsed, refused, without_comments
 from pycparser import c_ast
 
-from rparm.expressions.expression import RELATIONS, ExpressionError, Lookup, Node, in_order, parse
+from ..expressions.expression import RELATIONS, ExpressionError, Lookup, Node, in_order, parse
+from ..graph.graph import DERIVATIVES, Graph, Value
+from ..plain_c.expressions import ROUNDING
+from ..plain_c.interpreter import Interpreter
+from ..plain_c.memory import DOUBLE, is_real
+from ..plain_c.text import CTextError, Program, check_function, parsed, refused, without_comments
 
 LARGEST_FILE = 200_000  # bytes
 MOST_OPERATIONS = 10_000  # that a call stands for

@@ -5,10 +5,11 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from equations.graph import DERIVATIVES, Graph, Value
 from pycparser import c_ast
 
-from plain_c.memory import (
+from ..expressions.expression import RELATIONS, in_order
+from ..graph.graph import DERIVATIVES, Graph, Value
+from .memory import (
     BOOL,
     DOUBLE,
     INT,
@@ -25,9 +26,8 @@ from plain_c.memory import (
     is_real,
     is_whole,
 )
-from plain_c.text import CTextError, Program, refused, walk
-from plain_c.values import RELATION, Known
-from rparm.expressions.expression import RELATIONS, in_order
+from .text import CTextError, Program, refused, walk
+from .values import RELATION, Known
 
 BUILT_IN = ("fabs", "abs", "value_of", "moving_as")
 ROUNDING = ("ceil", "floor", "trunc", "round")  # of what has no derivatives

@@ -13,7 +13,7 @@ from functools import cached_property, reduce
 from operator import attrgetter
 from typing import Any, TypeVar
 
-from rparm.expressions.hints import SIGNS, meant
+from .hints import SIGNS, meant
 
 # functions, with the number of their arguments; None: two or more
 FUNCTIONS: dict[str, int | None] = dict.fromkeys(

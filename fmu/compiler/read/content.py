@@ -11,10 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from declaration.load import shown
-from equations_code import CodeFile
-from equations_tables import Table
 
-from rparm.expressions.expression import (
+from ..expressions.expression import (
     CONDITION,
     NUMBER,
     ExpressionError,
@@ -26,7 +24,9 @@ from rparm.expressions.expression import (
     in_order,
     parse,
 )
-from rparm.expressions.units import Measure, measured
+from ..expressions.units import Measure, measured
+from ..graph.tables import Table
+from .code import CodeFile
 
 FOLLOWS = "calculated"  # section of parameters that follow from others
 # of parameters, inputs and discrete variables that are no real numbers

@@ -14,8 +14,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, TextIO
 
-from rparm.expressions.expression import finite_number
-from rparm.expressions.units import Measure
+from ..expressions.expression import finite_number
+from ..expressions.units import Measure
 
 LARGEST_FILE = 50_000_000  # bytes
 SEPARATORS = ",;\t"  # of columns; between others than commas, a comma may be a decimal point

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping
 from itertools import groupby
 
 from declaration.load import shown
-from equations_content import Element, ModelFile, ModelFileError, placed
 
-from rparm.expressions.expression import ExpressionError, Node, at_indexes, parse, parse_ranges
+from ..expressions.expression import ExpressionError, Node, at_indexes, parse, parse_ranges
+from .content import Element, ModelFile, ModelFileError, placed
 
 FOR = "for"
 MOST_ELEMENTS = 20_000

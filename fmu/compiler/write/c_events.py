@@ -10,12 +10,13 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from equations_content import COUNTS, SWITCHES, Change, ModelFile, Sampler
-
-from equations.c_code import (
+from ..expressions.expression import CONDITION, WHOLE, Kind, in_order
+from ..graph.graph import MOVING, Graph, Relation, Value, is_unknown
+from ..names import c_name
+from ..read.content import COUNTS, SWITCHES, Change, ModelFile, Sampler
+from .c_code import (
     Code,
     Leaves,
-    c_name,
     declared,
     filled,
     indented,
@@ -23,10 +24,8 @@ from equations.c_code import (
     shortened,
     text,
 )
-from equations.errors import NONE, Errors
-from equations.graph import MOVING, Graph, Relation, Value, is_unknown
-from equations.rolled import rolled
-from rparm.expressions.expression import CONDITION, WHOLE, Kind, in_order
+from .errors import NONE, Errors
+from .rolled import rolled
 
 Guards = dict[Value, Value | None]  # conditions; None: always
 

@@ -1,0 +1,14 @@
+"""Makes a model in C of one file with its equations: read, one graph, write.
+
+A folder or module imports only from lines above its own:
+
+    expressions   what users write, and units
+    graph         operations on values and conditions, and their derivatives; tables
+    names         names in C of the variables of a file
+    plain_c       interprets functions in plain C, as values of a graph
+    read          a file with equations, checked, and its graph
+    write         C, declaration, page and lock file of a model
+    schema        by which editors check files
+
+The C that all models of files share is in the files *.in of write.
+"""

@@ -1,0 +1,177 @@
+"""The JSON Schema of files with equations, by which editors complete and check them.
+
+It is made of the tables by which files are read, and refuses what does not depend on the meaning of
+texts: `rparm build` checks expressions, units and where names are defined.
+"""
+
+import re
+import sys
+from collections.abc import Collection, Iterable
+from pathlib import Path
+from typing import Any
+
+from .expressions.expression import LONGEST
+from .expressions.units import ANGLE, BASE
+from .graph.tables import INTERPOLATIONS, OUTSIDE
+from .read import keys as reader
+from .read.arrays import FOR
+from .read.content import BOOLEAN, FOLLOWS, INTEGER, SWITCHES
+from .write import declaration
+
+Schema = dict[str, Any]
+PAGE = Path(__file__).parents[2] / "examples" / "models" / "README.md"
+NAME = f"^{reader.NAME.pattern}$"
+WITH_INDEXES = rf"{NAME}|^\s*{reader.NAME.pattern}\s*\[.+\]\s*$"
+# without surrogates, which TOML has not, and not all readers of patterns
+PLAIN = "^[^" + reader.CONTROL.pattern[1:].replace(r"\ud800-\udfff", "") + "*$"
+EXPRESSION_PATTERN = r"""^[\sA-Za-z0-9_.,+\-*/<>=!()\[\]"']+$"""
+LARGEST, LARGEST_INTEGER = sys.float_info.max, reader.LARGEST_INTEGER
+DEFINITIONS: dict[str, Schema] = {
+    "number": {"type": "number", "minimum": -LARGEST, "maximum": LARGEST},
+    "whole": {"type": "integer", "minimum": -LARGEST_INTEGER, "maximum": LARGEST_INTEGER},
+    "text": {"type": "string", "maxLength": reader.LONGEST_TEXT, "pattern": PLAIN},
+    "expression": {"type": "string", "maxLength": LONGEST, "pattern": EXPRESSION_PATTERN},
+}
+NUMBER, WHOLE, TEXT, EXPRESSION = ({"$ref": f"#/$defs/{name}"} for name in DEFINITIONS)
+ABOVE_0 = NUMBER | {"exclusiveMinimum": 0}
+TRUTH = {"type": "boolean"}
+WORD = {"type": "string", "pattern": NAME}
+ITEMS = {"type": "array", "items": WORD, "minItems": 1, "uniqueItems": True}
+ROWS = {"type": "array", "items": NUMBER, "minItems": 2}
+KEYS: dict[str, Schema] = {  # start: by the type
+    **dict.fromkeys(("min", "max"), NUMBER),
+    **dict.fromkeys(("unit", "description", "file"), TEXT),
+    **dict.fromkeys(("x", "y"), {"anyOf": [ROWS, TEXT]}),  # lists, or columns of the file
+    **dict.fromkeys(("reinit", "set"), {"type": "object", "additionalProperties": EXPRESSION}),
+    **dict.fromkeys(("derivative", "value", "when", "while", "every", "offset", FOR), EXPRESSION),
+    "nominal": ABOVE_0,
+    "start": {},
+    "type": {"anyOf": [{"enum": [BOOLEAN, INTEGER]}, ITEMS]},
+    "z": {"type": "array", "items": ROWS, "minItems": 2},
+    "interpolation": {"enum": INTERPOLATIONS},
+    "outside": {"enum": OUTSIDE},
+}
+
+
+def schema() -> Schema:
+    """Return the schema, with descriptions from the page."""
+    names = "|".join(sorted({*reader.RESERVED, *declaration.solver_names()}))
+    named = {"not": {"pattern": rf"^\s*({names})\s*(\[|$)|^der_"}}
+    rows = re.findall(r"^\| `\[?(\w+)[^|]*\| (.*) \|$", PAGE.read_text("utf-8"), re.MULTILINE)
+    about = {key: re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", text) for key, text in rows}
+    properties = _further(named)
+    properties |= {section: _by_name(_entry(section), named) for section in reader.SECTIONS}
+    found = {key: {"description": about.get(key, key)} | properties[key] for key in reader.HEAD}
+    some = [
+        {"required": [section], "properties": {section: {"minProperties": 1}}}
+        for section in reader.SECTIONS
+    ]
+    dialect = "https://json-schema.org/draft/2020-12/schema"
+    head = {"$schema": dialect, "title": "File with equations", "$defs": DEFINITIONS}
+    with_value = {"functions": {"additionalProperties": {"required": ["value"]}}}
+    only_in_c = {"if": {"not": {"required": ["code"]}}, "then": {"properties": with_value}}
+    return head | _table(found, "name") | {"anyOf": some} | only_in_c
+
+
+def _further(named: Schema) -> dict[str, Schema]:
+    """Return the schemas of all keys at the top but the sections of variables."""
+    device = re.sub("[a-z](?!-)", lambda x: f"[{x[0]}{x[0].upper()}]", reader.DEVICE.pattern[4:-1])
+    experiment = {key: ABOVE_0 | {"default": value} for key, value in reader.EXPERIMENT.items()}
+    experiment["tolerance"] |= {"exclusiveMaximum": 1}
+    mode = {"type": "string", "pattern": WITH_INDEXES, **named}
+    modes = {"anyOf": [TRUTH, _table({"start": _start(TRUTH), FOR: EXPRESSION}, "start")]}
+    unit = _table(dict.fromkeys((*BASE, ANGLE), {"type": "integer", "minimum": -99, "maximum": 99}))
+    size = {"type": "integer", "minimum": 0, "maximum": reader.MOST_SIZE}
+    of_functions = {"not": {"enum": sorted(reader.TAKEN)}}
+    arguments = ITEMS | {"items": WORD | {"not": {"enum": sorted(reader.RESERVED)}}}
+    with_units = {"type": "object", "additionalProperties": TEXT}
+    of_function = {"arguments": {"anyOf": [arguments, with_units]}, "unit": TEXT}
+    function = _table(of_function | {"value": EXPRESSION})
+    check = {"propertyNames": {"maxLength": reader.LONGEST_MESSAGE, "pattern": PLAIN}}
+    check["additionalProperties"] = {"anyOf": [EXPRESSION, _keys(["value"], "value")]}
+    return {
+        "name": WORD | {"not": {"pattern": f"^({device})$"}},
+        "description": TEXT,
+        "experiment": _table(experiment),
+        "modes": {
+            "anyOf": [_by_name(modes, named), {"type": "array", "items": mode, "uniqueItems": True}]
+        },
+        "code": TEXT | {"pattern": f"^{reader.CODE.pattern}$"},
+        "sizes": _by_name(size, named, has_indexes=False),
+        "units": {"type": "object", "additionalProperties": unit},
+        "tables": _by_name(_data(), of_functions, has_indexes=False),
+        "functions": _by_name(function, of_functions, has_indexes=False),
+        "sampled": _by_name(_change(reader.SAMPLER), named),
+        "events": _by_name(_change(reader.EVENT), named),
+        "check": {"type": "object"} | check,
+    }
+
+
+def _table(properties: dict[str, Schema], *needed: str) -> Schema:
+    found = {"type": "object", "properties": properties, "additionalProperties": False}
+    return found | {"required": [*needed]}
+
+
+def _keys(keys: Iterable[str], *needed: str) -> Schema:
+    """Return the schema of an entry with these keys, which may have indexes."""
+    return _table({key: KEYS[key] for key in (*keys, FOR)}, *needed)
+
+
+def _by_name(entry: Schema, named: Schema, has_indexes: bool = True) -> Schema:
+    """Return the schema of a table of entries."""
+    without = {"properties": {FOR: False, "start": {"not": {"type": "array"}}}}
+    patterns = {WITH_INDEXES: entry, NAME: without} if has_indexes else {NAME: entry}
+    found = {"type": "object", "propertyNames": named, "patternProperties": patterns}
+    return found | {"additionalProperties": False, "maxProperties": reader.MOST_ENTRIES}
+
+
+def _start(*values: Schema) -> Schema:
+    """Return the schema of a start value, or of one for each index, or of lists by an index."""
+    return {"anyOf": [*values, {"type": "array", "items": {"anyOf": [*values, {"type": "array"}]}}]}
+
+
+def _entry(section: str) -> Schema:
+    """Return the schema of an entry of a section of variables; its keys depend on its type."""
+    keys, needed = reader.SECTIONS[section]
+    follows = [EXPRESSION] if section in ("states", "discrete") else []
+    plain = [key for key in keys if key != "type"]
+    given = {"start": _start(NUMBER, *follows)} if "start" in keys else {}
+    kinds: list[tuple[Collection[str], str, Schema]] = [(plain, needed, given)]
+    if section == "parameters":
+        kinds.append((*reader.OWN_KEYS[FOLLOWS], {}))
+    if section in reader.NOT_REAL:
+        keys, needed = reader.OWN_KEYS[reader.NOT_REAL[section]]
+        unordered = [key for key in keys if key not in ("min", "max")]
+        start = _start(TRUTH, *follows)
+        kinds.append((unordered, needed, {"type": {"const": BOOLEAN}, "start": start}))
+        if reader.NOT_REAL[section] != SWITCHES:
+            whole = {"min": WHOLE, "max": WHOLE, "start": _start(WHOLE, *follows)}
+            kinds.append((keys, needed, {"type": {"const": INTEGER}} | whole))
+            kinds.append((unordered, needed, {"type": ITEMS, "start": _start({"type": "string"})}))
+    known = [*dict.fromkeys(key for keys, *_ in kinds for key in keys)]
+    found = _keys(known) | {"anyOf": []}
+    for keys, needed, own in kinds:
+        others = dict.fromkeys([key for key in known if key not in keys], False)
+        required = [key for key in (needed, "type" if "type" in own else "") if key]
+        found["anyOf"].append({"properties": others | own, "required": required})
+    return {"anyOf": [EXPRESSION, found]} if section == "where" else found
+
+
+def _data() -> Schema:
+    """Return the schema of a table of [tables]: two columns of a file, two lists, or a grid."""
+    found = _table({key: KEYS[key] for key in reader.TABLE})
+    found["properties"]["unit"] = _table(dict.fromkeys("xyz", TEXT))
+    lists, grid = {"x": ROWS, "y": ROWS, "file": False}, {"interpolation": {"const": "linear"}}
+    found["anyOf"] = [
+        {"properties": {"x": TEXT, "y": TEXT, "z": False}, "required": ["x", "y", "file"]},
+        {"properties": lists | {"z": False}, "required": ["x", "y"]},
+        {"properties": lists | grid, "required": ["x", "y", "z"]},
+    ]
+    return found
+
+
+def _change(keys: tuple[str, ...]) -> Schema:
+    """Return the schema of an event or sampler, which needs the first of its keys and an effect."""
+    some = {"minProperties": 1}
+    effects = [{"required": [key], "properties": {key: some}} for key in ("set", "reinit")]
+    return _keys(keys, keys[0]) | {"anyOf": effects}
