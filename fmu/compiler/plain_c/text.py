@@ -1,11 +1,11 @@
 """Plain C of equations as syntax trees, and what is refused of it before it is interpreted.
 
-A small preprocessor reads include guards and `#include "name.h"`; pycparser reads the rest. The
+A small preprocessor reads include guards and `#include`; pycparser reads the rest. The
 rules that users read are in models/README.md.
 """
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,12 @@ from pycparser.c_parser import CParser, ParseError
 # nothing of them is read: sin, bool and others are known
 SYSTEM_HEADERS = ("math.h", "stdbool.h", "stddef.h", "stdlib.h")
 PRELUDE = "typedef _Bool bool;\ntypedef unsigned long size_t;\n"
+LARGEST_TEXT = 200_000  # bytes of a file and all that it includes
 DIRECTIVE = re.compile(r"\s*#\s*(\w*)\s*(.*?)\s*$")
+NO_LINES = {  # of C, and what to write instead
+    r"(%:|\?\?=|(.*\W)?_Pragma\b).*": "of directives, only #include and include guards are read",
+    r"(.*\W)?(__)?asm(__)?\b.*": "assembly is not read: write the equation in C",
+}
 # a comment or a string, perhaps without an end: nothing is looked at twice
 COMMENT = re.compile(r"//[^\n]*|/\*.*?(?:\*/|\Z)|\"(?:\\.|[^\"\\\n])*\"?", re.DOTALL)
 LONGEST_WORD = 30  # characters in a message
@@ -71,35 +76,59 @@ class Program:
 
 # ---- Preprocessor --------------------------------------------------------------------------------
 class Preprocessor:
-    """The text of files with all that they include, with marks where each line is from."""
+    """The text of a file with all that it includes, with marks where each line is from.
 
-    def __init__(self, folders: Iterable[Path], ignored: Iterable[str]) -> None:
-        self.folders, self.ignored = list(folders), {*ignored, *SYSTEM_HEADERS}
+    `made` gives the text of a header that is made, or None; it is asked before the file is read.
+    """
+
+    def __init__(
+        self,
+        made: Callable[[Path], str | None],
+        folders: Iterable[Path] = (),
+        ignored: Iterable[str] = (),
+    ) -> None:
+        self.made, self.folders, self.ignored = made, list(folders), {*ignored}
         self.defined: set[str] = set()
         self.files: list[Path] = []
         self.lines: list[str] = []
+        self.room = LARGEST_TEXT
 
-    def add(self, path: Path, shown: str = "") -> None:
+    def add(self, path: Path, shown: str) -> None:
         """Add a file; shown: its name in messages."""
-        shown = shown or path.name
-        try:
-            text = path.read_text(encoding="utf-8")
-        except OSError as error:
-            raise CTextError(f"{path}: cannot be read: {error.strerror}") from None
-        except UnicodeDecodeError:
-            raise CTextError(f"{path}: is not UTF-8") from None
         self.files.append(path)
         self.lines.append(f'# 1 "{shown}"')
         skipping: list[bool] = []  # of each #ifndef that is open
+        text = self.made(path)
+        text = self.content(path, shown) if text is None else text
         for number, line in enumerate(without_comments(text, shown).split("\n"), 1):
+            place = f"{shown}:{number}"
             found = DIRECTIVE.match(line)
             if found is None:
+                for pattern, reason in NO_LINES.items():
+                    if re.fullmatch(pattern, line.strip()):
+                        raise CTextError(f"{place}: {reason}")
                 self.lines.append("" if any(skipping) else line)
                 continue
-            self.directive(found[1], found[2], skipping, path, f"{shown}:{number}")
+            self.directive(found[1], found[2], skipping, path, place)
             self.lines.append(f'# {number + 1} "{shown}"')
         if skipping:
-            raise CTextError(f"{shown}:{number}: #ifndef without #endif")
+            raise CTextError(f"{place}: #ifndef without #endif")
+
+    def content(self, path: Path, shown: str) -> str:
+        """Read a file."""
+        try:
+            if not path.is_file():
+                raise CTextError(f"{shown}: no such file")
+            content = path.read_bytes() if path.stat().st_size <= self.room else b""
+            if not content:
+                raise CTextError(f"{shown}: is empty, or has more than {LARGEST_TEXT} bytes")
+            self.room -= len(content)
+            return content.decode("utf-8-sig").replace("\r\n", "\n")
+        except UnicodeDecodeError as error:
+            line = content.count(b"\n", 0, error.start) + 1
+            raise CTextError(f"{shown}:{line}: is not UTF-8: save it in this encoding") from None
+        except OSError as error:
+            raise CTextError(f"{shown}: cannot be read: {error.strerror}") from None
 
     def directive(self, name: str, rest: str, skipping: list[bool], path: Path, place: str) -> None:
         """Read a line that begins with #."""
@@ -107,34 +136,35 @@ class Preprocessor:
             skipping.append(rest in self.defined)
         elif name == "endif" and skipping:
             skipping.pop()
-        elif any(skipping) or name in ("", "pragma"):
+        elif any(skipping) or (name == "pragma" and rest == "once"):
             pass
         elif name == "define" and rest.isidentifier():
             self.defined.add(rest)
         elif name == "define":
-            what = rest.split()[0] if rest else "it"
             raise CTextError(
-                f"{place}: macros with values are not read: write an enum for a whole number, or "
-                f"static const double {what.partition('(')[0]} = ..."
+                f"{place}: macros are not read: write static const double NAME = ... or a "
+                "function, and an enum for a whole number"
             )
-        elif name == "include":
-            self.include(rest, path, place)
+        elif name == "include" and (header := re.fullmatch(r'<([^<>]+)>|"([^"]+)"', rest)):
+            self.include(*header.groups(), path, place)
         else:
-            raise CTextError(f"{place}: #{name} is not read: only include guards and #include are")
+            raise CTextError(f"{place}: of directives, only #include and include guards are read")
 
-    def include(self, rest: str, path: Path, place: str) -> None:
-        name = rest[1:-1]
-        if name in self.ignored:
+    def include(self, system: str | None, own: str | None, path: Path, place: str) -> None:
+        """Add an included file, once."""
+        if (system or own) in (*self.ignored, *SYSTEM_HEADERS):
             return
-        if rest.startswith('"'):
-            for folder in (path.parent, *self.folders):
-                header = folder / name
-                if header.is_file():
-                    if header.resolve() not in [file.resolve() for file in self.files]:
-                        self.add(header, name)
-                    return
-            raise CTextError(f"{place}: {name} is not there")
-        raise CTextError(f"{place}: <{name}> is not read: <math.h> and <stdbool.h> are enough")
+        if own is None:
+            raise CTextError(
+                f"{place}: <{system}> is not read: <math.h> and <stdbool.h> are enough"
+            )
+        for folder in (path.parent, *self.folders):
+            header = folder / own
+            if header.is_file() or self.made(header) is not None:
+                if header.resolve() not in [file.resolve() for file in self.files]:
+                    self.add(header, own)
+                return
+        raise CTextError(f"{place}: {own}: no such file")
 
 
 def without_comments(text: str, shown: str) -> str:
@@ -155,10 +185,15 @@ def _joined(found: re.Match[str]) -> str:
 
 
 # ---- Parser --------------------------------------------------------------------------------------
-def read(path: Path, folders: Iterable[Path] = (), ignored: Iterable[str] = ()) -> Program:
+def read(
+    path: Path,
+    folders: Iterable[Path] = (),
+    ignored: Iterable[str] = (),
+    made: Callable[[Path], str | None] = lambda _: None,
+) -> Program:
     """Read the declarations of a file, with includes from `folders` but for `ignored` headers."""
-    preprocessor = Preprocessor(folders, ignored)
-    preprocessor.add(path)
+    preprocessor = Preprocessor(made, folders, ignored)
+    preprocessor.add(path, path.name)
     return parsed("\n".join(preprocessor.lines), preprocessor.files)
 
 

@@ -4,7 +4,8 @@ Nothing of it is compiled or run: plain_c interprets it, and what a call calcula
 of the graph, as if it stood in the expression. Every mistake is a ValueError, in one line.
 """
 
-import re
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -17,21 +18,13 @@ from ..expressions.expression import RELATIONS, ExpressionError, Lookup, Node, i
 from ..graph.graph import DERIVATIVES, Graph, Value
 from ..plain_c.expressions import ROUNDING
 from ..plain_c.interpreter import Interpreter
-from ..plain_c.memory import DOUBLE, is_real
-from ..plain_c.text import CTextError, Program, check_function, parsed, refused, without_comments
+from ..plain_c.memory import DOUBLE, LeafOf, is_real
+from ..plain_c.text import CTextError, Program, check_function, refused
+from ..plain_c.text import read as read_c
 
-LARGEST_FILE = 200_000  # bytes
 MOST_OPERATIONS = 10_000  # that a call stands for
 MOST_STEPS, MOST_STEPS_IN_ALL = 100_000, 500_000  # of the interpreter in a call, and in all
 MOST_RELATIONS = 1000  # of values that move, in the whole model
-HEADERS = "#include <math.h> and <stdbool.h>"
-NO_LINES = {  # of C, and what to write instead
-    r"#\s*include\s*<(math|stdbool)\.h>\s*": "",
-    r"#\s*include\b.*": f"only {HEADERS} are read: put all functions into this file",
-    r"#\s*define\b.*": "macros are not read: write static const double NAME = ... or a function",
-    r"(%:|\?\?=|#|(.*\W)?_Pragma\b).*": f"of directives, only {HEADERS} are read",
-    r"(.*\W)?(__)?asm(__)?\b.*": "assembly is not read: write the equation in C",
-}
 # functions of math.h that are no operations of the graph, as expressions of x and y
 EXPRESSIONS = {
     name: parse(text)
@@ -49,6 +42,7 @@ EXPRESSIONS = {
     }.items()
 }
 ARGUMENTS = {name: len(rules) for name, rules in DERIVATIVES.items()} | {"abs": 1}
+OF_REAL = {"value_of": 1, "moving_as": 2}  # of models/real.h
 ARGUMENTS |= {name: 1 + (name in ("fmin", "fmax", "hypot", "pow")) for name in EXPRESSIONS}
 
 
@@ -76,65 +70,43 @@ class CodeFile:
     warnings: list[str]
     flat: dict[str, set[str]]  # functions without slope that a function calls
 
-    def called_by(self, graph: Graph) -> Mapping[str, Callable[[list[Value], bool], Value]]:
-        """Return the functions of arguments in a graph, and of whether this is an instant."""
-        calls = Calls(self.program, graph)
-        return {name: partial(calls.result, f) for name, f in self.functions.items()}
+    def calls(self, graph: Graph) -> Calls:
+        """Return the calls of its functions in a graph."""
+        return Calls(self.program, graph)
 
 
-def read(path: Path) -> CodeFile:
-    """Read and check a C file: each function, as far as its arguments do not matter."""
-    program = parsed(_lines(path), [path])
+def read(path: Path, made: Callable[[Path], str | None]) -> CodeFile:
+    """Read and check a C file: each function, as far as its arguments do not matter.
+
+    `made` gives headers that are made.
+    """
+    program = read_c(path, made=made)
     graph = Graph(has_switches=False)
     calls = Calls(program, graph)
     for name, function in program.functions.items():
         check_function(function)
-        if name in ARGUMENTS or name in ROUNDING:
+        is_known = name in calls.known or name in ROUNDING
+        if is_known and not (name in OF_REAL and "real" in program.typedefs):
             reason = f"{name} is a function of math.h: give this one another name"
             raise refused(function.decl, reason)
     found = {name: calls.called(name, f) for name, f in program.functions.items()}
     for function in found.values():
-        if not function.is_helper:
+        if not function.is_helper and function.name not in OF_REAL:
             given = [graph.value("parameter", name=a) for a in function.arguments]
             calls.result(function, given, False)
     warnings = [warning.replace(" warning:", "") for warning in dict.fromkeys(calls.warnings)]
     return CodeFile(program, found, warnings, calls.flat)
 
 
-def _lines(path: Path) -> str:
-    """Return the text without comments and lines for the preprocessor, as the parser reads it."""
-    name = path.name
-    try:
-        if not path.is_file():
-            raise CTextError(f"{name}: no such file")
-        content = path.read_bytes() if path.stat().st_size <= LARGEST_FILE else b""
-        if not content:
-            raise CTextError(f"{name}: is empty, or has more than {LARGEST_FILE} bytes")
-        text = content.decode("utf-8-sig").replace("\r\n", "\n")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise CTextError(f"{name}:{line}: is not UTF-8: save it in this encoding") from None
-    except OSError as error:
-        raise CTextError(f"{name}: cannot be read: {error.strerror}") from None
-    lines = [f'# 1 "{name}"']
-    for number, line in enumerate(without_comments(text, name).split("\n"), 1):
-        for pattern, reason in NO_LINES.items():
-            if re.fullmatch(pattern, line.strip()):
-                if reason:
-                    raise CTextError(f"{name}:{number}: {reason}")
-                line = ""
-        lines.append(line)
-    return "\n".join(lines)
-
-
 class Calls(Interpreter):
     """Calls of functions of a program, as values of a graph."""
 
-    known, most_steps = ARGUMENTS, MOST_STEPS
+    most_steps = MOST_STEPS
 
     def __init__(self, program: Program, graph: Graph) -> None:
         self.warnings: list[str] = []
         super().__init__(program, graph, warn=self.warnings.append)
+        self.known = ARGUMENTS | (OF_REAL if "real" in program.typedefs else {})
         self.conditions.decided = graph.choice
         self.results: dict[tuple[object, ...], Value] = {}
         self.is_instant, self.steps_in_all = False, 0
@@ -170,6 +142,20 @@ class Calls(Interpreter):
                     f"{function.place}: calls take more than {MOST_STEPS_IN_ALL} steps"
                 )
         return self.results[key]
+
+    def written(self, name: str, leaf_of: LeafOf) -> dict[tuple[str | int, ...], Any]:
+        """Call a function of a struct; return what it writes, by the paths of fields."""
+        self.is_instant = False
+        self.flat.setdefault(name, set())
+        _, found = self.run(name, leaf_of)
+        self.steps_in_all += self.steps
+        return {place[1:]: value for place, value in found.items()}
+
+    def of(
+        self, functions: Mapping[str, Called]
+    ) -> Mapping[str, Callable[[list[Value], bool], Value]]:
+        """Return the functions of arguments, and of whether this is an instant."""
+        return {name: partial(self.result, function) for name, function in functions.items()}
 
     def relation(self, op: str, a: Value, b: Value, node: c_ast.Node) -> Value:
         """Compare real numbers: at an instant there are no switches."""

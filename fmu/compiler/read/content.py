@@ -182,6 +182,7 @@ class ModelFile:
     functions: dict[str, Function | Lookup] = field(default_factory=dict)
     tables: dict[str, Table] = field(default_factory=dict)
     code: CodeFile | None = None
+    header: Any = None  # of its struct of values, if it has C
     table_units: dict[str, dict[str, int]] = field(default_factory=dict)  # by `table_unit`
     dimensions: dict[str, int] = field(default_factory=dict)  # numbers of indexes, by name
     indexes: set[str] = field(default_factory=set)  # all that `for` gives
@@ -226,6 +227,12 @@ class ModelFile:
     def measured(self, unit: str) -> Measure:
         """Return a unit, which the file or SI has; ValueError if none has it."""
         return self.units[unit] if unit in self.units else measured(unit)
+
+    @property
+    def calculate(self) -> str:
+        """The function of C that writes variables without a value; empty if there is none."""
+        name = f"{self.path.stem}_calculate"
+        return name if self.code and name in self.code.program.functions else ""
 
     @property
     def has_units(self) -> bool:

@@ -6,7 +6,6 @@ line.
 
 import math
 import re
-import tomllib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,12 +21,13 @@ from ..expressions.expression import (
     ExpressionError,
     Function,
     Lookup,
+    Node,
     in_order,
     with_kinds,
 )
 from ..expressions.units import ANGLE, BASE, Measure, table_unit, unit_of, unit_of_exponents
 from ..graph.tables import read as table_of
-from . import keys
+from . import header, keys
 from .arrays import FOR, elements, every, target
 from .code import read as read_code
 from .content import (
@@ -44,9 +44,9 @@ from .content import (
     Variable,
     placed,
 )
+from .include import Source, source_of
 from .meaning import check
 
-LARGEST = 10**6  # bytes
 MOST_VARIABLES = 20_000
 
 
@@ -55,34 +55,10 @@ def _named(name: str) -> str:
     return name if re.fullmatch(rf"{keys.NAME.pattern}(\[[^]]+\].*)?", name) else shown(name)
 
 
-def tables_of(path: Path) -> tuple[str, dict[str, Any]]:
-    """Read text and tables of a file."""
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise ModelFileError(f"cannot be read: {error.strerror}") from None
-    if len(content) > LARGEST:
-        raise ModelFileError(f"has {len(content)} bytes, expected at most {LARGEST}")
-    try:
-        text = content.decode("utf-8-sig").replace("\r\n", "\n")
-        return text, tomllib.loads(text)
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise ModelFileError(f"line {line}: is not UTF-8: save it in this encoding") from None
-    except tomllib.TOMLDecodeError as error:
-        bare = re.search(r"(?m)^\s*(\w+\[[^]\n]+\])\s*=", text)
-        hint = f'; write "{bare[1]}" in quotes' if bare else ""
-        text = f"is not valid TOML: {' '.join(str(error).split()):.200}{hint}"
-        raise ModelFileError(text) from None
-    except (ValueError, RecursionError):
-        raise ModelFileError("has a number or a table that is too long") from None
-
-
-def read_tables(
-    path: Path, text: str, tables: dict[str, Any], solver_names: Iterable[str]
-) -> ModelFile:
+def read_tables(source: Source, solver_names: Iterable[str]) -> ModelFile:
     """Read the tables, without the meaning of the expressions."""
-    head = keys.entries(tables, keys.HEAD, "name", "section")
+    path, text = source.path, source.text
+    head = keys.entries(source.tables, keys.HEAD, "name", "section")
     if keys.DEVICE.fullmatch(head["name"]):
         raise ModelFileError("name: Windows keeps this name for a device, choose another one")
     with placed("[experiment]"):
@@ -105,7 +81,8 @@ def read_tables(
         _read_table(file, name, entry)
     if "code" in head:
         with placed("code"):
-            file.code = read_code(path.parent / head["code"])
+            file.code = read_code(path.parent / head["code"], header.made)
+            file.header = header.Header(source)
             for name, function in file.code.functions.items():
                 if function.is_helper and name in keys.TAKEN:
                     continue
@@ -268,7 +245,7 @@ def _read_variable(file: ModelFile, section: str, element: Element) -> None:
         entry = element.entry
         if section == "where" and not isinstance(entry, dict):
             entry = {"value": entry}
-        given = keys.entries(entry, *_keys(section, entry))
+        given = keys.entries(entry, *_keys(section, entry, file))
         section = _section(section, given)
         texts = {key: given.pop(key) for key in ("derivative", "value") if key in given}
         _set_start(section, given, texts)
@@ -283,11 +260,18 @@ def _read_variable(file: ModelFile, section: str, element: Element) -> None:
             variable.initial = expression
         else:
             variable.expression = expression
+    if section in header.CALCULATED and not texts:
+        function = f"{file.calculate}: {element.name}"
+        tree = Node("call", 1, name=function)
+        variable.expression = Expression(place, function, tree, variable.kind, element.name)
+        file.table_units[table_unit(function)] = variable.exponents
     file.variables[element.name] = variable
 
 
-def _keys(section: str, entry: object) -> tuple[tuple[str, ...], str]:
+def _keys(section: str, entry: object, file: ModelFile) -> tuple[tuple[str, ...], str]:
     """Return the keys that an entry may have, and the one that it needs."""
+    if section in header.CALCULATED and file.calculate:  # C may write it
+        return keys.SECTIONS[section][0], ""
     if section == "parameters" and isinstance(entry, dict) and "value" in entry:
         return keys.OWN_KEYS[FOLLOWS]
     if section in keys.NOT_REAL and isinstance(entry, dict) and "type" in entry:
@@ -470,9 +454,9 @@ def _hint(variable: Variable | None, is_mode: bool) -> str:
 def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     """Read and check a file for a model that has `solver_names`, too; ModelFileError."""
     with placed(path):
-        text, tables = tables_of(path)
-    with located(path, text):
-        file = read_tables(path, text, tables, solver_names)
+        source = source_of(path)
+    with located(path, source.text):
+        file = read_tables(source, solver_names)
         check(file)
     return file
 

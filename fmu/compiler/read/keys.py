@@ -36,7 +36,7 @@ MOST_SIZE = 20_000
 LONGEST_TEXT = 1000  # characters of a description
 LONGEST_MESSAGE = 500  # bytes: src/instance/settings.c has no room for more
 NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,99}", re.ASCII)
-CODE = re.compile(r'[^\x00-\x1f\\"]+\.c')
+CODE = re.compile(r'[^\x00-\x1f\\"]+\.[ch]')
 # files that Windows cannot have, with any suffix
 DEVICE = re.compile("(?i:con|prn|aux|nul|com[1-9]|lpt[1-9])")
 CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
@@ -60,7 +60,7 @@ OWN_KEYS = {
 }
 NOT_REAL = {"parameters": OPTIONS, "inputs": SWITCHES, "discrete": COUNTS}
 HEAD = (
-    *("name", "description", "experiment", "modes", "code", "sizes", "units", "tables"),
+    *("name", "description", "include", "experiment", "modes", "code", "sizes", "units", "tables"),
     *("functions", "sampled", "events", "check"),
     *SECTIONS,
 )
@@ -69,7 +69,7 @@ TABLE = ("x", "y", "z", "file", "interpolation", "outside")
 EVENT = ("when", "while", "reinit", "set")
 SAMPLER = ("every", "offset", "while", "reinit", "set")
 LARGEST_INTEGER = 2**31 - 1
-NO_TABLES = ("name", "description", "modes", "code")
+NO_TABLES = ("name", "description", "include", "modes", "code")
 TABLES = ("reinit", "set", *(key for key in HEAD if key not in NO_TABLES))
 
 

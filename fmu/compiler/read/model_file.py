@@ -1,13 +1,17 @@
 """The graph of a file with equations."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache, partial
 from pathlib import Path
 
 from ..expressions.expression import CONDITION, RELATIONS, Node, derivative_of, written
-from ..graph.graph import Graph
+from ..graph.graph import Graph, Value
 from ..names import Fields
+from ..plain_c.memory import is_real
+from ..plain_c.text import CTextError
 from . import file as file_reader
+from .code import Calls
 from .content import (
     COUNTS,
     OPTIONS,
@@ -36,7 +40,7 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     # without states nothing is integrated: outputs follow at once
     has_switches = bool(file.of("states") or file.events)
     graph = file.graph = Graph(tables=file.tables, has_switches=has_switches)
-    graph.functions = file.code.called_by(graph) if file.code else {}
+    calls = file.code.calls(graph) if file.code else None
     for variable in file.of(*LEAVES):
         op = "mode" if variable.kind == CONDITION else LEAVES[variable.section]
         variable.leaf = graph.value(op, name=variable.name)
@@ -48,6 +52,8 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     known = {variable.name: variable.leaf for variable in file.of(*LEAVES)}
     known |= {mode: graph.value("mode", name=mode) for mode in file.modes}
     known |= {"time": graph.value("time"), "pi": graph.number(math.pi)}
+    if calls:
+        graph.functions = calls.of(file.code.functions) | _written(file, calls, dict(known))
     sources: list[Expression] = []  # of each relation
     # right sides last: their conditions are switches of others
     for expression in sorted(file.order, key=lambda expression: expression.event == "then"):
@@ -68,15 +74,51 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
             known.setdefault(expression.target, expression.value)
     places = [source.place for source in sources]
     file.relation_texts = [
-        f"{place[0].strip('[]').replace('events.', 'event ')} ({_written(node)})"
+        f"{place[0].strip('[]').replace('events.', 'event ')} ({_shown(node)})"
         if place[-1] == "when"
-        else f"{_written(node)} of {' '.join(place[:2])}"
+        else f"{_shown(node)} of {' '.join(place[:2])}"
         for node, place in zip(graph.nodes, places, strict=True)
     ]
     return file
 
 
-def _written(switch: Node) -> str:
+def _written(
+    file: ModelFile, calls: Calls, known: Mapping[str, Value]
+) -> dict[str, Callable[[list[Value], bool], Value]]:
+    """Return the variables that a function of C writes, as functions without arguments."""
+    places = file.header.places
+
+    def leaf(place: tuple[str | int, ...], kind: object) -> object:
+        name = places.get(place[1:], "")
+        if name not in known:
+            field = "".join(f"[{x}]" if isinstance(x, int) else f".{x}" for x in place[1:])
+            raise CTextError(f"{file.calculate} reads {field[1:]} before it writes it")
+        if is_real(kind):
+            return known[name]
+        if known[name].op == "mode":
+            return calls.conditions.choice(known[name], 1, 0)
+        items = file.kinds[name]
+        return calls.conditions.leaf(
+            name, tuple(range(1, 1 + len(items))) if isinstance(items, tuple) else None
+        )
+
+    @cache
+    def values() -> dict[str, Value]:
+        found = calls.written(file.calculate, leaf)
+        return {places[place]: value for place, value in found.items() if place in places}
+
+    def value(name: str, _given: list[Value], _is_instant: bool) -> Value:
+        if name not in values():
+            raise CTextError(f"has no value, and {file.calculate} writes none")
+        return values()[name]
+
+    written = [
+        v for v in file.calculated if v.expression.tree.name == f"{file.calculate}: {v.name}"
+    ]
+    return {v.expression.tree.name: partial(value, v.name) for v in written}
+
+
+def _shown(switch: Node) -> str:
     """Return the text of a relation, or of the function that rounds."""
     if switch.op != "floor" or switch.function == "floor":
         return written(switch)

@@ -1,0 +1,168 @@
+"""The header that a C file includes to read and write the variables of a file: NAME_values.h.
+
+It is made of NAME.toml beside it. struct NAME_parameters has the parameters, with those of an
+included file OTHER.toml in a struct OTHER_parameters; struct NAME_values has the time and all
+variables. Elements of an array have their places in an array of C, from 0. What is neither real
+nor a condition has an enum.
+"""
+
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from .arrays import elements
+from .content import BOOLEAN, INTEGER, ModelFile
+from .include import Source, source_of
+
+SUFFIX = "_values.h"
+GROUPS = {"inputs": "inputs", "states": "states", "discrete": "held between events"}
+CALCULATED = ("where", "outputs")  # those without a value are written by C
+Place = tuple[str | int, ...]  # a field of struct NAME_values, from its name
+
+
+@dataclass(frozen=True)
+class Field:
+    """A variable of a struct, or all elements of an array."""
+
+    name: str
+    elements: tuple[str, ...]  # names of variables
+    entry: Any
+    prefix: str  # of the enum
+
+    @property
+    def c_type(self) -> str:
+        """Its type in C."""
+        kind = self._type
+        if isinstance(kind, list):
+            return f"enum {self.prefix}_{self.name}"
+        return "int" if kind in (BOOLEAN, INTEGER) else "double"
+
+    @property
+    def _type(self) -> Any:
+        return self.entry.get("type") if isinstance(self.entry, dict) else None
+
+    @property
+    def sizes(self) -> list[range]:
+        """Indexes of an array."""
+        if "[" not in self.elements[0]:
+            return []
+        indexes = [[*map(int, re.findall(r"(?<=[\[,])\d+", name))] for name in self.elements]
+        return [range(min(column), max(column) + 1) for column in zip(*indexes, strict=True)]
+
+    def lines(self) -> Iterator[str]:
+        """Yield its declaration."""
+        about = self.entry if isinstance(self.entry, dict) else {}
+        texts = [about[key] for key in ("unit", "description") if type(about.get(key)) is str]
+        comment = ": ".join(" ".join(text.split()) for text in texts).replace("*/", "* /")
+        sizes = "".join(f"[{len(size)}]" for size in self.sizes)
+        yield f"{self.c_type} {self.name}{sizes};" + (comment and f" /* {comment} */")
+
+    def enum(self) -> Iterator[str]:
+        """Yield the enum of its type, if it needs one."""
+        if isinstance(self._type, list):
+            head = f"{self.prefix}_{self.name}".upper()
+            yield f"enum {self.prefix}_{self.name} {{"
+            for number, item in enumerate(self._type, 1):
+                yield f"    {head}_{str(item).upper()} = {number},"
+            yield "};"
+
+    def places(self) -> Iterator[tuple[Place, str]]:
+        """Yield the places of variables, from the field."""
+        sizes = self.sizes
+        for name in self.elements:
+            indexes = map(int, re.findall(r"(?<=[\[,])\d+", name))
+            yield (self.name, *(i - s.start for i, s in zip(indexes, sizes, strict=True))), name
+
+
+class Header:
+    """The header of a file, and where each variable is in its struct of values."""
+
+    def __init__(self, source: Source) -> None:
+        self.stem = source.path.stem
+        self.inner = [Header(included) for included in source.included]
+        inner = {name for header in self.inner for _, name in header.parameters()}
+        tables = source.tables
+        file = ModelFile("", "", {}, source.path, "", set())
+        with suppress(AttributeError):  # what is wrong with it is said where it is read
+            file.sizes.update(tables.get("sizes", {}).items())
+
+        def fields(section: str, only_called: bool = False) -> list[Field]:
+            given = tables.get(section)
+            entries = given.items() if isinstance(given, dict) else ()
+            found = []
+            for key, entry in entries:
+                is_called = isinstance(entry, dict) and "value" not in entry
+                if not only_called or is_called:
+                    with suppress(Exception):  # as above
+                        found += [(each.name, entry) for each in elements(file, key, entry)]
+            runs = groupby(found, lambda pair: pair[0].partition("[")[0])
+            grouped = [(base, [*run]) for base, run in runs]
+            return [
+                Field(base, tuple(name for name, _ in run), run[0][1], self.stem)
+                for base, run in grouped
+            ]
+
+        self.own = [f for f in fields("parameters") if not inner.issuperset(f.elements)]
+        self.variables = {title: fields(section) for section, title in GROUPS.items()}
+        modes = tables.get("modes", [])
+        if isinstance(modes, dict | list):
+            names = [name for name in modes if isinstance(name, str)]
+            boolean = {"type": BOOLEAN}
+            self.variables["modes"] = [Field(n, (n,), boolean, self.stem) for n in names]
+        called = [field for section in CALCULATED for field in fields(section, True)]
+        self.variables["calculated"] = called
+
+    def parameters(self) -> Iterator[tuple[Place, str]]:
+        """Yield the places of parameters, from the struct of parameters."""
+        for header in self.inner:
+            for place, name in header.parameters():
+                yield (header.stem, *place), name
+        for field in self.own:
+            yield from field.places()
+
+    @property
+    def places(self) -> dict[Place, str]:
+        """Variables by their places in the struct of values."""
+        found: dict[Place, str] = {("time",): "time"}
+        found |= {("parameters", *place): name for place, name in self.parameters()}
+        for fields in self.variables.values():
+            found |= dict(pair for field in fields for pair in field.places())
+        return found
+
+    def text(self) -> str:
+        """The text of the header."""
+        lines = [f"/* Made of {self.stem}.toml: change that file. */", "#pragma once", ""]
+        lines += [f'#include "{header.stem}{SUFFIX}"' for header in self.inner]
+        for field in (*self.own, *(f for fields in self.variables.values() for f in fields)):
+            lines += [*field.enum()]
+        inner = [f"struct {h.stem}_parameters {h.stem};" for h in self.inner if h.has_parameters]
+        own = [line for field in self.own for line in field.lines()]
+        if self.has_parameters:
+            lines += _struct(f"{self.stem}_parameters", [*inner, *own])
+        fields = [f"struct {self.stem}_parameters parameters;"] if self.has_parameters else []
+        fields.append("double time; /* s */")
+        for title, group in self.variables.items():
+            fields += [f"/* {title} */"] if group else []
+            fields += [line for field in group for line in field.lines()]
+        return "\n".join([*lines, *_struct(f"{self.stem}_values", fields)])
+
+    @property
+    def has_parameters(self) -> bool:
+        """Whether there is a struct of parameters."""
+        return bool(self.own) or any(header.has_parameters for header in self.inner)
+
+
+def _struct(name: str, fields: Iterable[str]) -> list[str]:
+    return [f"struct {name} {{", *(f"    {field}" for field in fields), "};", ""]
+
+
+def made(path: Path) -> str | None:
+    """Return the text of NAME_values.h if NAME.toml is beside it."""
+    if not path.name.endswith(SUFFIX) or path.is_file():
+        return None
+    file = path.with_name(path.name.removesuffix(SUFFIX) + ".toml")
+    return Header(source_of(file)).text() if file.is_file() else None
