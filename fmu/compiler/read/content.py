@@ -96,6 +96,7 @@ class Variable:
     exponents: dict[str, int] = field(default_factory=dict)  # of the base units and rad
     display: tuple[str, float, float] | None = None  # unit in the file, with factor and offset
     description: str = ""
+    derivative_of: str = ""  # the state of which the FMU has it as the derivative
     expression: Expression | None = None  # derivative of a state, value of others
     initial: Expression | None = None  # start value that follows from parameters
     leaf: Any = None  # what a generator makes of a parameter, input, state or discrete variable

@@ -47,10 +47,10 @@ OF_ALL = ("start", "unit", "min", "max", "description")
 SECTIONS = {  # keys of their entries, and the one that each needs
     "parameters": ((*OF_ALL, "type"), "start"),
     "inputs": ((*OF_ALL, "type"), ""),
-    "states": ((*OF_ALL, "nominal", "derivative"), "derivative"),
+    "states": ((*OF_ALL, "nominal", "derivative", "derivative_of"), "derivative"),
     "discrete": (("start", "unit", "description", "type"), ""),
-    "where": (("value", "unit", "description"), "value"),  # or expressions
-    "outputs": (("value", "unit", "description"), "value"),
+    "where": (("value", "unit", "description", "derivative_of"), "value"),  # or expressions
+    "outputs": (("value", "unit", "description", "derivative_of"), "value"),
 }
 OWN_KEYS = {
     FOLLOWS: (("value", "unit", "description"), "value"),
@@ -159,7 +159,7 @@ READ = {
     "modes": _modes,
     "arguments": _arguments,
     "code": _expect("a C file such as crane.c", str, CODE.fullmatch),
-    "file": TEXT,
+    **dict.fromkeys(("file", "derivative_of"), TEXT),
 }  # how values of keys are read; others are expressions
 
 

@@ -28,6 +28,7 @@ MOST_COMPARED = 1000  # names that may have been meant
 def check(file: ModelFile) -> None:
     """Check all expressions, and order them: each after those that it names; ModelFileError."""
     _check_names(file)
+    _check_derivatives(file)
     file.order = _in_order(file)
     _check_periods(file)
     if file.has_units:
@@ -54,6 +55,24 @@ def _check_names(file: ModelFile) -> None:
                         hint = _hint(node.name, allowed, file)
                         raise ExpressionError(node.column, mistake.format(shown(node.name)) + hint)
                 expression.tree = with_kinds(expression.tree, expression.kind, kinds)
+
+
+def _check_derivatives(file: ModelFile) -> None:
+    """Check that a variable is the derivative that it says it is, and no other says so."""
+    found: set[str] = set()
+    for variable in file.variables.values():
+        state = file.variables.get(variable.derivative_of)
+        if not variable.derivative_of:
+            continue
+        with placed(variable.place, variable.name, "derivative_of"):
+            if state is None or state.section != "states":
+                raise ModelFileError(f"expected a state, got {shown(variable.derivative_of)}")
+            if state.expression.tree.op != "name" or state.expression.tree.name != variable.name:
+                wanted = f'expected derivative = "{variable.name}" of {state.name}'
+                raise ModelFileError(f"{wanted}, got {shown(state.expression.text)}")
+            if state.name in found:
+                raise ModelFileError(f"{state.name} has one derivative only")
+            found.add(state.name)
 
 
 def _hint(name: str, allowed: Collection[str], file: ModelFile) -> str:

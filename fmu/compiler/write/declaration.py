@@ -49,11 +49,17 @@ def keys(file: ModelFile) -> list[Key]:
     """Return name and kind of each variable, in the order in which they get value references."""
     return [
         *((variable.name, CAUSALITIES[variable.section]) for variable in file.variables.values()),
-        *((f"der_{state.name}", "local") for state in file.of("states")),
+        *((f"der_{state.name}", "local") for state in _without_derivative(file)),
         *((mode, "mode") for mode in file.modes),
         *((name, "local") for name in _indicators(file)),
         *((tick.name, "local") for tick in c_events.ticks(file)),
     ]
+
+
+def _without_derivative(file: ModelFile) -> list[Variable]:
+    """Return the states whose derivative is no variable of the file."""
+    named = {variable.derivative_of for variable in file.variables.values()}
+    return [state for state in file.of("states") if state.name not in named]
 
 
 def _indicators(file: ModelFile) -> dict[str, Relation]:
@@ -82,7 +88,7 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
     standard = {name: unit.exponents for name, unit in read_declaration(UNITS).units.items()}
     units = dict(standard)  # those that are declared here come to it
     tables = {v.name: _entries_of(v, file, units) for v in file.variables.values()}
-    for state in states:
+    for state in _without_derivative(file):
         rate = state.exponents | {"s": state.exponents.get("s", 0) - file.has_units}
         tables[f"der_{state.name}"] = {
             **_local(file.fields.rate(state.name)),
@@ -215,8 +221,11 @@ def _entries_of(
         entries["display"] = dict(zip(("name", "factor", "offset"), variable.display, strict=True))
     numbers = {key: getattr(variable, key) for key in NUMBERS}
     entries |= {key: number for key, number in numbers.items() if number is not None}
-    if variable.section == "outputs":
-        entries |= _dependencies(variable.value, file)
+    if variable.section == "outputs" or variable.derivative_of:
+        if variable.section != "states":
+            entries |= _dependencies(variable.value, file)
+    if variable.derivative_of:
+        entries["derivative_of"] = variable.derivative_of
     return entries | {"description": variable.description or variable.name}
 
 
