@@ -131,9 +131,33 @@ def test_value_references_stay_when_the_file_changes(tmp_path: Path) -> None:
     assert references(sampler) == references(sampler)  # names with something in front are longer
 
 
+def test_a_lock_file_in_the_older_form_is_read_and_written_in_the_new_one(tmp_path: Path) -> None:
+    path = tmp_path / "model.lock.toml"
+    variables = [("x", "output", 7), ("x[1,2]", "local", 3), ("x", "input", 9), ("up", "mode", 2)]
+    path.write_text(
+        "# Value references of M: written by the build. Keep it with the model.\n"
+        + "".join(
+            f'\n[[variables]]\nname = "{name}"\nkind = "{kind}"\nreference = {reference}\n'
+            for name, kind, reference in variables
+        )
+    )
+    found = lock.references(path, [("x", "input"), ("y", "input")])
+    expected = {(name, kind): reference for name, kind, reference in variables}
+    assert found == expected | {("y", "input"): 10}
+    path.write_text(lock.text("M", found))
+    assert path.read_text() == (
+        "# Value references of M: written by the build. Keep it with the model.\n\n"
+        '[mode]\nup = 2\n\n[local]\n"x[1,2]" = 3\n\n[output]\nx = 7\n\n[input]\nx = 9\ny = 10\n'
+    )
+    assert lock.references(path, []) == found
+
+
 @pytest.mark.parametrize(
     "text",
     ["x", "[[variables]]\nname = 'x'\n", "a = 1", "variables = 3"]
+    + ["[input]\nx = 5\nx = 6\n", "[input]\nx = 5\n[local]\ny = 5\n", "[input]\nx.y = 5\n"]
+    + ["[input]\nx = 5\n[[variables]]\n", "[input]\nx = true\n", "[input]\n'x y' = 5\n"]
+    + [f"[input]\nx = {r}\n" for r in ("0", "80", "99", "100000", "-1", "5.0", "'5'")]
     + [2 * f"[[variables]]\nname = 'x'\nkind = '{kind}'\nreference = 5\n" for kind in ("local", "")]
     + [
         f"[[variables]]\nname = 'x'\nkind = 'input'\nreference = {r}\n" for r in (0, 80, 99, 100000)

@@ -162,7 +162,7 @@ def test_what_an_fmu_is_made_from_makes_its_key(
     shutil.copytree(ROOT / "fmu", own)
     monkeypatch.setattr(build_cache.fmu_tools, "__path__", [str(own)])
     assert built(model) and not built(model)
-    (own / "equations" / "graph.py").write_text("changed")
+    (own / "compiler" / "graph" / "graph.py").write_text("changed")
     assert built(model)
 
 

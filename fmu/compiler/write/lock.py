@@ -1,12 +1,14 @@
 """Value references of a model's variables, which stay while its file changes.
 
-NAME.lock.toml beside the file has a line for each variable that ever was: its name, its kind and
-its value reference. It grows and never changes.
+NAME.lock.toml beside the file has a table for each kind, and in it a line for each variable that
+ever was: its name and its value reference. It grows and never changes.
 """
 
 import re
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from ..read.content import ModelFileError
 from .declaration import Key
@@ -15,6 +17,7 @@ RESERVED = (0, *range(80, 100))  # the time, the variables of the integrator
 LARGEST = 99_999
 # longer than in a file: der_ and others stand in front
 ELEMENT = re.compile(r"[A-Za-z]\w*(\[[0-9]+(,[0-9]+)*\])?", re.ASCII)
+BARE = re.compile(r"\w+", re.ASCII)  # names that stand without quotes
 HEAD = "# Value references of {name}: written by the build. Keep it with the model.\n"
 
 
@@ -40,25 +43,25 @@ def references(path: Path, wanted: list[Key]) -> dict[Key, int]:
 
 def text(name: str, found: dict[Key, int]) -> str:
     """Return the text of the lock file."""
-    lines = [
-        f'[[variables]]\nname = "{key[0]}"\nkind = "{key[1]}"\nreference = {reference}\n'
-        for key, reference in sorted(found.items(), key=lambda item: item[1])
-    ]
-    return "\n".join([HEAD.format(name=name), *lines])
+    kinds: dict[str, list[str]] = {}
+    for (variable, kind), reference in sorted(found.items(), key=lambda item: item[1]):
+        kinds.setdefault(kind, []).append(f"{_key(variable)} = {reference}\n")
+    tables = [f"[{_key(kind)}]\n{''.join(lines)}" for kind, lines in kinds.items()]
+    return "\n".join([HEAD.format(name=name), *tables])
+
+
+def _key(name: str) -> str:
+    return name if BARE.fullmatch(name) else f'"{name}"'
 
 
 def _read(path: Path) -> dict[Key, int]:
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-        entries = content.pop("variables", [])
-        if content or not isinstance(entries, list):
-            raise ValueError("expected [[variables]] and nothing else")
         found: dict[Key, int] = {}
-        for entry in entries:
-            key, reference = _entry(entry)
-            if key in found or reference in found.values():
-                raise ValueError(f"{key[0]} or reference {reference} is there twice")
-            found[key] = reference
+        for name, kind, reference in _entries(tomllib.loads(path.read_text(encoding="utf-8"))):
+            _check(name, kind, reference)
+            if (name, kind) in found or reference in found.values():
+                raise ValueError(f"{name} or reference {reference} is there twice")
+            found[name, kind] = reference
     except (OSError, ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
         raise ModelFileError(
@@ -68,10 +71,27 @@ def _read(path: Path) -> dict[Key, int]:
     return found
 
 
-def _entry(entry: object) -> tuple[Key, int]:
-    match entry:
-        case {"name": str(name), "kind": str(kind), "reference": int(reference)}:
-            fine = len(entry) == 3 and ELEMENT.fullmatch(name) and kind.isalpha()
-            if fine and reference not in RESERVED and 0 < reference <= LARGEST:
-                return (name, kind), reference
-    raise ValueError(f"{str(entry)[:100]} has no name, kind and free reference")
+def _entries(content: dict[str, Any]) -> Iterator[tuple[Any, Any, Any]]:
+    """Yield name, kind and reference of each variable, as written, or as a list: the older form."""
+    if "variables" not in content:
+        for kind, references in content.items():
+            if not isinstance(references, dict):
+                raise ValueError(f"expected tables of value references, but {kind} is none")
+            yield from ((name, kind, reference) for name, reference in references.items())
+        return
+    entries = content.pop("variables")
+    if content or not isinstance(entries, list):
+        raise ValueError("expected [[variables]] and nothing else")
+    for entry in entries:
+        if not isinstance(entry, dict) or entry.keys() != {"name", "kind", "reference"}:
+            raise ValueError(f"{str(entry)[:100]} has no name, kind and free reference")
+        yield entry["name"], entry["kind"], entry["reference"]
+
+
+def _check(name: Any, kind: Any, reference: Any) -> None:
+    """Raise ValueError where no such variable can be; True would be a number, too."""
+    fine = isinstance(name, str) and ELEMENT.fullmatch(name)
+    fine = fine and isinstance(kind, str) and kind.isalpha()
+    if not (fine and type(reference) is int and 0 < reference <= LARGEST) or reference in RESERVED:
+        entry = f"{name} = {reference} of kind {kind}"
+        raise ValueError(f"{entry:.100} has no name, kind and free reference")

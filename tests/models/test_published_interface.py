@@ -1,0 +1,116 @@
+"""Every FMU keeps its published interface, on which users' systems and scenarios rely: names, value
+references, starts, dependencies, units, types, flags, terminals and their order."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.models.published_interface import PLACES, differences, of_fmu, of_texts, published
+from tests.support.paths import EVERY
+
+# What may differ, and why: FMU, variable or path of another part, column; "*" is any
+CHANGED: dict[tuple[str, str, str], str] = {}
+
+each_version = pytest.mark.parametrize("version", PLACES)
+
+
+def allows(entry: tuple[str, str, str], difference: tuple[str, str, str]) -> bool:
+    """True if an entry of CHANGED is about a difference."""
+    return all(own in ("*", text) for own, text in zip(entry, difference, strict=True))
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_the_published_interface_stays(fmu: Path, name: str) -> None:
+    """A change is a line of CHANGED, and each line there is a change of some version."""
+    found = [
+        ((name, part, column), f"FMI {version}.0, {part}, {column}: {before!r} became {now!r}")
+        for version, place in PLACES.items()
+        for part, column, before, now in differences(
+            published(name, version), of_fmu(fmu.parent / place / f"{name}.fmu")
+        )
+    ]
+    wrong = [text for key, text in found if not any(allows(entry, key) for entry in CHANGED)]
+    assert not wrong, "\n".join(wrong)
+    own = [entry for entry in CHANGED if entry[0] == name]
+    assert [entry for entry in own if not any(allows(entry, key) for key, _ in found)] == []
+
+
+DESCRIPTION = """<fmiModelDescription fmiVersion="{version}.0" modelName="M" guid="{{1}}">
+  <CoSimulation modelIdentifier="M" canBeInstantiatedOnlyOncePerProcess="false" />
+  <UnitDefinitions><Unit name="kg"><BaseUnit kg="1" /></Unit></UnitDefinitions>
+  {types}
+  <ModelVariables>{variables}</ModelVariables>
+  <ModelStructure>{structure}</ModelStructure>
+</fmiModelDescription>"""
+TEXTS = {
+    "2": DESCRIPTION.format(
+        version=2,
+        types="",
+        variables="""
+        <ScalarVariable name="m" valueReference="7" causality="parameter" description="Mass">
+          <Real unit="kg" start="2.0" min="0.0" /></ScalarVariable>
+        <ScalarVariable name="x" valueReference="9" causality="output"><Real /></ScalarVariable>
+        <ScalarVariable name="v" valueReference="8" causality="output"><Real derivative="2" />
+        </ScalarVariable>""",
+        structure="""
+        <Outputs><Unknown index="2" dependencies="" /><Unknown index="3" /></Outputs>
+        <InitialUnknowns><Unknown index="3" dependencies="1 2" dependenciesKind="fixed dependent" />
+        </InitialUnknowns>""",
+    ),
+    "3": DESCRIPTION.format(
+        version=3,
+        types="""
+        <TypeDefinitions><Float64Type name="Float64 in kg" unit="kg" /></TypeDefinitions>""",
+        variables="""
+        <Float64 name="m" valueReference="7" causality="parameter" description="Mass" start="2.0"
+         declaredType="Float64 in kg" min="0.0" />
+        <Float64 name="x" valueReference="9" causality="output" />
+        <Float64 name="v" valueReference="8" causality="output" derivative="9" />""",
+        structure="""
+        <Output valueReference="9" dependencies="" /><Output valueReference="8" />
+        <InitialUnknown valueReference="8" dependencies="7 9" dependenciesKind="fixed dependent" />
+        """,
+    ),
+}
+EXPECTED = {
+    "m": {
+        "valueReference": "7", "causality": "parameter", "description": "Mass", "start": "2.0",
+        "type": "Float64", "unit": "kg", "min": "0.0",
+    },
+    "x": {"valueReference": "9", "causality": "output", "type": "Float64", "output": "none"},
+    "v": {
+        "valueReference": "8", "causality": "output", "type": "Float64", "derivative": "x",
+        "output": "all", "initial unknown": "7 9 fixed dependent",
+    },
+    "/": {"attributes": "modelName='M'"},
+    "/CoSimulation": {
+        "attributes": "canBeInstantiatedOnlyOncePerProcess='false' modelIdentifier='M'"
+    },
+    "/Unit kg/BaseUnit": {"attributes": "kg='1'"},
+    "/order/output": {"attributes": "x v"},
+    "/order/initial unknown": {"attributes": "v"},
+}  # fmt: skip
+
+
+@each_version
+def test_both_versions_are_read_alike(version: str) -> None:
+    assert of_texts(TEXTS[version]) == EXPECTED
+
+
+CHANGES = [
+    ('"m"', '"mass"', "mass"), ('"m"', '"mass"', "m"), ('"7"', '"6"', "m"),
+    ('start="2.0"', 'start="2.5"', "m"), ('"Mass"', '"mass"', "m"), ("parameter", "input", "m"),
+    ("kg", "g", "m"), (' min="0.0"', "", "m"), ('"1 2"', '"1"', "v"), ('"7 9"', '"7"', "v"),
+    ("fixed dependent", "dependent fixed", "v"), ("false", "true", "/CoSimulation"),
+    ('"M" guid', '"N" guid', "/"), (' dependencies=""', "", "x"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("version", "change"),
+    [(v, change) for v in PLACES for change in CHANGES if change[0] in TEXTS[v]],
+)
+def test_no_change_is_missed(version: str, change: tuple[str, str, str]) -> None:
+    before, now, part = change
+    found = of_texts(TEXTS[version].replace(before, now))
+    assert part in {name for name, *_ in differences(EXPECTED, found)}
