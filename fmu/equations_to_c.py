@@ -2,7 +2,7 @@
 
 Value references are those of its lock file, which has to have all: `rparm build` writes it. An
 entry of [where] or a number about a sampler that the lock file does not name is no variable of the
-FMU. Terminals, which such a file cannot declare, come from another file.
+FMU.
 """
 
 import argparse
@@ -22,7 +22,7 @@ def toml(declared: dict[str, Any]) -> str:
     lines = []
     for title, content in declared.items():
         tables = {title: content} if title in ("model", "experiment") else {}
-        if title in ("units", "variables"):
+        if title in ("units", "variables", "terminals"):
             tables = {f"{title}.{value_of_toml(name)}": table for name, table in content.items()}
         elif not tables:
             lines.append(f"{title} = {value_of_toml(content)}")
@@ -47,7 +47,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("file", type=Path, help="the file of the model")
     parser.add_argument("--output", type=Path, required=True, help="folder for the files")
-    parser.add_argument("--terminals", type=Path, help="file with [terminals], of variables.toml")
     arguments = parser.parse_args()
     file = read(arguments.file, declaration.solver_names())
     lock_file = lock.path_of(arguments.file)
@@ -57,9 +56,8 @@ def main() -> None:
     for name, kind in declaration.keys(file):
         if (name, kind) not in references and name not in hidden:
             raise ModelFileError(f"{lock_file}: has no {name}: build the model by rparm build")
-    terminals = arguments.terminals.read_text(encoding="utf-8") if arguments.terminals else ""
     texts = declaration.generated(file)
-    texts["variables.toml"] = toml(declaration.declared(file, references)) + terminals
+    texts["variables.toml"] = toml(declaration.declared(file, references))
     arguments.output.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
         write_if_changed(arguments.output / name, text)

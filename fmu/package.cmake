@@ -4,7 +4,7 @@
 # Builds NAME.fmu (FMI 2.0) and fmi3/NAME.fmu (FMI 3.0) in the current build folder, or the one of them that
 # VERSIONS names, from the model's folder (variables.toml, README.md; model.png and pictures of the README
 # where there are any) and the library that defines its struct model. EQUATIONS: a file with equations in place of
-# both, with its lock file; the folder may have a page, terminals.toml and pictures. The archive carries inputs and
+# both, with its lock file; the folder may have a page and pictures. The archive carries inputs and
 # references of the scenarios after REFERENCES. Targets:
 #   NAME_equations             the library with the struct model of EQUATIONS
 #   NAME, NAME_fmi3            the shared objects
@@ -58,20 +58,16 @@ function(add_fmu_library name target version description folder)
 endfunction()
 
 # The library NAME_equations, and variables.toml and README.md beside its sources in the folder.
-function(add_equations name file terminals folder)
+function(add_equations name file folder)
   cmake_path(ABSOLUTE_PATH file BASE_DIRECTORY ${PROJECT_SOURCE_DIR})
   cmake_path(REPLACE_EXTENSION file LAST_ONLY .lock.toml OUTPUT_VARIABLE lock)
-  set(option "")
-  if(terminals)
-    set(option --terminals ${terminals})
-  endif()
   file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/compiler/*.py ${FMU_SOURCE_DIR}/compiler/*/*
        ${FMU_SOURCE_DIR}/declaration/*
        ${PROJECT_SOURCE_DIR}/src/instance/*.toml)
   add_custom_command(
     OUTPUT ${folder}/equations.c ${folder}/equations.h ${folder}/variables.toml ${folder}/README.md
-    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/equations_to_c.py ${file} ${option} --output ${folder}
-    DEPENDS ${file} ${lock} ${terminals} ${generator} ${FMU_SOURCE_DIR}/equations_to_c.py ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/program.py
+    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/equations_to_c.py ${file} --output ${folder}
+    DEPENDS ${file} ${lock} ${generator} ${FMU_SOURCE_DIR}/equations_to_c.py ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/program.py
     COMMENT "Generating the equations of ${name}"
     VERBATIM)
   add_library(${name}_equations STATIC ${folder}/equations.c)
@@ -99,14 +95,11 @@ function(add_fmu name)
     file(GLOB icon CONFIGURE_DEPENDS ${folder}/model.png)
   endif()
   if(ARG_EQUATIONS)
-    set(terminals "")
-    if(ARG_FOLDER)
-      file(GLOB terminals CONFIGURE_DEPENDS ${folder}/terminals.toml)
-    else()
+    if(NOT ARG_FOLDER)
       set(folder ${out}/model)
       set(readme ${folder}/README.md)
     endif()
-    add_equations(${name} ${ARG_EQUATIONS} "${terminals}" ${out}/model)
+    add_equations(${name} ${ARG_EQUATIONS} ${out}/model)
     set(ARG_LIBRARY ${name}_equations)
     set(variables ${out}/model/variables.toml)
     if(icon) # the generator looks for it beside variables.toml

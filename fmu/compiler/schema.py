@@ -33,6 +33,9 @@ DEFINITIONS: dict[str, Schema] = {
     "expression": {"type": "string", "maxLength": LONGEST, "pattern": EXPRESSION_PATTERN},
 }
 NUMBER, WHOLE, TEXT, EXPRESSION = ({"$ref": f"#/$defs/{name}"} for name in DEFINITIONS)
+IDENTIFIER = {"pattern": "^[A-Za-z_][A-Za-z0-9_]*$"}
+TERMINALS = {"type": "object", "propertyNames": IDENTIFIER}
+TERMINALS["additionalProperties"] = {"$ref": "#/$defs/terminal"}
 ABOVE_0 = NUMBER | {"exclusiveMinimum": 0}
 TRUTH = {"type": "boolean"}
 WORD = {"type": "string", "pattern": NAME}
@@ -67,7 +70,8 @@ def schema() -> Schema:
         for section in reader.SECTIONS
     ]
     dialect = "https://json-schema.org/draft/2020-12/schema"
-    head = {"$schema": dialect, "title": "File with equations", "$defs": DEFINITIONS}
+    definitions = DEFINITIONS | {"terminal": _terminal()}
+    head = {"$schema": dialect, "title": "File with equations", "$defs": definitions}
     with_value = {"functions": {"additionalProperties": {"required": ["value"]}}}
     only_in_c = {"if": {"not": {"required": ["code"]}}, "then": {"properties": with_value}}
     return head | _table(found, "name") | {"anyOf": some} | only_in_c
@@ -104,6 +108,7 @@ def _further(named: Schema) -> dict[str, Schema]:
         "sampled": _by_name(_change(reader.SAMPLER), named),
         "events": _by_name(_change(reader.EVENT), named),
         "check": {"type": "object"} | check,
+        "terminals": TERMINALS,
     }
 
 
@@ -168,6 +173,17 @@ def _data() -> Schema:
         {"properties": lists | grid, "required": ["x", "y", "z"]},
     ]
     return found
+
+
+def _terminal() -> Schema:
+    """Return the schema of a terminal, which may have others in it."""
+    text = {"type": "string"}
+    members = {"type": "object", "propertyNames": IDENTIFIER, "additionalProperties": text}
+    head = {"rule": {"enum": ["plug", "bus", "none"]}, "description": text}
+    kinds = dict.fromkeys(("signals", "inflows", "outflows"), members)
+    found = _table(head | kinds | {"terminals": TERMINALS}, *head)
+    some = [{"required": [key], "properties": {key: {"minProperties": 1}}} for key in kinds]
+    return found | {"anyOf": [*some, {"required": ["terminals"]}]}
 
 
 def _change(keys: tuple[str, ...]) -> Schema:

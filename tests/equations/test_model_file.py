@@ -20,6 +20,7 @@ from tests.equations.compiled import (
     toml,
 )
 from tests.equations.examples import MISTAKES as WRITTEN
+from tests.equations.examples import MODELS
 from tests.support.paths import ROOT
 from tests.support.tables import cases
 
@@ -168,6 +169,13 @@ def test_a_lock_file_that_says_nothing_clear_is_refused(text: str, tmp_path: Pat
     path.write_text(text)
     with pytest.raises(ModelFileError, match=r"^[^\n]*model.lock.toml: is no lock file: [^\n]*$"):
         lock.references(path, [("x", "input")])
+
+
+def test_terminals_are_declared_as_the_file_has_them(tmp_path: Path) -> None:
+    text = MODELS["schema"]["RICH"]
+    content = declared(read_text(tmp_path, text))
+    assert content["terminals"] == tomllib.loads(text)["terminals"] != {}
+    assert tomllib.loads(toml(content))["terminals"] == content["terminals"]
 
 
 def mutated(chance: random.Random, text: str) -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from declaration.load import shown
+from declaration.schema import Terminal
 
 from ..expressions.expression import (
     CONDITION,
@@ -195,6 +196,7 @@ class ModelFile:
     sampled: list[Sampler] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     checks: list[tuple[str, Expression]] = field(default_factory=list)  # messages and conditions
+    terminals: dict[str, Terminal] = field(default_factory=dict)
     order: list[Expression] = field(default_factory=list)  # each after those that it names
     graph: Any = None  # what a generator makes of it
     fields: Any = None  # where it keeps the values

@@ -27,7 +27,7 @@ from ..expressions.expression import (
 )
 from ..expressions.units import ANGLE, BASE, Measure, table_unit, unit_of, unit_of_exponents
 from ..graph.tables import read as table_of
-from . import header, keys
+from . import header, keys, terminals
 from .arrays import FOR, elements, every, target
 from .code import read as read_code
 from .content import (
@@ -116,6 +116,7 @@ def read_tables(source: Source, solver_names: Iterable[str]) -> ModelFile:
         _read_event(file, element)
     for message, condition in head.get("check", {}).items():
         _read_check(file, message, condition)
+    terminals.read(file, head.get("terminals", {}))
     return file
 
 

@@ -61,7 +61,7 @@ OWN_KEYS = {
 NOT_REAL = {"parameters": OPTIONS, "inputs": SWITCHES, "discrete": COUNTS}
 HEAD = (
     *("name", "description", "include", "experiment", "modes", "code", "sizes", "units", "tables"),
-    *("functions", "sampled", "events", "check"),
+    *("functions", "sampled", "events", "check", "terminals"),
     *SECTIONS,
 )
 EXPERIMENT = {"stop": 10.0, "step": 0.01, "tolerance": 1e-8}

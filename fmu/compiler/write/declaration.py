@@ -135,6 +135,10 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
             for name, kind in sorted(keys(file), key=lambda key: key[0] in helpers)
             if name in tables and (name, kind) in references
         },
+        "terminals": {
+            name: terminal.model_dump(exclude_defaults=True)
+            for name, terminal in file.terminals.items()
+        },
     }
 
 
