@@ -11,10 +11,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from compiler.read.header import SUFFIX, Header
+from compiler.read.include import source_of
 from compiler.read.model_file import ModelFileError, read
 from compiler.write import c_events, declaration, lock
 from generate import write_if_changed
 from program import program
+from source_code import dependencies
 
 
 def toml(declared: dict[str, Any]) -> str:
@@ -47,9 +50,32 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("file", type=Path, help="the file of the model")
     parser.add_argument("--output", type=Path, required=True, help="folder for the files")
+    parser.add_argument("--depfile", type=Path, help="file for a rule of make: what was read")
+    text = "write NAME_values.h only: structs of its variables, for C files"
+    parser.add_argument("--header", action="store_true", help=text)
     arguments = parser.parse_args()
-    file = read(arguments.file, declaration.solver_names())
-    lock_file = lock.path_of(arguments.file)
+    if arguments.header:
+        texts, files = _header(arguments.file)
+    else:
+        texts, files = _model(arguments.file)
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    for name, text in texts.items():
+        write_if_changed(arguments.output / name, text)
+    if arguments.depfile:
+        rule = dependencies(str(arguments.output / next(iter(texts))), files)
+        arguments.depfile.write_text(rule, encoding="utf-8")
+
+
+def _header(path: Path) -> tuple[dict[str, str], list[Path]]:
+    """Return the header of a file, by its name, and what was read."""
+    source = source_of(path)
+    return {f"{path.stem}{SUFFIX}": Header(source).text()}, [s.path for s in source.all()]
+
+
+def _model(path: Path) -> tuple[dict[str, str], list[Path]]:
+    """Return the files of a model, by their names, and what was read."""
+    file = read(path, declaration.solver_names())
+    lock_file = lock.path_of(path)
     references = lock.references(lock_file, [])
     hidden = {variable.name for variable in file.of("where")}
     hidden |= {tick.name for tick in c_events.ticks(file)}
@@ -58,9 +84,7 @@ def main() -> None:
             raise ModelFileError(f"{lock_file}: has no {name}: build the model by rparm build")
     texts = declaration.generated(file)
     texts["variables.toml"] = toml(declaration.declared(file, references))
-    arguments.output.mkdir(parents=True, exist_ok=True)
-    for name, text in texts.items():
-        write_if_changed(arguments.output / name, text)
+    return texts, file.files
 
 
 if __name__ == "__main__":

@@ -67,7 +67,9 @@ function(add_equations name file folder)
   add_custom_command(
     OUTPUT ${folder}/equations.c ${folder}/equations.h ${folder}/variables.toml ${folder}/README.md
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/equations_to_c.py ${file} --output ${folder}
+            --depfile ${folder}/files.d
     DEPENDS ${file} ${lock} ${generator} ${FMU_SOURCE_DIR}/equations_to_c.py ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/program.py
+    DEPFILE ${folder}/files.d
     COMMENT "Generating the equations of ${name}"
     VERBATIM)
   add_library(${name}_equations STATIC ${folder}/equations.c)
@@ -75,6 +77,25 @@ function(add_equations name file folder)
   target_compile_options(${name}_equations PRIVATE -w) # what warnings are about, nobody has written
   target_link_libraries(${name}_equations PUBLIC model_interface PRIVATE relations elementary_functions
                         $<LINK_ONLY:integrator>) # the solver of a band
+endfunction()
+
+# NAME_values.h, which the C files of models include, of NAME.toml.
+function(add_values_header target file)
+  cmake_path(ABSOLUTE_PATH file)
+  cmake_path(GET file STEM name)
+  set(output ${CMAKE_CURRENT_BINARY_DIR}/${name}_values.h)
+  file(GLOB_RECURSE generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/compiler/read/*.py)
+  add_custom_command(
+    OUTPUT ${output}
+    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/equations_to_c.py ${file} --header
+            --output ${CMAKE_CURRENT_BINARY_DIR} --depfile ${output}.d
+    DEPENDS ${file} ${generator} ${FMU_SOURCE_DIR}/equations_to_c.py
+    DEPFILE ${output}.d
+    COMMENT "Making ${name}_values.h"
+    VERBATIM)
+  add_custom_target(${name}_values DEPENDS ${output})
+  add_dependencies(${target} ${name}_values)
+  target_include_directories(${target} PUBLIC ${CMAKE_CURRENT_BINARY_DIR})
 endfunction()
 
 function(add_fmu name)

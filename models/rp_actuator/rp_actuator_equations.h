@@ -1,7 +1,7 @@
 /* The equations of a drive. rp_actuator.h explains symbols and limits. */
 #pragma once
 
-#include "real.h"
+#include "../real.h"
 #include "rp_actuator.h"
 
 /* n k: effort per current, and back-EMF per velocity of the joint. */

@@ -15,7 +15,7 @@ enum rp_controller_mode {
 };
 
 struct rp_controller_parameters {
-    struct rp_parameters arm; /* what the controller believes of the arm */
+    struct arm_parameters arm; /* what the controller believes of the arm */
     double Kp[2];             /* 1/s2, >= 0 */
     double Kd[2];             /* 1/s, >= 0 */
     double Ki[2];             /* 1/s3, >= 0; 0: the integral part rests */

@@ -3,12 +3,12 @@
  * stands above this equation of the notes. */
 #pragma once
 
-#include "real.h"
+#include "../real.h"
 #include "rp_manipulator.h"
 
 /* The arm in a state, with what many equations share. */
 struct arm {
-    real m1, m2, I1z, I2z, l1, lc1, a, g; /* as in struct rp_parameters */
+    real m1, m2, I1z, I2z, l1, lc1, a, g; /* as in struct arm_parameters */
     real q[2], dq[2];
 
     real s1, c1; /* sin q1, cos q1 */
@@ -17,11 +17,11 @@ struct arm {
 };
 
 /* Inertia about z0 that does not depend on the slide, kg.m2. */
-static inline real arm_fixed_inertia(const struct rp_parameters *p) {
+static inline real arm_fixed_inertia(const struct arm_parameters *p) {
     return p->m1 * p->lc1 * p->lc1 + p->I1z + p->I2z;
 }
 
-static inline struct arm arm_in_state(const struct rp_parameters *p, const real q[2],
+static inline struct arm arm_in_state(const struct arm_parameters *p, const real q[2],
                                       const real dq[2]) {
     const real s1 = sin(q[0]), c1 = cos(q[0]); // first: nothing is kept across these calls
     const real L = p->l1 + q[1];
@@ -182,7 +182,7 @@ static inline void arm_forward_dynamics(const struct arm *arm, const real tau[2]
 }
 
 /* The same from parameters, states and inputs: the right side. */
-static inline void arm_accelerations(const struct rp_parameters *p, const real q[2],
+static inline void arm_accelerations(const struct arm_parameters *p, const real q[2],
                                      const real dq[2], const real tau[2], real ddq[2]) {
     const struct arm arm = arm_in_state(p, q, dq);
     arm_forward_dynamics(&arm, tau, ddq);

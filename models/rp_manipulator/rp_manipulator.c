@@ -4,7 +4,7 @@
 
 #include <stdio.h>
 
-bool rp_parameters_check(const struct rp_parameters *p, char *text, size_t size) {
+bool rp_parameters_check(const struct arm_parameters *p, char *text, size_t size) {
     if (arm_fixed_inertia(p) > 0.0) {
         return true;
     }

@@ -16,24 +16,15 @@
  * rp_parameters_check refuses, and for states that overflow, may be infinite or NaN. */
 #pragma once
 
+#include "arm_values.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 
-struct rp_parameters {
-    double m1;  /* kg, >= 0: mass of link 1 */
-    double m2;  /* kg, > 0: mass of link 2 */
-    double I1z; /* kg.m2, >= 0: moment of inertia of link 1 about its center of mass, along z0 */
-    double I2z; /* kg.m2, >= 0: the same of link 2 */
-    double l1;  /* m, >= 0: long side of link 1 (the notes write l and l1 for it) */
-    double lc1; /* m, >= 0: distance from the joint axis to the center of mass of link 1 */
-    double a;   /* m: short side of link 1, the offset of the slide from the joint axis */
-    double g;   /* m/s2: gravitational acceleration along -y0; 0 is the horizontal plane */
-};
-
-/* True where the equations have a solution, for parameters in the ranges of struct rp_parameters:
+/* True where the equations have a solution, for parameters in the ranges of struct arm_parameters:
  * m1 lc1^2 + I1z + I2z > 0, without which link 2 at L = 0 leaves joint 1 without inertia. False:
  * why is in text. */
-bool rp_parameters_check(const struct rp_parameters *p, char *text, size_t size);
+bool rp_parameters_check(const struct arm_parameters *p, char *text, size_t size);
 
 /* Force and moment that each link receives through its joint, in the frame of the link. */
 struct rp_joint_loads {

@@ -149,7 +149,7 @@ static bool stays_stuck(const struct rp_plant_values *values, int joint, double 
 }
 
 bool rp_plant_surely_holds(const struct rp_plant_values *values) {
-    const struct rp_parameters *arm = &values->parameters.arm;
+    const struct arm_parameters *arm = &values->parameters.arm;
     const struct rp_plant_inputs *inputs = &values->inputs;
     if (values->modes.payload != RP_PLANT_RELEASED || values->payload_attached != 0) {
         return false;

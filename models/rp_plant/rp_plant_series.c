@@ -220,7 +220,7 @@ static bool is_plain(const struct series_motion *m) {
 /* The bodies at this q2. */
 static void set_bodies(struct series_motion *m, double q2) {
     const struct rp_plant_parameters *p = m->p;
-    const struct rp_parameters *arm = &p->arm;
+    const struct arm_parameters *arm = &p->arm;
     double m2 = arm->m2;
     double a = arm->a;
     m->L0 = arm->l1 + q2;

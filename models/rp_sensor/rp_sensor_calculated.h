@@ -1,7 +1,7 @@
 /* The calculated fields of struct rp_sensor_values that are real. */
 #pragma once
 
-#include "real.h"
+#include "../real.h"
 #include "rp_sensor_model.h"
 
 /* Writes them from the parameters and the counts that are shown now and were shown a tick before.

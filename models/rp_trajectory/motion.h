@@ -1,7 +1,7 @@
 /* Arithmetic with a quantity that moves: the rules of sum, product, quotient and chain. */
 #pragma once
 
-#include "real.h"
+#include "../real.h"
 
 struct motion {
     real position;

@@ -11,7 +11,7 @@
 #include <mujoco/mujoco.h>
 #endif
 
-static const struct rp_parameters parameters = { // start values of the FMU
+static const struct arm_parameters parameters = { // start values of the FMU
     .m1 = 2.0, .m2 = 1.0, .I1z = 0.1, .I2z = 0.05, .l1 = 0.5, .lc1 = 0.25, .a = 0.1, .g = 9.81};
 
 static void arm(const double x[4], const double u[2], double dx[4]) {

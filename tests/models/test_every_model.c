@@ -6,7 +6,6 @@
 #include "last_text.h"
 #include "rp_actuator_model.h"
 #include "rp_controller_model.h"
-#include "rp_model.h"
 #include "rp_plant_model.h"
 #include "rp_plant_modes.h"
 #include "rp_sensor_model.h"
@@ -19,13 +18,12 @@
 #include <string.h>
 #include <unity.h>
 
-enum { ARM, PLANT, CONTROLLER, ACTUATOR, TRAJECTORY, SENSOR, WALL, SUBJECTS };
+enum { PLANT, CONTROLLER, ACTUATOR, TRAJECTORY, SENSOR, WALL, SUBJECTS };
 enum { DOUBLES = 256, STATES = 4, INPUTS = 10, INDICATORS = 16, ROWS = 64, POINTS = 2000 };
 
 /* A value structure, of any model. */
 union point {
     double all[DOUBLES];
-    struct rp_values arm;
     struct rp_plant_values plant;
     struct rp_controller_values controller;
     struct rp_actuator_values actuator;
@@ -76,16 +74,6 @@ static void sometimes_zero(double *values, int count) {
     for (int i = 0; i < count; i++) {
         values[i] = one_of(4) == 0 ? 0.0 : values[i];
     }
-}
-
-static void place_arm(int n) {
-    (void)n;
-    struct rp_parameters *p = &at.arm.parameters;
-    double *const may_be_zero[] = {&p->m1, &p->I2z, &p->lc1, &p->a, &p->g};
-    for (int i = 0; i < 5; i++) {
-        sometimes_zero(may_be_zero[i], 1);
-    }
-    p->a *= sign();
 }
 
 static void place_plant(int n) {
@@ -192,8 +180,6 @@ static void place_wall(int n) {
 
 // clang-format off
 static const struct subject subjects[SUBJECTS] = {
-    [ARM] = {&rp_model, {{0, PLACE(rp_values, ddq)}},
-     {{PLACE(rp_values, ddq), END(rp_values)}}, .place = place_arm},
     [PLANT] = {&rp_plant_model,
      {{0, PLACE(rp_plant_values, parameters.stops)},
       {PLACE(rp_plant_values, inputs), PLACE(rp_plant_values, ddq)}},
@@ -477,7 +463,7 @@ static void check(int which) {
 }
 
 static void test_each_model(void) {
-    static const char *const names[SUBJECTS] = {"arm",        "plant",  "controller", "actuator",
+    static const char *const names[SUBJECTS] = {"plant",  "controller", "actuator",
                                                 "trajectory", "sensor", "wall"};
     for (int which = 0; which < SUBJECTS; which++) {
         TEST_MESSAGE(names[which]); // the last one is the one that fails

@@ -54,7 +54,7 @@ static void test_a_sample_knows_the_payload(void) {
         setUp();
         struct rp_controller_parameters *p = &v.parameters;
         p->mode = RP_CONTROLLER_PD_GRAVITY;
-        p->arm = (struct rp_parameters){.m1 = 2.0, .m2 = 1.0, .l1 = 0.5, .lc1 = 0.25, .g = 9.81};
+        p->arm = (struct arm_parameters){.m1 = 2.0, .m2 = 1.0, .l1 = 0.5, .lc1 = 0.25, .g = 9.81};
         p->payload_mass = 1.5;
         p->sample_time = 0.25;
         p->Ki[0] = p->Ki[1] = v.inputs.q_ref[0] = 0.0;
@@ -230,7 +230,7 @@ static void test_times_that_do_not_fit_are_refused(void) {
 
 static void test_an_arm_without_inertia_is_refused(void) {
     next_point(RP_CONTROLLER_PD);
-    struct rp_parameters *arm = &at.v.parameters.arm;
+    struct arm_parameters *arm = &at.v.parameters.arm;
     model_test_accepted(&rp_controller_model, &at);
     arm->m1 = 2.0;
     arm->lc1 = arm->I1z = arm->I2z = 0.0;

@@ -28,7 +28,7 @@ static double uniform_or_zero(struct rp_test_random *random, double low, double 
     return rp_test_random_bits(random) % 8 == 0 ? 0.0 : value;
 }
 
-void rp_test_random_parameters(struct rp_test_random *random, struct rp_parameters *p) {
+void rp_test_random_parameters(struct rp_test_random *random, struct arm_parameters *p) {
     p->m1 = decades_or_zero(random, -2.0, 1.5);
     p->m2 = pow(10.0, rp_test_uniform(random, -2.0, 1.5));
     p->I1z = decades_or_zero(random, -3.0, 1.0);
@@ -52,12 +52,12 @@ void rp_test_random_state(struct rp_test_random *random, struct rp_test_state *s
     }
 }
 
-void rp_test_default_parameters(struct rp_parameters *p) {
-    *p = (struct rp_parameters){
+void rp_test_default_parameters(struct arm_parameters *p) {
+    *p = (struct arm_parameters){
         .m1 = 2.0, .m2 = 1.0, .I1z = 0.1, .I2z = 0.05, .l1 = 0.5, .lc1 = 0.25, .a = 0.1, .g = 9.81};
 }
 
-double rp_test_inertia(const struct rp_parameters *p, double q2) {
+double rp_test_inertia(const struct arm_parameters *p, double q2) {
     double L = p->l1 + q2;
     return p->m1 * p->lc1 * p->lc1 + p->I1z + p->I2z + p->m2 * L * L;
 }

@@ -33,16 +33,16 @@ uint64_t rp_test_random_bits(struct rp_test_random *random);
 double rp_test_uniform(struct rp_test_random *random, double low, double high);
 
 /* Valid parameters over several decades; zero where zero is allowed in one draw of eight. */
-void rp_test_random_parameters(struct rp_test_random *random, struct rp_parameters *p);
+void rp_test_random_parameters(struct rp_test_random *random, struct arm_parameters *p);
 
 /* l1 + q2 takes both signs. */
 void rp_test_random_state(struct rp_test_random *random, struct rp_test_state *state);
 
 /* The parameters that RPManipulator.fmu starts with. */
-void rp_test_default_parameters(struct rp_parameters *p);
+void rp_test_default_parameters(struct arm_parameters *p);
 
 /* m1 lc1^2 + I1z + I2z + m2 (l1 + q2)^2, called J. */
-double rp_test_inertia(const struct rp_parameters *p, double q2);
+double rp_test_inertia(const struct arm_parameters *p, double q2);
 
 /* Fails the running test unless |actual - expected| <= bound; NaN fails. */
 #define ASSERT_CLOSE(expected, actual, bound) rp_test_close(expected, actual, bound, __LINE__)

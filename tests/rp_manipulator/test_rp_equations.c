@@ -11,7 +11,7 @@
 #define EPS DBL_EPSILON
 
 static struct rp_test_random random_source;
-static struct rp_parameters p;
+static struct arm_parameters p;
 static struct rp_test_state s;
 
 /* Short names of the notes for the sample, set by next_sample. */

@@ -1,7 +1,6 @@
 /* Motions of the arm at values so extreme that the integrator's own arithmetic underflows or
  * overflows: a step is right or refused, never wrong. */
 #include "each_method.h"
-#include "rp_model.h"
 #include "run_instance.h"
 #include "value_references.h"
 
@@ -79,15 +78,9 @@ EACH_METHOD static void test_the_state_is_that_of_the_time_reached(void) {
     set(RP_MANIPULATOR_g, -9e-20);
     begin();
     const enum status status = instance_do_step(instance, 0.0, 4e209);
-    // the arm is so long that it does not move: only the Runge-Kutta method finds that; the Taylor
-    // method gets as far as its limit of steps lets it
-    const double reached = instance_time(instance);
-    TEST_ASSERT_EQUAL_INT(method == INTEGRATOR_ERK ? SEVERITY_NONE : SEVERITY_DISCARD,
-                          status_severity(status));
-    if (method == INTEGRATOR_TAYLOR) {
-        TEST_ASSERT_TRUE(reached > 0.0 && reached < 4e209);
-    } else {
-        TEST_ASSERT_EQUAL_DOUBLE(status == STATUS_OK ? 4e209 : 0.0, reached);
-    }
+    // the arm is so long that it does not move: CVODE does not find that
+    const bool finds = method == INTEGRATOR_ERK || method == INTEGRATOR_TAYLOR;
+    TEST_ASSERT_EQUAL_INT(finds ? SEVERITY_NONE : SEVERITY_DISCARD, status_severity(status));
+    TEST_ASSERT_EQUAL_DOUBLE(finds ? 4e209 : 0.0, instance_time(instance));
     TEST_ASSERT_TRUE(isfinite(get(RP_MANIPULATOR_q1)) && isfinite(get(RP_MANIPULATOR_q2)));
 }

@@ -83,15 +83,19 @@ def read(path: Path, made: Callable[[Path], str | None]) -> CodeFile:
     program = read_c(path, made=made)
     graph = Graph(has_switches=False)
     calls = Calls(program, graph)
-    for name, function in program.functions.items():
+    own = {
+        name: function
+        for name, function in program.functions.items()
+        if not (name in OF_REAL and "real" in program.typedefs)
+    }
+    for name, function in own.items():
         check_function(function)
-        is_known = name in calls.known or name in ROUNDING
-        if is_known and not (name in OF_REAL and "real" in program.typedefs):
+        if name in calls.known or name in ROUNDING:
             reason = f"{name} is a function of math.h: give this one another name"
             raise refused(function.decl, reason)
-    found = {name: calls.called(name, f) for name, f in program.functions.items()}
+    found = {name: calls.called(name, f) for name, f in own.items()}
     for function in found.values():
-        if not function.is_helper and function.name not in OF_REAL:
+        if not function.is_helper:
             given = [graph.value("parameter", name=a) for a in function.arguments]
             calls.result(function, given, False)
     warnings = [warning.replace(" warning:", "") for warning in dict.fromkeys(calls.warnings)]

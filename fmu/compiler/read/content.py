@@ -185,6 +185,7 @@ class ModelFile:
     tables: dict[str, Table] = field(default_factory=dict)
     code: CodeFile | None = None
     header: Any = None  # of its struct of values, if it has C
+    sources: list[Path] = field(default_factory=list)  # the files of equations, included ones first
     table_units: dict[str, dict[str, int]] = field(default_factory=dict)  # by `table_unit`
     dimensions: dict[str, int] = field(default_factory=dict)  # numbers of indexes, by name
     indexes: set[str] = field(default_factory=set)  # all that `for` gives
@@ -230,6 +231,12 @@ class ModelFile:
     def measured(self, unit: str) -> Measure:
         """Return a unit, which the file or SI has; ValueError if none has it."""
         return self.units[unit] if unit in self.units else measured(unit)
+
+    @property
+    def files(self) -> list[Path]:
+        """All files that were read but those of tables."""
+        code = self.code.program.files if self.code else []
+        return [*self.sources, *(path for path in code if path.is_file())]
 
     @property
     def calculate(self) -> str:

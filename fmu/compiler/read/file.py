@@ -458,6 +458,7 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
         source = source_of(path)
     with located(path, source.text):
         file = read_tables(source, solver_names)
+        file.sources = [each.path for each in source.all()]
         check(file)
     return file
 

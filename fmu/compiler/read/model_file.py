@@ -105,7 +105,10 @@ def _written(
     @cache
     def values() -> dict[str, Value]:
         found = calls.written(file.calculate, leaf)
-        return {places[place]: value for place, value in found.items() if place in places}
+        named = {places[place]: value for place, value in found.items() if place in places}
+        flat = calls.flat[file.calculate]
+        file.code.flat.update({f"{file.calculate}: {name}": flat for name in named})
+        return named
 
     def value(name: str, _given: list[Value], _is_instant: bool) -> Value:
         if name not in values():

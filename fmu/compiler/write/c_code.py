@@ -104,6 +104,8 @@ class Code:
             return self.outer.of(value)
         c_type = "int" if value.op in (*CONDITIONS, "locate") else "double"
         given = [self.known[argument] for argument in value.arguments]
+        if value.op in ("value_of", "moving_as"):  # which differ in derivatives only
+            return given[0]
         if value.op == "entry":
             return self.constant(value.name + "".join(f"[{index}]" for index in given))
         if value.op == "locate":

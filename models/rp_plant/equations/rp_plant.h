@@ -48,7 +48,7 @@ enum rp_plant_payload_mode {
 };
 
 struct rp_plant_parameters {
-    struct rp_parameters arm;
+    struct arm_parameters arm;
     double armature[2];           /* kg.m2, kg, >= 0: inertia of the drive, seen at the joint */
     double damping[2];            /* N.m.s/rad, N.s/m, >= 0 */
     double coulomb_friction[2];   /* N.m, N, >= 0: of a fast joint */

@@ -18,7 +18,6 @@
 
 #include "platform.h"
 #include "rp_equations.h"
-#include "rp_model.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -49,7 +48,7 @@ static inline struct products products_of_order(double row[][SERIES_LENGTH], int
 }
 
 /* What the states of the origin determine. */
-static void begin(const struct rp_parameters *p, double row[][SERIES_LENGTH]) {
+static void begin(const struct arm_parameters *p, double row[][SERIES_LENGTH]) {
     row[L][0] = p->l1 + row[Q2][0];
     row[P][0] = row[L][0] * row[W][0];
     row[S][0] = sin(row[Q1][0]);
@@ -57,7 +56,7 @@ static void begin(const struct rp_parameters *p, double row[][SERIES_LENGTH]) {
 }
 
 /* Right sides of N' and y' of order n that the efforts give. */
-ALWAYS_INLINE void efforts(const struct series_origin *origin, const struct rp_parameters *p,
+ALWAYS_INLINE void efforts(const struct series_origin *origin, const struct arm_parameters *p,
                            const double friction[2], int n, double effort[2]) {
     effort[0] = 0.0;
     effort[1] = 0.0;
@@ -76,11 +75,11 @@ ALWAYS_INLINE void efforts(const struct series_origin *origin, const struct rp_p
     effort[0] = tau1 + p->a * f2;
 }
 
-ALWAYS_INLINE void extend_with(const struct rp_parameters *parameters, const double friction[2],
+ALWAYS_INLINE void extend_with(const struct arm_parameters *parameters, const double friction[2],
                                const struct series_origin *origin, int first, int last,
                                double row[][SERIES_LENGTH]) {
     // a copy, which no coefficient overwrites
-    const struct rp_parameters p = *parameters;
+    const struct arm_parameters p = *parameters;
     if (first == 0) {
         begin(&p, row);
     }
@@ -109,7 +108,7 @@ ALWAYS_INLINE void extend_with(const struct rp_parameters *parameters, const dou
     }
 }
 
-void rp_series_extend(const struct rp_parameters *parameters, const double friction[2],
+void rp_series_extend(const struct arm_parameters *parameters, const double friction[2],
                       const struct series_origin *origin, int first, int last,
                       double row[][SERIES_LENGTH]) {
     if (friction == NULL) {
@@ -118,12 +117,3 @@ void rp_series_extend(const struct rp_parameters *parameters, const double frict
         extend_with(parameters, friction, origin, first, last, row);
     }
 }
-
-static enum status extend(const struct series_origin *origin, int first, int last,
-                          double row[][SERIES_LENGTH]) {
-    const struct rp_values *values = origin->values;
-    extend_with(&values->parameters, NULL, origin, first, last, row);
-    return STATUS_OK;
-}
-
-const struct series rp_series = {.row_count = RP_SERIES_ROWS, .extend = extend};
