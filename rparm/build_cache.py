@@ -8,6 +8,7 @@ cannot be written, builds do without it.
 import hashlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -24,6 +25,7 @@ from rparm.files import whole
 
 LARGEST = 2**30  # bytes of all entries
 LARGEST_NAMED = 10**7  # bytes of a file that a model names: a larger one is refused
+OF_VALUES = "_values.h"  # how headers end that are made of files with equations
 COMPILERS = ("gcc", "clang", "zig", "as", "ld")
 # variables that lead compilers to other files, or change what they write
 VARIABLES = ("CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH", "COMPILER_PATH", "GCC_EXEC_PREFIX")
@@ -124,12 +126,7 @@ def parts_of(
 def _parts(
     file: Path, runtimes: list[Path], of_this_machine: bool, packages: Iterable[str]
 ) -> Iterator[object]:
-    text = file.read_bytes()
-    yield text
-    for path in (file.parent / name for name in _named(tomllib.loads(text.decode("utf-8-sig")))):
-        yield path.relative_to(file.parent)
-        if path.is_file():
-            yield path.read_bytes() if path.stat().st_size <= LARGEST_NAMED else None
+    yield from _texts(file)
     fmu = Path(fmu_tools.__path__[0])
     own = [*fmu.parent.glob("src/instance/*.toml"), *fmu.rglob("*")]
     yield from _files(own, fmu.parent)
@@ -150,13 +147,41 @@ def compilers(first: str) -> Iterator[object]:
         yield subprocess.run([name, "--version"], capture_output=True, check=False).stdout
 
 
-def _named(content: Any) -> Iterator[str]:
-    """Yield the files that a file with equations names: its C file, and files of its tables."""
+def _texts(file: Path) -> Iterator[object]:
+    """Yield a file with equations and all files that it leads to, each with its name."""
+    todo, found = [file], {file.resolve()}
+    while todo:
+        path = todo.pop()
+        yield os.path.relpath(path, file.parent)
+        if not path.is_file():
+            continue
+        content = path.read_bytes() if path.stat().st_size <= LARGEST_NAMED else b""
+        yield content
+        for name in _named(path, content):
+            if (path.parent / name).resolve() not in found:
+                found.add((path.parent / name).resolve())
+                todo.append(path.parent / name)
+
+
+def _named(path: Path, content: bytes) -> Iterator[str]:
+    """Yield the files that a file names: what it includes, its C, and files of its tables."""
+    if path.suffix == ".toml":
+        yield from _in_tables(tomllib.loads(content.decode("utf-8-sig")))
+    elif path.suffix in (".c", ".h"):
+        for name in re.findall(r'^\s*#\s*include\s*"([^"]+)"', content.decode("latin-1"), re.M):
+            yield name
+            if name.endswith(OF_VALUES):  # made of that file
+                yield f"{name.removesuffix(OF_VALUES)}.toml"
+
+
+def _in_tables(content: Any) -> Iterator[str]:
     if isinstance(content, dict):
         for name, value in content.items():
             if name in ("code", "file") and isinstance(value, str):
                 yield value
-            yield from _named(value)
+            if name == "include" and isinstance(value, list):
+                yield from (each for each in value if isinstance(each, str))
+            yield from _in_tables(value)
 
 
 def _packages(names: Iterable[str]) -> set[str]:
