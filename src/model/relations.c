@@ -168,25 +168,40 @@ static void settle(const struct call *call) {
     }
 }
 
-/* Writes the modes that follow from the values, whatever they were before. */
-static void set_modes_from_values(const struct call *call, bool only_of_inputs) {
+/* Writes the modes that follow from the values, whatever they were before. Returns true if some
+ * have changed. */
+static bool set_modes_from_values(const struct call *call, bool only_of_inputs) {
     const struct relations *model = call->model;
     const struct compared *compared = call->room.compared;
+    bool changes = false;
     locate_segments(call);
     for (int i = 0; i < model->segment_count; i++) {
         if (model->segment[i].is_of_inputs || !only_of_inputs) {
+            changes |= call->segments[i] != call->room.segment[i];
             call->segments[i] = call->room.segment[i];
         }
     }
     compare(call, call->room.zeros, call->room.compared);
     for (int k = 0; k < model->relation_count; k++) {
         if (model->relation[k].is_of_inputs || !only_of_inputs) {
-            call->holds[k] = holds_at(&model->relation[k], compared[k].distance);
+            const int holds = holds_at(&model->relation[k], compared[k].distance);
+            changes |= call->holds[k] != holds;
+            call->holds[k] = holds;
         }
     }
-    if (!only_of_inputs) {
-        update_modes_until_stable(call, true);
+    return changes;
+}
+
+/* Writes the modes that follow from inputs only, each after those that its relation reads. */
+static void follow_inputs(const struct call *call) {
+    for (int count = 0;
+         set_modes_from_values(call, true) && count < call->model->relation_count; count++) {
     }
+}
+
+static void set_first_modes(const struct call *call) {
+    set_modes_from_values(call, false);
+    update_modes_until_stable(call, true);
 }
 
 const void *relations_followed(const struct relations *model, struct relations_room room,
@@ -200,7 +215,11 @@ const void *relations_followed(const struct relations *model, struct relations_r
         model->start(copy);
     }
     const struct call call = call_of(model, room, copy, t, room.zeros, NULL);
-    set_modes_from_values(&call, is_begun);
+    if (is_begun) {
+        follow_inputs(&call);
+    } else {
+        set_first_modes(&call);
+    }
     return copy;
 }
 
@@ -545,7 +564,7 @@ enum status relations_update(const struct relations *model, struct relations_roo
         if (status != STATUS_OK) {
             return status;
         }
-        set_modes_from_values(&call, false);
+        set_first_modes(&call);
         *call.is_begun = 1;
     }
     set_time(&call, event);

@@ -17,7 +17,7 @@ struct relation {
     bool includes_zero; /* true if it holds at its limit */
     bool is_timed;      /* true if its time is known in advance */
     bool rises;         /* of a timed relation: true if it holds after its time */
-    bool is_of_inputs;  /* true if it depends on inputs and parameters only */
+    bool is_of_inputs;  /* true if inputs move it and nothing else, also by way of others */
     bool is_of_time;    /* true if, between events, it moves by the time only */
     size_t indicator;   /* of a relation that is not timed */
 };
@@ -28,7 +28,7 @@ struct segment {
     int low;           /* relation that holds from the segment's begin on */
     int high;          /* relation that holds from its end on */
     int first, last;   /* numbers of the table's segments */
-    bool is_of_inputs; /* true if the value depends on inputs and parameters only */
+    bool is_of_inputs; /* true if inputs move the value and nothing else */
 };
 
 /* A mode of the model, or a discrete variable that is a whole number. */

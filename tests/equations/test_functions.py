@@ -280,6 +280,18 @@ def test_values_follow_while_parameters_are_set(spring: Path) -> None:
     assert instance.getReal([at["x"]])[0] == pytest.approx(1.5 * np.cos(0.3))
 
 
+def test_limits_of_inputs_follow_at_once_within_each_other() -> None:
+    """Also where a condition reads what another one decides."""
+    begun = initializing(made(MODELS["following_values"]["LIMITS"]))
+    instance, at = begun.fmi, begun.loaded.references
+    instance.exitInitializationMode()
+    instance.doStep(0.0, 0.1)
+    for u, high in ((5.0, 1.0), (-5.0, 3.0), (0.5, 3.0), (2.0, -4.0), (-9.0, -1.0)):
+        instance.setReal([at["u"], at["high"]], [u, high])
+        expected = max(min(max(min(u, high), -2.0), 1.5), -3.0 if high > 0.0 else -1.0)
+        assert instance.getReal([at["y"]]) == [expected]
+
+
 def test_an_importer_cannot_set_a_start_that_follows(spring: Path) -> None:
     begun = initializing(spring)
     instance, at = begun.fmi, begun.loaded.references

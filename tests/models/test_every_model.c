@@ -4,7 +4,6 @@
  * equations: test_all_is_written.py. Models themselves have tests in their folders. */
 #include "equations.h" /* of RPEnvironment */
 #include "last_text.h"
-#include "rp_actuator_model.h"
 #include "rp_controller_model.h"
 #include "rp_plant_model.h"
 #include "rp_plant_modes.h"
@@ -18,7 +17,7 @@
 #include <string.h>
 #include <unity.h>
 
-enum { PLANT, CONTROLLER, ACTUATOR, TRAJECTORY, SENSOR, WALL, SUBJECTS };
+enum { PLANT, CONTROLLER, TRAJECTORY, SENSOR, WALL, SUBJECTS };
 enum { DOUBLES = 256, STATES = 4, INPUTS = 10, INDICATORS = 16, ROWS = 64, POINTS = 2000 };
 
 /* A value structure, of any model. */
@@ -26,7 +25,6 @@ union point {
     double all[DOUBLES];
     struct rp_plant_values plant;
     struct rp_controller_values controller;
-    struct rp_actuator_values actuator;
     struct rp_trajectory_values trajectory;
     struct rp_sensor_values sensor;
     struct equations_values wall;
@@ -126,17 +124,6 @@ static void place_controller(int n) {
 
 /* What decides a current: the command, the current's limits, the voltage's, or both, beyond the
  * no-load speed. */
-static void place_actuator(int n) {
-    struct rp_actuator_values *v = &at.actuator;
-    for (int i = 0; i < 2; i++) {
-        const int side = i == 0 ? n % 4 : one_of(4);
-        v->inputs.effort_cmd[i] *= side == 1 || side == 2 ? 1e4 : 1.0;
-        v->inputs.dq[i] *= side == 3 ? 1e5 : 1.0;
-        v->parameters.current_max[i] *= side == 2 ? 1e3 : 32.0;
-        v->parameters.voltage_max[i] *= side == 2 ? 16.0 : 1e3;
-    }
-}
-
 /* Each motion and branch, at rest, in ramps and between; circles beside and around the axis. */
 static void place_trajectory(int n) {
     static const double times[] = {0.25, 0.875, 1.25, 2.0, 5.0, 7.0};
@@ -189,8 +176,6 @@ static const struct subject subjects[SUBJECTS] = {
      {{0, PLACE(rp_controller_values, parameters.sample_time)},
       {PLACE(rp_controller_values, inputs), PLACE(rp_controller_values, payload_attached)}},
      {{PLACE(rp_controller_values, dintegral), END(rp_controller_values)}}, .place = place_controller},
-    [ACTUATOR] = {&rp_actuator_model, {{0, PLACE(rp_actuator_values, dcurrent)}},
-     {{PLACE(rp_actuator_values, dcurrent), END(rp_actuator_values)}}, .place = place_actuator},
     [TRAJECTORY] = {&rp_trajectory_model,
      {{PLACE(rp_trajectory_values, parameters.l1), PLACE(rp_trajectory_values, payload)}},
      {{PLACE(rp_trajectory_values, q), PLACE(rp_trajectory_values, payload_attached)}},
@@ -463,7 +448,7 @@ static void check(int which) {
 }
 
 static void test_each_model(void) {
-    static const char *const names[SUBJECTS] = {"plant",  "controller", "actuator",
+    static const char *const names[SUBJECTS] = {"plant",  "controller",
                                                 "trajectory", "sensor", "wall"};
     for (int which = 0; which < SUBJECTS; which++) {
         TEST_MESSAGE(names[which]); // the last one is the one that fails

@@ -9,7 +9,15 @@ from tests.models.published_interface import PLACES, differences, of_fmu, of_tex
 from tests.support.paths import EVERY
 
 # What may differ, and why: FMU, variable or path of another part, column; "*" is any
-CHANGED: dict[tuple[str, str, str], str] = {}
+EVENTS = "where a limit begins and ends is an event now"
+CHANGED: dict[tuple[str, str, str], str] = {
+    ("RPActuator", "/", "attributes"): EVENTS,
+    ("RPActuator", "/ModelExchange", "attributes"): EVENTS,
+    ("RPActuator", "/CoSimulation", "attributes"): EVENTS,
+    ("RPActuator", "/order/event indicator", "*"): EVENTS,
+    **{("RPActuator", f"indicator_{i}", "*"): EVENTS for i in range(1, 9)},
+    **{("RPActuator", n, "*"): EVENTS for n in ("event_count", "last_event_time", "max_events")},
+}
 
 each_version = pytest.mark.parametrize("version", PLACES)
 

@@ -1,23 +1,15 @@
 /* The drives: braking, ends of the numbers and refusals.
  * test_actuator.py compares values with the equations. */
-#include "model_test.h"
-#include "rp_actuator_equations.h"
-#include "rp_actuator_model.h"
+#include "rp_actuator.h"
 #include "rp_test_support.h"
 #include "run_instance.h"
 #include "value_references.h"
 
 #include <float.h>
-#include <stdio.h>
-
-static struct rp_actuator_values at;
+#include <string.h>
 
 void setUp(void) {
     create_instance();
-    at = (struct rp_actuator_values){
-        .parameters = {{1.0, 1.5}, {0.5, 1.5}, {1.0, 2.0}, {32.0, 48.0}, {1e3, 2e3}, {1.0, 0.5}},
-        .inputs = {{1.5, 0.5}, {1.0, 2.0}},
-    };
 }
 
 /* Drive of joint 1. k and n are powers of two, so that commands of whole currents are exact. */
@@ -62,41 +54,40 @@ static void test_beyond_the_no_load_speed_the_drive_brakes(void) {
 
 /* ---- Ends of the numbers --------------------------------------------------------------------- */
 
+static const struct drive drive = {1.0, 1.0, 0.5, 32.0, 1e3, 1.0};
+
 static void test_not_a_number_is_not_limited(void) {
-    at.inputs.effort_cmd[0] = NAN;
-    TEST_ASSERT_TRUE(isnan(drive_limited_current(&at.parameters, &at.inputs, 0)));
-    TEST_ASSERT_FALSE(isnan(drive_limited_current(&at.parameters, &at.inputs, 1)));
+    TEST_ASSERT_TRUE(isnan(drive_limited_current(&drive, NAN, 1.0)));
+    TEST_ASSERT_FALSE(isnan(drive_limited_current(&drive, 0.5, 2.0)));
 }
 
 /* A command or a back-EMF that overflows is only very large. */
 static void test_what_overflows_meets_the_limit(void) {
-    struct rp_actuator_parameters *p = &at.parameters;
-    p->gear_ratio[0] = 1e-9;
-    at.inputs.effort_cmd[0] = DBL_MAX;
-    p->gear_ratio[1] = 1e9;
-    at.inputs.dq[1] = DBL_MAX;
-    TEST_ASSERT_TRUE(drive_limited_current(p, &at.inputs, 0) == p->current_max[0]);
-    TEST_ASSERT_TRUE(drive_limited_current(p, &at.inputs, 1) == -p->current_max[1]);
+    set(RP_ACTUATOR_gear_ratio1, 1e-9);
+    set(RP_ACTUATOR_tau1_cmd, DBL_MAX);
+    set(RP_ACTUATOR_gear_ratio2, 1e9);
+    set(RP_ACTUATOR_dq2, DBL_MAX);
+    initialize(0.0);
+    step_to(0.01);
+    TEST_ASSERT_TRUE(get(RP_ACTUATOR_current1_limited) == get(RP_ACTUATOR_current_max1));
+    TEST_ASSERT_TRUE(get(RP_ACTUATOR_current2_limited) == -get(RP_ACTUATOR_current_max2));
 }
 
 /* ---- What is refused ------------------------------------------------------------------------ */
 
 static void test_gears_without_a_ratio_are_refused(void) {
-    double *ratio = at.parameters.gear_ratio;
-    ratio[0] = -1e-9;
-    ratio[1] = 1e-9;
-    model_test_accepted(&rp_actuator_model, &at);
-    const struct {
-        double ratio;
-        const char *text;
-    } wrong[] = {{0.0, "0"}, {9e-10, "9e-10"}, {-5e-10, "-5e-10"}, {NAN, "nan"}};
-    for (int i = 0; i < 8; i++) {
-        char expected[128];
-        ratio[0] = ratio[1] = 1.0;
-        ratio[i / 4] = wrong[i % 4].ratio;
-        (void)snprintf(expected, sizeof expected,
-                       "gear_ratio%d = %s is refused: its magnitude must be 1e-09 or more",
-                       i / 4 + 1, wrong[i % 4].text);
-        model_test_refused(&rp_actuator_model, &at, expected);
+    const double ratios[] = {1e-9, -1e-9, 0.0, 9e-10, -5e-10};
+    for (int i = 0; i < 10; i++) {
+        instance_reset(instance);
+        set(i < 5 ? RP_ACTUATOR_gear_ratio1 : RP_ACTUATOR_gear_ratio2, ratios[i % 5]);
+        const struct instance_experiment experiment = {0};
+        ASSERT_OK(instance_setup_experiment(instance, &experiment));
+        ASSERT_OK(instance_enter_initialization(instance));
+        const enum status status = instance_exit_initialization(instance);
+        TEST_ASSERT_EQUAL_INT(i % 5 < 2 ? STATUS_OK : STATUS_INVALID_PARAMETERS, status);
+        if (status != STATUS_OK) {
+            const char *name = i < 5 ? "gear_ratio1" : "gear_ratio2";
+            TEST_ASSERT_NOT_NULL(strstr(last_text, name));
+        }
     }
 }

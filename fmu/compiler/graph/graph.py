@@ -92,11 +92,6 @@ class Relation:
         return self.mode.name
 
     @property
-    def is_of_inputs(self) -> bool:
-        """It follows from inputs and parameters only."""
-        return not {op for op, _ in self.distance.leaves} & {"state", "time", "mode"}
-
-    @property
     def is_of_time(self) -> bool:
         """It moves by the time only."""
         return is_of_time(self.distance)
@@ -136,6 +131,7 @@ class Graph:
     nodes: list[Node] = field(default_factory=list)  # of a text, for each relation
     segments: dict[str, Segment] = field(default_factory=dict)  # by the names of their leaves
     looked_up: dict[Value, tuple[Table, list[Value]]] = field(default_factory=dict)  # at instants
+    of_inputs: dict[Value, bool] = field(default_factory=dict)  # of distances
     has_switches: bool = True  # else relations are evaluated with the values
     is_guarded: bool = True  # else an infinite slope makes derivatives infinite, as in C
 
@@ -143,6 +139,20 @@ class Graph:
     def located(self) -> list[Relation]:
         """Relations with an indicator: those whose time is not known before."""
         return [relation for relation in self.relations.values() if relation.time is None]
+
+    def is_of_inputs(self, value: Value) -> bool:
+        """Return whether inputs move a value and nothing else, also by way of relations."""
+        if value not in self.of_inputs:
+            found = True
+            for op, name in value.leaves:
+                if name in self.relations:
+                    found = found and self.is_of_inputs(self.relations[name].distance)
+                elif name in self.segments:
+                    found = found and self.is_of_inputs(self.segments[name].argument)
+                else:
+                    found = found and op not in ("state", "time", "later")
+            self.of_inputs[value] = found
+        return self.of_inputs[value]
 
     def value(self, op: str, *arguments: Value, name: str = "", number: float = 0.0) -> Value:
         """The operation as it is."""

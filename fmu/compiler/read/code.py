@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from pycparser import c_ast
+from pycparser.c_generator import CGenerator
 
 from ..expressions.expression import RELATIONS, ExpressionError, Lookup, Node, in_order, parse
 from ..graph.graph import DERIVATIVES, Graph, Value
@@ -115,6 +116,7 @@ class Calls(Interpreter):
         self.results: dict[tuple[object, ...], Value] = {}
         self.is_instant, self.steps_in_all = False, 0
         self.flat: dict[str, set[str]] = {}
+        self.relation_texts: dict[str, str] = {}  # with their places in C
 
     def called(self, name: str, function: c_ast.FuncDef) -> Called:
         """Return how expressions call a function."""
@@ -168,7 +170,11 @@ class Calls(Interpreter):
             return self.graph.value(op, a, b)
         if len(self.graph.relations) > MOST_RELATIONS:
             raise refused(node, f"the model has more than {MOST_RELATIONS} conditions that move")
-        return super().relation(op, a, b, node)
+        found = super().relation(op, a, b, node)
+        for name in self.graph.relations.keys() - self.relation_texts.keys():
+            place = f"{node.coord.file}:{node.coord.line}"
+            self.relation_texts[name] = f"{CGenerator().visit(node)} of {place}"
+        return found
 
     def built_in(
         self, name: str, given: list[tuple[Any, Any]], state: Any, node: c_ast.FuncCall

@@ -73,11 +73,14 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
         elif expression.target:
             known.setdefault(expression.target, expression.value)
     places = [source.place for source in sources]
+    in_c = calls.relation_texts if calls else {}
     file.relation_texts = [
-        f"{place[0].strip('[]').replace('events.', 'event ')} ({_shown(node)})"
+        in_c[name]
+        if name in in_c
+        else f"{place[0].strip('[]').replace('events.', 'event ')} ({_shown(node)})"
         if place[-1] == "when"
         else f"{_shown(node)} of {' '.join(place[:2])}"
-        for node, place in zip(graph.nodes, places, strict=True)
+        for name, node, place in zip(graph.relations, graph.nodes, places, strict=True)
     ]
     return file
 

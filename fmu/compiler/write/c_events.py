@@ -212,7 +212,7 @@ class Events:
         table = [
             # at its time a timed one is past
             f"{{{int(r.rises if r.time else r.includes_zero)}, {int(r.time is not None)}, "
-            f"{int(r.rises)}, {int(r.is_of_inputs)}, {int(r.is_of_time)}, "
+            f"{int(r.rises)}, {int(self.graph.is_of_inputs(r.distance))}, {int(r.is_of_time)}, "
             f"{self.located.index(r) if r.time is None else 0}}},"
             for r in self.relations
         ]
@@ -227,7 +227,7 @@ class Events:
             state_offset=f"offsetof(struct equations_values, {file.fields.value(states[0].name)})"
             if states
             else "0",
-            has_inputs=int(any(r.is_of_inputs for r in self.relations)),
+            has_inputs=int(any(self.graph.is_of_inputs(r.distance) for r in self.relations)),
             modes=2
             + len(self.relations)
             + len(file.events)
@@ -314,7 +314,7 @@ class Events:
         table = []
         for i, s in enumerate(segments):
             code.lines.append(f"segment[{i}] = {located(s.bounds, code.of(s.argument))};")
-            bounds = (s.first, s.first + s.count - 1, int(s.low.is_of_inputs))
+            bounds = (s.first, s.first + s.count - 1, int(self.graph.is_of_inputs(s.low.distance)))
             row = (places[s.low.name], places[s.high.name], *bounds)
             table.append(f"{{{', '.join(map(str, row))}}},")
         return {"segments": len(segments), "segment": table or ["{0},"], "locate": code.lines}
