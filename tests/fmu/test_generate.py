@@ -141,26 +141,33 @@ def test_generated_files_in_the_build_are_fresh(fmu: Path, tmp_path: Path) -> No
     date = root.get("generationDateAndTime")
     epoch = str(int(datetime.fromisoformat(date).timestamp())) if date else ""
     options = ("--version", root.get("version", ""), "--license", ROOT / "LICENSE")
-    generated(VARIABLES, tmp_path, *options, SOURCE_DATE_EPOCH=epoch)
+    variables = built / "model" / "variables.toml"
+    generated(variables, tmp_path, *options, SOURCE_DATE_EPOCH=epoch)
     descriptions = ("modelDescription.xml", "fmi3/modelDescription.xml")
     for name in (*descriptions, "terminalsAndIcons.xml", "variables.c", "value_references.h"):
         assert (built / name).read_text() == (tmp_path / name).read_text()
 
 
-def test_a_variable_needs_only_its_declaration(model_copy: Path, tmp_path: Path) -> None:
-    model_copy.write_text(
-        model_copy.read_text()
-        + '[variables.lever]\nreference = 70\nfield = "loads.f1[1]"\ncausality = "local"\n'
-        'variability = "continuous"\nunit = "N"\ndescription = "Force out of the plane"\n'
+@pytest.fixture
+def wheel(tmp_path: Path) -> Path:
+    """variables.toml of a copy of the wheel."""
+    return copied("wheel", tmp_path, below="tests")
+
+
+def test_a_variable_needs_only_its_declaration(wheel: Path, tmp_path: Path) -> None:
+    wheel.write_text(
+        wheel.read_text()
+        + '[variables.lever]\nreference = 70\nfield = "push"\ncausality = "local"\n'
+        'variability = "continuous"\nunit = "N"\ndescription = "Push of the speed"\n'
     )
-    root = generated(model_copy, tmp_path / "out")
+    root = generated(wheel, tmp_path / "out")
     assert scalars(root)["lever"].get("valueReference") == "70"
     table = (tmp_path / "out" / "variables.c").read_text()
     assert '{70, "lever", VARIABLE_FLOAT64, VARIABLE_OF_MODEL' in table
-    compile_table(tmp_path / "out")
+    compile_table(tmp_path / "out", "tests/wheel")
 
 
-def compile_table(folder: Path, model: str = "rp_manipulator") -> None:
+def compile_table(folder: Path, model: str) -> None:
     """Compile the generated variables.c; raise with the compiler's words where that fails."""
     includes = [
         f"-I{ROOT / name}"
@@ -170,7 +177,7 @@ def compile_table(folder: Path, model: str = "rp_manipulator") -> None:
             "src/instance",
             "fmu/component",
             "models",
-            f"models/{model}",
+            model,
         )
     ]
     command = ["cc", "-std=c17", "-fsyntax-only", *includes, folder / "variables.c"]
@@ -179,13 +186,12 @@ def compile_table(folder: Path, model: str = "rp_manipulator") -> None:
         raise ValueError(result.stderr)
 
 
-@pytest.mark.parametrize("field", ["no_such_field", "loads", "q", "parameters"])
-def test_a_wrong_field_does_not_compile(model_copy: Path, tmp_path: Path, field: str) -> None:
-    text = model_copy.read_text().replace('field = "D[0][0]"', f'field = "{field}"')
-    model_copy.write_text(text)
-    generated(model_copy, tmp_path / "out")
+@pytest.mark.parametrize("field", ["no_such_field", "is_turning"])
+def test_a_wrong_field_does_not_compile(wheel: Path, tmp_path: Path, field: str) -> None:
+    change(wheel, 'field = "lost_speed"', f'field = "{field}"')
+    generated(wheel, tmp_path / "out")
     with pytest.raises(ValueError, match=field):
-        compile_table(tmp_path / "out")
+        compile_table(tmp_path / "out", "tests/wheel")
 
 
 def test_the_guid_follows_the_interface_and_not_the_texts(model_copy: Path, tmp_path: Path) -> None:
@@ -221,7 +227,7 @@ def test_a_constant_of_another_value_does_not_compile(
     change(trajectory, old, new)
     generated(trajectory, tmp_path / "out")
     with pytest.raises(ValueError, match=word):
-        compile_table(tmp_path / "out", "rp_trajectory")
+        compile_table(tmp_path / "out", "models/rp_trajectory")
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root writes everywhere")

@@ -7,7 +7,7 @@ from typing import Any
 from ..expressions.expression import in_order
 from ..graph.band import band
 from ..graph.graph import FALLIBLE, Value, is_number
-from ..read.content import OPTIONS, ModelFile
+from ..read.content import OPTIONS, ModelFile, Variable
 from .c_code import Code, declared, filled, indented, number, shortened, text
 from .c_events import Events, arrays, leaves, ticks
 from .c_series import Series
@@ -28,6 +28,7 @@ static enum status extend(const struct series_origin *origin, int first, int las
                             : extend_orders(origin, first, last, row);
 }
 """
+MOST_SHOWN = 8  # values of parameters in a message
 LONG = 1000  # statements for derivatives in small code: compilers need less time
 FOLLOWED = "relations_followed(&relations, ROOM, values, t, &copy)"
 
@@ -277,8 +278,8 @@ def _at_start(file: ModelFile, structure: str, derivatives: Mapping[str, Value])
 def _checks(file: ModelFile) -> list[str]:
     """Refuses parameters that are not finite or break a condition, or leave it undefined."""
     graph, code = file.graph, Code(leaves(file))
-    conditions = [
-        (f"isfinite(values->{file.fields.value(v.name)})", f"{base} is not finite")
+    conditions: list[tuple[str, str, list[Variable]]] = [
+        (f"isfinite(values->{file.fields.value(v.name)})", f"{base} is not finite", [])
         for v in file.of("parameters")
         for base in v.name.split("[")[:1]
     ]
@@ -286,10 +287,14 @@ def _checks(file: ModelFile) -> list[str]:
         holds, unknown = check.value, graph.unknown(check.value)
         if unknown is not None:
             holds = graph.value("and", graph.value("not", unknown), holds)
-        conditions.append((code.of(holds), message))
+        read = [v for v in file.of("parameters") if (v.leaf.op, v.name) in check.value.leaves]
+        conditions.append((code.of(holds), message, read[:MOST_SHOWN]))
     lines = []
-    for condition, message in conditions:
-        why = f'    (void)snprintf(text, size, "%s", {text(message)});'
+    for condition, message, read in conditions:
+        shown = ", ".join(f"{v.name} = %g" for v in read)
+        values = "".join(f", values->{file.fields.value(v.name)}" for v in read)
+        given = f'"%s{shown and f" ({shown})"}", {text(message)}{values}'
+        why = f"    (void)snprintf(text, size, {given});"
         refused = [f"if (!{condition}) {{", why, "    return STATUS_INVALID_PARAMETERS;", "}"]
         lines.append("\n".join(refused))
     return rolled(code.lines + lines)[0]

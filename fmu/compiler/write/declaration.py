@@ -225,9 +225,9 @@ def _entries_of(
         entries["display"] = dict(zip(("name", "factor", "offset"), variable.display, strict=True))
     numbers = {key: getattr(variable, key) for key in NUMBERS}
     entries |= {key: number for key, number in numbers.items() if number is not None}
-    if variable.section == "outputs" or variable.derivative_of:
-        if variable.section != "states":
-            entries |= _dependencies(variable.value, file)
+    is_derivative = bool(variable.derivative_of) and variable.section != "states"
+    if variable.section == "outputs" or is_derivative:
+        entries |= _dependencies(variable.value, file)
     if variable.derivative_of:
         entries["derivative_of"] = variable.derivative_of
     return entries | {"description": variable.description or variable.name}
