@@ -152,12 +152,15 @@ def _texts(file: Path) -> Iterator[object]:
     todo, found = [file], {file.resolve()}
     while todo:
         path = todo.pop()
-        yield os.path.relpath(path, file.parent)
+        if path != file:
+            yield os.path.relpath(path, file.parent)
         if not path.is_file():
             continue
         content = path.read_bytes() if path.stat().st_size <= LARGEST_NAMED else b""
         yield content
         for name in _named(path, content):
+            if path == file and name.endswith((".c", ".h")):  # names in C begin as the file's
+                yield file.stem
             if (path.parent / name).resolve() not in found:
                 found.add((path.parent / name).resolve())
                 todo.append(path.parent / name)

@@ -16,6 +16,8 @@ from .graph.tables import INTERPOLATIONS, OUTSIDE
 from .read import keys as reader
 from .read.arrays import FOR
 from .read.content import BOOLEAN, FOLLOWS, INTEGER, SWITCHES
+from .read.header import CALCULATED
+from .read.include import INCLUDED
 from .write import declaration
 
 Schema = dict[str, Any]
@@ -43,7 +45,7 @@ ITEMS = {"type": "array", "items": WORD, "minItems": 1, "uniqueItems": True}
 ROWS = {"type": "array", "items": NUMBER, "minItems": 2}
 KEYS: dict[str, Schema] = {  # start: by the type
     **dict.fromkeys(("min", "max"), NUMBER),
-    **dict.fromkeys(("unit", "description", "file"), TEXT),
+    **dict.fromkeys(("unit", "description", "file", "derivative_of"), TEXT),
     **dict.fromkeys(("x", "y"), {"anyOf": [ROWS, TEXT]}),  # lists, or columns of the file
     **dict.fromkeys(("reinit", "set"), {"type": "object", "additionalProperties": EXPRESSION}),
     **dict.fromkeys(("derivative", "value", "when", "while", "every", "offset", FOR), EXPRESSION),
@@ -72,7 +74,9 @@ def schema() -> Schema:
     dialect = "https://json-schema.org/draft/2020-12/schema"
     definitions = DEFINITIONS | {"terminal": _terminal()}
     head = {"$schema": dialect, "title": "File with equations", "$defs": definitions}
-    with_value = {"functions": {"additionalProperties": {"required": ["value"]}}}
+    with_value = dict.fromkeys(
+        ("functions", *CALCULATED), {"additionalProperties": {"required": ["value"]}}
+    )
     only_in_c = {"if": {"not": {"required": ["code"]}}, "then": {"properties": with_value}}
     return head | _table(found, "name") | {"anyOf": some} | only_in_c
 
@@ -100,6 +104,7 @@ def _further(named: Schema) -> dict[str, Schema]:
         "modes": {
             "anyOf": [_by_name(modes, named), {"type": "array", "items": mode, "uniqueItems": True}]
         },
+        "include": {"type": "array", "items": TEXT | {"pattern": f"^{INCLUDED.pattern}$"}},
         "code": TEXT | {"pattern": f"^{reader.CODE.pattern}$"},
         "sizes": _by_name(size, named, has_indexes=False),
         "units": {"type": "object", "additionalProperties": unit},
@@ -138,6 +143,7 @@ def _start(*values: Schema) -> Schema:
 def _entry(section: str) -> Schema:
     """Return the schema of an entry of a section of variables; its keys depend on its type."""
     keys, needed = reader.SECTIONS[section]
+    needed = "" if section in CALCULATED else needed  # C may write it
     follows = [EXPRESSION] if section in ("states", "discrete") else []
     plain = [key for key in keys if key != "type"]
     given = {"start": _start(NUMBER, *follows)} if "start" in keys else {}

@@ -118,8 +118,9 @@ def c_files(root: Path) -> list[Path]:
 
 def find_header(name: str, source: Path, files: list[Path]) -> Path | None:
     """The project's header that `source` includes by this name; None: it is not one of them."""
-    if source.parent / name in files:
-        return source.parent / name
+    beside = Path(os.path.normpath(source.parent / name))
+    if beside in files:
+        return beside
     found = [path for path in files if path.match(name)]
     assert len(found) < 2, f"{name} is the name of {len(found)} headers"
     return found[0] if found else None
@@ -153,7 +154,8 @@ def wrong_includes(root: Path) -> Iterator[str]:
         for name in includes(path):
             header = find_header(name, path, files)
             if header is None:
-                fine = is_library_of(name, folder)
+                made = name.removesuffix("_values.h") + ".toml"
+                fine = is_library_of(name, folder) or any((root / "models").rglob(made))
             else:
                 fine = is_allowed(header, folder, root)
             if not fine:

@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 
-from tests.equations.compiled import LENGTH, Origin
+from tests.equations.compiled import BUILD, LENGTH, Origin
 from tests.prove.problems import COMPILE
 from tests.support.paths import ROOT
 from tests.support.plain_equations import (
@@ -35,7 +35,8 @@ from tests.support.plain_equations import (
 MODELS = ROOT / "models"
 PLANT, ARM = MODELS / "rp_plant", MODELS / "rp_manipulator"
 FOLDERS = (PLANT, PLANT / "equations", ARM, MODELS, ROOT / "src" / "model")
-SOURCES = (PLANT / "rp_plant_series.c", ARM / "rp_series.c")
+SOURCES = (PLANT / "rp_plant_series.c", PLANT / "rp_series.c")
+MADE = BUILD / "models" / "rp_manipulator"  # arm_values.h
 NEVER_CALLED = "rp_plant_first_modes"  # while no mode is decided
 STUCK, FREE = 0, 2
 ATTACHED, RELEASED = 1, 2
@@ -139,7 +140,10 @@ class InC:
 
     def __init__(self, plain: PlainEquations, library: Path) -> None:
         self.plain = plain
-        options = [*(f"-I{folder}" for folder in FOLDERS), f"-Wl,--defsym={NEVER_CALLED}=0"]
+        options = [
+            *(f"-I{folder}" for folder in (*FOLDERS, MADE)),
+            f"-Wl,--defsym={NEVER_CALLED}=0",
+        ]
         command = [*COMPILE, "-shared", "-fPIC", *options, *SOURCES, "-o", library, "-lm"]
         subprocess.run(command, check=True)
         self.library = ctypes.CDLL(str(library))

@@ -20,6 +20,7 @@ from compiler.graph.graph import Graph, Value  # noqa: E402
 from compiler.plain_c.interpreter import Interpreter  # noqa: E402
 from compiler.plain_c.memory import Array, Structure, is_whole  # noqa: E402
 from compiler.plain_c.text import read  # noqa: E402
+from compiler.read.header import made  # noqa: E402
 
 __all__ = [
     "ACCELERATIONS", "STATES", "Array", "Leaf", "Place", "PlainEquations", "Sized", "Structure",
@@ -107,7 +108,7 @@ class PlainEquations:
     """What a function in a header writes, as values of a graph with the places of its leaves."""
 
     def __init__(self, header: Path, includes: Iterable[Path], function: str) -> None:
-        program = read(header, includes, ["model.h"])
+        program = read(header, includes, ["model.h"], made)
         graph = Graph(has_switches=False, is_guarded=False)
         self.interpreter = Interpreter(program, graph, doubles_move=False)
         self.places: dict[Value, Place] = {}
