@@ -9,9 +9,9 @@
 #include "rp_actuator_values.h"
 
 struct drive {
-    real k;           /* N.m/A, > 0: torque constant; the back-EMF constant in V.s/rad is the same */
-    real n;           /* 1 or rad/m; not 0; < 0: motor and joint turn opposite ways */
-    real R;           /* ohm, > 0 */
+    real k; /* N.m/A, > 0: torque constant; the back-EMF constant in V.s/rad is the same */
+    real n; /* 1 or rad/m; not 0; < 0: motor and joint turn opposite ways */
+    real R; /* ohm, > 0 */
     real current_max; /* A, > 0 */
     real voltage_max; /* V, > 0 */
     real T;           /* s, > 0: time constant of the current loop */

@@ -16,20 +16,20 @@ enum rp_controller_mode {
 
 struct rp_controller_parameters {
     struct arm_parameters arm; /* what the controller believes of the arm */
-    double Kp[2];             /* 1/s2, >= 0 */
-    double Kd[2];             /* 1/s, >= 0 */
-    double Ki[2];             /* 1/s3, >= 0; 0: the integral part rests */
-    double inertia[2];        /* kg.m2, kg, > 0: effective inertias, of the PD modes and the
-                                 anti-windup */
-    double tracking_time;     /* s, > 0: time constant of the anti-windup */
-    double limit[2];          /* N.m, N, >= 0: largest magnitude of the efforts */
-    double payload_mass;      /* kg, >= 0 */
-    double payload_inertia;   /* kg.m2, >= 0: about its center of mass, along z0 */
-    double payload_x;         /* m: its center of mass in frame 2, along x2 */
-    double payload_z;         /* m: the same, along z2 (the slide) */
-    double sample_time;       /* s; 0: the law acts continuously */
-    double delay;             /* s, 0 .. sample_time: from a sample to its efforts */
-    int mode;                 /* enum rp_controller_mode */
+    double Kp[2];              /* 1/s2, >= 0 */
+    double Kd[2];              /* 1/s, >= 0 */
+    double Ki[2];              /* 1/s3, >= 0; 0: the integral part rests */
+    double inertia[2];         /* kg.m2, kg, > 0: effective inertias, of the PD modes and the
+                                  anti-windup */
+    double tracking_time;      /* s, > 0: time constant of the anti-windup */
+    double limit[2];           /* N.m, N, >= 0: largest magnitude of the efforts */
+    double payload_mass;       /* kg, >= 0 */
+    double payload_inertia;    /* kg.m2, >= 0: about its center of mass, along z0 */
+    double payload_x;          /* m: its center of mass in frame 2, along x2 */
+    double payload_z;          /* m: the same, along z2 (the slide) */
+    double sample_time;        /* s; 0: the law acts continuously */
+    double delay;              /* s, 0 .. sample_time: from a sample to its efforts */
+    int mode;                  /* enum rp_controller_mode */
 };
 
 /* References and measurements. */

@@ -194,8 +194,8 @@ static bool set_modes_from_values(const struct call *call, bool only_of_inputs) 
 
 /* Writes the modes that follow from inputs only, each after those that its relation reads. */
 static void follow_inputs(const struct call *call) {
-    for (int count = 0;
-         set_modes_from_values(call, true) && count < call->model->relation_count; count++) {
+    for (int count = 0; set_modes_from_values(call, true) && count < call->model->relation_count;
+         count++) {
     }
 }
 

@@ -129,7 +129,7 @@ LONG = [
      + "\nreturn y; }", STEPS),
     (Y + "".join(f"if (y > {i}.0) {{ y += 1.0; }}" for i in range(1100)) + "\nreturn y; }",
      "more than 1000 conditions"),
-    ("#include <math.h>" + " " * 180_000 + f"x\n{F}", "bad.c:1: only #include <math.h> and"),
+    ("#include <math.h>" + " " * 180_000 + f"x\n{F}", "bad.c:1: of directives, only #include and"),
     ("".join(f"double g{i}(double x) {{ double y = x; "
              "for (int i = 0; i < 3000; i++) { y = y * x; } return y; }\n"
              for i in range(40)) + f"\n{F}", "calls take more than 500000 steps"),

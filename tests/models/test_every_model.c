@@ -448,8 +448,8 @@ static void check(int which) {
 }
 
 static void test_each_model(void) {
-    static const char *const names[SUBJECTS] = {"plant",  "controller",
-                                                "trajectory", "sensor", "wall"};
+    static const char *const names[SUBJECTS] = {"plant", "controller", "trajectory", "sensor",
+                                                "wall"};
     for (int which = 0; which < SUBJECTS; which++) {
         TEST_MESSAGE(names[which]); // the last one is the one that fails
         check(which);

@@ -210,6 +210,7 @@ def test_an_fmu_without_what_is_compared(
     path = edited(fmu, tmp_path / "a.fmu", {DESCRIPTION: change})
     command = [sys.executable, "-m", "rparm", "run", SCENARIO, "--fmu", str(path)]
     shutil.copytree(ROOT / "rparm", tmp_path / "rparm")
+    shutil.copytree(ROOT / "fmu" / "compiler", tmp_path / "fmu" / "compiler")
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert message in done.stderr and done.stderr.count("\n") == 1

@@ -18,7 +18,7 @@ from pycparser.c_parser import CParser, ParseError
 SYSTEM_HEADERS = ("math.h", "stdbool.h", "stddef.h", "stdlib.h")
 PRELUDE = "typedef _Bool bool;\ntypedef unsigned long size_t;\n"
 LARGEST_TEXT = 200_000  # bytes of a file and all that it includes
-DIRECTIVE = re.compile(r"\s*#\s*(\w*)\s*(.*?)\s*$")
+DIRECTIVE = re.compile(r"#\s*(\w*)\s*(.*)")  # without spaces around
 NO_LINES = {  # of C, and what to write instead
     r"(%:|\?\?=|(.*\W)?_Pragma\b).*": "of directives, only #include and include guards are read",
     r"(.*\W)?(__)?asm(__)?\b.*": "assembly is not read: write the equation in C",
@@ -102,7 +102,7 @@ class Preprocessor:
         text = self.content(path, shown) if text is None else text
         for number, line in enumerate(without_comments(text, shown).split("\n"), 1):
             place = f"{shown}:{number}"
-            found = DIRECTIVE.match(line)
+            found = DIRECTIVE.fullmatch(line.strip())
             if found is None:
                 for pattern, reason in NO_LINES.items():
                     if re.fullmatch(pattern, line.strip()):
