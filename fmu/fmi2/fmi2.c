@@ -359,8 +359,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
     if (!component_enter(component, CALL_fmi2DoStep)) {
         return fmi2Error;
     }
-    const enum status status =
-        instance_do_step(component->instance, currentCommunicationPoint, communicationStepSize);
+    const enum status status = instance_do_step(component->instance, currentCommunicationPoint,
+                                                communicationStepSize, NULL);
     if (status_severity(status) == SEVERITY_DISCARD) {
         component->state = STATE_STEP_FAILED;
     }

@@ -478,8 +478,8 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
         return fmi3Error;
     }
     const struct fmi3_component *component = instance;
-    const enum status status = instance_do_step_with(base->instance, currentCommunicationPoint,
-                                                     communicationStepSize, &component->options);
+    const enum status status = instance_do_step(base->instance, currentCommunicationPoint,
+                                                communicationStepSize, &component->options);
     if (status == STATUS_OK) {
         *eventHandlingNeeded =
             base->kind == KIND_CO_SIMULATION_WITH_EVENTS && instance_met_event(base->instance);

@@ -225,33 +225,6 @@ static inline void activate_values(struct instance *instance, struct clock_time 
     end_history(instance); // until the first advance has succeeded
 }
 
-static enum status restart(struct instance *instance, struct clock_time end,
-                           enum continuation continuation) {
-    struct instance_memory *memory = &instance->memory;
-    struct instance_state *state = &instance->state;
-    const bool is_event = continuation == CONTINUE_AFTER_EVENT;
-    const bool has_new_parameters = !instance_parameters_are_active(instance);
-    // the last step gives the length of the first one, unless the parameters have changed
-    if (has_new_parameters) {
-        state->next_step = 0.0;
-    } else if (!is_event) {
-        instance_update_next_step(instance);
-    }
-    activate_values(instance, end, is_event ? memory->current_inputs : memory->next_inputs,
-                    has_new_parameters);
-
-    // note the restart for a replay
-    state->steps_before_restart = state->statistics.steps;
-    state->restart_step = state->next_step;
-    state->restart_continues = continuation != CONTINUE_AFTER_CHANGE;
-    state->restart_after_event = is_event;
-    // after a change, no update since the last restart means that the model moves on
-    instance->indicators_are_active &= continuation == CONTINUE_AFTER_CHANGE && !has_new_parameters;
-    const struct integrator_start start = start_of(instance);
-    return integrator_restart(instance->integrator,
-                              doubles_of(memory->restart_values, instance->model->states), &start);
-}
-
 /* Replays the number of internal steps that the state gives. A forged state fails here. */
 enum status instance_replay_history(struct instance *instance) {
     const struct instance_state *state = &instance->state;
@@ -282,36 +255,35 @@ enum status instance_replay_history(struct instance *instance) {
 
 enum status instance_prepare_history(struct instance *instance, struct clock_time end,
                                      enum continuation continuation) {
-    switch (continuation) {
-    case CONTINUE_NOW:
-        break;
-    case CONTINUE_AFTER_REPLAY:
+    if (continuation == CONTINUE_NOW) {
+        return STATUS_OK;
+    }
+    if (continuation == CONTINUE_AFTER_REPLAY) {
         return instance_replay_history(instance);
-    case CONTINUE_AFTER_RESTART:
-    case CONTINUE_AFTER_CHANGE:
-    case CONTINUE_AFTER_EVENT:
-        return restart(instance, end, continuation);
     }
-    return STATUS_OK;
-}
-
-bool instance_interpolate(struct instance *instance, double target) {
-    if (!integrator_interpolate(instance->integrator, target,
-                                doubles_of(instance->memory.values, instance->model->states))) {
-        return false;
-    }
-    instance->state.latest_time = target;
-    return true;
-}
-
-enum status instance_advance(struct instance *instance, struct clock_time end, int64_t steps_left) {
+    struct instance_memory *memory = &instance->memory;
     struct instance_state *state = &instance->state;
-    const enum status status =
-        integrator_advance(instance->integrator, clock_difference(end, state->restart_time),
-                           steps_left > 1 ? steps_left : 1, &state->latest_time,
-                           doubles_of(instance->memory.values, instance->model->states));
-    integrator_get_statistics(instance->integrator, &state->statistics);
-    return status;
+    const bool is_event = continuation == CONTINUE_AFTER_EVENT;
+    const bool has_new_parameters = !instance_parameters_are_active(instance);
+    // the last step gives the length of the first one, unless the parameters have changed
+    if (has_new_parameters) {
+        state->next_step = 0.0;
+    } else if (!is_event) {
+        instance_update_next_step(instance);
+    }
+    activate_values(instance, end, is_event ? memory->current_inputs : memory->next_inputs,
+                    has_new_parameters);
+
+    // note the restart for a replay
+    state->steps_before_restart = state->statistics.steps;
+    state->restart_step = state->next_step;
+    state->restart_continues = continuation != CONTINUE_AFTER_CHANGE;
+    state->restart_after_event = is_event;
+    // after a change, no update since the last restart means that the model moves on
+    instance->indicators_are_active &= continuation == CONTINUE_AFTER_CHANGE && !has_new_parameters;
+    const struct integrator_start start = start_of(instance);
+    return integrator_restart(instance->integrator,
+                              doubles_of(memory->restart_values, instance->model->states), &start);
 }
 
 enum status instance_rest(struct instance *instance, struct clock_time end, struct clock_time until,

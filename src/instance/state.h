@@ -37,7 +37,7 @@ struct instance_state {
 
     /* The integrator's history, from which it continues while nothing changes. A replay needs only
      * the restart and the first and the last advance since then (integrator_advance). Only
-     * history.c updates these fields. */
+     * history.c and stepping.c update these fields. */
     bool has_history;
     struct clock_time restart_time;
     double horizon;     /* time that the integrator may not pass, s since the restart */
@@ -150,7 +150,7 @@ static inline bool instance_has_integrator(const struct instance *instance) {
 /* Returns the largest magnitude (s) among the start time and t: times are rounded like numbers of
  * this size. */
 static inline double instance_size_of_times(const struct instance *instance, double t) {
-    return fmax(fabs(t), fabs(instance->state.experiment.start_time));
+    return clock_larger(fabs(t), fabs(instance->state.experiment.start_time));
 }
 
 /* Returns the doubles at a range of a value structure. */

@@ -14,8 +14,8 @@ static char block[1024];
 void setUp(void) {
     create(&oscillator_description);
     initialize_of(instance, 0.0, 10.0);
-    ASSERT_OK(instance_do_step(instance, 0.0, 0.5));
-    ASSERT_OK(instance_do_step(instance, 0.5, 0.5));
+    ASSERT_OK(instance_do_step(instance, 0.0, 0.5, NULL));
+    ASSERT_OK(instance_do_step(instance, 0.5, 0.5, NULL));
     state = instance->state;
     TEST_ASSERT_TRUE(state.has_history && instance->memory.size <= sizeof block);
     memcpy(block, instance->memory.block, instance->memory.size);
@@ -184,13 +184,13 @@ static void test_a_history_does_not_contradict_itself(void) {
 static void test_a_history_that_is_too_short_is_found_at_the_next_step(void) {
     struct instance *forged = created(&oscillator_description);
     initialize_of(forged, 0.0, INFINITY);
-    ASSERT_OK(instance_do_step(forged, 0.0, 0.5));
+    ASSERT_OK(instance_do_step(forged, 0.0, 0.5, NULL));
     const long needed = forged->state.statistics.steps;
     TEST_ASSERT_GREATER_THAN_INT(2, needed);
-    ASSERT_OK(instance_do_step(forged, 0.5, 1e-3));
+    ASSERT_OK(instance_do_step(forged, 0.5, 1e-3, NULL));
     forged->state.steps_before_restart = forged->state.statistics.steps - (needed - 1);
     forged->history_is_lost = true;
-    ASSERT_REFUSED(instance_do_step(forged, 0.501, 1e-3));
+    ASSERT_REFUSED(instance_do_step(forged, 0.501, 1e-3, NULL));
     instance_destroy(forged);
 }
 
