@@ -229,13 +229,13 @@ const char *component_kind_name(unsigned kinds) {
     }
 }
 
-bool component_enter(struct component *component, unsigned call) {
+struct instance *component_enter(struct component *component, unsigned call) {
     if (component == NULL) {
-        return false;
+        return NULL;
     }
     const struct call_rule *rule = &component->adapter->rules[call];
     if (component_refuse_in_logger(component, rule->name)) {
-        return false;
+        return NULL;
     }
     if (component->is_logged[LOG_ALL]) {
         component_log(component, COMPONENT_OK, LOG_ALL, "%s", rule->name);
@@ -243,20 +243,78 @@ bool component_enter(struct component *component, unsigned call) {
     if ((component->kind & rule->kinds) == 0) {
         component_fail(component, "%s belongs to %s: the instance is one for %s", rule->name,
                        component_kind_name(rule->kinds), component_kind_name(component->kind));
-        return false;
+        return NULL;
     }
     if ((component->state & rule->states) == 0) {
         component_fail(component, "%s is not allowed while the instance is %s", rule->name,
                        state_name(component->state));
-        return false;
+        return NULL;
     }
-    return true;
+    return component->instance;
 }
 
-bool component_refuse_arrays(struct component *component, unsigned call, size_t count) {
+bool component_check_arrays(struct component *component, unsigned call, size_t count,
+                            const void *first, const void *second) {
+    if (count == 0 || (first != NULL && second != NULL)) {
+        return true;
+    }
     component_fail(component, "%s: an array is NULL, %zu values are expected",
                    component->adapter->rules[call].name, count);
     return false;
+}
+
+enum component_status component_go_to(struct component *component, enum fmi_state state,
+                                      enum status status) {
+    if (status != STATUS_OK) {
+        return component_failure(component, status);
+    }
+    component->state = state;
+    return COMPONENT_OK;
+}
+
+enum component_status component_exit_initialization(struct component *component, unsigned call) {
+    struct instance *instance = component_enter(component, call);
+    if (instance == NULL) {
+        return COMPONENT_ERROR;
+    }
+    const enum status status = instance_exit_initialization(instance);
+    if (status == STATUS_OK) {
+        component_log(component, COMPONENT_OK, LOG_EVENTS, "initialized at t = %.17g",
+                      instance_time(instance));
+    }
+    // into event mode, if the importer handles events
+    return component_go_to(
+        component, component->kind == KIND_CO_SIMULATION ? STATE_STEP_COMPLETE : STATE_EVENT,
+        status);
+}
+
+enum component_status component_terminate(struct component *component, unsigned call) {
+    const struct instance *instance = component_enter(component, call);
+    if (instance == NULL) {
+        return COMPONENT_ERROR;
+    }
+    component_log(component, COMPONENT_OK, LOG_EVENTS, "terminated at t = %.17g",
+                  instance_time(instance));
+    return component_go_to(component, STATE_TERMINATED, STATUS_OK);
+}
+
+enum component_status component_reset(struct component *component, unsigned call) {
+    struct instance *instance = component_enter(component, call);
+    if (instance == NULL) {
+        return COMPONENT_ERROR;
+    }
+    instance_reset(instance);
+    component_log(component, COMPONENT_OK, LOG_EVENTS, "reset to the start values");
+    return component_go_to(component, STATE_INSTANTIATED, STATUS_OK);
+}
+
+enum component_status component_access_none(struct component *component, const char *type,
+                                            const unsigned references[], size_t count) {
+    return count == 0 ? COMPONENT_OK
+                      : component_fail(component,
+                                       "value reference %u is accessed as %s: %s has no variable "
+                                       "of that type",
+                                       references[0], type, model_description.name);
 }
 
 /* ---- Life ----------------------------------------------------------------------------------- */
