@@ -2,7 +2,6 @@
 
 #include "failures.h"
 #include "modes.h"
-#include "settings.h"
 #include "state.h"
 #include "values.h"
 

@@ -1,7 +1,6 @@
 #include "plausibility.h"
 
 #include "history.h"
-#include "settings.h"
 #include "state.h"
 
 #include <math.h>

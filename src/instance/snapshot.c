@@ -1,7 +1,6 @@
 #include "snapshot.h"
 
 #include "history.h"
-#include "settings.h"
 #include "state.h"
 
 #include <stdlib.h>

@@ -3,7 +3,6 @@
 #include "failures.h"
 #include "history.h"
 #include "modes.h"
-#include "settings.h"
 #include "snapshot.h"
 #include "state.h"
 

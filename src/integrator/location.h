@@ -3,9 +3,9 @@
  * the sign at the end of a step decide whether an event is found. */
 #pragma once
 
-#include "falls.h"
 #include "ode.h"
 #include "platform.h"
+#include "roots.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -98,16 +98,6 @@ MUST_CHECK NONNULL enum status location_try(struct location *location);
 /* Searches the time from 0 to t, over which the states stay at x. */
 MUST_CHECK NONNULL enum status location_search_at_rest(struct location *location, const double x[],
                                                        double t);
-
-/* True if an indicator of a state is above 0 at the state x, and not at the state `next`. */
-MUST_CHECK NONNULL bool location_falls_between(const struct location *location, const double x[],
-                                               const double next[]);
-
-/* Writes z, the value of the first indicator that has triggered, and Newton's correction (s) of the
- * event's time, -z / z', from the state x and its derivative dx at the time t. Returns false if
- * there is no correction. */
-MUST_CHECK NONNULL bool location_correction(struct location *location, double t, const double x[],
-                                            const double dx[], double *z, double *correction);
 
 /* Returns a bound of how far a state moves over a step: the sum of |row[k]|, 0 < k <= degree. */
 static inline double location_way(const double row[], int degree) {

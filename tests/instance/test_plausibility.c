@@ -5,7 +5,6 @@
 #include "history.h"
 #include "one_instance.h"
 #include "oscillator_by_hand.h"
-#include "settings.h"
 #include "state.h"
 
 static struct instance_state state; /* of an instance that has taken a step */
