@@ -121,37 +121,29 @@ static const struct indicator *describe_indicators(struct instance *instance) {
     return instance->indicators;
 }
 
-/* True if the motion to target is the one of the integrator's history. This depends only on the
- * values set now and the integrator's, not on how often or in what order they were set.
- *
- * Any change of an input restarts it. Measured with inputs sampled from sines every 1 ms,
- * continuing CVODE's history over a jump has 450 times the error of a restart and is slower if
- * jumps are 4e-4 of the input, has 40 times the error at 4e-6 and 4 times at 4e-8. It gains only
- * below 1e-9, and rollback would have to replay every jump. */
-static bool continues(const struct instance *instance, double target) {
-    const struct instance_state *state = &instance->state;
-    return state->has_history && target <= state->horizon && instance_values_are_active(instance);
-}
-
 /* Returns integrator_longest_history of the method, in the current modes. */
 static int64_t longest_history(const struct instance *instance) {
     return integrator_longest_history(instance->configured.method, is_searched(instance));
 }
 
-/* True if the target needs one more internal step than a history may have. */
-static bool history_is_full(const struct instance *instance, double target) {
-    const struct instance_state *state = &instance->state;
-    const int64_t steps = state->statistics.steps - state->steps_before_restart;
-    return target > state->passed_time && steps >= longest_history(instance);
-}
-
+/* This depends only on the values set now and the integrator's, not on how often or in what order
+ * they were set.
+ *
+ * Any change of an input restarts it. Measured with inputs sampled from sines every 1 ms,
+ * continuing CVODE's history over a jump has 450 times the error of a restart and is slower if
+ * jumps are 4e-4 of the input, has 40 times the error at 4e-6 and 4 times at 4e-8. It gains only
+ * below 1e-9, and rollback would have to replay every jump. */
 enum continuation instance_continuation(const struct instance *instance, double target) {
-    if (!continues(instance, target)) {
-        return instance->state.event_point == EVENT_HANDLED && instance_is_unchanged(instance)
+    const struct instance_state *state = &instance->state;
+    const bool continues =
+        state->has_history && target <= state->horizon && instance_values_are_active(instance);
+    if (!continues) {
+        return state->event_point == EVENT_HANDLED && instance_is_unchanged(instance)
                    ? CONTINUE_AFTER_EVENT
                    : CONTINUE_AFTER_CHANGE;
     }
-    if (history_is_full(instance, target)) {
+    const int64_t steps = state->statistics.steps - state->steps_before_restart;
+    if (target > state->passed_time && steps >= longest_history(instance)) {
         return CONTINUE_AFTER_RESTART;
     }
     return instance->history_is_lost ? CONTINUE_AFTER_REPLAY : CONTINUE_NOW;

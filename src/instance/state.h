@@ -191,7 +191,8 @@ static inline size_t instance_event_size(const struct model *model) {
  * no comparison: the integrator's horizon ends with their step. */
 static inline bool instance_inputs_are_active(const struct instance *instance) {
     const struct instance_memory *memory = &instance->memory;
-    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+    const size_t count = count_of(instance->model->inputs);
+    for (size_t i = 0; i < count; i++) {
         const struct polynomial *next = &memory->next_inputs[i];
         if (next->d[0] != memory->active_inputs[i].d[0] ||
             (!instance->inputs_are_held && polynomial_moves(next))) {

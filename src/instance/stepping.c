@@ -101,28 +101,32 @@ static int64_t steps_left(const struct step *step) {
 
 /* ---- Inputs --------------------------------------------------------------------------------- */
 
-/* Sets the inputs to those at the beginning of a step. Until then, inputs have the values to which
- * the derivatives of the last step led. */
-static void begin_inputs(struct instance *instance) {
-    if (instance->inputs_are_held) {
-        return;
-    }
+/* Sets the inputs to their values elapsed s after the beginning of the step. Until the first time,
+ * inputs have the values to which the derivatives of the last step led. */
+static void move_inputs(struct instance *instance, double elapsed) {
     struct instance_memory *memory = &instance->memory;
     double *u = doubles_of(memory->values, instance->model->inputs);
-    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        memory->current_inputs[i] = memory->next_inputs[i];
-        u[i] = memory->next_inputs[i].d[0];
+    const size_t count = instance->inputs_are_held ? 0 : count_of(instance->model->inputs);
+    for (size_t i = 0; i < count; i++) {
+        const struct polynomial *next = &memory->next_inputs[i];
+        memory->current_inputs[i] =
+            elapsed > 0.0 && polynomial_moves(next) ? polynomial_shifted(next, elapsed) : *next;
+        u[i] = memory->current_inputs[i].d[0];
     }
 }
 
-/* Evaluates the inputs at the time of the instance, elapsed s after the beginning of the step. */
-static void evaluate_inputs(struct instance *instance, double elapsed) {
-    struct instance_memory *memory = &instance->memory;
-    instance->inputs_are_held = false;
-    double *u = doubles_of(memory->values, instance->model->inputs);
-    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        memory->current_inputs[i] = polynomial_shifted(&memory->next_inputs[i], elapsed);
-        u[i] = memory->current_inputs[i].d[0];
+/* Sets the inputs to their values at the end of a step. Their derivatives applied to it only. */
+static void end_inputs(const struct step *step) {
+    struct instance *instance = step->instance;
+    const size_t count = count_of(instance->model->inputs);
+    move_inputs(instance, clock_difference(instance->state.time, step->begin));
+    instance->inputs_are_held = true;
+    for (size_t i = 0; i < count; i++) {
+        struct polynomial *next = &instance->memory.next_inputs[i];
+        if (polynomial_moves(next)) {
+            *next = (struct polynomial){{next->d[0]}};
+            instance->inputs_are_held = false;
+        }
     }
 }
 
@@ -132,7 +136,8 @@ static void keep_last_nodes(const struct step *step) {
     struct instance *instance = step->instance;
     const struct instance_memory *memory = &instance->memory;
     instance->inputs_are_held = false;
-    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+    const size_t count = count_of(instance->model->inputs);
+    for (size_t i = 0; i < count; i++) {
         const double *nodes = instance->nodes + i * POLYNOMIAL_NODES;
         memory->next_inputs[i].d[0] =
             step->is_early ? memory->current_inputs[i].d[0] : nodes[POLYNOMIAL_NODES - 1];
@@ -155,7 +160,8 @@ static enum status check_inputs(const struct step *step) {
         return STATUS_OK;
     }
     const double step_size = clock_difference(step->end, step->begin);
-    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+    const size_t count = count_of(instance->model->inputs);
+    for (size_t i = 0; i < count; i++) {
         const struct polynomial *input = &instance->memory.next_inputs[i];
         if (polynomial_moves(input)) {
             const struct polynomial at_end = polynomial_shifted(input, step_size);
@@ -200,26 +206,6 @@ static enum status ask_inputs(const struct step *step, double step_size) {
     return STATUS_OK;
 }
 
-/* Sets the inputs to their values at the end of a step. Their derivatives applied to it only. */
-static void end_inputs(const struct step *step) {
-    struct instance *instance = step->instance;
-    const double elapsed = clock_difference(instance->state.time, step->begin);
-    struct instance_memory *memory = &instance->memory;
-    double *u = doubles_of(memory->values, instance->model->inputs);
-    instance->inputs_are_held = true;
-    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        struct polynomial *next = &memory->next_inputs[i];
-        if (polynomial_moves(next)) {
-            memory->current_inputs[i] = polynomial_shifted(next, elapsed);
-            *next = (struct polynomial){{next->d[0]}};
-            instance->inputs_are_held = false;
-        } else {
-            memory->current_inputs[i] = *next;
-        }
-        u[i] = memory->current_inputs[i].d[0];
-    }
-}
-
 /* ---- Integration ---------------------------------------------------------------------------- */
 
 /* Reports the time of the instance to options->accept. Returns true if the step will end earlier.
@@ -248,7 +234,7 @@ static bool observe(void *step_pointer, double t, const double x[]) {
     memcpy(doubles_of(instance->memory.values, instance->model->states), x,
            instance->model->states.size);
     instance_set_clock(instance, clock_add(instance->state.restart_time, t));
-    evaluate_inputs(instance, clock_difference(instance->state.time, step->begin));
+    move_inputs(instance, clock_difference(instance->state.time, step->begin));
     return report(step);
 }
 
@@ -337,7 +323,7 @@ static enum status begin_modes(struct step *step, enum continuation *continuatio
     if (status == STATUS_OK) {
         state->event_point = NO_EVENT;
         if (*continuation == CONTINUE_AFTER_CHANGE) {
-            begin_inputs(instance);
+            move_inputs(instance, 0.0);
             status = instance_update_modes(instance, NULL);
         }
     }
@@ -360,7 +346,7 @@ static void move_to_event(struct step *step) {
         instance->triggered[count] = true;
     }
     instance_set_clock(instance, time);
-    evaluate_inputs(instance, clock_difference(time, step->begin));
+    move_inputs(instance, clock_difference(time, step->begin));
     instance->step_met_event = true;
 }
 
