@@ -8,6 +8,8 @@
 
 /* ---- Log ------------------------------------------------------------------------------------ */
 
+enum { LOG_TEXT_SIZE = 1024 };
+
 static const char *const category_names[LOG_CATEGORY_COUNT] = {
     [LOG_EVENTS] = "logEvents",
     [LOG_STATUS_WARNING] = "logStatusWarning",
@@ -16,10 +18,6 @@ static const char *const category_names[LOG_CATEGORY_COUNT] = {
     [LOG_STATUS_FATAL] = "logStatusFatal",
     [LOG_ALL] = "logAll",
 };
-
-const char *component_category_name(enum log_category category) {
-    return category_names[category];
-}
 
 static bool continues_character(char c) {
     return ((unsigned char)c & 0xc0) == 0x80;
@@ -36,8 +34,11 @@ static size_t whole_length(const char *text, size_t length) {
     return length - begin < needed ? begin - 1 : length;
 }
 
-void component_make_harmless(const struct adapter *adapter, const char *text,
-                             char out[LOG_TEXT_SIZE]) {
+/* Makes a text harmless that importers search for references to variables, or pass to printf:
+ * doubles characters with a meaning there. Line ends become blanks, other control characters '?'.
+ */
+static void make_harmless(const struct adapter *adapter, const char *text,
+                          char out[LOG_TEXT_SIZE]) {
     size_t length = 0;
     for (; *text != '\0' && length < LOG_TEXT_SIZE - 2; text++) {
         const bool is_blank = strchr("\t\n\r", *text) != NULL;
@@ -57,7 +58,7 @@ static void send_one(const struct component *component, enum component_status st
                      enum log_category category, const char *raw) {
     if (component->is_logged[category]) {
         char text[LOG_TEXT_SIZE];
-        component_make_harmless(component->adapter, raw, text);
+        make_harmless(component->adapter, raw, text);
         component->adapter->send(component, status, category_names[category], text);
     }
 }
@@ -319,15 +320,23 @@ enum component_status component_access_none(struct component *component, const c
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-bool component_check_token(const char *name, const char *token_name, const char *token,
-                           const char *expected, char text[LOG_TEXT_SIZE]) {
+void component_begin(struct component *component, const struct adapter *adapter, enum fmi_kind kind,
+                     bool logging_on) {
+    component->adapter = adapter;
+    component->state = STATE_INSTANTIATED;
+    component->kind = kind;
+    log_always(component, logging_on ? ~0u : adapter->always_logged);
+}
+
+bool component_check_token(struct component *component, const char *name, const char *token_name,
+                           const char *token, const char *expected) {
     if (name == NULL || name[0] == '\0') {
-        (void)snprintf(text, LOG_TEXT_SIZE,
+        component_fail(component,
                        "the instance name is missing: a name that is not empty is expected");
         return false;
     }
     if (token == NULL || strcmp(token, expected) != 0) {
-        (void)snprintf(text, LOG_TEXT_SIZE,
+        component_fail(component,
                        "the %s '%.100s' is refused: '%s' is expected, the model description "
                        "belongs to another build",
                        token_name, token != NULL ? token : "", expected);
@@ -336,17 +345,12 @@ bool component_check_token(const char *name, const char *token_name, const char 
     return true;
 }
 
-enum component_status component_begin(struct component *component, const struct adapter *adapter,
-                                      enum fmi_kind kind, bool logging_on) {
-    component->adapter = adapter;
-    component->state = STATE_INSTANTIATED;
-    component->kind = kind;
-    log_always(component, logging_on ? ~0u : adapter->always_logged);
+enum component_status component_create_instance(struct component *component) {
     const struct message_sink sink = {.write = log_instance_text, .context = component};
     if (instance_create(&model_description, &sink, &component->instance) != STATUS_OK) {
         return COMPONENT_ERROR;
     }
-    if (kind == KIND_MODEL_EXCHANGE) {
+    if (component->kind == KIND_MODEL_EXCHANGE) {
         instance_integrate_outside(component->instance);
     }
     return COMPONENT_OK;

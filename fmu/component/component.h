@@ -56,8 +56,6 @@ enum log_category {
     LOG_CATEGORY_COUNT,
 };
 
-enum { LOG_TEXT_SIZE = 1024 };
-
 struct component;
 
 /* Decisions of a version of FMI. Categories are bits of 1 << enum log_category. */
@@ -90,20 +88,23 @@ struct component {
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-/* Returns true if the name and the token are right; expected: the token of the model description;
- * token_name: its name in this version. Otherwise writes a text that says why not. */
-MUST_CHECK NONNULL_ARGUMENTS(2, 4,
-                             5) bool component_check_token(const char *name, const char *token_name,
-                                                           const char *token, const char *expected,
-                                                           char text[LOG_TEXT_SIZE]);
+/* Begins a component, which must be zeroed, so that component_fail can log; adapter must outlive
+ * it.
+ */
+NONNULL void component_begin(struct component *component, const struct adapter *adapter,
+                             enum fmi_kind kind, bool logging_on);
 
-/* Begins a component, which must be zeroed; adapter must outlive it. On failure nothing has to be
- * freed. */
-MUST_CHECK NONNULL enum component_status component_begin(struct component *component,
-                                                         const struct adapter *adapter,
-                                                         enum fmi_kind kind, bool logging_on);
+/* Returns true if the name and the token are right; otherwise fails as component_fail. expected:
+ * the token of the model description; token_name: its name in this version. */
+MUST_CHECK NONNULL_ARGUMENTS(1, 3,
+                             5) bool component_check_token(struct component *component,
+                                                           const char *name, const char *token_name,
+                                                           const char *token, const char *expected);
 
-/* Frees the memory that component_begin allocated. */
+/* Makes the instance. On failure nothing has to be freed. */
+MUST_CHECK NONNULL enum component_status component_create_instance(struct component *component);
+
+/* Frees the instance. */
 NONNULL void component_end(struct component *component);
 
 /* ---- Calls ---------------------------------------------------------------------------------- */
@@ -174,17 +175,9 @@ NONNULL PRINTF_FORMAT(4, 5) void component_log(struct component *component,
                                                enum component_status status,
                                                enum log_category category, const char *format, ...);
 
-const char *component_category_name(enum log_category category);
-
 /* Sets which categories are sent: all of them if there are no names; otherwise on sends exactly
  * these, off removes them. Fails as component_fail, with nothing changed, at a name that is NULL or
  * unknown. */
 NONNULL_ARGUMENTS(1)
 enum component_status component_set_logging(struct component *component, bool on, size_t count,
                                             const char *const names[]);
-
-/* Makes a text harmless that importers search for references to variables, or pass to printf:
- * doubles characters with a meaning there. Line ends become blanks, other control characters '?'.
- */
-NONNULL void component_make_harmless(const struct adapter *adapter, const char *text,
-                                     char out[LOG_TEXT_SIZE]);

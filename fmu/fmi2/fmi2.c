@@ -10,8 +10,6 @@
 #include "values.h"
 
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -48,7 +46,7 @@ struct fmi2_component {
     struct component base;     /* first */
     fmi2CallbackLogger logger; /* NULL for no log */
     fmi2ComponentEnvironment environment;
-    char name[];
+    const char *name;
 };
 
 _Static_assert((int)COMPONENT_OK == fmi2OK && (int)COMPONENT_WARNING == fmi2Warning &&
@@ -94,60 +92,40 @@ static const struct adapter adapter = {
     .send = send_text,
 };
 
-/* Logs why there is no instance; functions may be NULL. */
-PRINTF_FORMAT(3, 4)
-static void refuse_instance(const fmi2CallbackFunctions *functions, fmi2String name,
-                            const char *format, ...) {
-    if (functions == NULL || functions->logger == NULL) {
-        return;
-    }
-    char raw[LOG_TEXT_SIZE];
-    char text[LOG_TEXT_SIZE];
-    va_list arguments;
-    va_start(arguments, format);
-    (void)vsnprintf(raw, sizeof raw, format, arguments);
-    va_end(arguments);
-    component_make_harmless(&adapter, raw, text);
-    functions->logger(functions->componentEnvironment, name != NULL ? name : "", fmi2Error,
-                      component_category_name(LOG_STATUS_ERROR), text);
-}
-
-static bool check_instantiation(fmi2String name, fmi2Type type, fmi2String guid,
-                                const fmi2CallbackFunctions *functions) {
-    char text[LOG_TEXT_SIZE];
-    if (!component_check_token(name, "GUID", guid, model_description.guid, text)) {
-        refuse_instance(functions, name, "%s", text);
-        return false;
-    }
-    if (type != fmi2CoSimulation && type != fmi2ModelExchange) {
-        refuse_instance(functions, name,
-                        "FMU type %d is refused: %d for Model Exchange or %d for Co-Simulation is "
-                        "expected",
-                        (int)type, (int)fmi2ModelExchange, (int)fmi2CoSimulation);
-        return false;
-    }
-    return functions != NULL;
-}
-
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
                               fmi2String fmuResourceLocation,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible,
                               fmi2Boolean loggingOn) {
-    if (!check_instantiation(instanceName, fmuType, fmuGUID, functions)) {
+    if (functions == NULL) {
         return NULL;
     }
+    struct fmi2_component component = {.logger = functions->logger,
+                                       .environment = functions->componentEnvironment,
+                                       .name = instanceName != NULL ? instanceName : ""};
     const enum fmi_kind kind =
         fmuType == fmi2CoSimulation ? KIND_CO_SIMULATION : KIND_MODEL_EXCHANGE;
-    const size_t name_size = strlen(instanceName) + 1;
-    struct fmi2_component *created = calloc(1, sizeof *created + name_size);
-    if (created == NULL) {
-        refuse_instance(functions, instanceName, "%s", status_text(STATUS_OUT_OF_MEMORY));
+    component_begin(&component.base, &adapter, kind, loggingOn != fmi2False);
+    if (!component_check_token(&component.base, instanceName, "GUID", fmuGUID,
+                               model_description.guid)) {
         return NULL;
     }
-    created->logger = functions->logger;
-    created->environment = functions->componentEnvironment;
-    memcpy(created->name, instanceName, name_size);
-    if (component_begin(&created->base, &adapter, kind, loggingOn != fmi2False) != COMPONENT_OK) {
+    if (fmuType != fmi2CoSimulation && fmuType != fmi2ModelExchange) {
+        component_fail(&component.base,
+                       "FMU type %d is refused: %d for Model Exchange or %d for Co-Simulation is "
+                       "expected",
+                       (int)fmuType, (int)fmi2ModelExchange, (int)fmi2CoSimulation);
+        return NULL;
+    }
+    // the name behind the component
+    const size_t name_size = strlen(component.name) + 1;
+    struct fmi2_component *created = malloc(sizeof *created + name_size);
+    if (created == NULL) {
+        component_fail(&component.base, "%s", status_text(STATUS_OUT_OF_MEMORY));
+        return NULL;
+    }
+    *created = component;
+    created->name = memcpy(created + 1, component.name, name_size);
+    if (component_create_instance(&created->base) != COMPONENT_OK) {
         free(created);
         return NULL;
     }

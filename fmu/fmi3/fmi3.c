@@ -9,8 +9,6 @@
 #include "values.h"
 
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -118,43 +116,29 @@ static enum status prepare_steps(struct fmi3_component *component) {
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-/* Receiver of texts while there is no instance. */
-struct receiver {
-    fmi3LogMessageCallback logger;
-    fmi3InstanceEnvironment environment;
-};
-
-PRINTF_FORMAT(2, 3)
-static fmi3Instance refuse_instance(const struct receiver *receiver, const char *format, ...) {
-    if (receiver->logger != NULL) {
-        char raw[LOG_TEXT_SIZE];
-        char text[LOG_TEXT_SIZE];
-        va_list arguments;
-        va_start(arguments, format);
-        (void)vsnprintf(raw, sizeof raw, format, arguments);
-        va_end(arguments);
-        component_make_harmless(&adapter, raw, text);
-        receiver->logger(receiver->environment, fmi3Error,
-                         component_category_name(LOG_STATUS_ERROR), text);
-    }
-    return NULL;
+/* Returns a component without an instance, which can log why there is none. */
+static struct fmi3_component begin(enum fmi_kind kind, fmi3Boolean logging_on,
+                                   fmi3InstanceEnvironment environment,
+                                   fmi3LogMessageCallback logger) {
+    struct fmi3_component component = {.logger = logger, .environment = environment};
+    component_begin(&component.base, &adapter, kind, logging_on);
+    return component;
 }
 
 static struct fmi3_component *instantiate(const char *call, fmi3String name, fmi3String token,
-                                          enum fmi_kind kind, bool logging_on,
-                                          const struct receiver *receiver) {
-    char text[LOG_TEXT_SIZE];
-    if (!component_check_token(name, "instantiation token", token, model_token_fmi3, text)) {
-        return refuse_instance(receiver, "%s", text);
+                                          struct fmi3_component component) {
+    if (!component_check_token(&component.base, name, "instantiation token", token,
+                               model_token_fmi3)) {
+        return NULL;
     }
     struct fmi3_component *created =
         calloc(1, sizeof *created + model_description.variable_count * sizeof(bool));
     if (created == NULL) {
-        return refuse_instance(receiver, "%s", status_text(STATUS_OUT_OF_MEMORY));
+        component_fail(&component.base, "%s", status_text(STATUS_OUT_OF_MEMORY));
+        return NULL;
     }
-    created->logger = receiver->logger;
-    created->environment = receiver->environment;
-    if (component_begin(&created->base, &adapter, kind, logging_on) != COMPONENT_OK) {
+    *created = component;
+    if (component_create_instance(&created->base) != COMPONENT_OK) {
         free(created);
         return NULL;
     }
@@ -172,10 +156,9 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
                                           fmi3Boolean loggingOn,
                                           fmi3InstanceEnvironment instanceEnvironment,
                                           fmi3LogMessageCallback logMessage) {
-    const struct receiver receiver = {logMessage, instanceEnvironment};
     struct fmi3_component *created =
         instantiate("fmi3InstantiateModelExchange", instanceName, instantiationToken,
-                    KIND_MODEL_EXCHANGE, loggingOn, &receiver);
+                    begin(KIND_MODEL_EXCHANGE, loggingOn, instanceEnvironment, logMessage));
     if (created != NULL) {
         instance_allow_setting_states(created->base.instance);
     }
@@ -217,10 +200,10 @@ fmi3Instance fmi3InstantiateCoSimulation(
     fmi3Boolean earlyReturnAllowed, const fmi3ValueReference requiredIntermediateVariables[],
     size_t nRequiredIntermediateVariables, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage, fmi3IntermediateUpdateCallback intermediateUpdate) {
-    const struct receiver receiver = {logMessage, instanceEnvironment};
-    struct fmi3_component *created = instantiate(
-        "fmi3InstantiateCoSimulation", instanceName, instantiationToken,
-        eventModeUsed ? KIND_CO_SIMULATION_WITH_EVENTS : KIND_CO_SIMULATION, loggingOn, &receiver);
+    const enum fmi_kind kind = eventModeUsed ? KIND_CO_SIMULATION_WITH_EVENTS : KIND_CO_SIMULATION;
+    struct fmi3_component *created =
+        instantiate("fmi3InstantiateCoSimulation", instanceName, instantiationToken,
+                    begin(kind, loggingOn, instanceEnvironment, logMessage));
     if (created == NULL) {
         return NULL;
     }
@@ -240,10 +223,11 @@ fmi3Instance fmi3InstantiateScheduledExecution(
     fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage, fmi3ClockUpdateCallback clockUpdate,
     fmi3LockPreemptionCallback lockPreemption, fmi3UnlockPreemptionCallback unlockPreemption) {
-    const struct receiver receiver = {logMessage, instanceEnvironment};
-    return refuse_instance(&receiver,
-                           "fmi3InstantiateScheduledExecution is refused: this is an FMU for Model "
-                           "Exchange and Co-Simulation");
+    struct fmi3_component component =
+        begin(KIND_CO_SIMULATION, loggingOn, instanceEnvironment, logMessage);
+    component_fail(&component.base, "fmi3InstantiateScheduledExecution is refused: this is an FMU "
+                                    "for Model Exchange and Co-Simulation");
+    return NULL;
 }
 
 void fmi3FreeInstance(fmi3Instance instance) {
