@@ -235,7 +235,7 @@ enum status instance_replay_history(struct instance *instance) {
     if (status == STATUS_OK && state->latest_time > state->first_time) {
         status = integrator_advance(instance->integrator, state->latest_time, steps, &reached, x);
     }
-    integrator_set_statistics(instance->integrator, &state->statistics);
+    *integrator_totals(instance->integrator) = state->statistics;
     instance->history_is_lost = false;
     if (status != STATUS_OK || integrator_passed_time(instance->integrator) != state->passed_time) {
         message_write(&instance->sink, STATUS_INVALID_ARGUMENT,

@@ -82,7 +82,7 @@ static enum status resume(struct instance *instance) {
     if (instance_is_configured_otherwise(instance)) {
         status = instance_configure_integrator(instance);
     }
-    integrator_set_statistics(instance->integrator, &instance->state.statistics);
+    *integrator_totals(instance->integrator) = instance->state.statistics;
     return status;
 }
 

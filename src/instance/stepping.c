@@ -247,7 +247,7 @@ static enum status advance(struct step *step) {
         integrator_advance(instance->integrator, clock_difference(step->until, state->restart_time),
                            left > 1 ? left : 1, &state->latest_time,
                            doubles_of(instance->memory.values, instance->model->states));
-    integrator_get_statistics(instance->integrator, &state->statistics);
+    state->statistics = *integrator_totals(instance->integrator);
     step->triggered =
         instance->model->events != NULL ? integrator_event(instance->integrator) : NULL;
     return status;

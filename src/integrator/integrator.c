@@ -329,14 +329,6 @@ bool integrator_seems_stiff(struct integrator *integrator) {
            of_deviations * integrator->statistics.last_step > 0.01;
 }
 
-/* ---- Statistics ----------------------------------------------------------------------------- */
-
-void integrator_get_statistics(const struct integrator *integrator,
-                               struct integrator_statistics *statistics) {
-    *statistics = integrator->statistics;
-}
-
-void integrator_set_statistics(struct integrator *integrator,
-                               const struct integrator_statistics *statistics) {
-    integrator->statistics = *statistics;
+struct integrator_statistics *integrator_totals(struct integrator *integrator) {
+    return &integrator->statistics;
 }
