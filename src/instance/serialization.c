@@ -229,7 +229,7 @@ static void transfer_values(struct codec *codec, const struct instance *instance
 /* Transfers modes and discrete states, declared as variables or not. */
 static void transfer_kept(struct codec *codec, const struct model *model, char *values) {
     const struct model_events events = events_of(model);
-    int *modes = ints_of(values, events.modes);
+    int *modes = (int *)(void *)(values + events.modes.offset);
     double *kept = doubles_of(values, events.discrete_states);
     for (size_t i = 0; i < events.modes.size / sizeof *modes; i++) {
         codec_int(codec, "a mode", &modes[i]);

@@ -55,22 +55,24 @@ struct instance_state {
     struct clock_time cut_end; /* end of the step without that event */
 };
 
-/* Parts of one block of memory, in this order; a snapshot copies the block. */
+/* Parts of one block of memory; a snapshot copies the block. In it the inputs stand first, in this
+ * order, then largest_inputs, unhandled, restart_values and values. Here stand first what each step
+ * reads. */
 struct instance_memory {
     struct polynomial *next_inputs; /* inputs of the next step: last value set, and derivatives */
     struct polynomial *current_inputs; /* inputs at the current time */
     struct polynomial *active_inputs;  /* inputs since the last restart */
-    double *largest_inputs; /* largest magnitude of each so far; empty without `errors` */
-    bool *unhandled;        /* causes of the unhandled event, like triggered of struct instance */
     char *restart_values; /* value structure at the last restart, with which the integrator runs */
     char *values; /* value structure of the model, as set and read from outside, with the inputs at
                      the current time */
-
+    struct range written; /* part of a value structure that a step writes, besides calculated values
+                           */
+    double *largest_inputs; /* largest magnitude of each so far; empty without `errors` */
+    bool *unhandled;        /* causes of the unhandled event, like triggered of struct instance */
     char *block;
-    size_t size; /* bytes */
-    /* Parts of the block that a step writes, besides the first two and calculated values. */
-    struct range written_at_restart; /* active_inputs to restart_values */
-    struct range written;            /* of a value structure */
+    size_t size;                     /* bytes */
+    struct range written_at_restart; /* part of the block that a step writes besides: active_inputs
+                                        to restart_values */
 };
 
 /* Place and kind of the value of a reference. */
@@ -158,11 +160,6 @@ static inline double *doubles_of(char *values, struct range range) {
     return (double *)(void *)(values + range.offset);
 }
 
-/* Returns the ints at a range of a value structure. */
-static inline int *ints_of(char *values, struct range range) {
-    return (int *)(void *)(values + range.offset);
-}
-
 /* Returns the model's events; no indicators and empty ranges if it has none. */
 static inline struct model_events events_of(const struct model *model) {
     return model->events != NULL ? *model->events : (struct model_events){0};
@@ -227,17 +224,6 @@ NONNULL const struct variable *instance_refuse_reference(const struct instance *
                                                          unsigned reference,
                                                          enum variable_type type);
 
-/* Returns the variable with this reference and type; NULL, with a message, if there is none. This
- * function and instance_write_field are inline: they run once or more for each value that is set or
- * read. */
-static inline const struct variable *instance_find(const struct instance *instance,
-                                                   unsigned reference, enum variable_type type) {
-    const struct variable *variable = variable_find(instance->description, reference);
-    return variable != NULL && variable->type == type
-               ? variable
-               : instance_refuse_reference(instance, reference, type);
-}
-
 /* Returns the place of a variable's value. */
 static inline void *instance_field(struct instance *instance, const struct variable *variable) {
     char *structure = variable->owner == VARIABLE_OF_MODEL ? instance->memory.values
@@ -265,8 +251,8 @@ static inline size_t instance_input_index(const struct instance *instance,
     return (variable->offset - instance->model->inputs.offset) / sizeof(double);
 }
 
-/* Writes the value. The value of an input of type float64 also goes into its polynomial of the next
- * step. */
+/* Writes the value; inline, because it runs for each value that is set. The value of an input of
+ * type float64 also goes into its polynomial of the next step. */
 static inline void instance_write_field(struct instance *instance, const struct variable *variable,
                                         double value) {
     void *field = instance_field(instance, variable);
