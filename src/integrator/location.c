@@ -137,7 +137,7 @@ enum status location_restart(struct location *location, const struct integrator_
             location->touch[i] = 2.0 * rounding;
         } else {
             const double factor = fabs(indicator->factor);
-            const double z = indicator_at_state(indicator, x);
+            const double z = indicator->offset + indicator->factor * x[indicator->state];
             const bool is_sure = indicator->rises || z > 0.0;
             location->is_armed[i] = is_sure && (z > rounding || (rounding == 0.0 && z >= 0.0));
             const double miss = factor * location->settings->absolute_tolerances[indicator->state];
@@ -188,6 +188,17 @@ static void expand(const struct step_polynomial *step, const struct indicator *i
     }
 }
 
+/* Returns a bound of how far a state moves over a step: the sum of |row[k]|, 0 < k <= degree. */
+static double way_of(const double row[], int degree) {
+    double way[2] = {0.0, 0.0};
+    const double *c = row + 1;
+    for (const double *end = row + degree; c < end; c += 2) {
+        way[0] += fabs(c[0]);
+        way[1] += fabs(c[1]);
+    }
+    return way[0] + way[1] + (degree % 2 != 0 ? fabs(row[degree]) : 0.0);
+}
+
 /* True if the state moves by less than the indicator is above 0 and above its noise at a restart.
  */
 static bool is_far_above(const struct location *location, size_t i) {
@@ -195,7 +206,7 @@ static bool is_far_above(const struct location *location, size_t i) {
     const struct indicator *indicator = &location->indicators[i];
     const double value = indicator->offset + indicator->factor * step->row[indicator->state][0];
     const double noise = location->is_armed[i] ? 0.0 : location->noise[i];
-    const double way = location_way(step->row[indicator->state], step->degree);
+    const double way = way_of(step->row[indicator->state], step->degree);
     const double slack = 0x1p-40; // far above all rounding here and in Horner's scheme
     return (1.0 - slack) * value > (1.0 + slack) * fabs(indicator->factor) * way + noise;
 }

@@ -319,6 +319,11 @@ static bool step_to(struct erk *erk, int first, double t, double x[]) {
     return is_evaluated;
 }
 
+/* Returns the value of an INDICATOR_OF_STATE at the states x. */
+static double indicator_at_state(const struct indicator *indicator, const double x[]) {
+    return indicator->offset + indicator->factor * x[indicator->state];
+}
+
 /* True if an indicator of a state is above 0 at the state x, and not at the state `next`. */
 static bool falls_between(const struct location *location, const double x[], const double next[]) {
     bool falls = false;
