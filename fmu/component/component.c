@@ -8,6 +8,8 @@
 
 /* ---- Log ------------------------------------------------------------------------------------ */
 
+enum { LOG_TEXT_SIZE = 1024 };
+
 static const char *const category_names[LOG_CATEGORY_COUNT] = {
     [LOG_EVENTS] = "logEvents",
     [LOG_STATUS_WARNING] = "logStatusWarning",
@@ -16,10 +18,6 @@ static const char *const category_names[LOG_CATEGORY_COUNT] = {
     [LOG_STATUS_FATAL] = "logStatusFatal",
     [LOG_ALL] = "logAll",
 };
-
-const char *component_category_name(enum log_category category) {
-    return category_names[category];
-}
 
 static bool continues_character(char c) {
     return ((unsigned char)c & 0xc0) == 0x80;
@@ -36,8 +34,11 @@ static size_t whole_length(const char *text, size_t length) {
     return length - begin < needed ? begin - 1 : length;
 }
 
-void component_make_harmless(const struct adapter *adapter, const char *text,
-                             char out[LOG_TEXT_SIZE]) {
+/* Makes a text harmless that importers search for references to variables, or pass to printf:
+ * doubles characters with a meaning there. Line ends become blanks, other control characters '?'.
+ */
+static void make_harmless(const struct adapter *adapter, const char *text,
+                          char out[LOG_TEXT_SIZE]) {
     size_t length = 0;
     for (; *text != '\0' && length < LOG_TEXT_SIZE - 2; text++) {
         const bool is_blank = strchr("\t\n\r", *text) != NULL;
@@ -57,7 +58,7 @@ static void send_one(const struct component *component, enum component_status st
                      enum log_category category, const char *raw) {
     if (component->is_logged[category]) {
         char text[LOG_TEXT_SIZE];
-        component_make_harmless(component->adapter, raw, text);
+        make_harmless(component->adapter, raw, text);
         component->adapter->send(component, status, category_names[category], text);
     }
 }
@@ -229,13 +230,13 @@ const char *component_kind_name(unsigned kinds) {
     }
 }
 
-bool component_enter(struct component *component, unsigned call) {
+struct instance *component_enter(struct component *component, unsigned call) {
     if (component == NULL) {
-        return false;
+        return NULL;
     }
     const struct call_rule *rule = &component->adapter->rules[call];
     if (component_refuse_in_logger(component, rule->name)) {
-        return false;
+        return NULL;
     }
     if (component->is_logged[LOG_ALL]) {
         component_log(component, COMPONENT_OK, LOG_ALL, "%s", rule->name);
@@ -243,33 +244,99 @@ bool component_enter(struct component *component, unsigned call) {
     if ((component->kind & rule->kinds) == 0) {
         component_fail(component, "%s belongs to %s: the instance is one for %s", rule->name,
                        component_kind_name(rule->kinds), component_kind_name(component->kind));
-        return false;
+        return NULL;
     }
     if ((component->state & rule->states) == 0) {
         component_fail(component, "%s is not allowed while the instance is %s", rule->name,
                        state_name(component->state));
-        return false;
+        return NULL;
     }
-    return true;
+    return component->instance;
 }
 
-bool component_refuse_arrays(struct component *component, unsigned call, size_t count) {
+bool component_check_arrays(struct component *component, unsigned call, size_t count,
+                            const void *first, const void *second) {
+    if (count == 0 || (first != NULL && second != NULL)) {
+        return true;
+    }
     component_fail(component, "%s: an array is NULL, %zu values are expected",
                    component->adapter->rules[call].name, count);
     return false;
 }
 
+enum component_status component_go_to(struct component *component, enum fmi_state state,
+                                      enum status status) {
+    if (status != STATUS_OK) {
+        return component_failure(component, status);
+    }
+    component->state = state;
+    return COMPONENT_OK;
+}
+
+enum component_status component_exit_initialization(struct component *component, unsigned call) {
+    struct instance *instance = component_enter(component, call);
+    if (instance == NULL) {
+        return COMPONENT_ERROR;
+    }
+    const enum status status = instance_exit_initialization(instance);
+    if (status == STATUS_OK) {
+        component_log(component, COMPONENT_OK, LOG_EVENTS, "initialized at t = %.17g",
+                      instance_time(instance));
+    }
+    // into event mode, if the importer handles events
+    return component_go_to(
+        component, component->kind == KIND_CO_SIMULATION ? STATE_STEP_COMPLETE : STATE_EVENT,
+        status);
+}
+
+enum component_status component_terminate(struct component *component, unsigned call) {
+    const struct instance *instance = component_enter(component, call);
+    if (instance == NULL) {
+        return COMPONENT_ERROR;
+    }
+    component_log(component, COMPONENT_OK, LOG_EVENTS, "terminated at t = %.17g",
+                  instance_time(instance));
+    return component_go_to(component, STATE_TERMINATED, STATUS_OK);
+}
+
+enum component_status component_reset(struct component *component, unsigned call) {
+    struct instance *instance = component_enter(component, call);
+    if (instance == NULL) {
+        return COMPONENT_ERROR;
+    }
+    instance_reset(instance);
+    component_log(component, COMPONENT_OK, LOG_EVENTS, "reset to the start values");
+    return component_go_to(component, STATE_INSTANTIATED, STATUS_OK);
+}
+
+enum component_status component_access_none(struct component *component, const char *type,
+                                            const unsigned references[], size_t count) {
+    return count == 0 ? COMPONENT_OK
+                      : component_fail(component,
+                                       "value reference %u is accessed as %s: %s has no variable "
+                                       "of that type",
+                                       references[0], type, model_description.name);
+}
+
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-bool component_check_token(const char *name, const char *token_name, const char *token,
-                           const char *expected, char text[LOG_TEXT_SIZE]) {
+void component_begin(struct component *component, const struct adapter *adapter, enum fmi_kind kind,
+                     bool logging_on) {
+    component->adapter = adapter;
+    component->state = STATE_INSTANTIATED;
+    component->kind = kind;
+    log_always(component, logging_on ? ~0u : adapter->always_logged);
+}
+
+bool component_check_token(struct component *component, const char *name, const char *token_name,
+                           const char *token, const char *expected) {
     if (name == NULL || name[0] == '\0') {
-        (void)snprintf(text, LOG_TEXT_SIZE,
+        component_fail(component,
                        "the instance name is missing: a name that is not empty is expected");
         return false;
     }
     if (token == NULL || strcmp(token, expected) != 0) {
-        (void)snprintf(text, LOG_TEXT_SIZE,
+        component_fail(component,
                        "the %s '%.100s' is refused: '%s' is expected, the model description "
                        "belongs to another build",
                        token_name, token != NULL ? token : "", expected);
@@ -278,17 +345,12 @@ bool component_check_token(const char *name, const char *token_name, const char 
     return true;
 }
 
-enum component_status component_begin(struct component *component, const struct adapter *adapter,
-                                      enum fmi_kind kind, bool logging_on) {
-    component->adapter = adapter;
-    component->state = STATE_INSTANTIATED;
-    component->kind = kind;
-    log_always(component, logging_on ? ~0u : adapter->always_logged);
+enum component_status component_create_instance(struct component *component) {
     const struct message_sink sink = {.write = log_instance_text, .context = component};
     if (instance_create(&model_description, &sink, &component->instance) != STATUS_OK) {
         return COMPONENT_ERROR;
     }
-    if (kind == KIND_MODEL_EXCHANGE) {
+    if (component->kind == KIND_MODEL_EXCHANGE) {
         instance_integrate_outside(component->instance);
     }
     return COMPONENT_OK;

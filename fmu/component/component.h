@@ -3,7 +3,6 @@
  * begin with a struct component, and converts status and types. */
 #pragma once
 
-#include "derivatives.h"
 #include "instance.h"
 
 /* States of an instance in FMI, one bit each. */
@@ -57,8 +56,6 @@ enum log_category {
     LOG_CATEGORY_COUNT,
 };
 
-enum { LOG_TEXT_SIZE = 1024 };
-
 struct component;
 
 /* Decisions of a version of FMI. Categories are bits of 1 << enum log_category. */
@@ -67,15 +64,9 @@ struct adapter {
     const struct call_rule *rules; /* by the version's own numbers of calls */
     unsigned states;               /* states of the version, as bits of enum fmi_state */
     enum fmi_state after_error;    /* state after an error */
-    unsigned always_logged;  /* categories sent although an instance was made with logging off */
-    unsigned never_silent;   /* categories that component_set_logging cannot switch off */
-    enum known_kinds knowns; /* knowns of directional and adjoint derivatives */
-    const char *doubled;     /* characters that must be doubled to stand for themselves in a text */
-
-    /* Returns true if these values may be read or set in intermediate update mode; otherwise fails
-     * as component_fail. NULL if the version has no such mode. */
-    bool (*check_access)(struct component *component, unsigned call, bool setting,
-                         const unsigned references[], size_t count);
+    unsigned always_logged; /* categories sent although an instance was made with logging off */
+    unsigned never_silent;  /* categories that component_set_logging cannot switch off */
+    const char *doubled;    /* characters that must be doubled to stand for themselves in a text */
 
     /* Sends a finished text to the importer. */
     void (*send)(const struct component *component, enum component_status status,
@@ -97,43 +88,53 @@ struct component {
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-/* Returns true if the name and the token are right; expected: the token of the model description;
- * token_name: its name in this version. Otherwise writes a text that says why not. */
-MUST_CHECK NONNULL_ARGUMENTS(2, 4,
-                             5) bool component_check_token(const char *name, const char *token_name,
-                                                           const char *token, const char *expected,
-                                                           char text[LOG_TEXT_SIZE]);
+/* Begins a component, which must be zeroed, so that component_fail can log; adapter must outlive
+ * it.
+ */
+NONNULL void component_begin(struct component *component, const struct adapter *adapter,
+                             enum fmi_kind kind, bool logging_on);
 
-/* Begins a component, which must be zeroed; adapter must outlive it. On failure nothing has to be
- * freed. */
-MUST_CHECK NONNULL enum component_status component_begin(struct component *component,
-                                                         const struct adapter *adapter,
-                                                         enum fmi_kind kind, bool logging_on);
+/* Returns true if the name and the token are right; otherwise fails as component_fail. expected:
+ * the token of the model description; token_name: its name in this version. */
+MUST_CHECK NONNULL_ARGUMENTS(1, 3,
+                             5) bool component_check_token(struct component *component,
+                                                           const char *name, const char *token_name,
+                                                           const char *token, const char *expected);
 
-/* Frees the memory that component_begin allocated. */
+/* Makes the instance. On failure nothing has to be freed. */
+MUST_CHECK NONNULL enum component_status component_create_instance(struct component *component);
+
+/* Frees the instance. */
 NONNULL void component_end(struct component *component);
 
 /* ---- Calls ---------------------------------------------------------------------------------- */
 
-/* Begins a call. Returns true if it may run: the component is not NULL, of the right kind and in a
- * state that the rule allows. Otherwise fails as component_fail. */
-MUST_CHECK bool component_enter(struct component *component, unsigned call);
+/* Begins a call. Returns the instance that it is for; NULL, after component_fail, if it may not
+ * run: the component is NULL, of another kind, or in a state in which the rule does not allow it.
+ */
+MUST_CHECK struct instance *component_enter(struct component *component, unsigned call);
 
 /* Refuses a call from inside the importer's logger, while the instance is in the middle of another
  * call; it changes nothing. A message says so after the logger's own. Returns true if it has
  * refused the call. */
 MUST_CHECK NONNULL bool component_refuse_in_logger(struct component *component, const char *call);
 
-/* Reports NULL in place of an array as component_fail does. Returns false. */
-NONNULL bool component_refuse_arrays(struct component *component, unsigned call, size_t count);
+/* Returns true if neither array is NULL, unless count is 0. Otherwise fails as component_fail. */
+MUST_CHECK NONNULL_ARGUMENTS(1) bool component_check_arrays(struct component *component,
+                                                            unsigned call, size_t count,
+                                                            const void *first, const void *second);
 
-/* Returns true if count values may be accessed: neither array is NULL, unless count is 0. Otherwise
- * fails as component_fail. */
-MUST_CHECK NONNULL_ARGUMENTS(1) static inline bool component_check_arrays(
-    struct component *component, unsigned call, size_t count, const void *references,
-    const void *values) {
-    return count == 0 || (references != NULL && values != NULL) ||
-           component_refuse_arrays(component, call, count);
+/* Begins a call with two arrays of count values: component_enter and component_check_arrays. */
+MUST_CHECK static inline struct instance *component_enter_with(struct component *component,
+                                                               unsigned call, size_t count,
+                                                               const void *first,
+                                                               const void *second) {
+    struct instance *instance = component_enter(component, call);
+    const bool is_right = (first != NULL && second != NULL) || count == 0;
+    return instance != NULL &&
+                   (is_right || component_check_arrays(component, call, count, first, second))
+               ? instance
+               : NULL;
 }
 
 /* Does the same as component_result for a status other than STATUS_OK. */
@@ -145,6 +146,20 @@ NONNULL static inline enum component_status component_result(struct component *c
                                                              enum status status) {
     return status == STATUS_OK ? COMPONENT_OK : component_failure(component, status);
 }
+
+/* Ends a call that leads to this FMI state, with the status of the instance. */
+NONNULL enum component_status component_go_to(struct component *component, enum fmi_state state,
+                                              enum status status);
+
+/* The calls in which both versions log an event. */
+enum component_status component_exit_initialization(struct component *component, unsigned call);
+enum component_status component_terminate(struct component *component, unsigned call);
+enum component_status component_reset(struct component *component, unsigned call);
+
+/* Accesses a type that no variable has: succeeds only if no value is asked for. */
+NONNULL_ARGUMENTS(1, 2)
+enum component_status component_access_none(struct component *component, const char *type,
+                                            const unsigned references[], size_t count);
 
 /* Fails with an error that the adapter finds: logs it, goes to the same state as component_result,
  * returns COMPONENT_ERROR. Inside the importer's logger it changes nothing. */
@@ -160,17 +175,9 @@ NONNULL PRINTF_FORMAT(4, 5) void component_log(struct component *component,
                                                enum component_status status,
                                                enum log_category category, const char *format, ...);
 
-const char *component_category_name(enum log_category category);
-
 /* Sets which categories are sent: all of them if there are no names; otherwise on sends exactly
  * these, off removes them. Fails as component_fail, with nothing changed, at a name that is NULL or
  * unknown. */
 NONNULL_ARGUMENTS(1)
 enum component_status component_set_logging(struct component *component, bool on, size_t count,
                                             const char *const names[]);
-
-/* Makes a text harmless that importers search for references to variables, or pass to printf:
- * doubles characters with a meaning there. Line ends become blanks, other control characters '?'.
- */
-NONNULL void component_make_harmless(const struct adapter *adapter, const char *text,
-                                     char out[LOG_TEXT_SIZE]);

@@ -1,15 +1,15 @@
 /* All functions of FMI 2.0: checks of arguments that only FMI has, conversion of types and status,
  * and nothing else. */
-#include "component.h"
+#include "continuous_states.h"
+#include "derivatives.h"
 #include "fmi2Functions.h"
 #include "fmi2_functions.h"
+#include "fmu_state.h"
 #include "model_description.h"
-#include "shared_calls.h"
 #include "stepping.h"
+#include "values.h"
 
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -46,7 +46,7 @@ struct fmi2_component {
     struct component base;     /* first */
     fmi2CallbackLogger logger; /* NULL for no log */
     fmi2ComponentEnvironment environment;
-    char name[];
+    const char *name;
 };
 
 _Static_assert((int)COMPONENT_OK == fmi2OK && (int)COMPONENT_WARNING == fmi2Warning &&
@@ -56,6 +56,11 @@ _Static_assert((int)COMPONENT_OK == fmi2OK && (int)COMPONENT_WARNING == fmi2Warn
 
 static fmi2Status fmi2_status(enum component_status status) {
     return (fmi2Status)status;
+}
+
+/* Converts a status of the instance. */
+static fmi2Status result(struct component *component, enum status status) {
+    return fmi2_status(component_result(component, status));
 }
 
 /* ---- Versions, life and logging ------------------------------------------------------------- */
@@ -83,65 +88,44 @@ static const struct adapter adapter = {
     .states = ~(unsigned)STATE_INTERMEDIATE_UPDATE,
     .after_error = STATE_ERROR,
     .always_logged = ~(1u << LOG_EVENTS | 1u << LOG_ALL),
-    .knowns = KNOWN_MOTION,
     .doubled = "#%", // references to variables, formats of printf (section 2.1.5)
     .send = send_text,
 };
-
-/* Logs why there is no instance; functions may be NULL. */
-PRINTF_FORMAT(3, 4)
-static void refuse_instance(const fmi2CallbackFunctions *functions, fmi2String name,
-                            const char *format, ...) {
-    if (functions == NULL || functions->logger == NULL) {
-        return;
-    }
-    char raw[LOG_TEXT_SIZE];
-    char text[LOG_TEXT_SIZE];
-    va_list arguments;
-    va_start(arguments, format);
-    (void)vsnprintf(raw, sizeof raw, format, arguments);
-    va_end(arguments);
-    component_make_harmless(&adapter, raw, text);
-    functions->logger(functions->componentEnvironment, name != NULL ? name : "", fmi2Error,
-                      component_category_name(LOG_STATUS_ERROR), text);
-}
-
-static bool check_instantiation(fmi2String name, fmi2Type type, fmi2String guid,
-                                const fmi2CallbackFunctions *functions) {
-    char text[LOG_TEXT_SIZE];
-    if (!component_check_token(name, "GUID", guid, model_description.guid, text)) {
-        refuse_instance(functions, name, "%s", text);
-        return false;
-    }
-    if (type != fmi2CoSimulation && type != fmi2ModelExchange) {
-        refuse_instance(functions, name,
-                        "FMU type %d is refused: %d for Model Exchange or %d for Co-Simulation is "
-                        "expected",
-                        (int)type, (int)fmi2ModelExchange, (int)fmi2CoSimulation);
-        return false;
-    }
-    return functions != NULL;
-}
 
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
                               fmi2String fmuResourceLocation,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible,
                               fmi2Boolean loggingOn) {
-    if (!check_instantiation(instanceName, fmuType, fmuGUID, functions)) {
+    if (functions == NULL) {
         return NULL;
     }
+    struct fmi2_component component = {.logger = functions->logger,
+                                       .environment = functions->componentEnvironment,
+                                       .name = instanceName != NULL ? instanceName : ""};
     const enum fmi_kind kind =
         fmuType == fmi2CoSimulation ? KIND_CO_SIMULATION : KIND_MODEL_EXCHANGE;
-    const size_t name_size = strlen(instanceName) + 1;
-    struct fmi2_component *created = calloc(1, sizeof *created + name_size);
-    if (created == NULL) {
-        refuse_instance(functions, instanceName, "%s", status_text(STATUS_OUT_OF_MEMORY));
+    component_begin(&component.base, &adapter, kind, loggingOn != fmi2False);
+    if (!component_check_token(&component.base, instanceName, "GUID", fmuGUID,
+                               model_description.guid)) {
         return NULL;
     }
-    created->logger = functions->logger;
-    created->environment = functions->componentEnvironment;
-    memcpy(created->name, instanceName, name_size);
-    if (component_begin(&created->base, &adapter, kind, loggingOn != fmi2False) != COMPONENT_OK) {
+    if (fmuType != fmi2CoSimulation && fmuType != fmi2ModelExchange) {
+        component_fail(&component.base,
+                       "FMU type %d is refused: %d for Model Exchange or %d for Co-Simulation is "
+                       "expected",
+                       (int)fmuType, (int)fmi2ModelExchange, (int)fmi2CoSimulation);
+        return NULL;
+    }
+    // the name behind the component
+    const size_t name_size = strlen(component.name) + 1;
+    struct fmi2_component *created = malloc(sizeof *created + name_size);
+    if (created == NULL) {
+        component_fail(&component.base, "%s", status_text(STATUS_OUT_OF_MEMORY));
+        return NULL;
+    }
+    *created = component;
+    created->name = memcpy(created + 1, component.name, name_size);
+    if (component_create_instance(&created->base) != COMPONENT_OK) {
         free(created);
         return NULL;
     }
@@ -160,13 +144,10 @@ void fmi2FreeInstance(fmi2Component c) {
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[]) {
     const enum fmi2_call call = CALL_fmi2SetDebugLogging;
-    struct component *component = c;
-    if (!component_enter(component, call) ||
-        !component_check_arrays(component, call, nCategories, categories, categories)) {
+    if (component_enter_with(c, call, nCategories, categories, categories) == NULL) {
         return fmi2Error;
     }
-    return fmi2_status(
-        component_set_logging(component, loggingOn != fmi2False, nCategories, categories));
+    return fmi2_status(component_set_logging(c, loggingOn != fmi2False, nCategories, categories));
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance,
@@ -178,23 +159,28 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
         .tolerance_defined = toleranceDefined != fmi2False,
         .tolerance = tolerance,
     };
-    return fmi2_status(mode_setup_experiment(c, CALL_fmi2SetupExperiment, &experiment));
+    struct instance *instance = component_enter(c, CALL_fmi2SetupExperiment);
+    return instance != NULL ? result(c, instance_setup_experiment(instance, &experiment))
+                            : fmi2Error;
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
-    return fmi2_status(mode_enter_initialization(c, CALL_fmi2EnterInitializationMode, NULL));
+    struct instance *instance = component_enter(c, CALL_fmi2EnterInitializationMode);
+    return instance != NULL ? fmi2_status(component_go_to(c, STATE_INITIALIZATION,
+                                                          instance_enter_initialization(instance)))
+                            : fmi2Error;
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
-    return fmi2_status(mode_exit_initialization(c, CALL_fmi2ExitInitializationMode));
+    return fmi2_status(component_exit_initialization(c, CALL_fmi2ExitInitializationMode));
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
-    return fmi2_status(mode_terminate(c, CALL_fmi2Terminate));
+    return fmi2_status(component_terminate(c, CALL_fmi2Terminate));
 }
 
 fmi2Status fmi2Reset(fmi2Component c) {
-    return fmi2_status(mode_reset(c, CALL_fmi2Reset));
+    return fmi2_status(component_reset(c, CALL_fmi2Reset));
 }
 
 /* ---- Values --------------------------------------------------------------------------------- */
@@ -202,7 +188,10 @@ fmi2Status fmi2Reset(fmi2Component c) {
 #define ACCESS(Verb, verb, Type, type, element)                                                    \
     fmi2Status fmi2##Verb##Type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,        \
                                 element value[]) {                                                 \
-        return fmi2_status(access_##verb##_##type(c, CALL_fmi2##Verb##Type, vr, nvr, value));      \
+        struct instance *instance =                                                                \
+            component_enter_with(c, CALL_fmi2##Verb##Type, nvr, vr, value);                        \
+        return instance != NULL ? result(c, instance_##verb##_##type(instance, vr, nvr, value))    \
+                                : fmi2Error;                                                       \
     }
 ACCESS(Get, get, Real, real, fmi2Real)
 ACCESS(Set, set, Real, real, const fmi2Real)
@@ -211,14 +200,22 @@ ACCESS(Set, set, Integer, integer, const fmi2Integer)
 ACCESS(Get, get, Boolean, boolean, fmi2Boolean)
 ACCESS(Set, set, Boolean, boolean, const fmi2Boolean)
 
+/* Accesses a type that no variable has. */
+static fmi2Status access_none(fmi2Component c, enum fmi2_call call, const fmi2ValueReference vr[],
+                              size_t nvr, const void *value) {
+    return component_enter_with(c, call, nvr, vr, value) != NULL
+               ? fmi2_status(component_access_none(c, "String", vr, nvr))
+               : fmi2Error;
+}
+
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                          fmi2String value[]) {
-    return fmi2_status(access_none(c, CALL_fmi2GetString, "String", vr, nvr, value));
+    return access_none(c, CALL_fmi2GetString, vr, nvr, value);
 }
 
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                          const fmi2String value[]) {
-    return fmi2_status(access_none(c, CALL_fmi2SetString, "String", vr, nvr, value));
+    return access_none(c, CALL_fmi2SetString, vr, nvr, value);
 }
 
 /* ---- FMU state ------------------------------------------------------------------------------ */
@@ -257,26 +254,35 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         size_t nUnknown, const fmi2ValueReference vKnown_ref[],
                                         size_t nKnown, const fmi2Real dvKnown[],
                                         fmi2Real dvUnknown[]) {
-    return fmi2_status(access_get_directional_derivative(c, CALL_fmi2GetDirectionalDerivative,
-                                                         vUnknown_ref, nUnknown, vKnown_ref, nKnown,
-                                                         dvKnown, dvUnknown));
+    const enum fmi2_call call = CALL_fmi2GetDirectionalDerivative;
+    struct instance *instance = component_enter_with(c, call, nUnknown, vUnknown_ref, dvUnknown);
+    if (instance == NULL || !component_check_arrays(c, call, nKnown, vKnown_ref, dvKnown)) {
+        return fmi2Error;
+    }
+    return result(c, instance_get_directional_derivative(instance, KNOWN_MOTION, vUnknown_ref,
+                                                         nUnknown, vKnown_ref, nKnown, dvKnown,
+                                                         dvUnknown));
 }
 
 /* ---- Model Exchange: modes (section 3.2) ---------------------------------------------------- */
 
 fmi2Status fmi2EnterEventMode(fmi2Component c) {
-    return fmi2_status(mode_enter_event(c, CALL_fmi2EnterEventMode));
+    struct instance *instance = component_enter(c, CALL_fmi2EnterEventMode);
+    if (instance == NULL) {
+        return fmi2Error;
+    }
+    instance_enter_event_mode(instance);
+    return fmi2_status(component_go_to(c, STATE_EVENT, STATUS_OK));
 }
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo) {
-    const enum fmi2_call call = CALL_fmi2NewDiscreteStates;
-    struct component *component = c;
-    if (!component_enter(component, call) ||
-        !component_check_arrays(component, call, 1, fmi2eventInfo, fmi2eventInfo)) {
+    struct instance *instance =
+        component_enter_with(c, CALL_fmi2NewDiscreteStates, 1, fmi2eventInfo, fmi2eventInfo);
+    if (instance == NULL) {
         return fmi2Error;
     }
     struct discrete_update update;
-    const enum component_status status = mode_update_discrete_states(component, &update);
+    const enum status status = instance_update_discrete_states(instance, &update);
     const bool has_next_time = isfinite(update.next_time);
     *fmi2eventInfo = (fmi2EventInfo){
         .newDiscreteStatesNeeded = update.is_incomplete ? fmi2True : fmi2False,
@@ -286,67 +292,85 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo) 
         .nextEventTimeDefined = has_next_time ? fmi2True : fmi2False,
         .nextEventTime = has_next_time ? update.next_time : 0.0,
     };
-    return fmi2_status(status);
+    return result(c, status);
 }
 
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
-    return fmi2_status(mode_enter_continuous_time(c, CALL_fmi2EnterContinuousTimeMode));
+    struct instance *instance = component_enter(c, CALL_fmi2EnterContinuousTimeMode);
+    return instance != NULL ? fmi2_status(component_go_to(c, STATE_CONTINUOUS_TIME,
+                                                          instance_enter_continuous_time(instance)))
+                            : fmi2Error;
 }
 
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
                                        fmi2Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi2Boolean *enterEventMode,
                                        fmi2Boolean *terminateSimulation) {
-    bool is_event = false;
-    const enum component_status status = continuous_complete_step(
-        c, CALL_fmi2CompletedIntegratorStep, enterEventMode, terminateSimulation, &is_event);
-    if (status == COMPONENT_OK) {
-        *enterEventMode = is_event;
-        *terminateSimulation = fmi2False;
+    struct instance *instance = component_enter_with(c, CALL_fmi2CompletedIntegratorStep, 1,
+                                                     enterEventMode, terminateSimulation);
+    if (instance == NULL) {
+        return fmi2Error;
     }
-    return fmi2_status(status);
+    *enterEventMode = instance_complete_step(instance);
+    *terminateSimulation = fmi2False;
+    return fmi2OK;
 }
 
 /* ---- Model Exchange: time and states -------------------------------------------------------- */
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
-    return fmi2_status(continuous_set_time(c, CALL_fmi2SetTime, time));
+    struct instance *instance = component_enter(c, CALL_fmi2SetTime);
+    return instance != NULL ? result(c, instance_set_time(instance, time)) : fmi2Error;
 }
 
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx) {
-    return fmi2_status(continuous_set_states(c, CALL_fmi2SetContinuousStates, x, nx));
+    struct instance *instance = component_enter_with(c, CALL_fmi2SetContinuousStates, nx, x, x);
+    return instance != NULL ? result(c, instance_set_states(instance, x, nx)) : fmi2Error;
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx) {
-    return fmi2_status(continuous_get_derivatives(c, CALL_fmi2GetDerivatives, derivatives, nx));
+    struct instance *instance =
+        component_enter_with(c, CALL_fmi2GetDerivatives, nx, derivatives, derivatives);
+    return instance != NULL ? result(c, instance_get_derivatives(instance, derivatives, nx))
+                            : fmi2Error;
 }
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni) {
-    return fmi2_status(
-        continuous_get_indicators(c, CALL_fmi2GetEventIndicators, eventIndicators, ni));
+    struct instance *instance =
+        component_enter_with(c, CALL_fmi2GetEventIndicators, ni, eventIndicators, eventIndicators);
+    return instance != NULL ? result(c, instance_get_indicators(instance, eventIndicators, ni))
+                            : fmi2Error;
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx) {
-    return fmi2_status(continuous_get_states(c, CALL_fmi2GetContinuousStates, x, nx));
+    struct instance *instance = component_enter_with(c, CALL_fmi2GetContinuousStates, nx, x, x);
+    return instance != NULL ? result(c, instance_get_states(instance, x, nx)) : fmi2Error;
 }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx) {
-    return fmi2_status(
-        continuous_get_nominals(c, CALL_fmi2GetNominalsOfContinuousStates, x_nominal, nx));
+    struct instance *instance =
+        component_enter_with(c, CALL_fmi2GetNominalsOfContinuousStates, nx, x_nominal, x_nominal);
+    return instance != NULL ? result(c, instance_get_nominals(instance, x_nominal, nx)) : fmi2Error;
 }
 
 /* ---- Co-Simulation: derivatives of inputs and outputs (section 4.2) ------------------------- */
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[]) {
-    return fmi2_status(
-        access_set_input_derivatives(c, CALL_fmi2SetRealInputDerivatives, vr, nvr, order, value));
+    const enum fmi2_call call = CALL_fmi2SetRealInputDerivatives;
+    struct instance *instance = component_enter_with(c, call, nvr, vr, value);
+    return instance != NULL && component_check_arrays(c, call, nvr, order, order)
+               ? result(c, instance_set_input_derivatives(instance, vr, nvr, order, value))
+               : fmi2Error;
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                         const fmi2Integer order[], fmi2Real value[]) {
-    return fmi2_status(
-        access_get_output_derivatives(c, CALL_fmi2GetRealOutputDerivatives, vr, nvr, order, value));
+    const enum fmi2_call call = CALL_fmi2GetRealOutputDerivatives;
+    struct instance *instance = component_enter_with(c, call, nvr, vr, value);
+    return instance != NULL && component_check_arrays(c, call, nvr, order, order)
+               ? result(c, instance_get_output_derivatives(instance, vr, nvr, order, value))
+               : fmi2Error;
 }
 
 /* ---- Co-Simulation: steps ------------------------------------------------------------------- */
@@ -356,34 +380,33 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
     // importers say true, and roll back nevertheless
     struct component *component = c;
-    if (!component_enter(component, CALL_fmi2DoStep)) {
+    struct instance *instance = component_enter(component, CALL_fmi2DoStep);
+    if (instance == NULL) {
         return fmi2Error;
     }
     const enum status status =
-        instance_do_step(component->instance, currentCommunicationPoint, communicationStepSize);
+        instance_do_step(instance, currentCommunicationPoint, communicationStepSize, NULL);
+    if (status == STATUS_OK) {
+        return fmi2OK;
+    }
     if (status_severity(status) == SEVERITY_DISCARD) {
         component->state = STATE_STEP_FAILED;
     }
-    return fmi2_status(component_result(component, status));
+    return result(component, status);
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c) {
     // no state allows it: no step is ever pending
-    return component_enter(c, CALL_fmi2CancelStep) ? fmi2OK : fmi2Error;
+    return component_enter(c, CALL_fmi2CancelStep) != NULL ? fmi2OK : fmi2Error;
 }
 
 /* ---- Co-Simulation: status ------------------------------------------------------------------ */
 
-static bool begin_query(struct component *component, enum fmi2_call call, const void *value) {
-    return component_enter(component, call) &&
-           component_check_arrays(component, call, 1, value, value);
-}
-
-static fmi2Status no_status(struct component *component, enum fmi2_call call, const void *value) {
-    if (!begin_query(component, call, value)) {
+static fmi2Status no_status(fmi2Component c, enum fmi2_call call, const void *value) {
+    if (component_enter_with(c, call, 1, value, value) == NULL) {
         return fmi2Error;
     }
-    component_log(component, COMPONENT_DISCARD, LOG_STATUS_DISCARD,
+    component_log(c, COMPONENT_DISCARD, LOG_STATUS_DISCARD,
                   "%s: this status cannot be known, no step is ever pending",
                   fmi2_call_rules[call].name);
     return fmi2Discard;
@@ -394,14 +417,15 @@ fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *va
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value) {
-    struct component *component = c;
     if (s != fmi2LastSuccessfulTime) {
-        return no_status(component, CALL_fmi2GetRealStatus, value);
+        return no_status(c, CALL_fmi2GetRealStatus, value);
     }
-    if (!begin_query(component, CALL_fmi2GetRealStatus, value)) {
+    const struct instance *instance =
+        component_enter_with(c, CALL_fmi2GetRealStatus, 1, value, value);
+    if (instance == NULL) {
         return fmi2Error;
     }
-    *value = instance_time(component->instance);
+    *value = instance_time(instance);
     return fmi2OK;
 }
 
@@ -413,7 +437,7 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boo
     if (s != fmi2Terminated) {
         return no_status(c, CALL_fmi2GetBooleanStatus, value);
     }
-    if (!begin_query(c, CALL_fmi2GetBooleanStatus, value)) {
+    if (component_enter_with(c, CALL_fmi2GetBooleanStatus, 1, value, value) == NULL) {
         return fmi2Error;
     }
     *value = fmi2False; // the FMU never ends a simulation by itself

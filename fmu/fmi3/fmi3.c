@@ -1,16 +1,21 @@
 /* All supported functions of FMI 3.0: checks of arguments that only FMI has, conversion of types
  * and status, and nothing else. */
 #include "continuous_states.h"
+#include "derivatives.h"
 #include "fmi3_calls.h"
+#include "fmu_state.h"
 #include "model_description.h"
-#include "shared_calls.h"
 #include "stepping.h"
+#include "values.h"
 
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* Converts a status of the instance. */
+static fmi3Status result(struct component *component, enum status status) {
+    return fmi3_status(component_result(component, status));
+}
 
 /* ---- Version and logging -------------------------------------------------------------------- */
 
@@ -36,21 +41,17 @@ static const struct adapter adapter = {
     .after_error = STATE_TERMINATED,
     .always_logged = ERRORS,
     .never_silent = ERRORS,
-    .knowns = KNOWN_ARGUMENTS,
     .doubled = "#", // references to variables: the text is no format
-    .check_access = fmi3_check_access,
     .send = send_text,
 };
 
 fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
                                const fmi3String categories[]) {
-    const enum fmi3_call call = CALL_fmi3SetDebugLogging;
-    struct component *component = instance;
-    if (!component_enter(component, call) ||
-        !component_check_arrays(component, call, nCategories, categories, categories)) {
+    if (component_enter_with(instance, CALL_fmi3SetDebugLogging, nCategories, categories,
+                             categories) == NULL) {
         return fmi3Error;
     }
-    return fmi3_status(component_set_logging(component, loggingOn, nCategories, categories));
+    return fmi3_status(component_set_logging(instance, loggingOn, nCategories, categories));
 }
 
 /* ---- Intermediate updates ------------------------------------------------------------------- */
@@ -115,43 +116,29 @@ static enum status prepare_steps(struct fmi3_component *component) {
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-/* Receiver of texts while there is no instance. */
-struct receiver {
-    fmi3LogMessageCallback logger;
-    fmi3InstanceEnvironment environment;
-};
-
-PRINTF_FORMAT(2, 3)
-static fmi3Instance refuse_instance(const struct receiver *receiver, const char *format, ...) {
-    if (receiver->logger != NULL) {
-        char raw[LOG_TEXT_SIZE];
-        char text[LOG_TEXT_SIZE];
-        va_list arguments;
-        va_start(arguments, format);
-        (void)vsnprintf(raw, sizeof raw, format, arguments);
-        va_end(arguments);
-        component_make_harmless(&adapter, raw, text);
-        receiver->logger(receiver->environment, fmi3Error,
-                         component_category_name(LOG_STATUS_ERROR), text);
-    }
-    return NULL;
+/* Returns a component without an instance, which can log why there is none. */
+static struct fmi3_component begin(enum fmi_kind kind, fmi3Boolean logging_on,
+                                   fmi3InstanceEnvironment environment,
+                                   fmi3LogMessageCallback logger) {
+    struct fmi3_component component = {.logger = logger, .environment = environment};
+    component_begin(&component.base, &adapter, kind, logging_on);
+    return component;
 }
 
 static struct fmi3_component *instantiate(const char *call, fmi3String name, fmi3String token,
-                                          enum fmi_kind kind, bool logging_on,
-                                          const struct receiver *receiver) {
-    char text[LOG_TEXT_SIZE];
-    if (!component_check_token(name, "instantiation token", token, model_token_fmi3, text)) {
-        return refuse_instance(receiver, "%s", text);
+                                          struct fmi3_component component) {
+    if (!component_check_token(&component.base, name, "instantiation token", token,
+                               model_token_fmi3)) {
+        return NULL;
     }
     struct fmi3_component *created =
         calloc(1, sizeof *created + model_description.variable_count * sizeof(bool));
     if (created == NULL) {
-        return refuse_instance(receiver, "%s", status_text(STATUS_OUT_OF_MEMORY));
+        component_fail(&component.base, "%s", status_text(STATUS_OUT_OF_MEMORY));
+        return NULL;
     }
-    created->logger = receiver->logger;
-    created->environment = receiver->environment;
-    if (component_begin(&created->base, &adapter, kind, logging_on) != COMPONENT_OK) {
+    *created = component;
+    if (component_create_instance(&created->base) != COMPONENT_OK) {
         free(created);
         return NULL;
     }
@@ -169,10 +156,9 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
                                           fmi3Boolean loggingOn,
                                           fmi3InstanceEnvironment instanceEnvironment,
                                           fmi3LogMessageCallback logMessage) {
-    const struct receiver receiver = {logMessage, instanceEnvironment};
     struct fmi3_component *created =
         instantiate("fmi3InstantiateModelExchange", instanceName, instantiationToken,
-                    KIND_MODEL_EXCHANGE, loggingOn, &receiver);
+                    begin(KIND_MODEL_EXCHANGE, loggingOn, instanceEnvironment, logMessage));
     if (created != NULL) {
         instance_allow_setting_states(created->base.instance);
     }
@@ -214,10 +200,10 @@ fmi3Instance fmi3InstantiateCoSimulation(
     fmi3Boolean earlyReturnAllowed, const fmi3ValueReference requiredIntermediateVariables[],
     size_t nRequiredIntermediateVariables, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage, fmi3IntermediateUpdateCallback intermediateUpdate) {
-    const struct receiver receiver = {logMessage, instanceEnvironment};
-    struct fmi3_component *created = instantiate(
-        "fmi3InstantiateCoSimulation", instanceName, instantiationToken,
-        eventModeUsed ? KIND_CO_SIMULATION_WITH_EVENTS : KIND_CO_SIMULATION, loggingOn, &receiver);
+    const enum fmi_kind kind = eventModeUsed ? KIND_CO_SIMULATION_WITH_EVENTS : KIND_CO_SIMULATION;
+    struct fmi3_component *created =
+        instantiate("fmi3InstantiateCoSimulation", instanceName, instantiationToken,
+                    begin(kind, loggingOn, instanceEnvironment, logMessage));
     if (created == NULL) {
         return NULL;
     }
@@ -237,10 +223,11 @@ fmi3Instance fmi3InstantiateScheduledExecution(
     fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage, fmi3ClockUpdateCallback clockUpdate,
     fmi3LockPreemptionCallback lockPreemption, fmi3UnlockPreemptionCallback unlockPreemption) {
-    const struct receiver receiver = {logMessage, instanceEnvironment};
-    return refuse_instance(&receiver,
-                           "fmi3InstantiateScheduledExecution is refused: this is an FMU for Model "
-                           "Exchange and Co-Simulation");
+    struct fmi3_component component =
+        begin(KIND_CO_SIMULATION, loggingOn, instanceEnvironment, logMessage);
+    component_fail(&component.base, "fmi3InstantiateScheduledExecution is refused: this is an FMU "
+                                    "for Model Exchange and Co-Simulation");
+    return NULL;
 }
 
 void fmi3FreeInstance(fmi3Instance instance) {
@@ -269,16 +256,28 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
         .tolerance_defined = toleranceDefined,
         .tolerance = tolerance,
     };
-    return fmi3_status(
-        mode_enter_initialization(instance, CALL_fmi3EnterInitializationMode, &experiment));
+    struct instance *entered = component_enter(instance, CALL_fmi3EnterInitializationMode);
+    if (entered == NULL) {
+        return fmi3Error;
+    }
+    enum status status = instance_setup_experiment(entered, &experiment);
+    if (status == STATUS_OK) {
+        status = instance_enter_initialization(entered);
+    }
+    return fmi3_status(component_go_to(instance, STATE_INITIALIZATION, status));
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance instance) {
-    return fmi3_status(mode_exit_initialization(instance, CALL_fmi3ExitInitializationMode));
+    return fmi3_status(component_exit_initialization(instance, CALL_fmi3ExitInitializationMode));
 }
 
 fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
-    return fmi3_status(mode_enter_event(instance, CALL_fmi3EnterEventMode));
+    struct instance *entered = component_enter(instance, CALL_fmi3EnterEventMode);
+    if (entered == NULL) {
+        return fmi3Error;
+    }
+    instance_enter_event_mode(entered);
+    return fmi3_status(component_go_to(instance, STATE_EVENT, STATUS_OK));
 }
 
 /* One update decides all modes. Another one is needed only if the importer has passed several time
@@ -289,17 +288,16 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
                                     fmi3Boolean *valuesOfContinuousStatesChanged,
                                     fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime) {
     const enum fmi3_call call = CALL_fmi3UpdateDiscreteStates;
-    struct component *component = instance;
-    if (!component_enter(component, call) ||
-        !component_check_arrays(component, call, 1, discreteStatesNeedUpdate,
-                                terminateSimulation) ||
-        !component_check_arrays(component, call, 1, nominalsOfContinuousStatesChanged,
+    struct instance *entered =
+        component_enter_with(instance, call, 1, discreteStatesNeedUpdate, terminateSimulation);
+    if (entered == NULL ||
+        !component_check_arrays(instance, call, 1, nominalsOfContinuousStatesChanged,
                                 valuesOfContinuousStatesChanged) ||
-        !component_check_arrays(component, call, 1, nextEventTimeDefined, nextEventTime)) {
+        !component_check_arrays(instance, call, 1, nextEventTimeDefined, nextEventTime)) {
         return fmi3Error;
     }
     struct discrete_update update;
-    const enum component_status status = mode_update_discrete_states(component, &update);
+    const enum status status = instance_update_discrete_states(entered, &update);
     const bool has_next_time = isfinite(update.next_time);
     *discreteStatesNeedUpdate = update.is_incomplete;
     *terminateSimulation = fmi3False;
@@ -307,55 +305,71 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     *valuesOfContinuousStatesChanged = update.states_changed;
     *nextEventTimeDefined = has_next_time;
     *nextEventTime = has_next_time ? update.next_time : 0.0;
-    return fmi3_status(status);
+    return result(instance, status);
 }
 
 fmi3Status fmi3Terminate(fmi3Instance instance) {
-    return fmi3_status(mode_terminate(instance, CALL_fmi3Terminate));
+    return fmi3_status(component_terminate(instance, CALL_fmi3Terminate));
 }
 
 fmi3Status fmi3Reset(fmi3Instance instance) {
-    return fmi3_status(mode_reset(instance, CALL_fmi3Reset));
+    return fmi3_status(component_reset(instance, CALL_fmi3Reset));
 }
 
 /* ---- Values --------------------------------------------------------------------------------- */
 
-/* Defines the function for one type; `access` reads or sets the values. */
-#define FUNCTION(name, element, access)                                                            \
-    fmi3Status name(fmi3Instance instance, const fmi3ValueReference valueReferences[],             \
-                    size_t nValueReferences, element values[], size_t nValues) {                   \
-        const enum fmi3_call call = CALL_##name;                                                   \
-        if (!fmi3_check_count(instance, call, nValues, nValueReferences)) {                        \
-            return fmi3Error;                                                                      \
-        }                                                                                          \
-        return fmi3_status(access);                                                                \
-    }
-
-/* Defines the functions for types that variables have; type: its name in shared_calls.h. */
-#define OF_VARIABLES(Type, type)                                                                   \
-    FUNCTION(fmi3Get##Type, fmi3##Type,                                                            \
-             access_get_##type(instance, call, valueReferences, nValueReferences, values))         \
-    FUNCTION(fmi3Set##Type, const fmi3##Type,                                                      \
-             access_set_##type(instance, call, valueReferences, nValueReferences, values))
-OF_VARIABLES(Float64, real)
-OF_VARIABLES(Int32, int32)
-OF_VARIABLES(Int64, enumeration)
-OF_VARIABLES(Boolean, bool)
-
-/* Accesses a type that no variable has. */
-static enum component_status none(struct component *component, enum fmi3_call call, bool setting,
-                                  const char *type, const fmi3ValueReference references[],
-                                  size_t count, const void *values) {
-    return fmi3_check_access(component, call, setting, references, count)
-               ? access_none(component, call, type, references, count, values)
-               : COMPONENT_ERROR;
+/* Begins a call that reads or sets values. Returns the instance; NULL if the call is refused. */
+static struct instance *enter_access(fmi3Instance instance, enum fmi3_call call, bool setting,
+                                     const fmi3ValueReference references[], size_t count,
+                                     const void *values, size_t value_count) {
+    struct instance *entered = fmi3_check_count(instance, call, value_count, count)
+                                   ? component_enter_with(instance, call, count, references, values)
+                                   : NULL;
+    return entered != NULL && fmi3_check_access(instance, call, setting, references, count)
+               ? entered
+               : NULL;
 }
 
+/* Defines the function for a type that variables have; verb and type: their names in values.h. */
+#define ACCESS(Verb, verb, setting, Type, type, element)                                           \
+    fmi3Status fmi3##Verb##Type(fmi3Instance instance, const fmi3ValueReference valueReferences[], \
+                                size_t nValueReferences, element values[], size_t nValues) {       \
+        struct instance *entered =                                                                 \
+            enter_access(instance, CALL_fmi3##Verb##Type, setting, valueReferences,                \
+                         nValueReferences, values, nValues);                                       \
+        return entered != NULL                                                                     \
+                   ? result(instance, instance_##verb##_##type(entered, valueReferences,           \
+                                                               nValueReferences, values))          \
+                   : fmi3Error;                                                                    \
+    }
+ACCESS(Get, get, false, Float64, real, fmi3Float64)
+ACCESS(Set, set, true, Float64, real, const fmi3Float64)
+ACCESS(Get, get, false, Int32, int32, fmi3Int32)
+ACCESS(Set, set, true, Int32, int32, const fmi3Int32)
+ACCESS(Get, get, false, Int64, enumeration, fmi3Int64)
+ACCESS(Set, set, true, Int64, enumeration, const fmi3Int64)
+ACCESS(Get, get, false, Boolean, bool, fmi3Boolean)
+ACCESS(Set, set, true, Boolean, bool, const fmi3Boolean)
+
+/* Accesses a type that no variable has. */
+static fmi3Status access_none(fmi3Instance instance, enum fmi3_call call, bool setting,
+                              const char *type, const fmi3ValueReference references[], size_t count,
+                              const void *values, size_t value_count) {
+    if (enter_access(instance, call, setting, references, count, values, value_count) == NULL) {
+        return fmi3Error;
+    }
+    return fmi3_status(component_access_none(instance, type, references, count));
+}
+
+#define ACCESS_NONE(Verb, setting, Type, element)                                                  \
+    fmi3Status fmi3##Verb##Type(fmi3Instance instance, const fmi3ValueReference valueReferences[], \
+                                size_t nValueReferences, element values[], size_t nValues) {       \
+        return access_none(instance, CALL_fmi3##Verb##Type, setting, #Type, valueReferences,       \
+                           nValueReferences, values, nValues);                                     \
+    }
 #define OF_NONE(Type)                                                                              \
-    FUNCTION(fmi3Get##Type, fmi3##Type,                                                            \
-             none(instance, call, false, #Type, valueReferences, nValueReferences, values))        \
-    FUNCTION(fmi3Set##Type, const fmi3##Type,                                                      \
-             none(instance, call, true, #Type, valueReferences, nValueReferences, values))
+    ACCESS_NONE(Get, false, Type, fmi3##Type)                                                      \
+    ACCESS_NONE(Set, true, Type, const fmi3##Type)
 OF_NONE(Float32)
 OF_NONE(Int8)
 OF_NONE(UInt8)
@@ -368,23 +382,15 @@ OF_NONE(String)
 fmi3Status fmi3GetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                          size_t nValueReferences, size_t valueSizes[], fmi3Binary values[],
                          size_t nValues) {
-    const enum fmi3_call call = CALL_fmi3GetBinary;
-    if (!fmi3_check_count(instance, call, nValues, nValueReferences)) {
-        return fmi3Error;
-    }
-    return fmi3_status(
-        none(instance, call, false, "Binary", valueReferences, nValueReferences, values));
+    return access_none(instance, CALL_fmi3GetBinary, false, "Binary", valueReferences,
+                       nValueReferences, values, nValues);
 }
 
 fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                          size_t nValueReferences, const size_t valueSizes[],
                          const fmi3Binary values[], size_t nValues) {
-    const enum fmi3_call call = CALL_fmi3SetBinary;
-    if (!fmi3_check_count(instance, call, nValues, nValueReferences)) {
-        return fmi3Error;
-    }
-    return fmi3_status(
-        none(instance, call, true, "Binary", valueReferences, nValueReferences, values));
+    return access_none(instance, CALL_fmi3SetBinary, true, "Binary", valueReferences,
+                       nValueReferences, values, nValues);
 }
 
 /* ---- FMU state ------------------------------------------------------------------------------ */
@@ -428,8 +434,14 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueRe
         !fmi3_check_count(instance, call, nSensitivity, nUnknowns)) {
         return fmi3Error;
     }
-    return fmi3_status(access_get_directional_derivative(instance, call, unknowns, nUnknowns,
-                                                         knowns, nKnowns, seed, sensitivity));
+    struct instance *entered =
+        component_enter_with(instance, call, nUnknowns, unknowns, sensitivity);
+    if (entered == NULL || !component_check_arrays(instance, call, nKnowns, knowns, seed)) {
+        return fmi3Error;
+    }
+    return result(instance,
+                  instance_get_directional_derivative(entered, KNOWN_ARGUMENTS, unknowns, nUnknowns,
+                                                      knowns, nKnowns, seed, sensitivity));
 }
 
 fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[],
@@ -441,14 +453,21 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
         !fmi3_check_count(instance, call, nSensitivity, nKnowns)) {
         return fmi3Error;
     }
-    return fmi3_status(access_get_adjoint_derivative(instance, call, unknowns, nUnknowns, knowns,
-                                                     nKnowns, seed, sensitivity));
+    struct instance *entered = component_enter_with(instance, call, nUnknowns, unknowns, seed);
+    if (entered == NULL || !component_check_arrays(instance, call, nKnowns, knowns, sensitivity)) {
+        return fmi3Error;
+    }
+    return result(instance,
+                  instance_get_adjoint_derivative(entered, KNOWN_ARGUMENTS, unknowns, nUnknowns,
+                                                  knowns, nKnowns, seed, sensitivity));
 }
 
 /* ---- Co-Simulation (section 4.2) ------------------------------------------------------------ */
 
 fmi3Status fmi3EnterStepMode(fmi3Instance instance) {
-    return fmi3_status(mode_enter_step(instance, CALL_fmi3EnterStepMode));
+    return component_enter(instance, CALL_fmi3EnterStepMode) != NULL
+               ? fmi3_status(component_go_to(instance, STATE_STEP_COMPLETE, STATUS_OK))
+               : fmi3Error;
 }
 
 fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance,
@@ -456,12 +475,13 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance,
                                     size_t nValueReferences, const fmi3Int32 orders[],
                                     fmi3Float64 values[], size_t nValues) {
     const enum fmi3_call call = CALL_fmi3GetOutputDerivatives;
-    if (!fmi3_check_count(instance, call, nValues, nValueReferences) ||
-        !fmi3_check_access(instance, call, false, valueReferences, nValueReferences)) {
-        return fmi3Error;
-    }
-    return fmi3_status(access_get_output_derivatives(instance, call, valueReferences,
-                                                     nValueReferences, orders, values));
+    struct instance *entered =
+        enter_access(instance, call, false, valueReferences, nValueReferences, values, nValues);
+    return entered != NULL &&
+                   component_check_arrays(instance, call, nValueReferences, orders, orders)
+               ? result(instance, instance_get_output_derivatives(entered, valueReferences,
+                                                                  nValueReferences, orders, values))
+               : fmi3Error;
 }
 
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint,
@@ -471,88 +491,110 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
                       fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
     // importers say true, and roll back nevertheless
     const enum fmi3_call call = CALL_fmi3DoStep;
-    struct component *base = instance;
-    if (!component_enter(base, call) ||
-        !component_check_arrays(base, call, 1, eventHandlingNeeded, terminateSimulation) ||
-        !component_check_arrays(base, call, 1, earlyReturn, lastSuccessfulTime)) {
+    const struct fmi3_component *component = instance;
+    struct instance *entered =
+        component_enter_with(instance, call, 1, eventHandlingNeeded, terminateSimulation);
+    if (entered == NULL ||
+        !component_check_arrays(instance, call, 1, earlyReturn, lastSuccessfulTime)) {
         return fmi3Error;
     }
-    const struct fmi3_component *component = instance;
-    const enum status status = instance_do_step_with(base->instance, currentCommunicationPoint,
-                                                     communicationStepSize, &component->options);
-    if (status == STATUS_OK) {
-        *eventHandlingNeeded =
-            base->kind == KIND_CO_SIMULATION_WITH_EVENTS && instance_met_event(base->instance);
-        *terminateSimulation = fmi3False;
-        *lastSuccessfulTime = instance_time(base->instance);
-        *earlyReturn = *lastSuccessfulTime < currentCommunicationPoint + communicationStepSize;
+    const enum status status = instance_do_step(entered, currentCommunicationPoint,
+                                                communicationStepSize, &component->options);
+    if (status != STATUS_OK) {
+        return result(instance, status);
     }
-    return fmi3_status(component_result(base, status));
+    *eventHandlingNeeded =
+        component->base.kind == KIND_CO_SIMULATION_WITH_EVENTS && instance_met_event(entered);
+    *terminateSimulation = fmi3False;
+    *lastSuccessfulTime = instance_time(entered);
+    *earlyReturn = *lastSuccessfulTime < currentCommunicationPoint + communicationStepSize;
+    return fmi3OK;
 }
 
 /* ---- Model Exchange: modes (section 3.2) ---------------------------------------------------- */
 
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance) {
-    return fmi3_status(mode_enter_continuous_time(instance, CALL_fmi3EnterContinuousTimeMode));
+    struct instance *entered = component_enter(instance, CALL_fmi3EnterContinuousTimeMode);
+    return entered != NULL ? fmi3_status(component_go_to(instance, STATE_CONTINUOUS_TIME,
+                                                         instance_enter_continuous_time(entered)))
+                           : fmi3Error;
 }
 
 fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance,
                                        fmi3Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi3Boolean *enterEventMode,
                                        fmi3Boolean *terminateSimulation) {
-    bool is_event = false;
-    const enum component_status status = continuous_complete_step(
-        instance, CALL_fmi3CompletedIntegratorStep, enterEventMode, terminateSimulation, &is_event);
-    if (status == COMPONENT_OK) {
-        *enterEventMode = is_event;
-        *terminateSimulation = fmi3False;
+    struct instance *entered = component_enter_with(instance, CALL_fmi3CompletedIntegratorStep, 1,
+                                                    enterEventMode, terminateSimulation);
+    if (entered == NULL) {
+        return fmi3Error;
     }
-    return fmi3_status(status);
+    *enterEventMode = instance_complete_step(entered);
+    *terminateSimulation = fmi3False;
+    return fmi3OK;
 }
 
 /* ---- Model Exchange: time and states -------------------------------------------------------- */
 
 fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time) {
-    return fmi3_status(continuous_set_time(instance, CALL_fmi3SetTime, time));
+    struct instance *entered = component_enter(instance, CALL_fmi3SetTime);
+    return entered != NULL ? result(instance, instance_set_time(entered, time)) : fmi3Error;
 }
 
 fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 continuousStates[],
                                    size_t nContinuousStates) {
-    return fmi3_status(continuous_set_states(instance, CALL_fmi3SetContinuousStates,
-                                             continuousStates, nContinuousStates));
+    struct instance *entered =
+        component_enter_with(instance, CALL_fmi3SetContinuousStates, nContinuousStates,
+                             continuousStates, continuousStates);
+    return entered != NULL
+               ? result(instance, instance_set_states(entered, continuousStates, nContinuousStates))
+               : fmi3Error;
 }
 
 fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuousStates[],
                                    size_t nContinuousStates) {
-    return fmi3_status(continuous_get_states(instance, CALL_fmi3GetContinuousStates,
-                                             continuousStates, nContinuousStates));
+    struct instance *entered =
+        component_enter_with(instance, CALL_fmi3GetContinuousStates, nContinuousStates,
+                             continuousStates, continuousStates);
+    return entered != NULL
+               ? result(instance, instance_get_states(entered, continuousStates, nContinuousStates))
+               : fmi3Error;
 }
 
 fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 derivatives[],
                                              size_t nContinuousStates) {
-    return fmi3_status(continuous_get_derivatives(instance, CALL_fmi3GetContinuousStateDerivatives,
-                                                  derivatives, nContinuousStates));
+    struct instance *entered =
+        component_enter_with(instance, CALL_fmi3GetContinuousStateDerivatives, nContinuousStates,
+                             derivatives, derivatives);
+    return entered != NULL
+               ? result(instance, instance_get_derivatives(entered, derivatives, nContinuousStates))
+               : fmi3Error;
 }
 
 fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[],
                                              size_t nContinuousStates) {
-    return fmi3_status(continuous_get_nominals(instance, CALL_fmi3GetNominalsOfContinuousStates,
-                                               nominals, nContinuousStates));
+    struct instance *entered = component_enter_with(
+        instance, CALL_fmi3GetNominalsOfContinuousStates, nContinuousStates, nominals, nominals);
+    return entered != NULL
+               ? result(instance, instance_get_nominals(entered, nominals, nContinuousStates))
+               : fmi3Error;
 }
 
 fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndicators[],
                                   size_t nEventIndicators) {
-    return fmi3_status(continuous_get_indicators(instance, CALL_fmi3GetEventIndicators,
-                                                 eventIndicators, nEventIndicators));
+    struct instance *entered = component_enter_with(
+        instance, CALL_fmi3GetEventIndicators, nEventIndicators, eventIndicators, eventIndicators);
+    return entered != NULL ? result(instance, instance_get_indicators(entered, eventIndicators,
+                                                                      nEventIndicators))
+                           : fmi3Error;
 }
 
 /* ---- Model Exchange: numbers ---------------------------------------------------------------- */
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators) {
-    const enum fmi3_call call = CALL_fmi3GetNumberOfEventIndicators;
-    struct component *component = instance;
-    if (!component_enter(component, call) ||
-        !component_check_arrays(component, call, 1, nEventIndicators, nEventIndicators)) {
+    const struct instance *entered = component_enter_with(
+        instance, CALL_fmi3GetNumberOfEventIndicators, 1, nEventIndicators, nEventIndicators);
+    if (entered == NULL) {
         return fmi3Error;
     }
     *nEventIndicators = model_description.indicator_count;
@@ -560,12 +602,11 @@ fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventI
 }
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates) {
-    const enum fmi3_call call = CALL_fmi3GetNumberOfContinuousStates;
-    struct component *component = instance;
-    if (!component_enter(component, call) ||
-        !component_check_arrays(component, call, 1, nContinuousStates, nContinuousStates)) {
+    const struct instance *entered = component_enter_with(
+        instance, CALL_fmi3GetNumberOfContinuousStates, 1, nContinuousStates, nContinuousStates);
+    if (entered == NULL) {
         return fmi3Error;
     }
-    *nContinuousStates = instance_state_count(component->instance);
+    *nContinuousStates = instance_state_count(entered);
     return fmi3OK;
 }

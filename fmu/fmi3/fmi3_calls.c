@@ -25,16 +25,19 @@ const struct call_rule fmi3_call_rules[FMI3_CALL_COUNT] = {FMI3_FUNCTION_LIST(FM
 
 /* ---- Checks --------------------------------------------------------------------------------- */
 
-bool fmi3_refuse_count(struct component *component, enum fmi3_call call, size_t count,
-                       size_t expected) {
+bool fmi3_check_count(struct component *component, enum fmi3_call call, size_t count,
+                      size_t expected) {
+    if (count == expected || component == NULL) {
+        return true;
+    }
     component_fail(component, "%s: an array has %zu values: %zu are expected",
                    fmi3_call_rules[call].name, count, expected);
     return false;
 }
 
-bool fmi3_check_access(struct component *component, unsigned call, bool setting,
+bool fmi3_check_access(struct component *component, enum fmi3_call call, bool setting,
                        const fmi3ValueReference references[], size_t count) {
-    if (component == NULL || component->state != STATE_INTERMEDIATE_UPDATE) {
+    if (component->state != STATE_INTERMEDIATE_UPDATE) {
         return true;
     }
     const struct fmi3_component *inside = (const struct fmi3_component *)component;
@@ -64,12 +67,11 @@ bool fmi3_check_access(struct component *component, unsigned call, bool setting,
 
 /* Fails with an error that says why the FMU does not support a call. */
 static fmi3Status unsupported(fmi3Instance instance, enum fmi3_call call, const char *reason) {
-    struct component *component = instance;
-    if (!component_enter(component, call)) {
+    if (component_enter(instance, call) == NULL) {
         return fmi3Error;
     }
     return fmi3_status(
-        component_fail(component, "%s is not supported: %s", fmi3_call_rules[call].name, reason));
+        component_fail(instance, "%s is not supported: %s", fmi3_call_rules[call].name, reason));
 }
 
 static const char no_clocks[] = "the model has no clocks";

@@ -42,18 +42,12 @@ static inline fmi3Status fmi3_status(enum component_status status) {
     return (fmi3Status)status;
 }
 
-/* Reports a wrong number of values as component_fail does. Returns false. */
-NONNULL bool fmi3_refuse_count(struct component *component, enum fmi3_call call, size_t count,
-                               size_t expected);
-
 /* Returns true if the number of values is right; otherwise fails as component_fail. */
-static inline bool fmi3_check_count(struct component *component, enum fmi3_call call, size_t count,
-                                    size_t expected) {
-    return count == expected || component == NULL ||
-           fmi3_refuse_count(component, call, count, expected);
-}
+bool fmi3_check_count(struct component *component, enum fmi3_call call, size_t count,
+                      size_t expected);
 
 /* Returns true if the variables may be read or set in intermediate update mode; otherwise fails as
  * component_fail. Other modes are not checked here. */
-bool fmi3_check_access(struct component *component, unsigned call, bool setting,
+NONNULL_ARGUMENTS(1)
+bool fmi3_check_access(struct component *component, enum fmi3_call call, bool setting,
                        const fmi3ValueReference references[], size_t count);

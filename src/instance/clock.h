@@ -39,6 +39,14 @@ static inline double clock_difference(struct clock_time later, struct clock_time
  * In s. Times up to a given size (s, the largest magnitude among the start time and the times at
  * hand) are computed in different ways: products, sums, decimal numbers. */
 
+/* Return the larger and the smaller of two numbers: fmax and fmin are calls. */
+static inline double clock_larger(double x, double y) {
+    return x > y ? x : y;
+}
+static inline double clock_smaller(double x, double y) {
+    return x < y ? x : y;
+}
+
 /* Returns the largest distance between neighbouring doubles. */
 static inline double clock_spacing(double size) {
     return DBL_EPSILON * fabs(size);
@@ -56,14 +64,15 @@ static inline double clock_rounding(double size) {
  * begin of a step of step_size > 0: min(1e-9 max(size, step_size), step_size / 100), and never less
  * than clock_rounding. */
 static inline double clock_slack(double size, double step_size) {
-    return fmax(fmin(1e-9 * fmax(size, step_size), CLOCK_LARGEST_PART * step_size),
-                clock_rounding(size));
+    const double part =
+        clock_smaller(1e-9 * clock_larger(size, step_size), CLOCK_LARGEST_PART * step_size);
+    return clock_larger(part, clock_rounding(size));
 }
 
 /* Returns by how much a step adds to the drift of a master: the mismatch that was accepted at its
  * beginning or, if the master hides it, the rounding of a sum of times. */
 static inline double clock_step_drift(double size, double mismatch) {
-    return fmax(fabs(mismatch), 0.5 * clock_spacing(size));
+    return clock_larger(fabs(mismatch), 0.5 * clock_spacing(size));
 }
 
 /* Returns how far a time event may be from the end of a step of step_size > 0 to happen there: the
@@ -72,7 +81,8 @@ static inline double clock_step_drift(double size, double mismatch) {
  * event comes early. */
 static inline double clock_tick_slack(double size, double step_size, double drift) {
     const double rounding = clock_rounding(size);
-    return fmax(fmin(drift + rounding, CLOCK_LARGEST_PART * step_size), rounding);
+    const double part = clock_smaller(drift + rounding, CLOCK_LARGEST_PART * step_size);
+    return clock_larger(part, rounding);
 }
 
 /* ---- Polynomials ----------------------------------------------------------------------------
@@ -101,12 +111,36 @@ static inline bool polynomials_move(const struct polynomial polynomials[], size_
 }
 
 /* Returns the value at time t (s) after the origin. */
-double polynomial_value(const struct polynomial *polynomial, double t);
+static inline double polynomial_value(const struct polynomial *polynomial, double t) {
+    const double *d = polynomial->d;
+    return d[0] + t * (d[1] + t / 2.0 * (d[2] + t / 3.0 * d[3]));
+}
 
 /* Returns the polynomial with values[k] at k step_size / (POLYNOMIAL_NODES - 1), step_size > 0 (s).
  * With equal values, all its derivatives are 0. */
 enum { POLYNOMIAL_NODES = POLYNOMIAL_DEGREE + 1 };
-struct polynomial polynomial_through(const double values[POLYNOMIAL_NODES], double step_size);
+static inline struct polynomial polynomial_through(const double values[POLYNOMIAL_NODES],
+                                                   double step_size) {
+    // Newton's forward differences, and their series for the derivatives at the first node
+    const double s = step_size / (POLYNOMIAL_NODES - 1);
+    const double first[] = {values[1] - values[0], values[2] - values[1], values[3] - values[2]};
+    const double second[] = {first[1] - first[0], first[2] - first[1]};
+    const double third = second[1] - second[0];
+    return (struct polynomial){{
+        values[0],
+        (first[0] - second[0] / 2.0 + third / 3.0) / s,
+        (second[0] - third) / s / s,
+        third / s / s / s,
+    }};
+}
 
 /* Returns the same polynomial with its origin moved by t (s). */
-struct polynomial polynomial_shifted(const struct polynomial *polynomial, double t);
+static inline struct polynomial polynomial_shifted(const struct polynomial *polynomial, double t) {
+    const double *d = polynomial->d;
+    return (struct polynomial){{
+        polynomial_value(polynomial, t),
+        d[1] + t * (d[2] + t / 2.0 * d[3]),
+        d[2] + t * d[3],
+        d[3],
+    }};
+}

@@ -2,7 +2,6 @@
 
 #include "failures.h"
 #include "modes.h"
-#include "settings.h"
 #include "state.h"
 #include "values.h"
 
@@ -66,18 +65,24 @@ size_t instance_state_count(const struct instance *instance) {
     return count_of(instance->model->states);
 }
 
-static enum status check_count(const struct instance *instance, size_t count) {
-    if (count == instance_state_count(instance)) {
+/* Returns STATUS_OK if there are as many continuous states, or event indicators, as are accessed.
+ */
+static enum status check_count(const struct instance *instance, const char *what, size_t count,
+                               size_t expected) {
+    if (count == expected) {
         return STATUS_OK;
     }
-    message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
-                  "%zu continuous states are accessed: there are %zu", count,
-                  instance_state_count(instance));
+    message_write(&instance->sink, STATUS_INVALID_ARGUMENT, "%zu %s are accessed: there are %zu",
+                  count, what, expected);
     return STATUS_INVALID_ARGUMENT;
 }
 
+static enum status check_states(const struct instance *instance, size_t count) {
+    return check_count(instance, "continuous states", count, instance_state_count(instance));
+}
+
 enum status instance_set_states(struct instance *instance, const double x[], size_t count) {
-    const enum status status = check_count(instance, count);
+    const enum status status = check_states(instance, count);
     if (status != STATUS_OK) {
         return status;
     }
@@ -111,12 +116,12 @@ static enum status copy_finite(struct instance *instance, struct range range, do
 }
 
 enum status instance_get_states(struct instance *instance, double x[], size_t count) {
-    const enum status status = check_count(instance, count);
+    const enum status status = check_states(instance, count);
     return status != STATUS_OK ? status : copy_finite(instance, instance->model->states, x);
 }
 
 enum status instance_get_derivatives(struct instance *instance, double dx[], size_t count) {
-    enum status status = check_count(instance, count);
+    enum status status = check_states(instance, count);
     if (status == STATUS_OK) {
         status = instance_update_outputs(instance);
     }
@@ -125,7 +130,7 @@ enum status instance_get_derivatives(struct instance *instance, double dx[], siz
 
 enum status instance_get_nominals(struct instance *instance, double nominals[], size_t count) {
     const struct range states = instance->model->states;
-    const enum status status = check_count(instance, count);
+    const enum status status = check_states(instance, count);
     for (size_t i = 0; status == STATUS_OK && i < instance->description->variable_count; i++) {
         const struct variable *variable = &instance->description->variables[i];
         const size_t from_states = variable->offset - states.offset;
@@ -134,4 +139,13 @@ enum status instance_get_nominals(struct instance *instance, double nominals[], 
         }
     }
     return status;
+}
+
+enum status instance_get_indicators(struct instance *instance, double indicators[], size_t count) {
+    const struct model_description *description = instance->description;
+    const enum status status =
+        check_count(instance, "event indicators", count, description->indicator_count);
+    return status != STATUS_OK
+               ? status
+               : instance_get_real(instance, description->indicators, count, indicators);
 }

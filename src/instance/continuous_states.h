@@ -36,3 +36,7 @@ MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_get_derivatives(struct instance *instance, double dx[], size_t count);
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_get_nominals(struct instance *instance, double nominals[], size_t count);
+
+/* Reads the variables that are the event indicators; count must be their number. */
+MUST_CHECK NONNULL_ARGUMENTS(1) enum status
+    instance_get_indicators(struct instance *instance, double indicators[], size_t count);

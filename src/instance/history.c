@@ -121,37 +121,29 @@ static const struct indicator *describe_indicators(struct instance *instance) {
     return instance->indicators;
 }
 
-/* True if the motion to target is the one of the integrator's history. This depends only on the
- * values set now and the integrator's, not on how often or in what order they were set.
- *
- * Any change of an input restarts it. Measured with inputs sampled from sines every 1 ms,
- * continuing CVODE's history over a jump has 450 times the error of a restart and is slower if
- * jumps are 4e-4 of the input, has 40 times the error at 4e-6 and 4 times at 4e-8. It gains only
- * below 1e-9, and rollback would have to replay every jump. */
-static bool continues(const struct instance *instance, double target) {
-    const struct instance_state *state = &instance->state;
-    return state->has_history && target <= state->horizon && instance_values_are_active(instance);
-}
-
 /* Returns integrator_longest_history of the method, in the current modes. */
 static int64_t longest_history(const struct instance *instance) {
     return integrator_longest_history(instance->configured.method, is_searched(instance));
 }
 
-/* True if the target needs one more internal step than a history may have. */
-static bool history_is_full(const struct instance *instance, double target) {
-    const struct instance_state *state = &instance->state;
-    const int64_t steps = state->statistics.steps - state->steps_before_restart;
-    return target > state->passed_time && steps >= longest_history(instance);
-}
-
+/* This depends only on the values set now and the integrator's, not on how often or in what order
+ * they were set.
+ *
+ * Any change of an input restarts it. Measured with inputs sampled from sines every 1 ms,
+ * continuing CVODE's history over a jump has 450 times the error of a restart and is slower if
+ * jumps are 4e-4 of the input, has 40 times the error at 4e-6 and 4 times at 4e-8. It gains only
+ * below 1e-9, and rollback would have to replay every jump. */
 enum continuation instance_continuation(const struct instance *instance, double target) {
-    if (!continues(instance, target)) {
-        return instance->state.event_point == EVENT_HANDLED && instance_is_unchanged(instance)
+    const struct instance_state *state = &instance->state;
+    const bool continues =
+        state->has_history && target <= state->horizon && instance_values_are_active(instance);
+    if (!continues) {
+        return state->event_point == EVENT_HANDLED && instance_is_unchanged(instance)
                    ? CONTINUE_AFTER_EVENT
                    : CONTINUE_AFTER_CHANGE;
     }
-    if (history_is_full(instance, target)) {
+    const int64_t steps = state->statistics.steps - state->steps_before_restart;
+    if (target > state->passed_time && steps >= longest_history(instance)) {
         return CONTINUE_AFTER_RESTART;
     }
     return instance->history_is_lost ? CONTINUE_AFTER_REPLAY : CONTINUE_NOW;
@@ -225,8 +217,42 @@ static inline void activate_values(struct instance *instance, struct clock_time 
     end_history(instance); // until the first advance has succeeded
 }
 
-static enum status restart(struct instance *instance, struct clock_time end,
-                           enum continuation continuation) {
+/* Replays the number of internal steps that the state gives. A forged state fails here. */
+enum status instance_replay_history(struct instance *instance) {
+    const struct instance_state *state = &instance->state;
+    const struct range states = instance->model->states;
+    const int64_t steps = state->statistics.steps - state->steps_before_restart;
+    double *x = doubles_of(instance->first_derivatives, states);
+    double reached;
+    prepare_inputs(instance, polynomials_move(instance->memory.active_inputs,
+                                              count_of(instance->model->inputs)));
+    const struct integrator_start start = start_of(instance);
+    enum status status = integrator_restart(
+        instance->integrator, doubles_of(instance->memory.restart_values, states), &start);
+    if (status == STATUS_OK) {
+        status = integrator_advance(instance->integrator, state->first_time, steps, &reached, x);
+    }
+    if (status == STATUS_OK && state->latest_time > state->first_time) {
+        status = integrator_advance(instance->integrator, state->latest_time, steps, &reached, x);
+    }
+    *integrator_totals(instance->integrator) = state->statistics;
+    instance->history_is_lost = false;
+    if (status != STATUS_OK || integrator_passed_time(instance->integrator) != state->passed_time) {
+        message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
+                      "the restored state cannot be continued: it contradicts itself");
+        return STATUS_INVALID_ARGUMENT;
+    }
+    return STATUS_OK;
+}
+
+enum status instance_prepare_history(struct instance *instance, struct clock_time end,
+                                     enum continuation continuation) {
+    if (continuation == CONTINUE_NOW) {
+        return STATUS_OK;
+    }
+    if (continuation == CONTINUE_AFTER_REPLAY) {
+        return instance_replay_history(instance);
+    }
     struct instance_memory *memory = &instance->memory;
     struct instance_state *state = &instance->state;
     const bool is_event = continuation == CONTINUE_AFTER_EVENT;
@@ -250,68 +276,6 @@ static enum status restart(struct instance *instance, struct clock_time end,
     const struct integrator_start start = start_of(instance);
     return integrator_restart(instance->integrator,
                               doubles_of(memory->restart_values, instance->model->states), &start);
-}
-
-/* Replays the number of internal steps that the state gives. A forged state fails here. */
-enum status instance_replay_history(struct instance *instance) {
-    const struct instance_state *state = &instance->state;
-    const struct range states = instance->model->states;
-    const int64_t steps = state->statistics.steps - state->steps_before_restart;
-    double *x = doubles_of(instance->first_derivatives, states);
-    double reached;
-    prepare_inputs(instance, polynomials_move(instance->memory.active_inputs,
-                                              count_of(instance->model->inputs)));
-    const struct integrator_start start = start_of(instance);
-    enum status status = integrator_restart(
-        instance->integrator, doubles_of(instance->memory.restart_values, states), &start);
-    if (status == STATUS_OK) {
-        status = integrator_advance(instance->integrator, state->first_time, steps, &reached, x);
-    }
-    if (status == STATUS_OK && state->latest_time > state->first_time) {
-        status = integrator_advance(instance->integrator, state->latest_time, steps, &reached, x);
-    }
-    integrator_set_statistics(instance->integrator, &state->statistics);
-    instance->history_is_lost = false;
-    if (status != STATUS_OK || integrator_passed_time(instance->integrator) != state->passed_time) {
-        message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
-                      "the restored state cannot be continued: it contradicts itself");
-        return STATUS_INVALID_ARGUMENT;
-    }
-    return STATUS_OK;
-}
-
-enum status instance_prepare_history(struct instance *instance, struct clock_time end,
-                                     enum continuation continuation) {
-    switch (continuation) {
-    case CONTINUE_NOW:
-        break;
-    case CONTINUE_AFTER_REPLAY:
-        return instance_replay_history(instance);
-    case CONTINUE_AFTER_RESTART:
-    case CONTINUE_AFTER_CHANGE:
-    case CONTINUE_AFTER_EVENT:
-        return restart(instance, end, continuation);
-    }
-    return STATUS_OK;
-}
-
-bool instance_interpolate(struct instance *instance, double target) {
-    if (!integrator_interpolate(instance->integrator, target,
-                                doubles_of(instance->memory.values, instance->model->states))) {
-        return false;
-    }
-    instance->state.latest_time = target;
-    return true;
-}
-
-enum status instance_advance(struct instance *instance, struct clock_time end, int64_t steps_left) {
-    struct instance_state *state = &instance->state;
-    const enum status status =
-        integrator_advance(instance->integrator, clock_difference(end, state->restart_time),
-                           steps_left > 1 ? steps_left : 1, &state->latest_time,
-                           doubles_of(instance->memory.values, instance->model->states));
-    integrator_get_statistics(instance->integrator, &state->statistics);
-    return status;
 }
 
 enum status instance_rest(struct instance *instance, struct clock_time end, struct clock_time until,

@@ -29,15 +29,6 @@ MUST_CHECK NONNULL enum status instance_prepare_history(struct instance *instanc
                                                         struct clock_time end,
                                                         enum continuation continuation);
 
-/* Writes the states at target (s since the restart) if an internal step has passed it already: then
- * nothing can fail, and nothing is counted. Returns false if none has. */
-MUST_CHECK NONNULL bool instance_interpolate(struct instance *instance, double target);
-
-/* Advances the prepared integrator to the time end, in steps_left internal steps at most, but in 1
- * at least, or to an earlier state event. Counts its work. */
-MUST_CHECK NONNULL enum status instance_advance(struct instance *instance, struct clock_time end,
-                                                int64_t steps_left);
-
 /* Lets the time pass to `until`, or to an earlier event of an input, in modes in which no state
  * moves, and ends the history. end: the end of the step; meets_time_event: at `until`. */
 MUST_CHECK NONNULL enum status instance_rest(struct instance *instance, struct clock_time end,

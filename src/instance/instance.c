@@ -2,7 +2,6 @@
 
 #include "history.h"
 #include "modes.h"
-#include "settings.h"
 #include "snapshot.h"
 #include "state.h"
 

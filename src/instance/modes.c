@@ -1,7 +1,6 @@
 #include "modes.h"
 
 #include "failures.h"
-#include "settings.h"
 #include "state.h"
 
 #include <limits.h>

@@ -1,7 +1,6 @@
 #include "plausibility.h"
 
 #include "history.h"
-#include "settings.h"
 #include "state.h"
 
 #include <math.h>
@@ -89,7 +88,12 @@ static bool check_statistics(const struct instance *instance, const struct insta
 }
 
 /* Checks the values for a replay of the integrator's history. */
-static bool check_history(const struct instance *instance, const struct instance_state *state) {
+static bool check_history(const struct instance *instance, const struct instance_state *state,
+                          const struct polynomial active_inputs[]) {
+    const double latest = clock_difference(state->time, state->restart_time);
+    const double horizon =
+        instance_horizon(state, state->restart_time, state->first_time,
+                         polynomials_move(active_inputs, count_of(instance->model->inputs)));
     const int64_t steps = state->statistics.steps - state->steps_before_restart;
     const int64_t most_steps =
         integrator_longest_history((enum integrator_method)state->own.solver_method,
@@ -106,10 +110,10 @@ static bool check_history(const struct instance *instance, const struct instance
         {"the steps since the restart", (double)steps,
          !exists || (steps > 0 && steps <= most_steps)},
         {"first_time", state->first_time, !exists || state->first_time > 0.0},
-        {"latest_time", state->latest_time,
-         !exists || (state->latest_time >= state->first_time && isfinite(state->latest_time))},
+        {"the time since the restart", latest,
+         !exists || (latest >= state->first_time && isfinite(latest))},
         {"passed_time", state->passed_time, !exists || state->passed_time >= state->first_time},
-        {"horizon", state->horizon, !exists || state->horizon >= state->latest_time},
+        {"horizon", horizon, !exists || horizon >= latest},
     };
     return check_all(instance, values, COUNT(values));
 }
@@ -258,7 +262,8 @@ static bool check_event_point(const struct instance *instance, const struct inst
     const struct clock_time end = state->cut_end;
     const struct named_value values[] = {
         {"event_point", state->event_point,
-         state->event_point == NO_EVENT || (is_stepping && (is_unhandled || is_handled))},
+         state->event_point == NO_EVENT ||
+             (is_stepping && !state->has_history && (is_unhandled || is_handled))},
         {"the number of causes of the unhandled event", count, is_unhandled == (count > 0)},
         {"the end of the step cut short", end.s, isfinite(end.s)},
         {"the rest of the end of the step cut short", end.rest,
@@ -288,26 +293,6 @@ static bool check_twins(const struct instance *instance, const struct twin twins
         }
     }
     return true;
-}
-
-/* Checks the instance's variables, which follow from its clock, its settings and the integrator's
- * totals. */
-static bool check_variables(const struct instance *instance, const struct instance_state *state) {
-    const struct instance_values *own = &state->own;
-    struct instance_values counted = {0};
-    instance_write_statistics(&state->statistics, &counted);
-    const struct twin twins[] = {
-        {"the variable time", own->time, state->time.s},
-        {"effective_relative_tolerance", own->effective_relative_tolerance,
-         instance_tolerance(instance, state)},
-        {"solver_steps", own->solver_steps, counted.solver_steps},
-        {"solver_rhs_evaluations", own->solver_rhs_evaluations, counted.solver_rhs_evaluations},
-        {"solver_restarts", own->solver_restarts, counted.solver_restarts},
-        {"solver_failed_steps", own->solver_failed_steps, counted.solver_failed_steps},
-        {"solver_last_step", own->solver_last_step, counted.solver_last_step},
-        {"solver_last_order", own->solver_last_order, counted.solver_last_order},
-    };
-    return check_twins(instance, twins, COUNT(twins));
 }
 
 /* Checks that the start is the experiment's, and that nothing has been counted before it. */
@@ -344,20 +329,6 @@ static bool check_start(const struct instance *instance, const struct instance_s
             check_twins(instance, of_experiment, COUNT(of_experiment))) &&
            (state->experiment_defined ||
             check_twins(instance, of_no_experiment, COUNT(of_no_experiment)));
-}
-
-/* Checks that the integrator's history ends at the current time, and that its horizon follows from
- * the inputs. */
-static bool check_history_twins(const struct instance *instance, const struct instance_state *state,
-                                const struct polynomial active_inputs[]) {
-    const struct twin twins[] = {
-        {"latest_time", state->latest_time, clock_difference(state->time, state->restart_time)},
-        {"horizon", state->horizon,
-         instance_horizon(state, state->restart_time, state->first_time,
-                          polynomials_move(active_inputs, count_of(instance->model->inputs)))},
-        {"event_point", state->event_point, NO_EVENT},
-    };
-    return !state->has_history || check_twins(instance, twins, COUNT(twins));
 }
 
 /* Checks values that are stored twice: inputs at the current time are among the values, too, fixed
@@ -402,7 +373,7 @@ enum status instance_check_plausible(const struct instance *instance,
     // derivatives of inputs at the current time are not checked: they may have overflowed
     const bool is_plausible =
         check_settings(instance, state) && check_statistics(instance, state) &&
-        check_history(instance, state) &&
+        check_history(instance, state, (const void *)active_inputs) &&
         check_inputs(instance, "an input", (const void *)next_inputs) &&
         check_inputs(instance, "an input since the restart", (const void *)active_inputs) &&
         check_structure(instance, values) &&
@@ -412,8 +383,7 @@ enum status instance_check_plausible(const struct instance *instance,
         check_event_point(
             instance, state,
             (const void *)(block + ((const char *)memory->unhandled - memory->block))) &&
-        check_variables(instance, state) && check_start(instance, state) &&
-        check_history_twins(instance, state, (const void *)active_inputs) &&
+        check_start(instance, state) &&
         check_value_twins(instance, state, values, restart_values, (const void *)current);
     return is_plausible ? STATUS_OK : STATUS_INVALID_ARGUMENT;
 }

@@ -11,7 +11,7 @@
 #include <string.h>
 
 static const char magic[8] = {'C', 'O', 'S', 'I', 'M', 'S', 'T', 'A'};
-enum { FORMAT_VERSION = 2, HASH_SIZE = 8 };
+enum { FORMAT_VERSION = 3, HASH_SIZE = 8 };
 
 /* Reader, writer or counter of the fields of a serialized state, with one sequence of calls for all
  * three. */
@@ -106,7 +106,7 @@ static const char *codec_check(struct codec *codec, const char *guid, size_t len
         return "it is not a saved state of such a model";
     }
     if (version != FORMAT_VERSION) {
-        return "it has another version of the format, 2 is expected";
+        return "it has another version of the format, 3 is expected";
     }
     const size_t guid_size = strlen(guid);
     if (guid_length != guid_size || codec->size - codec->at < guid_size ||
@@ -180,17 +180,10 @@ static void transfer_experiment(struct codec *codec, struct instance_experiment 
     codec_real(codec, &experiment->tolerance);
 }
 
+/* Transfers what does not follow from other fields (instance_restore). */
 static void transfer_own(struct codec *codec, struct instance_values *own) {
-    codec_real(codec, &own->time);
-    codec_int(codec, "solver_steps", &own->solver_steps);
-    codec_int(codec, "solver_rhs_evaluations", &own->solver_rhs_evaluations);
     codec_real(codec, &own->relative_tolerance);
     codec_int(codec, "max_internal_steps", &own->max_internal_steps);
-    codec_real(codec, &own->effective_relative_tolerance);
-    codec_int(codec, "solver_restarts", &own->solver_restarts);
-    codec_real(codec, &own->solver_last_step);
-    codec_int(codec, "solver_last_order", &own->solver_last_order);
-    codec_int(codec, "solver_failed_steps", &own->solver_failed_steps);
     codec_int(codec, "solver_method", &own->solver_method);
     codec_real(codec, &own->max_step);
     codec_int(codec, "event_count", &own->event_count);
@@ -229,7 +222,7 @@ static void transfer_values(struct codec *codec, const struct instance *instance
 /* Transfers modes and discrete states, declared as variables or not. */
 static void transfer_kept(struct codec *codec, const struct model *model, char *values) {
     const struct model_events events = events_of(model);
-    int *modes = ints_of(values, events.modes);
+    int *modes = (int *)(void *)(values + events.modes.offset);
     double *kept = doubles_of(values, events.discrete_states);
     for (size_t i = 0; i < events.modes.size / sizeof *modes; i++) {
         codec_int(codec, "a mode", &modes[i]);
@@ -285,9 +278,7 @@ static void transfer_state(struct codec *codec, const struct instance *instance,
     codec_bool(codec, "has_history", &state->has_history);
     codec_real(codec, &state->restart_time.s);
     codec_real(codec, &state->restart_time.rest);
-    codec_real(codec, &state->horizon);
     codec_real(codec, &state->first_time);
-    codec_real(codec, &state->latest_time);
     codec_real(codec, &state->passed_time);
     transfer_statistics(codec, &state->statistics);
     codec_int64(codec, &state->steps_before_restart);

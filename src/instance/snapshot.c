@@ -1,7 +1,6 @@
 #include "snapshot.h"
 
 #include "history.h"
-#include "settings.h"
 #include "state.h"
 
 #include <stdlib.h>
@@ -67,8 +66,18 @@ enum status instance_save(struct instance *instance, unsigned tag,
     return STATUS_OK;
 }
 
-/* Prepares the instance to continue from its new state and memory. */
+/* Prepares the instance to continue from its new state and memory. Writes the fields that follow
+ * from others: bytes do not have them. */
 static enum status resume(struct instance *instance) {
+    struct instance_state *state = &instance->state;
+    state->own.time = state->time.s;
+    instance_write_statistics(&state->statistics, &state->own);
+    if (state->has_history) {
+        state->latest_time = clock_difference(state->time, state->restart_time);
+        state->horizon = instance_horizon(
+            state, state->restart_time, state->first_time,
+            polynomials_move(instance->memory.active_inputs, count_of(instance->model->inputs)));
+    }
     instance->outputs_are_valid = false;
     instance->parameters_are_valid = false;
     instance->parameters_are_active = false;
@@ -83,7 +92,7 @@ static enum status resume(struct instance *instance) {
     if (instance_is_configured_otherwise(instance)) {
         status = instance_configure_integrator(instance);
     }
-    integrator_set_statistics(instance->integrator, &instance->state.statistics);
+    *integrator_totals(instance->integrator) = state->statistics;
     return status;
 }
 
@@ -126,10 +135,7 @@ void instance_keep(struct instance *instance, struct instance_snapshot *snapshot
 }
 
 enum status instance_undo(struct instance *instance, const struct instance_snapshot *snapshot) {
-    struct instance_state *state = &instance->state;
-    copy_state(state, &snapshot->state);
-    state->own.time = state->time.s;
-    instance_write_statistics(&state->statistics, &state->own);
+    copy_state(&instance->state, &snapshot->state);
     copy_written(&instance->memory, snapshot->inputs_are_held, instance->memory.block,
                  (const char *)snapshot->memory);
     if (snapshot->inputs_are_held) {

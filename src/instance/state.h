@@ -37,7 +37,7 @@ struct instance_state {
 
     /* The integrator's history, from which it continues while nothing changes. A replay needs only
      * the restart and the first and the last advance since then (integrator_advance). Only
-     * history.c updates these fields. */
+     * history.c and stepping.c update these fields. */
     bool has_history;
     struct clock_time restart_time;
     double horizon;     /* time that the integrator may not pass, s since the restart */
@@ -55,22 +55,24 @@ struct instance_state {
     struct clock_time cut_end; /* end of the step without that event */
 };
 
-/* Parts of one block of memory, in this order; a snapshot copies the block. */
+/* Parts of one block of memory; a snapshot copies the block. In it the inputs stand first, in this
+ * order, then largest_inputs, unhandled, restart_values and values. Here stand first what each step
+ * reads. */
 struct instance_memory {
     struct polynomial *next_inputs; /* inputs of the next step: last value set, and derivatives */
     struct polynomial *current_inputs; /* inputs at the current time */
     struct polynomial *active_inputs;  /* inputs since the last restart */
-    double *largest_inputs; /* largest magnitude of each so far; empty without `errors` */
-    bool *unhandled;        /* causes of the unhandled event, like triggered of struct instance */
     char *restart_values; /* value structure at the last restart, with which the integrator runs */
     char *values; /* value structure of the model, as set and read from outside, with the inputs at
                      the current time */
-
+    struct range written; /* part of a value structure that a step writes, besides calculated values
+                           */
+    double *largest_inputs; /* largest magnitude of each so far; empty without `errors` */
+    bool *unhandled;        /* causes of the unhandled event, like triggered of struct instance */
     char *block;
-    size_t size; /* bytes */
-    /* Parts of the block that a step writes, besides the first two and calculated values. */
-    struct range written_at_restart; /* active_inputs to restart_values */
-    struct range written;            /* of a value structure */
+    size_t size;                     /* bytes */
+    struct range written_at_restart; /* part of the block that a step writes besides: active_inputs
+                                        to restart_values */
 };
 
 /* Place and kind of the value of a reference. */
@@ -150,17 +152,12 @@ static inline bool instance_has_integrator(const struct instance *instance) {
 /* Returns the largest magnitude (s) among the start time and t: times are rounded like numbers of
  * this size. */
 static inline double instance_size_of_times(const struct instance *instance, double t) {
-    return fmax(fabs(t), fabs(instance->state.experiment.start_time));
+    return clock_larger(fabs(t), fabs(instance->state.experiment.start_time));
 }
 
 /* Returns the doubles at a range of a value structure. */
 static inline double *doubles_of(char *values, struct range range) {
     return (double *)(void *)(values + range.offset);
-}
-
-/* Returns the ints at a range of a value structure. */
-static inline int *ints_of(char *values, struct range range) {
-    return (int *)(void *)(values + range.offset);
 }
 
 /* Returns the model's events; no indicators and empty ranges if it has none. */
@@ -191,7 +188,8 @@ static inline size_t instance_event_size(const struct model *model) {
  * no comparison: the integrator's horizon ends with their step. */
 static inline bool instance_inputs_are_active(const struct instance *instance) {
     const struct instance_memory *memory = &instance->memory;
-    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+    const size_t count = count_of(instance->model->inputs);
+    for (size_t i = 0; i < count; i++) {
         const struct polynomial *next = &memory->next_inputs[i];
         if (next->d[0] != memory->active_inputs[i].d[0] ||
             (!instance->inputs_are_held && polynomial_moves(next))) {
@@ -226,17 +224,6 @@ NONNULL const struct variable *instance_refuse_reference(const struct instance *
                                                          unsigned reference,
                                                          enum variable_type type);
 
-/* Returns the variable with this reference and type; NULL, with a message, if there is none. This
- * function and instance_write_field are inline: they run once or more for each value that is set or
- * read. */
-static inline const struct variable *instance_find(const struct instance *instance,
-                                                   unsigned reference, enum variable_type type) {
-    const struct variable *variable = variable_find(instance->description, reference);
-    return variable != NULL && variable->type == type
-               ? variable
-               : instance_refuse_reference(instance, reference, type);
-}
-
 /* Returns the place of a variable's value. */
 static inline void *instance_field(struct instance *instance, const struct variable *variable) {
     char *structure = variable->owner == VARIABLE_OF_MODEL ? instance->memory.values
@@ -264,8 +251,8 @@ static inline size_t instance_input_index(const struct instance *instance,
     return (variable->offset - instance->model->inputs.offset) / sizeof(double);
 }
 
-/* Writes the value. The value of an input of type float64 also goes into its polynomial of the next
- * step. */
+/* Writes the value; inline, because it runs for each value that is set. The value of an input of
+ * type float64 also goes into its polynomial of the next step. */
 static inline void instance_write_field(struct instance *instance, const struct variable *variable,
                                         double value) {
     void *field = instance_field(instance, variable);
@@ -303,3 +290,32 @@ static inline void instance_set_clock(struct instance *instance, struct clock_ti
 
 /* Returns STATUS_NOT_FINITE, with a message that `what` cannot be computed. */
 NONNULL enum status instance_not_finite(const struct instance *instance, const char *what);
+
+/* ---- Settings -------------------------------------------------------------------------------
+ * Experiment, parameters, and the integrator's settings that follow. */
+
+/* Ratio of a state's absolute tolerance to the relative tolerance times the nominal value. */
+#define INSTANCE_ABSOLUTE_FRACTION 1e-2
+
+/* Returns STATUS_OK if the experiment can be run; otherwise a message says why not. */
+MUST_CHECK NONNULL enum status
+instance_check_experiment(const struct instance *instance,
+                          const struct instance_experiment *experiment);
+
+/* Returns STATUS_OK if the parameters are consistent; otherwise a message says why not. */
+MUST_CHECK NONNULL enum status instance_check_parameters(struct instance *instance);
+
+/* Return the requested relative tolerance, and the one of the integrator, by settings in state. */
+NONNULL double instance_requested_tolerance(const struct instance *instance,
+                                            const struct instance_state *state);
+NONNULL double instance_tolerance(const struct instance *instance,
+                                  const struct instance_state *state);
+
+/* Writes this tolerance where users read it, and the absolute tolerances. */
+NONNULL void instance_update_tolerance(struct instance *instance);
+
+/* True if the values ask for another method, tolerance or limit than the integrator has. */
+NONNULL bool instance_is_configured_otherwise(const struct instance *instance);
+
+/* Gives the integrator the method, tolerances and limits that the values ask for. */
+MUST_CHECK NONNULL enum status instance_configure_integrator(struct instance *instance);

@@ -3,14 +3,6 @@
 
 #include "snapshot.h"
 
-/* Steps from communication_point to communication_point + step_size (s) with constant inputs
- * (zero-order hold), or polynomials if derivatives were set. Returns STATUS_INVALID_TIME if
- * step_size is not > 0, communication_point is not where the instance is (clock_slack), or the end
- * is past the stop time. If the integration ends early (severity discard), instance_time is the
- * time it reached, with the states at that time. */
-MUST_CHECK NONNULL enum status instance_do_step(struct instance *instance,
-                                                double communication_point, double step_size);
-
 /* Way in which a step deals with an event. An event at its beginning is always handled, so that
  * every step makes progress. */
 enum event_handling {
@@ -42,10 +34,14 @@ struct step_options {
     enum event_handling at_event;
 };
 
-/* Does the same as instance_do_step, with options; instance_time returns the end of the step. */
-MUST_CHECK NONNULL enum status instance_do_step_with(struct instance *instance,
-                                                     double communication_point, double step_size,
-                                                     const struct step_options *options);
+/* Steps from communication_point to communication_point + step_size (s) with constant inputs
+ * (zero-order hold), or polynomials if derivatives were set. options: NULL for none. Returns
+ * STATUS_INVALID_TIME if step_size is not > 0, communication_point is not where the instance is
+ * (clock_slack), or the end is past the stop time. If the integration ends early (severity
+ * discard), instance_time is the time it reached, with the states at that time. */
+MUST_CHECK NONNULL_ARGUMENTS(1) enum status
+    instance_do_step(struct instance *instance, double communication_point, double step_size,
+                     const struct step_options *options);
 
 /* True if the last step passed an event, or left it. */
 NONNULL bool instance_met_event(const struct instance *instance);

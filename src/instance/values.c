@@ -2,7 +2,6 @@
 
 #include "failures.h"
 #include "modes.h"
-#include "settings.h"
 #include "state.h"
 
 #include <math.h>
@@ -111,6 +110,15 @@ static inline bool is_settable(const struct instance *instance, const struct var
             instance_is_state(instance, variable));
 }
 
+/* Returns the variable with this reference and type; NULL, with a message, if there is none. */
+static inline const struct variable *find(const struct instance *instance, unsigned reference,
+                                          enum variable_type type) {
+    const struct variable *variable = variable_find(instance->description, reference);
+    return variable != NULL && variable->type == type
+               ? variable
+               : instance_refuse_reference(instance, reference, type);
+}
+
 ALWAYS_INLINE const struct variable *find_settable(const struct instance *instance,
                                                    unsigned reference, enum variable_type type) {
     static const char *const when[PHASE_COUNT] = {
@@ -120,7 +128,7 @@ ALWAYS_INLINE const struct variable *find_settable(const struct instance *instan
         [PHASE_CONTINUOUS_TIME] =
             "while the time is continuous: only continuous inputs and states can",
     };
-    const struct variable *variable = instance_find(instance, reference, type);
+    const struct variable *variable = find(instance, reference, type);
     if (variable != NULL && !is_settable(instance, variable)) {
         message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
                       "%s (value reference %u) cannot be set %s", variable->name, reference,
@@ -229,7 +237,7 @@ static enum status prepare_ints(struct instance *instance, enum array array,
     const struct shown shown = shown_in(instance);
     for (size_t i = 0; i < count; i++) {
         const unsigned reference = references[i];
-        if (instance_find(instance, reference, type_for(instance, array, reference)) == NULL) {
+        if (find(instance, reference, type_for(instance, array, reference)) == NULL) {
             return STATUS_INVALID_ARGUMENT;
         }
         if (is_shown(&shown, &instance->reals[reference])) {

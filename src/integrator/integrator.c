@@ -178,76 +178,59 @@ static void add_work(struct integrator *integrator, const struct method_work *wo
     integrator->internal_end = work->internal;
 }
 
-/* Writes the state at t to integrator->x if an internal step has passed t already; false if not. */
-static bool write_interpolated(struct integrator *integrator, double t) {
-    const struct method *method = integrator->method;
-    return integrator->internal_end >= t && method->interpolate != NULL &&
-           method->interpolate(integrator->memory, t, integrator->x) &&
-           problem_are_finite(integrator->x, integrator->problem.ode.state_count);
-}
-
-/* True if the state in x can be used. With extreme values a solver reports success although its
- * step has underflowed to nothing, or its state is not finite. */
-static bool has_reached(const struct integrator *integrator, double t) {
+/* Makes the state in x, at t, the one reached. Returns false if it cannot be used: with extreme
+ * values a solver reports success although its step has underflowed to nothing, or its state is not
+ * finite. */
+static bool accept(struct integrator *integrator, double t) {
+    double *x = integrator->x;
     // at a stop time the solver may be short of it by its own rounding
-    return problem_are_finite(integrator->x, integrator->problem.ode.state_count) &&
-           integrator->internal_end >= t * (1.0 - 1e-12);
-}
-
-/* Makes x the state reached. */
-static void accept(struct integrator *integrator, double t) {
-    double *reached_x = integrator->x;
-    integrator->x = integrator->reached_x;
-    integrator->reached_x = reached_x;
-    integrator->problem.reached = t;
-}
-
-static enum status advance(struct integrator *integrator, double t, int64_t max_steps) {
-    struct problem *problem = &integrator->problem;
-    struct method_work work = {0};
-    double stopped_at = problem->reached;
-    enum status status = integrator->method->advance(
-        integrator->memory, t, max_steps, integrator->reached_x, &stopped_at, integrator->x, &work);
-    add_work(integrator, &work);
-    if (status == STATUS_OK && !work.is_cut_short) {
-        stopped_at = t;
-    }
-    if (has_reached(integrator, stopped_at)) {
-        accept(integrator, stopped_at);
-    } else if (status == STATUS_OK) {
-        status = problem_is_stuck(problem) ? STATUS_NOT_FINITE : STATUS_NO_CONVERGENCE;
-    }
-    return status;
-}
-
-static void copy_state(const struct integrator *integrator, double x[]) {
-    memcpy(x, integrator->reached_x, integrator->problem.ode.state_count * sizeof(double));
-}
-
-static bool interpolate(struct integrator *integrator, double t, double x[]) {
-    if (!write_interpolated(integrator, t)) {
+    if (!problem_are_finite(x, integrator->problem.ode.state_count) ||
+        !(integrator->internal_end >= t * (1.0 - 1e-12))) {
         return false;
     }
-    accept(integrator, t);
-    copy_state(integrator, x);
+    integrator->x = integrator->reached_x;
+    integrator->reached_x = x;
+    integrator->problem.reached = t;
     return true;
 }
 
+/* Goes to t if an internal step has passed t already; returns false if not. */
+static bool interpolate(struct integrator *integrator, double t) {
+    const struct method *method = integrator->method;
+    return integrator->internal_end >= t && method->interpolate != NULL &&
+           method->interpolate(integrator->memory, t, integrator->x) && accept(integrator, t);
+}
+
 bool integrator_interpolate(struct integrator *integrator, double t, double x[]) {
-    return t < integrator->problem.location.time && interpolate(integrator, t, x);
+    if (t >= integrator->problem.location.time || !interpolate(integrator, t)) {
+        return false;
+    }
+    memcpy(x, integrator->reached_x, integrator->problem.ode.state_count * sizeof(double));
+    return true;
 }
 
 enum status integrator_advance(struct integrator *integrator, double t, int64_t max_steps,
                                double *reached, double x[]) {
+    struct problem *problem = &integrator->problem;
     // an event that an internal step has passed already comes first
-    const double event = integrator->problem.location.time;
-    const double target = event < t ? event : t;
+    const double target = problem->location.time < t ? problem->location.time : t;
     enum status status = STATUS_OK;
-    if (!interpolate(integrator, target, x)) {
-        status = advance(integrator, target, max_steps);
-        copy_state(integrator, x);
+    if (!interpolate(integrator, target)) {
+        struct method_work work = {0};
+        double stopped_at = problem->reached;
+        status =
+            integrator->method->advance(integrator->memory, target, max_steps,
+                                        integrator->reached_x, &stopped_at, integrator->x, &work);
+        add_work(integrator, &work);
+        if (status == STATUS_OK && !work.is_cut_short) {
+            stopped_at = target;
+        }
+        if (!accept(integrator, stopped_at) && status == STATUS_OK) {
+            status = problem_is_stuck(problem) ? STATUS_NOT_FINITE : STATUS_NO_CONVERGENCE;
+        }
     }
-    *reached = integrator->problem.reached;
+    memcpy(x, integrator->reached_x, problem->ode.state_count * sizeof(double));
+    *reached = problem->reached;
     return status;
 }
 
@@ -346,14 +329,6 @@ bool integrator_seems_stiff(struct integrator *integrator) {
            of_deviations * integrator->statistics.last_step > 0.01;
 }
 
-/* ---- Statistics ----------------------------------------------------------------------------- */
-
-void integrator_get_statistics(const struct integrator *integrator,
-                               struct integrator_statistics *statistics) {
-    *statistics = integrator->statistics;
-}
-
-void integrator_set_statistics(struct integrator *integrator,
-                               const struct integrator_statistics *statistics) {
-    integrator->statistics = *statistics;
+struct integrator_statistics *integrator_totals(struct integrator *integrator) {
+    return &integrator->statistics;
 }

@@ -100,9 +100,5 @@ NONNULL const double *integrator_failure(const struct integrator *integrator, do
  * Evaluates the right-hand side. integrator_failure forgets its state. */
 NONNULL bool integrator_seems_stiff(struct integrator *integrator);
 
-NONNULL void integrator_get_statistics(const struct integrator *integrator,
-                                       struct integrator_statistics *statistics);
-
-/* Overwrites the totals, so that repeated work does not count. */
-NONNULL void integrator_set_statistics(struct integrator *integrator,
-                                       const struct integrator_statistics *statistics);
+/* Returns the totals. The caller may overwrite them, so that repeated work does not count. */
+NONNULL struct integrator_statistics *integrator_totals(struct integrator *integrator);

@@ -1,27 +1,173 @@
 #include "location.h"
 
+#include <float.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
+
+/* ---- Life ----------------------------------------------------------------------------------- */
+
+bool location_create(const struct ode *ode, const struct integrator_settings *settings,
+                     struct location *location) {
+    const size_t states = ode->state_count;
+    const size_t count = ode->indicator_count;
+    *location = (struct location){.ode = ode, .settings = settings, .time = INFINITY};
+    if (count == 0) {
+        return true;
+    }
+    const size_t in_rows = (states + count) * SERIES_LENGTH;
+    location->x =
+        calloc(3 * states + 6 * count + in_rows + count * CHEBYSHEV_LENGTH, sizeof *location->x);
+    location->used = calloc(count, sizeof *location->used);
+    location->is_armed = calloc(3 * count, sizeof *location->is_armed);
+    location->kept = calloc(count, sizeof *location->kept);
+    if (location->x == NULL || location->used == NULL || location->is_armed == NULL ||
+        location->kept == NULL) {
+        location_destroy(location);
+        return false;
+    }
+    location->dx = location->x + states;
+    location->restart_x = location->dx + states;
+    location->z = location->restart_x + states;
+    location->first = location->z + count;
+    location->noise = location->first + count;
+    location->touch = location->noise + count;
+    location->rounding = location->touch + count;
+    location->error = location->rounding + count;
+    location->rows = (double(*)[SERIES_LENGTH])(location->error + count);
+    location->step.indicator_row = location->rows + states;
+    location->samples = (double(*)[CHEBYSHEV_LENGTH])(location->error + count + in_rows);
+    location->has_row = location->is_armed + count;
+    location->triggered = location->has_row + count;
+    return true;
+}
+
+void location_destroy(struct location *location) {
+    free(location->kept);
+    free(location->is_armed);
+    free(location->used);
+    free(location->x);
+    *location = (struct location){.time = INFINITY};
+}
+
+/* ---- Restart --------------------------------------------------------------------------------- */
+
+/* Returns the error of a state that no event follows from, in its unit: the tolerance, or the
+ * rounding of all steps so far. However small the state is at a restart, it has the error of its
+ * usual size: absolute tolerances are relative ones of a hundredth of it. */
+static double error_of(const struct location *location, size_t state, double x) {
+    const struct integrator_settings *settings = location->settings;
+    const double tolerance = settings->absolute_tolerances[state];
+    const double usual = 100.0 * tolerance / settings->relative_tolerance;
+    return larger(tolerance, 2.0 * falls_roundings * DBL_EPSILON * larger(fabs(x), usual));
+}
+
+/* Restarts the indicators of the model, whose noise follows from their limits so far. */
+static enum status restart_model(struct location *location, const double x[]) {
+    const struct ode *ode = location->ode;
+    const struct integrator_settings *settings = location->settings;
+    const enum status status = ode->indicators(0.0, x, location->z, ode->context);
+    if (ode->rounding != NULL) {
+        for (size_t i = 0; i < ode->state_count; i++) {
+            location->x[i] = 2.0 * DBL_EPSILON * fabs(x[i]);
+            location->dx[i] = error_of(location, i, x[i]) / falls_roundings;
+        }
+        ode->rounding(location->dx, location->touch, ode->context);
+        ode->rounding(location->x, location->first, ode->context);
+        for (size_t i = 0; i < ode->state_count; i++) {
+            location->x[i] =
+                settings->absolute_tolerances[i] + settings->relative_tolerance * fabs(x[i]);
+        }
+        ode->rounding(location->x, location->error, ode->context);
+    }
+    for (size_t k = 0; status == STATUS_OK && k < location->used_count; k++) {
+        const size_t i = location->used[k];
+        location->touch[i] *= ode->rounding != NULL ? falls_roundings : 1.0;
+        if (location->indicators[i].kind != INDICATOR_OF_MODEL) {
+            continue;
+        }
+        location->is_armed[i] = location->z[i] > 0.0;
+        location->samples[i][0] = location->z[i];
+        location->calm_end = 0.0;
+        if (ode->rounding != NULL) {
+            location->rounding[i] = larger(location->first[i], DBL_MIN);
+            location->noise[i] = larger(location->error[i], location->rounding[i]);
+            location->is_armed[i] = location->z[i] > location->rounding[i];
+        }
+    }
+    return status;
+}
+
+/* Writes which indicators are used. */
+static void find_used(struct location *location) {
+    location->needs_model = false;
+    location->used_count = 0;
+    for (size_t i = 0; i < location->ode->indicator_count; i++) {
+        const struct indicator *indicator = &location->indicators[i];
+        if (indicator->kind == INDICATOR_OF_MODEL ||
+            (indicator->kind == INDICATOR_OF_STATE && indicator->factor != 0.0)) {
+            location->used[location->used_count] = i;
+            location->used_count++;
+            location->needs_model |= indicator->kind == INDICATOR_OF_MODEL;
+        }
+    }
+}
+
+enum status location_restart(struct location *location, const struct integrator_start *start,
+                             const double x[]) {
+    const struct indicator *indicators = start->indicators;
+    location->indicators = indicators;
+    location->time = INFINITY;
+    location->calm = 0.0;
+    location->calm_end = NAN;
+    if (indicators == NULL) {
+        return STATUS_OK;
+    }
+    if (!start->keeps_indicators) {
+        find_used(location);
+    }
+    memcpy(location->restart_x, x, location->ode->state_count * sizeof *x);
+    for (size_t k = 0; k < location->used_count; k++) {
+        const size_t i = location->used[k];
+        const struct indicator *indicator = &indicators[i];
+        const double rounding = 2.0 * DBL_EPSILON * fabs(indicator->offset);
+        location->has_row[i] = false;
+        if (indicator->kind == INDICATOR_OF_MODEL) {
+            location->noise[i] = larger(2.0 * rounding, DBL_MIN);
+            location->touch[i] = 2.0 * rounding;
+        } else {
+            const double factor = fabs(indicator->factor);
+            const double z = indicator->offset + indicator->factor * x[indicator->state];
+            const bool is_sure = indicator->rises || z > 0.0;
+            location->is_armed[i] = is_sure && (z > rounding || (rounding == 0.0 && z >= 0.0));
+            const double miss = factor * location->settings->absolute_tolerances[indicator->state];
+            location->noise[i] = is_sure ? rounding : larger(rounding, miss);
+            location->touch[i] =
+                factor * error_of(location, indicator->state, x[indicator->state]) + 4.0 * rounding;
+        }
+    }
+    return location->needs_model ? restart_model(location, x) : STATUS_OK;
+}
+
+/* ---- Indicators of states ------------------------------------------------------------------- */
 
 static enum status evaluate(struct location *location, double t, const double x[]) {
     return location->ode->indicators(t, x, location->z, location->ode->context);
 }
 
-/* ---- Indicators of states ------------------------------------------------------------------- */
-
-/* Returns fall_first of indicator i, whose polynomial is p. */
+/* Returns roots_first_fall of indicator i, whose polynomial is p. */
 static double first_fall(const struct location *location, size_t i,
                          const struct roots_polynomial *p, double error, double latest,
                          bool is_restart) {
     const bool is_near =
         location->indicators[i].kind == INDICATOR_OF_MODEL && p->c[0] <= location->error[i];
     const double touch = larger(location->touch[i], is_near ? location->error[i] : 0.0);
-    return fall_first(p, &(struct fall){.error = error,
-                                        .touch = touch,
-                                        .latest = latest,
-                                        .is_restart = is_restart,
-                                        .is_armed = &location->is_armed[i],
-                                        .noise = &location->noise[i]});
+    return roots_first_fall(p, &(struct fall){.error = error,
+                                              .touch = touch,
+                                              .latest = latest,
+                                              .is_restart = is_restart,
+                                              .is_armed = &location->is_armed[i],
+                                              .noise = &location->noise[i]});
 }
 
 /* Replaces c(s) by c(s - 1). */
@@ -42,6 +188,17 @@ static void expand(const struct step_polynomial *step, const struct indicator *i
     }
 }
 
+/* Returns a bound of how far a state moves over a step: the sum of |row[k]|, 0 < k <= degree. */
+static double way_of(const double row[], int degree) {
+    double way[2] = {0.0, 0.0};
+    const double *c = row + 1;
+    for (const double *end = row + degree; c < end; c += 2) {
+        way[0] += fabs(c[0]);
+        way[1] += fabs(c[1]);
+    }
+    return way[0] + way[1] + (degree % 2 != 0 ? fabs(row[degree]) : 0.0);
+}
+
 /* True if the state moves by less than the indicator is above 0 and above its noise at a restart.
  */
 static bool is_far_above(const struct location *location, size_t i) {
@@ -49,7 +206,7 @@ static bool is_far_above(const struct location *location, size_t i) {
     const struct indicator *indicator = &location->indicators[i];
     const double value = indicator->offset + indicator->factor * step->row[indicator->state][0];
     const double noise = location->is_armed[i] ? 0.0 : location->noise[i];
-    const double way = location_way(step->row[indicator->state], step->degree);
+    const double way = way_of(step->row[indicator->state], step->degree);
     const double slack = 0x1p-40; // far above all rounding here and in Horner's scheme
     return (1.0 - slack) * value > (1.0 + slack) * fabs(indicator->factor) * way + noise;
 }
@@ -456,52 +613,4 @@ enum status location_search_at_rest(struct location *location, const double x[],
         step->row[i][0] = x[i];
     }
     return location_search(location);
-}
-
-bool location_falls_between(const struct location *location, const double x[],
-                            const double next[]) {
-    bool falls = false;
-    for (size_t k = 0; k < location->used_count; k++) {
-        const struct indicator *indicator = &location->indicators[location->used[k]];
-        falls |= indicator->kind == INDICATOR_OF_STATE && indicator_at_state(indicator, x) > 0.0 &&
-                 indicator_at_state(indicator, next) <= 0.0;
-    }
-    return falls;
-}
-
-static enum status evaluate_one(struct location *location, size_t i, double t, const double x[],
-                                double *z) {
-    if (location->indicators[i].kind == INDICATOR_OF_STATE) {
-        *z = indicator_at_state(&location->indicators[i], x);
-        return STATUS_OK;
-    }
-    const enum status status = evaluate(location, t, x);
-    *z = location->z[i];
-    return status;
-}
-
-bool location_correction(struct location *location, double t, const double x[], const double dx[],
-                         double *z, double *correction) {
-    size_t i = 0;
-    while (!location->triggered[i]) {
-        i++;
-    }
-    if (evaluate_one(location, i, t, x, z) != STATUS_OK) {
-        return false;
-    }
-    // over so small a part of the step the derivative of an indicator hardly changes; the part is
-    // longer if the difference is lost in rounding
-    double z_ahead = *z;
-    double ahead = 0x1p-20 * (location->step.end - location->step.begin);
-    for (int tries = 0; z_ahead == *z && tries < 4; tries++) {
-        for (size_t j = 0; j < location->ode->state_count; j++) {
-            location->x[j] = x[j] + ahead * dx[j];
-        }
-        if (evaluate_one(location, i, t + ahead, location->x, &z_ahead) != STATUS_OK) {
-            return false;
-        }
-        *correction = -*z * ahead / (z_ahead - *z);
-        ahead *= 0x1p4;
-    }
-    return isfinite(*correction);
 }

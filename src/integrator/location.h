@@ -3,9 +3,9 @@
  * the sign at the end of a step decide whether an event is found. */
 #pragma once
 
-#include "falls.h"
 #include "ode.h"
 #include "platform.h"
+#include "roots.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -77,11 +77,6 @@ static inline bool location_is_active(const struct location *location) {
     return location->indicators != NULL;
 }
 
-/* Returns the value of an INDICATOR_OF_STATE at the states x. */
-static inline double indicator_at_state(const struct indicator *indicator, const double x[]) {
-    return indicator->offset + indicator->factor * x[indicator->state];
-}
-
 /* Drops the rows of location->step that neither represent their indicators up to the relative
  * tolerance nor show the first fall nearly: the series may end before an indicator of fast motion
  * has converged. x: the states at the end of the step. */
@@ -98,27 +93,6 @@ MUST_CHECK NONNULL enum status location_try(struct location *location);
 /* Searches the time from 0 to t, over which the states stay at x. */
 MUST_CHECK NONNULL enum status location_search_at_rest(struct location *location, const double x[],
                                                        double t);
-
-/* True if an indicator of a state is above 0 at the state x, and not at the state `next`. */
-MUST_CHECK NONNULL bool location_falls_between(const struct location *location, const double x[],
-                                               const double next[]);
-
-/* Writes z, the value of the first indicator that has triggered, and Newton's correction (s) of the
- * event's time, -z / z', from the state x and its derivative dx at the time t. Returns false if
- * there is no correction. */
-MUST_CHECK NONNULL bool location_correction(struct location *location, double t, const double x[],
-                                            const double dx[], double *z, double *correction);
-
-/* Returns a bound of how far a state moves over a step: the sum of |row[k]|, 0 < k <= degree. */
-static inline double location_way(const double row[], int degree) {
-    double way[2] = {0.0, 0.0};
-    const double *c = row + 1;
-    for (const double *end = row + degree; c < end; c += 2) {
-        way[0] += fabs(c[0]);
-        way[1] += fabs(c[1]);
-    }
-    return way[0] + way[1] + (degree % 2 != 0 ? fabs(row[degree]) : 0.0);
-}
 
 /* Writes the states at s of location->step, 0 to 1 from its begin on. */
 NONNULL void location_write_states(const struct location *location, double s, double x[]);

@@ -62,32 +62,6 @@ static inline enum status problem_rhs(struct problem *problem, double t, const d
     return problem_fail(problem, t, x);
 }
 
-/* Writes the Jacobian as in ode.h; fails like problem_rhs. */
-static inline enum status problem_jacobian(struct problem *problem, double t, const double x[],
-                                           double J[]) {
-    const struct ode *ode = &problem->ode;
-    if (ode->jacobian(t, x, J, ode->context) == STATUS_OK &&
-        problem_are_finite(J, ode_jacobian_size(ode))) {
-        return STATUS_OK;
-    }
-    return problem_fail(problem, t, x);
-}
-
-/* Writes coefficients as in ode.h; a series begun at order 0, or 1 if that is known, counts as
- * an evaluation. Fails like problem_rhs; the caller checks whether coefficients are finite. */
-static inline enum status problem_series(struct problem *problem, double t, double time_scale,
-                                         int first, int last, double rows[][SERIES_LENGTH]) {
-    const struct ode *ode = &problem->ode;
-    problem->evaluation_count += first <= 1 ? 1 : 0;
-    if (ode->series(t, time_scale, first, last, rows, ode->context) == STATUS_OK) {
-        return STATUS_OK;
-    }
-    for (size_t i = 0; i < ode->state_count; i++) {
-        problem->failed_x[i] = rows[i][0];
-    }
-    return problem_fail(problem, t, problem->failed_x);
-}
-
 /* True if the method is stuck in front of a time at which the right-hand side cannot be evaluated.
  */
 static inline bool problem_is_stuck(const struct problem *problem) {

@@ -51,8 +51,14 @@ struct cvode {
 static int evaluate_jacobian(sunrealtype t, N_Vector x, N_Vector dx, SUNMatrix jacobian,
                              void *user_data, N_Vector work1, N_Vector work2, N_Vector work3) {
     const struct sundials *base = user_data;
-    double *J = base->problem->ode.band != NULL ? SM_DATA_B(jacobian) : SM_DATA_D(jacobian);
-    return sundials_callback_flag(problem_jacobian(base->problem, t, small_vector_data(x), J));
+    struct problem *problem = base->problem;
+    const struct ode *ode = &problem->ode;
+    double *J = ode->band != NULL ? SM_DATA_B(jacobian) : SM_DATA_D(jacobian);
+    enum status status = ode->jacobian(t, small_vector_data(x), J, ode->context);
+    if (status != STATUS_OK || !problem_are_finite(J, ode_jacobian_size(ode))) {
+        status = problem_fail(problem, t, small_vector_data(x));
+    }
+    return sundials_callback_flag(status);
 }
 
 static void destroy(void *memory) {

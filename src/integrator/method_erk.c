@@ -319,6 +319,22 @@ static bool step_to(struct erk *erk, int first, double t, double x[]) {
     return is_evaluated;
 }
 
+/* Returns the value of an INDICATOR_OF_STATE at the states x. */
+static double indicator_at_state(const struct indicator *indicator, const double x[]) {
+    return indicator->offset + indicator->factor * x[indicator->state];
+}
+
+/* True if an indicator of a state is above 0 at the state x, and not at the state `next`. */
+static bool falls_between(const struct location *location, const double x[], const double next[]) {
+    bool falls = false;
+    for (size_t k = 0; k < location->used_count; k++) {
+        const struct indicator *indicator = &location->indicators[location->used[k]];
+        falls |= indicator->kind == INDICATOR_OF_STATE && indicator_at_state(indicator, x) > 0.0 &&
+                 indicator_at_state(indicator, next) <= 0.0;
+    }
+    return falls;
+}
+
 /* True if an indicator of a state falls to 0 up to the time t as far as the first two stages, which
  * it evaluates, can say. x: room for a state. */
 static bool foresees_event(struct erk *erk, double t, double x[]) {
@@ -334,7 +350,7 @@ static bool foresees_event(struct erk *erk, double t, double x[]) {
         const double change = erk->step_dx[n + i] - erk->step_dx[i];
         x[i] = erk->step_x[i] + length * (erk->step_dx[i] + of_change * change);
     }
-    return location_falls_between(&erk->base.problem->location, erk->step_x, x);
+    return falls_between(&erk->base.problem->location, erk->step_x, x);
 }
 
 /* Makes the advance after an event, or onto one, in one step, without the start of ERKStep, a half
@@ -418,6 +434,47 @@ static int advance_carefully(struct erk *erk, double begin, double end, int64_t 
     return flag;
 }
 
+/* Writes indicator i at the time t and the state x to z. */
+static enum status evaluate_indicator(const struct location *location, size_t i, double t,
+                                      const double x[], double *z) {
+    if (location->indicators[i].kind == INDICATOR_OF_STATE) {
+        *z = indicator_at_state(&location->indicators[i], x);
+        return STATUS_OK;
+    }
+    const enum status status = location->ode->indicators(t, x, location->z, location->ode->context);
+    *z = location->z[i];
+    return status;
+}
+
+/* Writes z, the value of the first indicator that has triggered, and Newton's correction (s) of the
+ * event's time, -z / z', from the state x and its derivative dx at the time t. Returns false if
+ * there is no correction. */
+static bool correct_time(const struct location *location, double t, const double x[],
+                         const double dx[], double *z, double *correction) {
+    size_t i = 0;
+    while (!location->triggered[i]) {
+        i++;
+    }
+    if (evaluate_indicator(location, i, t, x, z) != STATUS_OK) {
+        return false;
+    }
+    // over so small a part of the step the derivative of an indicator hardly changes; the part is
+    // longer if the difference is lost in rounding
+    double z_ahead = *z;
+    double ahead = 0x1p-20 * (location->step.end - location->step.begin);
+    for (int tries = 0; z_ahead == *z && tries < 4; tries++) {
+        for (size_t j = 0; j < location->ode->state_count; j++) {
+            location->x[j] = x[j] + ahead * dx[j];
+        }
+        if (evaluate_indicator(location, i, t + ahead, location->x, &z_ahead) != STATUS_OK) {
+            return false;
+        }
+        *correction = -*z * ahead / (z_ahead - *z);
+        ahead *= 0x1p4;
+    }
+    return isfinite(*correction);
+}
+
 /* Steps onto the event. The polynomial of the search is less accurate than the step: Newton's
  * method leads from its root to the root of the steps that end there. The indicator may be 0 at the
  * begin of the step, too: a correction that leads out of the part with the fall divides this part
@@ -436,7 +493,7 @@ static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
         flag = step_to(erk, 1, t, x) ? ARK_SUCCESS : ARK_RHSFUNC_FAIL;
         double z = 0.0;
         double correction = 0.0;
-        if (flag < 0 || !location_correction(location, t, x, erk->dx, &z, &correction)) {
+        if (flag < 0 || !correct_time(location, t, x, erk->dx, &z, &correction)) {
             break;
         }
         if (z > 0.0) {

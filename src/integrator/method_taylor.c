@@ -206,11 +206,7 @@ static double step_within_reach(struct taylor *taylor, const double x[], double 
     ode->reach(x, reach, ode->context);
     double within = step;
     for (size_t i = 0; i < ode->state_count; i++) {
-        // up to one time scale, with room for rounding
         if (reach[i] == INFINITY) {
-            continue;
-        }
-        if (step <= 1.0 && 1.001 * location_way(series->row[i], series->order) < reach[i]) {
             continue;
         }
         double way = 0.0;

@@ -53,59 +53,28 @@ static N_Vector_ID id(N_Vector x) {
 
 /* ---- Operations, n elements each ------------------------------------------------------------ */
 
-ALWAYS_INLINE void linear_sum(sunindextype n, double a, const double *x, double b, const double *y,
-                              double *z) {
-    INDEPENDENT_ITERATIONS // arguments may be the same vector, but never overlap otherwise
-        for (sunindextype i = 0; i < n; i++) {
-        z[i] = a * x[i] + b * y[i];
+// clang-format off
+/* Defines an operation that writes each z[i]. Arguments may be the same vector, but never overlap
+ * otherwise. */
+#define ELEMENTWISE(name, result, ...)                                                             \
+    ALWAYS_INLINE void name(sunindextype n, __VA_ARGS__, double *z) {                              \
+        INDEPENDENT_ITERATIONS                                                                     \
+        for (sunindextype i = 0; i < n; i++) {                                                     \
+            z[i] = (result);                                                                       \
+        }                                                                                          \
     }
-}
+ELEMENTWISE(linear_sum, a * x[i] + b * y[i], double a, const double *x, double b, const double *y)
+ELEMENTWISE(product, x[i] * y[i], const double *x, const double *y)
+ELEMENTWISE(quotient, x[i] / y[i], const double *x, const double *y)
+ELEMENTWISE(scale, c * x[i], double c, const double *x)
+ELEMENTWISE(absolute, fabs(x[i]), const double *x)
+ELEMENTWISE(inverse, 1.0 / x[i], const double *x)
+ELEMENTWISE(add_constant, x[i] + b, const double *x, double b)
+// clang-format on
 
 ALWAYS_INLINE void constant(sunindextype n, double c, double *z) {
     for (sunindextype i = 0; i < n; i++) {
         z[i] = c;
-    }
-}
-
-ALWAYS_INLINE void product(sunindextype n, const double *x, const double *y, double *z) {
-    INDEPENDENT_ITERATIONS
-    for (sunindextype i = 0; i < n; i++) {
-        z[i] = x[i] * y[i];
-    }
-}
-
-ALWAYS_INLINE void quotient(sunindextype n, const double *x, const double *y, double *z) {
-    INDEPENDENT_ITERATIONS
-    for (sunindextype i = 0; i < n; i++) {
-        z[i] = x[i] / y[i];
-    }
-}
-
-ALWAYS_INLINE void scale(sunindextype n, double c, const double *x, double *z) {
-    INDEPENDENT_ITERATIONS
-    for (sunindextype i = 0; i < n; i++) {
-        z[i] = c * x[i];
-    }
-}
-
-ALWAYS_INLINE void absolute(sunindextype n, const double *x, double *z) {
-    INDEPENDENT_ITERATIONS
-    for (sunindextype i = 0; i < n; i++) {
-        z[i] = fabs(x[i]);
-    }
-}
-
-ALWAYS_INLINE void inverse(sunindextype n, const double *x, double *z) {
-    INDEPENDENT_ITERATIONS
-    for (sunindextype i = 0; i < n; i++) {
-        z[i] = 1.0 / x[i];
-    }
-}
-
-ALWAYS_INLINE void add_constant(sunindextype n, const double *x, double b, double *z) {
-    INDEPENDENT_ITERATIONS
-    for (sunindextype i = 0; i < n; i++) {
-        z[i] = x[i] + b;
     }
 }
 

@@ -56,6 +56,21 @@ void taylor_series_configure(struct taylor_series *series) {
 
 /* ---- Orders --------------------------------------------------------------------------------- */
 
+/* Writes coefficients as in ode.h; a series begun at order 0, or 1 if that is known, counts as
+ * an evaluation. Fails like problem_rhs; the caller checks whether coefficients are finite. */
+static enum status extend(struct problem *problem, double t, double time_scale, int first, int last,
+                          double rows[][SERIES_LENGTH]) {
+    const struct ode *ode = &problem->ode;
+    problem->evaluation_count += first <= 1 ? 1 : 0;
+    if (ode->series(t, time_scale, first, last, rows, ode->context) == STATUS_OK) {
+        return STATUS_OK;
+    }
+    for (size_t i = 0; i < ode->state_count; i++) {
+        problem->failed_x[i] = rows[i][0];
+    }
+    return problem_fail(problem, t, problem->failed_x);
+}
+
 /* Begins the series, with the orders from 0 to last. Order 0 may be known from the step before. */
 static enum status begin(struct taylor_series *series, double t, double time_scale,
                          const double x[], int last) {
@@ -75,14 +90,13 @@ static enum status begin(struct taylor_series *series, double t, double time_sca
     series->time_scale = time_scale;
     series->order = last;
     series->end = NAN;
-    return problem_series(series->problem, t, time_scale, first, last, series->row);
+    return extend(series->problem, t, time_scale, first, last, series->row);
 }
 
 enum status taylor_series_add_orders(struct taylor_series *series, int last) {
     const int first = series->order + 1;
     series->order = last;
-    return problem_series(series->problem, series->begin, series->time_scale, first, last,
-                          series->row);
+    return extend(series->problem, series->begin, series->time_scale, first, last, series->row);
 }
 
 /* Returns the sum of the terms of order k, one time scale ahead, in tolerances of the states; or a
@@ -182,8 +196,7 @@ enum status taylor_series_measure_defect(struct taylor_series *series, double s,
     for (size_t i = 0; i < n; i++) {
         end_row[i][0] = end_x[i];
     }
-    const enum status status =
-        problem_series(series->problem, end, series->time_scale, 0, 1, end_row);
+    const enum status status = extend(series->problem, end, series->time_scale, 0, 1, end_row);
     if (status != STATUS_OK) {
         return status;
     }

@@ -63,7 +63,7 @@ static void test_inputs_are_those_of_the_time(void) {
             const double slope = 2.0;
             set(TOY_INPUT, slope * k * h);
             set_input_derivative(TOY_INPUT, 1, slope);
-            ASSERT_OK(instance_do_step(instance, k * h, h));
+            ASSERT_OK(instance_do_step(instance, k * h, h, NULL));
             if (hammer()->strokes > 0) {
                 const double stroke = first + (hammer()->strokes - 1) * period;
                 TEST_ASSERT_DOUBLE_WITHIN(1e-15, slope * stroke, hammer()->last);
@@ -94,7 +94,7 @@ static void test_strokes_close_to_each_other(void) {
     run(1.0, 0.25, 1);
     TEST_ASSERT_EQUAL_INT(1, hammer()->strokes);
     TEST_ASSERT_TRUE(get(TOY_TIME) == 1.25);
-    ASSERT_OK(instance_do_step(instance, 1.25, 0x1p-22));
+    ASSERT_OK(instance_do_step(instance, 1.25, 0x1p-22, NULL));
     TEST_ASSERT_EQUAL_INT(1 + (1 << 16), hammer()->strokes);
     TEST_ASSERT_TRUE(get(TOY_LAST_EVENT) == 1.25 + 0x1p-22);
 }
@@ -151,20 +151,20 @@ static void test_the_internal_steps_allowed_limit_time_events(void) {
     set(TOY_PARAMETER1, 0x1p-54);
     set(TOY_PARAMETER2, 0.25);
     initialize();
-    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_EVENTS, instance_do_step(instance, 0.0, 0.25));
+    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_EVENTS, instance_do_step(instance, 0.0, 0.25, NULL));
     TEST_ASSERT_EQUAL_STRING("the step ended at t = 0.25: a time event is due there, one more than "
                              "max_internal_steps = 3",
                              last_text);
     TEST_ASSERT_EQUAL_INT(3, hammer()->strokes);
     TEST_ASSERT_EQUAL_INT(3, get_int(TOY_EVENTS));
-    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, instance_do_step(instance, 0.25, 0x1p-40));
+    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, instance_do_step(instance, 0.25, 0x1p-40, NULL));
     TEST_ASSERT_GREATER_THAN_INT(3, hammer()->strokes);
 }
 
 static void test_time_events_without_progress_are_refused(void) {
     start_hammer(1, 0.0, 0.0, 0.1);
     last_text[0] = '\0';
-    TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, instance_do_step(instance, 0.0, 1.0));
+    TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, instance_do_step(instance, 0.0, 1.0, NULL));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_text, "at t = 0.1 is followed by one"), last_text);
 }
 
@@ -173,18 +173,17 @@ static void test_a_stroke_is_left_to_event_mode(void) {
     const struct step_options left = {.at_event = EVENTS_LEFT};
     struct discrete_update update;
     start_hammer(1, 0.0, period, first);
-    ASSERT_OK(instance_do_step_with(instance, 0.0, 1.0, &left));
+    ASSERT_OK(instance_do_step(instance, 0.0, 1.0, &left));
     TEST_ASSERT_TRUE(instance_met_event(instance) && instance_time(instance) == first);
     TEST_ASSERT_EQUAL_INT(0, hammer()->strokes);
     ASSERT_OK(instance_update_discrete_states(instance, &update));
     TEST_ASSERT_EQUAL_INT(1, hammer()->strokes);
     TEST_ASSERT_EQUAL_DOUBLE(first + period, update.next_time);
-    ASSERT_OK(instance_do_step_with(instance, first, 0.1, &left));
+    ASSERT_OK(instance_do_step(instance, first, 0.1, &left));
     TEST_ASSERT_FALSE(instance_met_event(instance));
-    ASSERT_OK(
-        instance_do_step_with(instance, first + 0.1, 0.2, &left)); // with rounding: at the end
+    ASSERT_OK(instance_do_step(instance, first + 0.1, 0.2, &left)); // with rounding: at the end
     TEST_ASSERT_TRUE(instance_met_event(instance));
-    ASSERT_OK(instance_do_step_with(instance, first + 0.1 + 0.2, 0.1, &left)); // passes it first
+    ASSERT_OK(instance_do_step(instance, first + 0.1 + 0.2, 0.1, &left)); // passes it first
     TEST_ASSERT_EQUAL_INT(2, hammer()->strokes);
 }
 
@@ -208,12 +207,12 @@ EACH_METHOD static void test_a_stroke_ends_rest(void) {
     for (int i = 0; i < 2; i++) {
         start_as(&description, method, 0.0, 5.0, first);
         if (i == 1) {
-            ASSERT_OK(instance_do_step_with(instance, 0.0, 1.0, &left));
+            ASSERT_OK(instance_do_step(instance, 0.0, 1.0, &left));
             TEST_ASSERT_EQUAL_DOUBLE(first, instance_time(instance));
             TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_SPEED));
         }
-        ASSERT_OK(
-            instance_do_step(instance, instance_time(instance), 1.0 - instance_time(instance)));
+        ASSERT_OK(instance_do_step(instance, instance_time(instance), 1.0 - instance_time(instance),
+                                   NULL));
         const double x[] = {get(TOY_POSITION), get(TOY_SPEED), get_int(TOY_STEPS)};
         TEST_ASSERT_DOUBLE_WITHIN(1e-9, kick + force * (1.0 - first), x[1]);
         if (i == 0) {
@@ -236,9 +235,9 @@ static void test_an_input_stays_where_the_stroke_is(void) {
     for (int i = 0; i < 2; i++) {
         const struct step_options options = {.ask_inputs = rising_force, .at_event = handlings[i]};
         start_hammer(1, 0.0, period, first);
-        ASSERT_OK(instance_do_step_with(instance, 0.0, 0.2, &options));
+        ASSERT_OK(instance_do_step(instance, 0.0, 0.2, &options));
         TEST_ASSERT_EQUAL_DOUBLE(first, instance_time(instance));
-        ASSERT_OK(instance_do_step(instance, first, 0.1));
+        ASSERT_OK(instance_do_step(instance, first, 0.1, NULL));
         TEST_ASSERT_DOUBLE_WITHIN(1e-9, first * first + kick + 2.0 * first * 0.1, get(TOY_SPEED));
     }
 }

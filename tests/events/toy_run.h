@@ -38,7 +38,7 @@ static inline void prepare_outside(const struct model_description *description) 
 /* Steps of h from the time t on, which must be the instance's. */
 static inline void run(double t, double h, int steps) {
     for (int i = 0; i < steps; i++) {
-        ASSERT_OK(instance_do_step(instance, t + i * h, h));
+        ASSERT_OK(instance_do_step(instance, t + i * h, h, NULL));
     }
 }
 

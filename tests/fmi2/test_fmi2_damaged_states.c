@@ -105,7 +105,7 @@ static void test_the_form_is_the_documented_one(void) {
     const uint8_t *data = (const uint8_t *)bytes.data;
     const size_t length = data[LENGTH_AT] + 256u * data[LENGTH_AT + 1];
     TEST_ASSERT_EQUAL_MEMORY("COSIMSTA", data, VERSION_AT);
-    TEST_ASSERT_EQUAL_MEMORY("\2\0\0\0", data + VERSION_AT, 4);
+    TEST_ASSERT_EQUAL_MEMORY("\3\0\0\0", data + VERSION_AT, 4);
     TEST_ASSERT_EQUAL_UINT(bytes.size, length);
     TEST_ASSERT_EQUAL_UINT(sizeof guid - 1, data[GUID_LENGTH_AT]);
     TEST_ASSERT_EQUAL_MEMORY(guid, data + GUID_AT, sizeof guid - 1);
@@ -123,8 +123,8 @@ static void check_foreign(fmi2Component c, fmi2FMUstate good, const struct fmu_b
         fmi2Byte value;
     } cases[] = {
         {0, 'X'},
-        {VERSION_AT, 1},
-        {VERSION_AT, 3},
+        {VERSION_AT, 2},
+        {VERSION_AT, 4},
         {VERSION_AT + 3, 1},
         {LENGTH_AT, 0},
         {LENGTH_AT + 3, 1},

@@ -109,7 +109,7 @@ static void run_watched(int method) {
             expected.omega = 3.0;
             set(OSCILLATOR_OMEGA, expected.omega);
         }
-        ASSERT_OK(instance_do_step(instance, expected.t, h));
+        ASSERT_OK(instance_do_step(instance, expected.t, h, NULL));
     }
 }
 
@@ -156,7 +156,7 @@ static int evaluations(enum status with(const void *values, double t, const doub
     model.jacobian = with;
     begin(INTEGRATOR_CVODE_BDF, 100.0, 2000.0);
     set(OSCILLATOR_U, 1.0);
-    const enum status status = instance_do_step(instance, start, 1.0);
+    const enum status status = instance_do_step(instance, start, 1.0, NULL);
     TEST_ASSERT_TRUE(status == STATUS_OK || (with != jacobian && status == STATUS_TOO_MANY_STEPS));
     return get_int(OSCILLATOR_EVALUATIONS);
 }
@@ -176,7 +176,7 @@ static void test_inputs_are_those_of_the_jacobians_time(void) {
     begin(INTEGRATOR_CVODE_BDF, 3.0, 0.5);
     set(OSCILLATOR_U, 0.25);
     set_input_derivative(OSCILLATOR_U, 1, 2.0);
-    ASSERT_OK(instance_do_step(instance, start, 0.5));
+    ASSERT_OK(instance_do_step(instance, start, 0.5, NULL));
     const double x[2] = {0.3, -0.1};
     double dx[2];
     double J[4];

@@ -64,13 +64,13 @@ EACH_METHOD static void test_the_sign_of_zero_is_no_change(void) {
     initialize_at(0.0);
     for (int i = 0; i < 50; i++) {
         set(OSCILLATOR_U, i % 2 == 0 ? 0.0 : -0.0);
-        ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
+        ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01, NULL));
     }
     const int alternating = get_int(OSCILLATOR_STEPS);
     begin_anew();
     initialize_at(0.0);
     for (int i = 0; i < 50; i++) {
-        ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
+        ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01, NULL));
     }
     TEST_ASSERT_EQUAL_INT(get_int(OSCILLATOR_STEPS), alternating);
 }
@@ -79,7 +79,7 @@ EACH_METHOD static void test_the_sign_of_zero_is_no_change(void) {
 
 static void step_held(int steps, double h) {
     for (int i = 0; i < steps; i++) {
-        ASSERT_OK(instance_do_step(instance, i * h, h));
+        ASSERT_OK(instance_do_step(instance, i * h, h, NULL));
     }
 }
 
@@ -108,12 +108,12 @@ EACH_METHOD static void test_a_rollback_repeats_one_series_at_most(void) {
         const double t = instance_time(instance);
         ASSERT_OK(instance_save(instance, 0, &snapshot));
         unsigned begun = series_begun;
-        ASSERT_OK(instance_do_step(instance, t, 0.0078125));
+        ASSERT_OK(instance_do_step(instance, t, 0.0078125, NULL));
         get_states(instance, expected);
         const unsigned once = series_begun - begun;
         ASSERT_OK(instance_restore(instance, snapshot));
         begun = series_begun;
-        ASSERT_OK(instance_do_step(instance, t, 0.0078125));
+        ASSERT_OK(instance_do_step(instance, t, 0.0078125, NULL));
         get_states(instance, states);
         // one at its begin, and one at its end for the check
         TEST_ASSERT_TRUE(series_begun - begun <= once + 2);
@@ -129,7 +129,7 @@ EACH_METHOD static void test_no_internal_step_passes_the_end_of_a_polynomial(voi
     for (int i = 1024; i < 1100; i++) {
         latest = -INFINITY;
         set_input_derivative(OSCILLATOR_U, 1, 0.5);
-        ASSERT_OK(instance_do_step(instance, i * h, h));
+        ASSERT_OK(instance_do_step(instance, i * h, h, NULL));
         TEST_ASSERT_TRUE(latest <= (i + 1) * h * (1.0 + 1e-12));
     }
 }
@@ -152,8 +152,8 @@ EACH_METHOD static void test_a_new_parameter_makes_a_new_instance(void) {
     set(OSCILLATOR_OMEGA, 3.0);
     set(OSCILLATOR_U, 1.5);
     for (int i = 1024; i < 2048; i++) {
-        ASSERT_OK(instance_do_step(instance, i * h, h));
-        ASSERT_OK(instance_do_step(fresh, i * h, h));
+        ASSERT_OK(instance_do_step(instance, i * h, h, NULL));
+        ASSERT_OK(instance_do_step(fresh, i * h, h, NULL));
         get_states(instance, states);
         get_states(fresh, expected);
         TEST_ASSERT_EQUAL_MEMORY(expected, states, sizeof states);
@@ -187,7 +187,7 @@ static double error_with_jumps(double tolerance, double jump, int every) {
             u = 1.0 + jump * random_sign(&random);
         }
         set(OSCILLATOR_U, u);
-        ASSERT_OK(instance_do_step(instance, i * h, h));
+        ASSERT_OK(instance_do_step(instance, i * h, h, NULL));
         oscillator_solution(2.0, u, h, exact, exact);
         get_states(instance, states);
         for (int k = 0; k < 2; k++) {
@@ -218,10 +218,10 @@ EACH_METHOD static void test_a_step_that_rounds_to_none_is_refused(void) {
     const double far = 9007199254740992.0;
     TEST_ASSERT_TRUE(far + 1.0 == far && far - 1.0 != far);
     initialize_of(instance, far, INFINITY);
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_TIME, instance_do_step(instance, far, 1.0));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_TIME, instance_do_step(instance, far, 1.0, NULL));
     TEST_ASSERT_NOT_NULL(strstr(last_text, "does not change the time"));
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_TIME, instance_do_step(instance, far - 1.0, 1.0));
-    ASSERT_OK(instance_do_step(instance, far, 2.0));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_TIME, instance_do_step(instance, far - 1.0, 1.0, NULL));
+    ASSERT_OK(instance_do_step(instance, far, 2.0, NULL));
 }
 
 /* A nominal value sets the scale of the absolute tolerance: the larger, the fewer internal steps
@@ -244,7 +244,7 @@ static int steps_with_nominal(double nominal) {
     ASSERT_OK(instance_set_integer(scaled, &method_reference, 1, &method));
     set_of(scaled, OSCILLATOR_X, 1e-6);
     initialize_of(scaled, 0.0, INFINITY);
-    ASSERT_OK(instance_do_step(scaled, 0.0, 10.0));
+    ASSERT_OK(instance_do_step(scaled, 0.0, 10.0, NULL));
     ASSERT_OK(instance_get_integer(scaled, &steps_reference, 1, &steps));
     instance_destroy(scaled);
     return steps;
@@ -259,17 +259,17 @@ EACH_CVODE_METHOD static void test_a_restart_finds_its_first_step_without_evalua
     struct instance *fresh = watched();
     const double x = 0.5;
     initialize_of(instance, 0.0, INFINITY);
-    ASSERT_OK(instance_do_step(instance, 0.0, 2.0));
+    ASSERT_OK(instance_do_step(instance, 0.0, 2.0, NULL));
     const int before = get_int(OSCILLATOR_EVALUATIONS);
     set(OSCILLATOR_U, x);
-    ASSERT_OK(instance_do_step(instance, 2.0, 1e-6));
+    ASSERT_OK(instance_do_step(instance, 2.0, 1e-6, NULL));
     const int restarted = get_int(OSCILLATOR_EVALUATIONS) - before;
 
     set_of(fresh, OSCILLATOR_X, get(OSCILLATOR_X));
     set_of(fresh, OSCILLATOR_V, get(OSCILLATOR_V));
     set_of(fresh, OSCILLATOR_U, x);
     initialize_of(fresh, 0.0, INFINITY);
-    ASSERT_OK(instance_do_step(fresh, 0.0, 1e-6));
+    ASSERT_OK(instance_do_step(fresh, 0.0, 1e-6, NULL));
     const unsigned reference = OSCILLATOR_EVALUATIONS;
     int evaluations = 0;
     ASSERT_OK(instance_get_integer(fresh, &reference, 1, &evaluations));
@@ -312,14 +312,14 @@ EACH_METHOD static void test_a_cubic_input_is_exact(void) {
     set(OSCILLATOR_MAX_STEP, 0.25); // so that all methods need some steps
     initialize_at(1.0);
     for (int i = 0; i < 4; i++) {
-        ASSERT_OK(instance_do_step_with(instance, 1.0 + 0.25 * i, 0.25, &options));
+        ASSERT_OK(instance_do_step(instance, 1.0 + 0.25 * i, 0.25, &options));
         TEST_ASSERT_TRUE(get(OSCILLATOR_U) == cubic(1.25 + 0.25 * i));
     }
     TEST_ASSERT_EQUAL_UINT(4 * POLYNOMIAL_NODES, asked);
     TEST_ASSERT_DOUBLE_WITHIN(1e-7, solution(2.0), get(OSCILLATOR_X));
     // afterwards it is held at its last value
     const double held = get(OSCILLATOR_U);
-    ASSERT_OK(instance_do_step(instance, 2.0, 0.25));
+    ASSERT_OK(instance_do_step(instance, 2.0, 0.25, NULL));
     TEST_ASSERT_TRUE(held == get(OSCILLATOR_U));
 }
 
@@ -344,8 +344,7 @@ EACH_METHOD static void test_the_limit_of_internal_steps_holds_over_early_ends(v
     initialize_at(1.0);
     report_count = 0;
     last_report = 1.0;
-    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS,
-                          instance_do_step_with(instance, 1.0, 99.0, &noting));
+    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, instance_do_step(instance, 1.0, 99.0, &noting));
     TEST_ASSERT_LESS_OR_EQUAL_UINT(12, report_count);
 }
 
@@ -372,9 +371,9 @@ EACH_METHOD static void test_messages_have_the_time_of_the_simulation(void) {
     set_int(OSCILLATOR_SOLVER_METHOD, method);
     set_int(OSCILLATOR_MAX_STEPS, 12);
     initialize_at(1000.0);
-    ASSERT_OK(instance_do_step(instance, 1000.0, 1e-6));
+    ASSERT_OK(instance_do_step(instance, 1000.0, 1e-6, NULL));
     set(OSCILLATOR_U, 1.0); // a restart
     const double t = instance_time(instance);
-    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, instance_do_step(instance, t, 99.0));
+    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, instance_do_step(instance, t, 99.0, NULL));
     TEST_ASSERT_GREATER_THAN_UINT(0, times_said);
 }

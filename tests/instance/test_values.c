@@ -77,7 +77,7 @@ static void test_a_value_set_after_a_moving_step_has_no_slope(void) {
     const double w = 2.0;
     ASSERT_OK(instance_exit_initialization(instance));
     set_input_derivative(OSCILLATOR_U, 1, 3.0);
-    ASSERT_OK(instance_do_step(instance, 0.0, 0.5));
+    ASSERT_OK(instance_do_step(instance, 0.0, 0.5, NULL));
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, -w * w * get(OSCILLATOR_V) + 3.0, derivative(OSCILLATOR_A, 1));
     set(OSCILLATOR_U, 0.25);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, -w * w * get(OSCILLATOR_V), derivative(OSCILLATOR_A, 1));
@@ -89,7 +89,7 @@ static void test_new_derivatives_start_from_the_value_set_last(void) {
     ASSERT_OK(instance_exit_initialization(instance));
     set_input_derivative(OSCILLATOR_U, 1, 3.0);
     set_input_derivative(OSCILLATOR_U, 2, -8.0);
-    ASSERT_OK(instance_do_step(instance, 0.0, 0.5));
+    ASSERT_OK(instance_do_step(instance, 0.0, 0.5, NULL));
     set_input_derivative(OSCILLATOR_U, 1, 5.0);
     const double x = get(OSCILLATOR_X);
     TEST_ASSERT_EQUAL_DOUBLE(-4.0 * x, get(OSCILLATOR_A));
@@ -157,7 +157,7 @@ static void begin_failing(void) {
     is_infinite = false;
     create(&model_description);
     initialize_at(0.0);
-    ASSERT_OK(instance_do_step(instance, 0.0, 0.1));
+    ASSERT_OK(instance_do_step(instance, 0.0, 0.1, NULL));
     last_text[0] = '\0';
 }
 

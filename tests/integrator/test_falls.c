@@ -37,16 +37,16 @@ static void test_a_fall_up_to_the_latest_is_located_to_the_same_bit(void) {
         bool is_armed_too = is_armed;
         double noise = i % 8 < 4 ? 1e-15 : 1e-10;
         double same_noise = noise;
-        const double s = fall_first(&p, &(struct fall){.latest = INFINITY,
-                                                       .is_restart = true,
-                                                       .is_armed = &is_armed,
-                                                       .noise = &noise});
+        const double s = roots_first_fall(&p, &(struct fall){.latest = INFINITY,
+                                                             .is_restart = true,
+                                                             .is_armed = &is_armed,
+                                                             .noise = &noise});
         const bool is_close = s <= 1.0 && i % 5 == 0;
         const double latest = is_close ? s * (1.0 + 1e-15 * chance()) : fabs(chance());
-        const double found = fall_first(&p, &(struct fall){.latest = latest,
-                                                           .is_restart = true,
-                                                           .is_armed = &is_armed_too,
-                                                           .noise = &same_noise});
+        const double found = roots_first_fall(&p, &(struct fall){.latest = latest,
+                                                                 .is_restart = true,
+                                                                 .is_armed = &is_armed_too,
+                                                                 .noise = &same_noise});
         if (s <= latest) {
             TEST_ASSERT_TRUE(found == s);
             located++;
@@ -61,7 +61,7 @@ static void test_a_fall_up_to_the_latest_is_located_to_the_same_bit(void) {
 
 static double fall_within(const double c[], int degree, double noise, bool *is_armed) {
     const struct roots_polynomial p = {c, degree, -1.0};
-    return fall_first(
+    return roots_first_fall(
         &p, &(struct fall){
                 .latest = INFINITY, .is_restart = true, .is_armed = is_armed, .noise = &noise});
 }
@@ -85,11 +85,11 @@ static void test_a_dip_within_the_touch_is_no_fall(void) {
     for (int k = 0; k < 2; k++) {
         bool is_armed = true;
         double noise = 0.0;
-        const double s = fall_first(&(struct roots_polynomial){c, 2, -1.0},
-                                    &(struct fall){.touch = k == 0 ? 1e-7 : 1e-5,
-                                                   .latest = INFINITY,
-                                                   .is_armed = &is_armed,
-                                                   .noise = &noise});
+        const double s = roots_first_fall(&(struct roots_polynomial){c, 2, -1.0},
+                                          &(struct fall){.touch = k == 0 ? 1e-7 : 1e-5,
+                                                         .latest = INFINITY,
+                                                         .is_armed = &is_armed,
+                                                         .noise = &noise});
         TEST_ASSERT_TRUE(k == 0 ? fabs(s - 0.499) < 1e-12 : s == INFINITY);
     }
 }

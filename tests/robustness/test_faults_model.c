@@ -133,10 +133,10 @@ static struct state expected_end(int method, bool has_first_step) {
     struct instance *instance = create(method);
     double t = start;
     if (has_first_step) {
-        ASSERT_OK(instance_do_step(instance, t, before_fault));
+        ASSERT_OK(instance_do_step(instance, t, before_fault, NULL));
         t += before_fault;
     }
-    ASSERT_OK(instance_do_step(instance, t, step));
+    ASSERT_OK(instance_do_step(instance, t, step, NULL));
     const struct state end = state_of(instance);
     instance_destroy(instance);
     return end;
@@ -150,7 +150,7 @@ static bool try_step(int method, bool has_first_step, long number, enum way way,
     struct instance_snapshot *snapshot = NULL;
     struct instance *instance = create(method);
     if (has_first_step) {
-        ASSERT_OK(instance_do_step(instance, start, before_fault));
+        ASSERT_OK(instance_do_step(instance, start, before_fault, NULL));
     }
     ASSERT_OK(instance_save(instance, 0, &snapshot));
     const struct state before = state_of(instance);
@@ -159,7 +159,7 @@ static bool try_step(int method, bool has_first_step, long number, enum way way,
 
     last_text[0] = '\0';
     fail_from(number, way, lasting);
-    const enum status status = instance_do_step(instance, before.t, step);
+    const enum status status = instance_do_step(instance, before.t, step, NULL);
     fail_no_more();
     const bool has_failed = fault.count > 0;
     const struct state reached = state_of(instance);
@@ -174,7 +174,7 @@ static bool try_step(int method, bool has_first_step, long number, enum way way,
     }
 
     ASSERT_OK(instance_restore(instance, snapshot));
-    ASSERT_OK(instance_do_step(instance, before.t, step));
+    ASSERT_OK(instance_do_step(instance, before.t, step, NULL));
     const struct state again = state_of(instance);
     TEST_ASSERT_EQUAL_MEMORY_MESSAGE(expected, &again, sizeof again, about);
     instance_destroy(instance);

@@ -70,7 +70,7 @@ static double step(const struct grid *grid, double t, double h) {
     double shortest = h;
     while (left > 0.0) {
         shortest = fmin(shortest, left);
-        ASSERT_OK(instance_do_step_with(instance, t, left, &options));
+        ASSERT_OK(instance_do_step(instance, t, left, &options));
         t = instance_time(instance);
         left = t == end ? 0.0 : end - t;
     }

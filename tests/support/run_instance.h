@@ -46,7 +46,8 @@ static inline void initialize(double tolerance) {
 }
 
 static inline void step_to(double t) {
-    ASSERT_OK(instance_do_step(instance, instance_time(instance), t - instance_time(instance)));
+    ASSERT_OK(
+        instance_do_step(instance, instance_time(instance), t - instance_time(instance), NULL));
 }
 
 #endif

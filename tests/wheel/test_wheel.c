@@ -122,7 +122,7 @@ static void test_calculated_integers_and_booleans_are_up_to_date(void) {
     TEST_ASSERT_EQUAL_INT(-3, get_int32(instance, WHEEL_turns));
     ASSERT_OK(set_boolean(WHEEL_is_reversed, 0));
     ASSERT_OK(instance_exit_initialization(instance));
-    ASSERT_OK(instance_do_step(instance, 0.0, 5.0)); // to 10 rad
+    ASSERT_OK(instance_do_step(instance, 0.0, 5.0, NULL)); // to 10 rad
     TEST_ASSERT_EQUAL_INT(1, get_int32(instance, WHEEL_turns));
 }
 
@@ -229,12 +229,12 @@ static void start(void) {
 static void step_to(double end, enum event_handling at_event) {
     const struct step_options options = {.at_event = at_event};
     const double now = instance_time(instance);
-    ASSERT_OK(instance_do_step_with(instance, now, end - now, &options));
+    ASSERT_OK(instance_do_step(instance, now, end - now, &options));
 }
 
 static void step(enum event_handling at_event) {
     const struct step_options options = {.at_event = at_event};
-    ASSERT_OK(instance_do_step_with(instance, start_time, 0.1, &options));
+    ASSERT_OK(instance_do_step(instance, start_time, 0.1, &options));
 }
 
 static void update(void) {
@@ -394,7 +394,7 @@ static void test_no_mode_is_decided_before_the_initialization_ends(void) {
 static void test_forged_modes_since_the_restart_are_refused(void) {
     set(WHEEL_stop, 1.0);
     ASSERT_OK(instance_exit_initialization(instance));
-    ASSERT_OK(instance_do_step(instance, 0.0, 0.5));
+    ASSERT_OK(instance_do_step(instance, 0.0, 0.5, NULL));
     TEST_ASSERT_TRUE(instance->state.has_history);
     assert_accepted();
     values_of(instance)->catches = 1;

@@ -34,7 +34,7 @@ from .content import (
 MOST_ENTRIES = 1000
 MOST_SIZE = 20_000
 LONGEST_TEXT = 1000  # characters of a description
-LONGEST_MESSAGE = 500  # bytes: src/instance/settings.c has no room for more
+LONGEST_MESSAGE = 500  # bytes: src/instance/state.c has no room for more
 NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,99}", re.ASCII)
 CODE = re.compile(r'[^\x00-\x1f\\"]+\.[ch]')
 # files that Windows cannot have, with any suffix
