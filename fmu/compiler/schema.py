@@ -153,12 +153,16 @@ def _entry(section: str) -> Schema:
     if section in reader.NOT_REAL:
         keys, needed = reader.OWN_KEYS[reader.NOT_REAL[section]]
         unordered = [key for key in keys if key not in ("min", "max")]
-        start = _start(TRUTH, *follows)
-        kinds.append((unordered, needed, {"type": {"const": BOOLEAN}, "start": start}))
+
+        def start(*values: Schema) -> Schema:
+            return {"start": _start(*values)} if "start" in keys else {}
+
+        given = {"type": {"const": BOOLEAN}} | start(TRUTH, *follows)
+        kinds.append((unordered, needed, given))
         if reader.NOT_REAL[section] != SWITCHES:
-            whole = {"min": WHOLE, "max": WHOLE, "start": _start(WHOLE, *follows)}
+            whole = {"min": WHOLE, "max": WHOLE} | start(WHOLE, *follows)
             kinds.append((keys, needed, {"type": {"const": INTEGER}} | whole))
-            kinds.append((unordered, needed, {"type": ITEMS, "start": _start({"type": "string"})}))
+            kinds.append((unordered, needed, {"type": ITEMS} | start({"type": "string"})))
     known = [*dict.fromkeys(key for keys, *_ in kinds for key in keys)]
     found = _keys(known) | {"anyOf": []}
     for keys, needed, own in kinds:

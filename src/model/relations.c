@@ -323,7 +323,7 @@ static enum status refuse(const struct call *call, const struct event *event,
 static enum status check_counts(const struct call *call, const struct event *event) {
     const struct relations *model = call->model;
     for (int i = 0; i < model->count_count; i++) {
-        if (call->segments[model->segment_count + i] == RELATIONS_NO_COUNT) {
+        if (call->segments[model->segment_count + i] == MODEL_NO_INT) {
             if (event->reason != NULL) {
                 (void)snprintf(event->reason, event->reason_size, "%s is beyond %d",
                                model->count[i].name, INT_MAX);

@@ -134,11 +134,11 @@ static inline int relations_locate(const double begins[], size_t count, double x
     return (int)low;
 }
 
-enum { RELATIONS_NO_COUNT = INT_MIN, RELATIONS_MOST_COUNTED = 1 << 30 };
+enum { RELATIONS_MOST_COUNTED = 1 << 30 };
 
-/* Returns a whole number; RELATIONS_NO_COUNT if an int cannot hold it. */
+/* Returns a whole number; MODEL_NO_INT if an int cannot hold it. */
 static inline int relations_whole(double x) {
-    return fabs(x) <= INT_MAX ? (int)x : RELATIONS_NO_COUNT;
+    return fabs(x) <= INT_MAX ? (int)x : MODEL_NO_INT;
 }
 
 /* Returns the largest whole number up to x, within +-RELATIONS_MOST_COUNTED. */

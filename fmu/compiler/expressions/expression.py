@@ -220,6 +220,14 @@ def with_kinds(
     return items.get(root, root)
 
 
+def kind_of(root: Node, kinds: Mapping[str, Kind]) -> Kind:
+    """Return the kind of an expression, of which `kinds` has the names that are no numbers."""
+    found: dict[Node, Kind] = {}
+    for node in in_order([root]):
+        found[node] = _kind(node, [found[argument] for argument in node.arguments], kinds)
+    return found[root]
+
+
 def _kind(node: Node, given: list[Kind], kinds: Mapping[str, Kind]) -> Kind:
     if node.op == "name":
         return kinds.get(node.name, NUMBER)

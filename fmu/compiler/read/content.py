@@ -115,8 +115,8 @@ class Variable:
 
     @property
     def is_real(self) -> bool:
-        """Whether it is neither a condition nor a count nor an enumeration."""
-        return self.section not in (OPTIONS, SWITCHES, COUNTS)
+        """Whether it is neither a condition nor a whole number nor an enumeration."""
+        return self.kind == NUMBER
 
 
 @dataclass
@@ -264,6 +264,16 @@ class ModelFile:
     def calculated(self) -> list[Variable]:
         """Variables that follow from others at any time."""
         return self.of(FOLLOWS, "where", "outputs")
+
+    @property
+    def calculated_reals(self) -> list[Variable]:
+        """Those that are real numbers."""
+        return [v for v in self.calculated if v.is_real]
+
+    @property
+    def calculated_counts(self) -> list[Variable]:
+        """Those that are conditions, whole numbers or enumerations."""
+        return [v for v in self.calculated if not v.is_real]
 
     @cached_property
     def places(self) -> dict[str, int]:

@@ -299,7 +299,8 @@ def _set_start(section: str, given: dict[str, Any], texts: dict[str, Any]) -> No
     """Read a start value by its kind; one that follows from parameters goes into the texts."""
     kind, start = given.get("kind", NUMBER), given.get("start")
     if isinstance(kind, tuple) and (start is None or start in kind):
-        given["start"] = kind.index(start or kind[0]) + 1
+        if section not in keys.CALCULATED:
+            given["start"] = kind.index(start or kind[0]) + 1
         return
     wanted = "true or false" if kind == CONDITION else kind
     if isinstance(kind, tuple):

@@ -43,22 +43,25 @@ CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\u
 RESERVED = {*FUNCTIONS, *NO_NAMES, "pi", "time", "GUID", "NAME", "TOKEN_FMI3"}
 TAKEN = {*RESERVED, *FURTHER, "sum", "der"}  # no names of functions
 NUMBERS = ("start", "min", "max", "nominal")
+CALCULATED = ("where", "outputs")
 OF_ALL = ("start", "unit", "min", "max", "description")
 SECTIONS = {  # keys of their entries, and the one that each needs
     "parameters": ((*OF_ALL, "type"), "start"),
     "inputs": ((*OF_ALL, "type"), ""),
     "states": ((*OF_ALL, "nominal", "derivative", "derivative_of"), "derivative"),
     "discrete": (("start", "unit", "description", "type"), ""),
-    "where": (("value", "unit", "description", "derivative_of"), "value"),  # or expressions
-    "outputs": (("value", "unit", "description", "derivative_of"), "value"),
+    "where": (("value", "unit", "description", "type", "derivative_of"), "value"),  # or expressions
+    "outputs": (("value", "unit", "description", "type", "derivative_of"), "value"),
 }
 OWN_KEYS = {
     FOLLOWS: (("value", "unit", "description"), "value"),
     OPTIONS: (("type", "start", "min", "max", "description"), "start"),
     SWITCHES: (("type", "start", "description"), ""),
     COUNTS: (("type", "start", "min", "max", "description"), ""),
+    **dict.fromkeys(CALCULATED, (("type", "value", "min", "max", "description"), "value")),
 }
 NOT_REAL = {"parameters": OPTIONS, "inputs": SWITCHES, "discrete": COUNTS}
+NOT_REAL |= {section: section for section in CALCULATED}
 HEAD = (
     *("name", "description", "include", "experiment", "modes", "code", "sizes", "units", "tables"),
     *("functions", "sampled", "events", "check", "terminals"),

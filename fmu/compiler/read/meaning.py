@@ -7,11 +7,13 @@ from graphlib import CycleError, TopologicalSorter
 from declaration.load import shown
 
 from ..expressions.expression import (
+    CONDITION,
     CONSTANTS,
     ExpressionError,
     derivative_of,
     evaluated,
     in_order,
+    kind_of,
     names,
     with_kinds,
 )
@@ -30,18 +32,18 @@ def check(file: ModelFile) -> None:
     _check_names(file)
     _check_derivatives(file)
     file.order = _in_order(file)
+    _check_kinds(file)
     _check_periods(file)
     if file.has_units:
         _check_units(file)
 
 
 def _check_names(file: ModelFile) -> None:
-    """Check the names and kinds in all expressions."""
+    """Check the names in all expressions."""
     rates = [derivative_of(state.name) for state in file.of("states")]
     known = dict.fromkeys((*file.variables, *file.modes, "time", *CONSTANTS, *rates))
     constant = file.of("parameters", FOLLOWS, OPTIONS)
     parameters = dict.fromkeys((*(v.name for v in constant), *CONSTANTS))
-    kinds = file.kinds
     for index in file.indexes & known.keys():
         raise ModelFileError(f"{file.place_of(index)}: {index}: this name is an index of for, too")
     for expressions, allowed, mistake in (
@@ -54,7 +56,18 @@ def _check_names(file: ModelFile) -> None:
                     if node.op == "name" and node.name not in allowed:
                         hint = _hint(node.name, allowed, file)
                         raise ExpressionError(node.column, mistake.format(shown(node.name)) + hint)
-                expression.tree = with_kinds(expression.tree, expression.kind, kinds)
+
+
+def _check_kinds(file: ModelFile) -> None:
+    """Check the kinds in all expressions; an entry of [where] that is a condition is Boolean."""
+    kinds = file.kinds
+    plain = {v.expression: v for v in file.of("where") if v.is_real and not v.unit}
+    for expression in file.order:
+        with placed(*expression.place):
+            if expression in plain and kind_of(expression.tree, kinds) == CONDITION:
+                plain[expression].kind = expression.kind = CONDITION
+                kinds[expression.target] = CONDITION
+            expression.tree = with_kinds(expression.tree, expression.kind, kinds)
 
 
 def _check_derivatives(file: ModelFile) -> None:
@@ -170,6 +183,8 @@ def _check_units(file: ModelFile) -> None:
         if expression.target:
             units.setdefault(expression.target, unit)
     for variable in file.of("where"):
+        if not variable.is_real:
+            continue
         with placed("[where]", variable.name):
             variable.exponents = _whole(units[variable.name])
 

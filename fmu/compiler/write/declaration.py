@@ -144,7 +144,7 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
 
 def flat(file: ModelFile) -> list[str]:
     """Return functions without slope of what moves or is set, with the variables that call them."""
-    called = [(v.name, v.expression) for v in file.of("states", "where", "outputs")]
+    called = [(v.name, v.expression) for v in file.of("states", "where", "outputs") if v.is_real]
     called += [pair for change in file.changes for pair in change.given.items()]
     found = {}
     for name, expression in called:
@@ -235,9 +235,11 @@ def _entries_of(
 
 def _entries_of_count(variable: Variable, file: ModelFile) -> dict[str, object]:
     """Table of a condition, a whole number or an enumeration."""
-    kind, is_parameter = variable.kind, variable.section == OPTIONS
-    leaf: Leaf = (variable.leaf.op, variable.name)
-    variability = "discrete" if not is_parameter else "fixed" if leaf in _fixed(file) else "tunable"
+    kind, is_calculated = variable.kind, variable.leaf is None
+    leaf: Leaf = ("" if is_calculated else variable.leaf.op, variable.name)
+    variability = "discrete"
+    if variable.section == OPTIONS:
+        variability = "fixed" if leaf in _fixed(file) else "tunable"
     entries: dict[str, object] = {
         "field": file.fields.count(variable.name),
         "type": TYPES.get(kind, "enumeration") if isinstance(kind, str) else "enumeration",
@@ -248,7 +250,9 @@ def _entries_of_count(variable: Variable, file: ModelFile) -> dict[str, object]:
         entries["items"] = {item: {"description": item} for item in kind}
     bounds = {"min": variable.min, "max": variable.max}
     entries |= {key: number for key, number in bounds.items() if number is not None}
-    if variable.section == COUNTS:
+    if is_calculated:
+        entries |= _dependencies(variable.value, file)
+    elif variable.section == COUNTS:
         entries |= _known_of(_reached({leaf}, file, ["discrete"]), file)
         entries |= _initially({leaf}, {}, file)
     else:
