@@ -51,6 +51,7 @@ KEYS: dict[str, Schema] = {  # start: by the type
     **dict.fromkeys(("derivative", "value", "when", "while", "every", "offset", FOR), EXPRESSION),
     "nominal": ABOVE_0,
     "start": {},
+    "variability": {"const": "fixed"},
     "type": {"anyOf": [{"enum": [BOOLEAN, INTEGER]}, ITEMS]},
     "z": {"type": "array", "items": ROWS, "minItems": 2},
     "interpolation": {"enum": INTERPOLATIONS},

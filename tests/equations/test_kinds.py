@@ -1,4 +1,7 @@
-"""Outputs and entries of [where] that are no real numbers."""
+"""Outputs and [where] that are no real numbers; random numbers, which whole numbers choose."""
+
+import math
+from collections.abc import Iterator
 
 import fmpy
 import numpy as np
@@ -9,7 +12,7 @@ from tests.equations.compiled import declared, read
 from tests.equations.examples import METHODS, MODELS, loaded, made, simulated
 from tests.support.instances import Instance
 
-GEAR = MODELS["kinds"]["GEAR"]
+GEAR, NOISE = MODELS["kinds"]["GEAR"], MODELS["kinds"]["NOISE"]
 
 
 @pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
@@ -64,3 +67,57 @@ def test_a_whole_number_of_more_than_32_bits_is_named() -> None:
         assert unit.messages[-1].text == f"{said} with count = 1500000000, large = 1.5"
         unit.set(large=1.0)
         assert unit.fmi.getInteger(more) == [2 * 10**9]
+
+
+# ---- Random numbers ------------------------------------------------------------------------------
+
+
+def words(seed: int, stream: int, times: int) -> Iterator[int]:
+    """Words of 53 bits of SplitMix64, whose start is finalized so often."""
+
+    def finalized(z: int) -> int:
+        z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9 % 2**64
+        z = (z ^ (z >> 27)) * 0x94D049BB133111EB % 2**64
+        return z ^ (z >> 31)
+
+    state = (seed % 2**32 << 32) + stream
+    for _ in range(times):
+        state = finalized(state)
+    while True:
+        state = (state + 0x9E3779B97F4A7C15) % 2**64
+        yield finalized(state) >> 11
+
+
+def normal(seed: int, stream: int, count: int) -> list[float]:
+    found = words(seed, stream, 1)
+    pairs = [((next(found) + 1) / 2**53, next(found) / 2**53) for _ in range(count)]
+    return [math.sqrt(-2 * math.log(a)) * math.cos(2 * math.pi * b) for a, b in pairs]
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_random_numbers_follow_from_seed_and_number(method: int) -> None:
+    """They push a state, piece by piece, and disturb its samples; names may be like functions."""
+    run = simulated(made(NOISE), 4.0, 0.05, {"seed": -3, "solver_method": method}, also=["gust"])
+    t, gusts = run["time"], np.array([2.0 * z for z in normal(-3, 2, 40)])
+    x = np.concatenate([[0.0], np.cumsum(gusts) / 8])
+    piece = np.minimum(np.floor(t * 8 + 1e-9), 31).astype(int)
+    assert np.max(np.abs(run["x"] - x[piece] - gusts[piece] * (t - piece / 8))) < 1e-7
+    tick = np.floor(t * 10 + 1e-6).astype(int)
+    assert np.array_equal(run["k"], tick + 1)
+    uniform = words(-3, 0, 2)
+    assert np.array_equal(run["u"], np.array([next(uniform) / 2**53 for _ in range(50)])[tick])
+    at_tick = np.abs(t * 10 - tick) < 1e-6
+    added = 2.0 * np.array(normal(-3, 0, 50))[tick]
+    assert np.sum(at_tick) > 40
+    assert np.max(np.abs(run["y"] - run["x"] - added)[at_tick]) < 1e-12
+
+
+def test_a_function_of_the_file_is_meant_instead() -> None:
+    run = simulated(made(MODELS["kinds"]["OWN_NOISE"]), 1.0, 0.5, {}, relative_tolerance=1e-10)
+    assert run["x"][-1] == pytest.approx(math.exp(2.0), rel=1e-8)
+
+
+def test_a_parameter_is_fixed_if_the_file_says_so() -> None:
+    variables = declared(read(made(NOISE).with_suffix(".toml")))["variables"]
+    fixed = {name for name, v in variables.items() if v.get("variability") == "fixed"}
+    assert fixed == {"seed", "sigma", "noise", "tau"}  # the last two by the sampler

@@ -250,6 +250,8 @@ def _needed(node: Node, own: Kind, found: Mapping[Node, Kind]) -> list[Kind]:
     if node.op == "if":
         is_item = not {*given[1:]} <= {NUMBER, WHOLE, CONDITION}
         return [CONDITION, *[own if is_item else NUMBER] * 2]
+    if node.op in RANDOM:
+        return [WHOLE] * len(given)
     if node.op in EQUALITIES:
         enumerations = [kind for kind in given if isinstance(kind, tuple)]
         if not enumerations and {*given} not in ({WHOLE}, {CONDITION}):
@@ -349,16 +351,21 @@ class Range:
 
 @dataclass(frozen=True)
 class Lookup:
-    """A table, a function of a C file, floor or hypot: an operation of its own."""
+    """A table, a function of a C file or of `RANDOM`, floor or hypot: an operation of its own.
+
+    optional: how many of the arguments need not be given; they are 0 then.
+    """
 
     name: str
     arguments: tuple[str, ...]
     op: str = "table"
+    optional: int = 0
 
     def of(self, given: Sequence[Node], column: int) -> Node:
         """Return the operation on these arguments."""
         function = self.name if self.op == self.name else ""
-        return Node(self.op, column, tuple(given), name=self.name, function=function)
+        zeros = [Node("number", column)] * (len(self.arguments) - len(given))
+        return Node(self.op, column, (*given, *zeros), name=self.name, function=function)
 
 
 def parse(text: str, functions: Mapping[str, Function | Lookup] | None = None) -> Node:
@@ -534,8 +541,12 @@ class _Parser:
             separator = ","
         self.expect(")")
         count = len(further.arguments) if further else FUNCTIONS[function.text]
-        if len(arguments) != (max(2, len(arguments)) if count is None else count):
-            wanted = f"{'2 or more' if count is None else count} argument{'s' * (count != 1)}"
+        fewest = 2 if count is None else count - getattr(further, "optional", 0)
+        if not fewest <= len(arguments) <= (count or len(arguments)):
+            numbers = (
+                "2 or more" if count is None else " or ".join(map(str, sorted({fewest, count})))
+            )
+            wanted = f"{numbers} argument{'s' * (count != 1)}"
             text = f"{function.text}: expected {wanted}, got {len(arguments)}"
             raise ExpressionError(function.column, text)
         if further:
@@ -582,6 +593,8 @@ for _name, _arguments, _body in (
     _parts = (tuple(_arguments.split()), parse(_body, _WHOLE), _name == "sign")
     FURTHER[_name] = Function(*_parts, function=_name)
 FURTHER |= {"floor": _WHOLE["whole"], "hypot": Lookup("hypot", ("x", "y"), "hypot")}
+# of files with equations; a function of the same name that the file has is meant instead
+RANDOM = {name: Lookup(name, ("seed", "k", "stream"), name, 1) for name in ("noise", "uniform")}
 
 
 # ---- Indexes -------------------------------------------------------------------------------------

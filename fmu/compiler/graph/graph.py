@@ -31,7 +31,8 @@ RUNTIME = ("first", "second")  # derivatives that may be 0 in one call and not i
 CONDITIONS = ("mode", "and", "or", "not", "isnan", "isfinite", "==", *RELATIONS)
 OPPOSITE = {"<": ">=", ">=": "<", ">": "<=", "<=": ">"}
 SWITCHING = ("floor", "locate", *RELATIONS)  # results jump
-STILL = (*CONDITIONS, "value_of", "entry", "locate", "floor")  # derivatives are 0
+RANDOM = ("noise", "uniform")  # of whole numbers
+STILL = (*CONDITIONS, *RANDOM, "value_of", "entry", "locate", "floor")  # derivatives are 0
 PRODUCTS_UP_TO = 8  # whole exponents that are repeated multiplication
 MOST_COUNTED = 2**30  # by floor of what moves
 WHOLE_UP_TO = 64  # whole exponents whose derivatives are defined at 0

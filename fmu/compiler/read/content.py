@@ -16,6 +16,7 @@ from declaration.schema import Terminal
 from ..expressions.expression import (
     CONDITION,
     NUMBER,
+    RANDOM,
     ExpressionError,
     Function,
     Kind,
@@ -49,7 +50,7 @@ INSTEAD = {
         "samplers are written as [sampled.NAME] with every and set, which see the values before"
     ),
     r"\b(?:noise|random|rand|randn|gauss|normal|uniform)\s*(?:\(|$)": (
-        "noise is not supported: make it outside and give it to an input"
+        "random numbers are noise(seed, k) and uniform(seed, k), of whole numbers"
     ),
 }
 
@@ -98,6 +99,7 @@ class Variable:
     display: tuple[str, float, float] | None = None  # unit in the file, with factor and offset
     description: str = ""
     derivative_of: str = ""  # the state of which the FMU has it as the derivative
+    variability: str = ""  # "fixed" if the file says so
     expression: Expression | None = None  # derivative of a state, value of others
     initial: Expression | None = None  # start value that follows from parameters
     leaf: Any = None  # what a generator makes of a parameter, input, state or discrete variable
@@ -212,7 +214,7 @@ class ModelFile:
                 raise ModelFileError(f"expected an expression in quotes, got {shown(text)}")
             try:
                 if text not in self.parsed:
-                    self.parsed[text] = parse(text, self.functions)
+                    self.parsed[text] = parse(text, RANDOM | self.functions)
                 tree = at_indexes(self.parsed[text], self.sizes | element.indexes)
             except ValueError as error:
                 raise ModelFileError(f"{error}{instead_of(text)}") from None

@@ -46,7 +46,7 @@ NUMBERS = ("start", "min", "max", "nominal")
 CALCULATED = ("where", "outputs")
 OF_ALL = ("start", "unit", "min", "max", "description")
 SECTIONS = {  # keys of their entries, and the one that each needs
-    "parameters": ((*OF_ALL, "type"), "start"),
+    "parameters": ((*OF_ALL, "type", "variability"), "start"),
     "inputs": ((*OF_ALL, "type"), ""),
     "states": ((*OF_ALL, "nominal", "derivative", "derivative_of"), "derivative"),
     "discrete": (("start", "unit", "description", "type"), ""),
@@ -55,7 +55,7 @@ SECTIONS = {  # keys of their entries, and the one that each needs
 }
 OWN_KEYS = {
     FOLLOWS: (("value", "unit", "description"), "value"),
-    OPTIONS: (("type", "start", "min", "max", "description"), "start"),
+    OPTIONS: (("type", "start", "min", "max", "description", "variability"), "start"),
     SWITCHES: (("type", "start", "description"), ""),
     COUNTS: (("type", "start", "min", "max", "description"), ""),
     **dict.fromkeys(CALCULATED, (("type", "value", "min", "max", "description"), "value")),
@@ -154,6 +154,7 @@ READ = {
     **dict.fromkeys((*NUMBERS, *EXPERIMENT), finite_number),
     "start": lambda given: given if type(given) in (bool, str) else finite_number(given),
     "type": _type,
+    "variability": _expect('"fixed"', str, lambda value: value == "fixed"),
     "description": plain_text,
     "unit": _unit,
     **dict.fromkeys(TABLES, _expect("a table", dict, lambda _: True)),

@@ -17,6 +17,7 @@ from ..read.content import Expression
 FORMULAS = {op: f"{{}} {op} {{}}" for op in ("+", "-", "*", "/", "==", *RELATIONS)}
 FORMULAS |= {"and": "{} && {}", "or": "{} || {}", "not": "!{}"}
 FORMULAS |= {"negative": "-{}", "if": "{} ? {} : {}", "hypot": "slopes_hypot({}, {})"}
+FORMULAS |= {"noise": "random_normal({}, {}, {})", "uniform": "random_uniform({}, {}, {})"}
 
 LONGEST = 200  # characters of a text with indexes
 Leaves = Mapping[tuple[str, str], str]  # where C has a leaf, by its operation and name

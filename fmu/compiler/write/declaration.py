@@ -262,8 +262,9 @@ def _entries_of_count(variable: Variable, file: ModelFile) -> dict[str, object]:
 
 
 def _fixed(file: ModelFile) -> frozenset[Leaf]:
-    """Leaves that periods follow from, which must not change."""
-    return frozenset().union(*(e.value.leaves for s in file.sampled for e in s.periods))
+    """Leaves of parameters that must not change: the file says so, or periods follow from them."""
+    said = {(v.leaf.op, v.name) for v in file.of("parameters", OPTIONS) if v.variability}
+    return frozenset(said).union(*(e.value.leaves for s in file.sampled for e in s.periods))
 
 
 def _unit(units: dict[str, dict[str, int]], exponents: dict[str, int], name: str = "") -> str:
