@@ -235,10 +235,14 @@ static double *discrete_of(const struct call *call) {
     return (double *)(void *)((char *)call->values + call->model->discrete.offset);
 }
 
-/* Returns the time of a sampler's next tick, s: never a sum of periods, which would drift. */
+/* Returns the time of a sampler's next tick, s: never a sum of periods, which would drift. INFINITY
+ * with a period of 0. */
 static double tick_time(const struct relations *model, struct relations_room room,
                         const void *values, int sampler) {
     const double *discrete = discrete_in(model, values);
+    if (room.every[sampler] == 0.0) {
+        return INFINITY;
+    }
     return discrete[0] + (room.offset[sampler] + discrete[1 + sampler] * room.every[sampler]);
 }
 
@@ -514,11 +518,12 @@ static void pass(const struct call *call, const struct event *event) {
     }
 }
 
-/* Returns true if a sampler with this period and offset (s) can tick from the time t (s) on;
- * otherwise writes the reason. */
+/* Returns true if a sampler with this period and offset (s) can tick from the time t (s) on, or
+ * never does since its period is 0; otherwise writes the reason. */
 static bool can_tick(const char *name, double every, double offset, const struct event *event) {
     const double shortest = fmax(event_shortest_period(event->t), shortest_period);
-    if (every >= shortest && isfinite(every) && offset >= 0.0 && isfinite(offset)) {
+    const bool is_possible = every == 0.0 || (every >= shortest && isfinite(every));
+    if (is_possible && offset >= 0.0 && isfinite(offset)) {
         return true;
     }
     if (event->reason != NULL && !(offset >= 0.0 && isfinite(offset))) {
@@ -527,7 +532,7 @@ static bool can_tick(const char *name, double every, double offset, const struct
     } else if (event->reason != NULL) {
         (void)snprintf(event->reason, event->reason_size,
                        "%s: every = %g s is refused: at a start time of %g s it must be "
-                       "%g s or more",
+                       "%g s or more, or 0",
                        name, every, event->t, shortest);
     }
     return false;

@@ -3,7 +3,7 @@
  *
  * A relation compares two values; its mode says whether it holds, and changes at events only. An
  * event of the model fires when its condition becomes true. A sampler ticks at the times start +
- * (offset + k every), k = 0, 1, ... */
+ * (offset + k every), k = 0, 1, ...; with a period of 0 it never does. */
 #pragma once
 
 #include "model.h"

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
+from rparm import api
 from tests.equations.compiled import declared, read
 from tests.equations.examples import METHODS, MODELS, loaded, made, simulated
 from tests.support.instances import Instance
 
-GEAR, NOISE = MODELS["kinds"]["GEAR"], MODELS["kinds"]["NOISE"]
+EITHER, GEAR, NOISE = (MODELS["kinds"][name] for name in ("EITHER", "GEAR", "NOISE"))
 
 
 @pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
@@ -121,3 +122,31 @@ def test_a_parameter_is_fixed_if_the_file_says_so() -> None:
     variables = declared(read(made(NOISE).with_suffix(".toml")))["variables"]
     fixed = {name for name, v in variables.items() if v.get("variability") == "fixed"}
     assert fixed == {"seed", "sigma", "noise", "tau"}  # the last two by the sampler
+
+
+# ---- A law that is continuous or sampled ---------------------------------------------------------
+
+
+@pytest.mark.parametrize("Ts", [0.0, 0.1])
+@pytest.mark.parametrize("version", ["", "fmi3"])
+@pytest.mark.parametrize("fmi_type", ["CoSimulation", "ModelExchange"])
+def test_a_sampler_of_period_0_never_ticks(fmi_type: str, version: str, Ts: float) -> None:
+    fmu = made(EITHER)
+    run = simulated(
+        fmu.parent / version / fmu.name, 2.0, 0.05, {"Ts": Ts}, fmi_type=fmi_type,
+        relative_tolerance=1e-10,
+    )  # fmt: skip
+    t, tick = run["time"], np.floor(run["time"] * 10 + 0.5 + 1e-9)
+    is_clear = np.abs(t * 10 + 0.5 - np.round(t * 10 + 0.5)) > 1e-6  # importers see both sides
+    assert np.array_equal(run["ticks"][is_clear], (tick if Ts else 0 * t)[is_clear])
+    at_tick = np.append(1.0, 0.6 ** np.arange(21.0))  # before the first one, x rests at 1
+    sampled = at_tick[tick.astype(int)] - 0.4 * (tick > 0) * at_tick[tick.astype(int)] * (
+        t * 10 + 0.5 - tick
+    )
+    assert np.max(np.abs(run["x"] - (sampled if Ts else np.exp(-4.0 * t)))) < 1e-8
+
+
+def test_a_linear_model_has_only_samplers_that_tick() -> None:
+    fmu = made(EITHER)
+    continuous, sampled = (api.linearize(fmu, at={"Ts": Ts}) for Ts in (0.0, 0.1))
+    assert continuous.states == ("x",) and sampled.states == ("x", "held")

@@ -125,7 +125,7 @@ def _in_order(file: ModelFile) -> list[Expression]:
 
 
 def _check_periods(file: ModelFile) -> None:
-    """Check that samplers tick, and starts exist, with the start values of the parameters."""
+    """Check that samplers can tick, and starts exist, with the start values of the parameters."""
     starts = {variable.name: variable.start for variable in file.of("parameters", OPTIONS)}
     follows = {variable.expression for variable in file.of(FOLLOWS)}
     for expression in file.order:
@@ -138,8 +138,8 @@ def _check_periods(file: ModelFile) -> None:
     for sampler in file.sampled:
         every, offset = (_number(expression, starts) for expression in sampler.periods)
         with placed(*sampler.every.place):
-            if not SHORTEST <= every < math.inf:
-                wanted = f"expected {SHORTEST:g} s or more"
+            if every != 0 and not SHORTEST <= every < math.inf:
+                wanted = f"expected {SHORTEST:g} s or more, or 0"
                 raise ModelFileError(f"is {every:g} s at the start values, {wanted}")
         with placed(*sampler.offset.place):
             if not 0 <= offset < math.inf:
