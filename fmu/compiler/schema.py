@@ -48,6 +48,7 @@ KEYS: dict[str, Schema] = {  # start: by the type
     **dict.fromkeys(("unit", "description", "file", "derivative_of"), TEXT),
     **dict.fromkeys(("x", "y"), {"anyOf": [ROWS, TEXT]}),  # lists, or columns of the file
     **dict.fromkeys(("reinit", "set"), {"type": "object", "additionalProperties": EXPRESSION}),
+    "where": {"type": "object", "propertyNames": WORD, "additionalProperties": EXPRESSION},
     **dict.fromkeys(("derivative", "value", "when", "while", "every", "offset", FOR), EXPRESSION),
     "nominal": ABOVE_0,
     "start": {},

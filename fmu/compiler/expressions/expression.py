@@ -317,15 +317,24 @@ class Function:
             body = replace(self, name="").of(given, column)
             return Node("unit", column, (body,), name=table_unit(self.name))
         known = dict(zip(self.arguments, given, strict=True))
-        found: dict[Node, Node] = {}
-        for node in in_order([self.body]):
-            if node.op == "name" and node.name in known:
-                found[node] = known[node.name]
-            else:
-                arguments = tuple(found[argument] for argument in node.arguments)
-                function = self.function or node.function
-                found[node] = replace(node, column=column, arguments=arguments, function=function)
-        return replace(found[self.body], name=UNIT_ONE) if self.has_unit_one else found[self.body]
+        found = with_names(self.body, known, column, self.function)
+        return replace(found, name=UNIT_ONE) if self.has_unit_one else found
+
+
+def with_names(root: Node, known: Mapping[str, Node], column: int = 0, function: str = "") -> Node:
+    """Return an expression with others in the place of names; a column counts for all of it."""
+    found: dict[Node, Node] = {}
+    for node in in_order([root]):
+        if node.op == "name" and node.name in known:
+            found[node] = known[node.name]
+        else:
+            found[node] = replace(
+                node,
+                column=column or node.column,
+                arguments=tuple(found[argument] for argument in node.arguments),
+                function=function or node.function,
+            )
+    return found[root]
 
 
 def table_unit(name: str, argument: int | str = "") -> str:

@@ -76,7 +76,7 @@ class Expression:
     place: tuple[str, ...]
     text: str
     tree: Node
-    kind: Kind = NUMBER
+    kind: Kind | None = NUMBER  # None: any
     target: str = ""  # the variable or mode that it is assigned to; of a period: time
     is_rate: bool = False  # of the target
     event: str = ""  # "when" one happens, or "then"
@@ -129,6 +129,7 @@ class Change:
     during: Expression | None  # `while`
     reinit: dict[str, Expression]  # by state
     set: dict[str, Expression]  # by mode or discrete variable
+    where: list[Expression]  # which the others name
 
     @property
     def given(self) -> dict[str, Expression]:
@@ -143,7 +144,7 @@ class Change:
     @property
     def expressions(self) -> list[Expression]:
         """All of them."""
-        return [*self.conditions, *self.given.values()]
+        return [*self.conditions, *self.where, *self.given.values()]
 
 
 @dataclass

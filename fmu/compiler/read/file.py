@@ -24,6 +24,7 @@ from ..expressions.expression import (
     Node,
     in_order,
     with_kinds,
+    with_names,
 )
 from ..expressions.units import ANGLE, BASE, Measure, table_unit, unit_of, unit_of_exponents
 from ..graph.tables import read as table_of
@@ -416,13 +417,14 @@ def _change(
 
 def _given(
     file: ModelFile, element: Element, place: str, given: dict[str, Any], event: str
-) -> tuple[Expression | None, dict[str, Expression], dict[str, Expression]]:
-    """Return `while`, `reinit` and `set`; event: of the expression of `while`."""
+) -> tuple[Expression | None, dict[str, Expression], dict[str, Expression], list[Expression]]:
+    """Return `while`, `reinit`, `set` and `where`; event: of the expression of `while`."""
     kinds = {
         "reinit": (("states",), "a state"),
         "set": (("discrete", COUNTS), "one of modes or of [discrete]"),
     }
     found: dict[str, dict[str, Expression]] = {"reinit": {}, "set": {}}
+    where, local = _local(file, element, place, given.get("where", {}))
     for key, (sections, what) in kinds.items():
         for written, text in given.get(key, {}).items():
             whole = (place, f"{key}: {written}")
@@ -434,12 +436,33 @@ def _given(
                 hint = _hint(variable, name in file.modes)
                 raise ModelFileError(f"{place}: {key}: expected {what}, got {shown(name)}{hint}")
             kind = CONDITION if is_mode else variable.kind
-            found[key][name] = file.expression(element, whole, text, kind, name, event="then")
+            new = file.expression(element, whole, text, kind, name, event="then")
+            new.tree = with_names(new.tree, local)
+            found[key][name] = new
     during = None
     if "while" in given:
         whole = (place, "while")
         during = file.expression(element, whole, given["while"], CONDITION, event=event)
-    return during, found["reinit"], found["set"]
+    return during, found["reinit"], found["set"], where
+
+
+def _local(
+    file: ModelFile, element: Element, place: str, entries: dict[str, object]
+) -> tuple[list[Expression], dict[str, Node]]:
+    """Return the expressions of `where` of an event or sampler, and what their names stand for."""
+    found: list[Expression] = []
+    known: dict[str, Node] = {}
+    for name, text in entries.items():
+        whole = (place, f"where: {_named(name)}")
+        with placed(*whole):
+            _check_name(name, file)
+            if name in (*file.indexes, *element.indexes):
+                raise ModelFileError("this name is an index of for, too")
+        own = file.expression(element, whole, text, None, event="then")
+        own.tree = with_names(own.tree, known)
+        known[name] = own.tree
+        found.append(own)
+    return found, known
 
 
 def _hint(variable: Variable | None, is_mode: bool) -> str:

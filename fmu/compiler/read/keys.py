@@ -69,8 +69,8 @@ HEAD = (
 )
 EXPERIMENT = {"stop": 10.0, "step": 0.01, "tolerance": 1e-8}
 TABLE = ("x", "y", "z", "file", "interpolation", "outside")
-EVENT = ("when", "while", "reinit", "set")
-SAMPLER = ("every", "offset", "while", "reinit", "set")
+EVENT = ("when", "while", "where", "reinit", "set")
+SAMPLER = ("every", "offset", "while", "where", "reinit", "set")
 LARGEST_INTEGER = 2**31 - 1
 NO_TABLES = ("name", "description", "include", "modes", "code")
 TABLES = ("reinit", "set", *(key for key in HEAD if key not in NO_TABLES))

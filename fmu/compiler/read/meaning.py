@@ -67,7 +67,8 @@ def _check_kinds(file: ModelFile) -> None:
             if expression in plain and kind_of(expression.tree, kinds) == CONDITION:
                 plain[expression].kind = expression.kind = CONDITION
                 kinds[expression.target] = CONDITION
-            expression.tree = with_kinds(expression.tree, expression.kind, kinds)
+            kind = expression.kind or kind_of(expression.tree, kinds)
+            expression.tree = with_kinds(expression.tree, kind, kinds)
 
 
 def _check_derivatives(file: ModelFile) -> None:
