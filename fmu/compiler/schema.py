@@ -43,16 +43,20 @@ TRUTH = {"type": "boolean"}
 WORD = {"type": "string", "pattern": NAME}
 ITEMS = {"type": "array", "items": WORD, "minItems": 1, "uniqueItems": True}
 ROWS = {"type": "array", "items": NUMBER, "minItems": 2}
+VALUE = {"type": "object", "properties": {"value": EXPRESSION, FOR: EXPRESSION}}
+NEW = {"anyOf": [EXPRESSION, VALUE | {"required": ["value"], "additionalProperties": False}]}
 KEYS: dict[str, Schema] = {  # start: by the type
     **dict.fromkeys(("min", "max"), NUMBER),
     **dict.fromkeys(("unit", "description", "file", "derivative_of"), TEXT),
     **dict.fromkeys(("x", "y"), {"anyOf": [ROWS, TEXT]}),  # lists, or columns of the file
-    **dict.fromkeys(("reinit", "set"), {"type": "object", "additionalProperties": EXPRESSION}),
+    **dict.fromkeys(("reinit", "set"), {"type": "object", "additionalProperties": NEW}),
     "where": {"type": "object", "propertyNames": WORD, "additionalProperties": EXPRESSION},
     **dict.fromkeys(("derivative", "value", "when", "while", "every", "offset", FOR), EXPRESSION),
     "nominal": ABOVE_0,
     "start": {},
-    "variability": {"const": "fixed"},
+    "variability": {"enum": ["fixed", "discrete"]},
+    "shown": TRUTH,
+    "derivative_of": WORD,
     "type": {"anyOf": [{"enum": [BOOLEAN, INTEGER]}, ITEMS]},
     "z": {"type": "array", "items": ROWS, "minItems": 2},
     "interpolation": {"enum": INTERPOLATIONS},

@@ -85,12 +85,14 @@ static const struct variable *next_variable(const struct instance *instance, con
         while (is_in_name((*text)[length])) {
             length++;
         }
+        const size_t base = length;
         if (length > 0 && (*text)[length] == '[') {
             length += strcspn(*text + length, "]");
             length += (*text)[length] == ']';
         }
         if (length > 0) {
             found = find(instance, 0, *text, length);
+            length = found != NULL ? length : base; // indexes may be variables
             found = is_rate && found != NULL ? rate_of(instance, found) : found;
             is_rate = strncmp(*text, "der(", strlen("der(")) == 0;
         }

@@ -518,9 +518,10 @@ static void pass(const struct call *call, const struct event *event) {
     }
 }
 
-/* Returns true if a sampler with this period and offset (s) can tick from the time t (s) on, or
- * never does since its period is 0; otherwise writes the reason. */
-static bool can_tick(const char *name, double every, double offset, const struct event *event) {
+/* Returns true if a sampler with this period and offset (s) can tick from the time of the event on,
+ * or never does since its period is 0; otherwise writes the reason. */
+static bool can_tick(const struct relations *model, int sampler, double every, double offset,
+                     const struct event *event) {
     const double shortest = fmax(event_shortest_period(event->t), shortest_period);
     const bool is_possible = every == 0.0 || (every >= shortest && isfinite(every));
     if (is_possible && offset >= 0.0 && isfinite(offset)) {
@@ -528,12 +529,13 @@ static bool can_tick(const char *name, double every, double offset, const struct
     }
     if (event->reason != NULL && !(offset >= 0.0 && isfinite(offset))) {
         (void)snprintf(event->reason, event->reason_size,
-                       "%s: offset = %g s is refused: it must be 0 or more", name, offset);
+                       "%s: offset = %g s is refused: it must be 0 or more",
+                       model->change_names[model->event_count + sampler], offset);
     } else if (event->reason != NULL) {
         (void)snprintf(event->reason, event->reason_size,
-                       "%s: every = %g s is refused: at a start time of %g s it must be "
-                       "%g s or more, or 0",
-                       name, every, event->t, shortest);
+                       "%s = %g s is refused: at a start time of %g s it must be %g s or more, "
+                       "or 0",
+                       model->every_names[sampler], every, event->t, shortest);
     }
     return false;
 }
@@ -544,8 +546,7 @@ static enum status start_samplers(const struct call *call, const struct event *e
     const struct relations *model = call->model;
     model->write_periods(call->values, call->room.every, call->room.offset);
     for (int i = 0; i < model->sampler_count; i++) {
-        if (!can_tick(model->change_names[model->event_count + i], call->room.every[i],
-                      call->room.offset[i], event)) {
+        if (!can_tick(model, i, call->room.every[i], call->room.offset[i], event)) {
             return STATUS_INVALID_PARAMETERS;
         }
     }

@@ -76,6 +76,7 @@ struct relations {
     const struct count *count;
     const double *nominal;           /* of each state */
     const char *const *change_names; /* of events, then of samplers */
+    const char *const *every_names;  /* of the period of each sampler */
     const struct assignment *assignment;
     int assignment_count;
 
@@ -144,6 +145,11 @@ static inline int relations_whole(double x) {
 /* Returns the largest whole number up to x, within +-RELATIONS_MOST_COUNTED. */
 static inline int relations_floor(double x) {
     return (int)floor(fmax(-RELATIONS_MOST_COUNTED, fmin(x, RELATIONS_MOST_COUNTED)));
+}
+
+/* Returns the element at a place, a whole number from 0 on; NAN if there is none. */
+static inline double relations_element(const double elements[], int count, double place) {
+    return place >= 0.0 && place < count ? elements[(int)place] : (double)NAN;
 }
 
 /* Error of the time of a time event, over its size. */

@@ -10,10 +10,18 @@ from fmpy.fmi1 import FMICallException
 
 from rparm import api
 from tests.equations.compiled import declared, read
-from tests.equations.examples import METHODS, MODELS, loaded, made, simulated
+from tests.equations.examples import METHODS, MODELS, initializing, loaded, made, simulated
 from tests.support.instances import Instance
 
-EITHER, GEAR, NOISE = (MODELS["kinds"][name] for name in ("EITHER", "GEAR", "NOISE"))
+TEXTS = MODELS["kinds"]
+DELAY, EITHER, GEAR, NOISE = (TEXTS[name] for name in ("DELAY", "EITHER", "GEAR", "NOISE"))
+STATE = """name = "Checked"
+[parameters]
+p = { start = 1.0 }
+n = { type = "Integer", start = 2 }
+[states]
+x = { derivative = "-x" }
+"""
 
 
 @pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
@@ -114,7 +122,7 @@ def test_random_numbers_follow_from_seed_and_number(method: int) -> None:
 
 
 def test_a_function_of_the_file_is_meant_instead() -> None:
-    run = simulated(made(MODELS["kinds"]["OWN_NOISE"]), 1.0, 0.5, {}, relative_tolerance=1e-10)
+    run = simulated(made(TEXTS["OWN_NOISE"]), 1.0, 0.5, {}, relative_tolerance=1e-10)
     assert run["x"][-1] == pytest.approx(math.exp(2.0), rel=1e-8)
 
 
@@ -150,3 +158,60 @@ def test_a_linear_model_has_only_samplers_that_tick() -> None:
     fmu = made(EITHER)
     continuous, sampled = (api.linearize(fmu, at={"Ts": Ts}) for Ts in (0.0, 0.1))
     assert continuous.states == ("x",) and sampled.states == ("x", "held")
+
+
+# ---- Arrays --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("delay", [0, 3, 4])
+def test_an_index_may_follow_from_variables(delay: int) -> None:
+    """A register whose start is that of an input, and the element that a parameter names."""
+    with initializing(made(DELAY)) as unit:
+        integers = [unit.loaded.references[name] for name in ("delay", "at")]
+        unit.fmi.setInteger(integers[:1], [delay])
+        unit.set(u=1.5)
+        assert unit.get("late", "twice") == [3.0, 6.0]
+        unit.fmi.exitInitializationMode()
+        is_open = [unit.loaded.references["is_open"]]
+        given = [1.5 - k for k in range(12)]
+        x = 0.0
+        for k, u in enumerate(given):
+            unit.set(u=u)
+            t, late = k * 0.1, unit.get("late")[0]
+            unit.step(t, 0.1)
+            shown = given[k - delay] if k >= delay else 3.0
+            place = (k + 1) % 3
+            assert unit.get("late", "twice") == [shown, 2 * shown]
+            assert unit.fmi.getInteger(integers[1:]) == [place + 1]
+            assert unit.fmi.getBoolean(is_open) == [place != 1]
+            assert unit.get("column") == [[0.0, 21.0, 22.0][place]]
+            x -= 0.5 * (late + shown)
+            assert unit.get("x")[0] == pytest.approx(x, abs=1e-8)
+
+
+def test_an_index_out_of_range_is_named() -> None:
+    with Instance(loaded(made(DELAY)), logging_on=True) as unit:
+        unit.fmi.setInteger([unit.loaded.references["delay"]], [5])
+        unit.initialize()
+        with pytest.raises(FMICallException, match="discard"):
+            unit.get("late")
+        said = "late: d[delay] [index of d: 0..4] is not finite at t = 0 with delay = 5"
+        assert unit.messages[-1].text == said
+
+
+def test_what_is_not_shown_is_no_variable() -> None:
+    fmu = made(DELAY)
+    variables = {v.name: v for v in fmpy.read_model_description(fmu).modelVariables}
+    assert not [name for name in variables if name.startswith(("d[", "hidden", "sampled_"))]
+    kinds = {name: variables[name].variability for name in ("late", "twice", "e[1,2]")}
+    assert kinds == {"late": "discrete", "twice": "continuous", "e[1,2]": "discrete"}
+
+
+def test_a_check_shows_values() -> None:
+    text = STATE + '[check]\n"100 % of {p} and {n}, not {q}" = "p < n"\n'
+    with Instance(loaded(made(text)), logging_on=True) as unit:
+        unit.begin(p=2.5)
+        with pytest.raises(FMICallException, match="error"):
+            unit.fmi.exitInitializationMode()
+        # to loggers a message is a format
+        assert unit.messages[-1].text == "100 %% of 2.5 and 2, not {q}"

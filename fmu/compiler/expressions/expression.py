@@ -100,8 +100,10 @@ class Node:
     of `RELATIONS` or `EQUALITIES`, + - * / **, "negative", "and", "or", "not", "if" (arguments:
     condition, value if true, otherwise), "floor", "hypot", or a name of `FUNCTIONS`. min and max
     have two arguments here.
-    Until `at_indexes` has replaced them: "element" of an array (arguments: its indexes; `name` has
-    {} where they come), "sum" of the `body` over the index `name` (arguments: first and last).
+    "element" of an array by indexes that follow from variables (arguments: the indexes; `name` has
+    {} where they come; behind them, once `with_elements` has added them, the elements in `of`).
+    Until `at_indexes` has replaced them: other elements, and "sum" of the `body` over the index
+    `name` (arguments: first and last).
     `function`: of `FURTHER`, of whose expression it is.
     """
 
@@ -112,6 +114,7 @@ class Node:
     name: str = ""
     body: "Node | None" = None
     function: str = ""
+    of: tuple[tuple[int, ...], ...] = ()
 
 
 def in_order(
@@ -161,6 +164,8 @@ def written(root: Node) -> str:
                 text = f"{'-' if node.op == 'negative' else 'not '}{inner[0]}"
             case "if":
                 text = f"{inner[1]} if {inner[0]} else {texts[2]}"
+            case "element":
+                text = node.name.format(*texts)
             case op if op in BINDING:
                 text = f" {op} ".join(inner)
             case op:
@@ -237,6 +242,9 @@ def _kind(node: Node, given: list[Kind], kinds: Mapping[str, Kind]) -> Kind:
         return CONDITION
     if node.op == "if" and not {*given[1:]} <= {NUMBER, WHOLE, CONDITION}:
         return max(given[1:], key=lambda kind: isinstance(kind, tuple))
+    if node.op == "element":
+        elements = {*given[node.name.count("{}") :]}
+        return elements.pop() if len(elements) == 1 else NUMBER
     is_whole = node.op == "number" and node.value.is_integer()
     is_whole |= node.op in KEEP_WHOLE and {*given[node.op == "if" :]} == {WHOLE}
     return WHOLE if is_whole or node.op == "floor" else NUMBER
@@ -252,6 +260,9 @@ def _needed(node: Node, own: Kind, found: Mapping[Node, Kind]) -> list[Kind]:
         return [CONDITION, *[own if is_item else NUMBER] * 2]
     if node.op in RANDOM:
         return [WHOLE] * len(given)
+    if node.op == "element":
+        count = node.name.count("{}")
+        return [WHOLE] * count + [found[node]] * (len(given) - count)
     if node.op in EQUALITIES:
         enumerations = [kind for kind in given if isinstance(kind, tuple)]
         if not enumerations and {*given} not in ({WHOLE}, {CONDITION}):
@@ -607,17 +618,49 @@ RANDOM = {name: Lookup(name, ("seed", "k", "stream"), name, 1) for name in ("noi
 
 
 # ---- Indexes -------------------------------------------------------------------------------------
-def at_indexes(root: Node, indexes: Mapping[str, int]) -> Node:
+def at_indexes(root: Node, indexes: Mapping[str, int], are_known: bool = True) -> Node:
     """Replace indexes by their values, elements by their names, and sums by their terms.
 
-    Conditions on indexes alone are decided. ExpressionError where an index is none.
+    Conditions on indexes alone are decided. ExpressionError where an index is none; unless they
+    `are_known`, elements stay whose indexes follow from variables.
     """
-    return _AtIndexes(dict(indexes)).of(root)
+    return _AtIndexes(dict(indexes), are_known).of(root)
+
+
+def with_elements(root: Node, elements: Mapping[str, Collection[tuple[int, ...]]]) -> Node:
+    """Add their elements to the look-ups by indexes that follow from variables.
+
+    elements: indexes of all elements, by the names of arrays. ExpressionError where there are none.
+    """
+    found: dict[Node, Node] = {}
+    for node in in_order([root]):
+        arguments = tuple(found[argument] for argument in node.arguments)
+        new = node if arguments == node.arguments else replace(node, arguments=arguments)
+        if node.op == "element":
+            base, numbers = node.name.partition("[")[0], [*map(_number_of, arguments)]
+            of = [
+                at
+                for at in elements.get(base, ())
+                if len(at) == len(numbers)
+                and all(n in (None, i) for n, i in zip(numbers, at, strict=True))
+            ]
+            if not of:
+                raise ExpressionError(node.column, f"there is no {base} with such indexes")
+            names = (f"{base}[{','.join(map(str, at))}]" for at in of)
+            own = tuple(Node("name", node.column, name=name) for name in names)
+            new = replace(node, arguments=arguments + own, of=tuple(of))
+        found[node] = new
+    return found[root]
+
+
+def _number_of(index: Node) -> int | None:
+    """Return the value of an index; None if it follows from variables."""
+    return None if names(index) else _index(index)
 
 
 class _AtIndexes:
-    def __init__(self, indexes: dict[str, int]) -> None:
-        self.indexes = indexes
+    def __init__(self, indexes: dict[str, int], are_known: bool) -> None:
+        self.indexes, self.are_known = indexes, are_known
         self.count = 0  # of operations
 
     def of(self, root: Node) -> Node:
@@ -636,6 +679,8 @@ class _AtIndexes:
                 decided.add(new)
             elif node.op in ("number", "literal"):
                 fixed.add(new)
+            elif node.op == "element" and not self.are_known and any(map(names, given)):
+                pass  # of variables
             elif node.op == "element":
                 name = node.name.format(*map(_index, given))
                 new = Node("name", node.column, name=name)

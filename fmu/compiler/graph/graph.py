@@ -5,7 +5,8 @@ one or two arguments; in derivatives also the functions of src/model/slopes.h. C
 mode, relations, and, or, not, isnan, isfinite. abs, min, max and squares have become others.
 From C come the leaf integer, the condition ==, and two operations that differ in derivatives only:
 value_of(x) rests, and moving_as(x, y) moves as y; and the functions ceil, floor, trunc, round.
-Of tables: entry, of an array by one or two segments, and locate, the segment of a number.
+Of tables: entry, of an array by one or two segments, and locate, the segment of a number. Of
+arrays: element, one of the arguments behind the first one, which is its place from 0 on.
 """
 
 from __future__ import annotations
@@ -202,6 +203,8 @@ class Graph:
                     value = self.value("not", self.value("==", *given))
                 case "table":
                     value = self.in_table(self.tables[node.name], given, is_instant)
+                case "element":
+                    value = self._element(node, given)
                 case "call":
                     value = self.functions[node.name](given, is_instant)
                 case "unit":
@@ -211,6 +214,35 @@ class Graph:
             found[node] = value
             self.nodes += [node] * (len(self.relations) - len(self.nodes))
         return found[root]
+
+    def _element(self, node: Node, given: list[Value]) -> Value:
+        """The element at indexes that follow from variables; not a number where there is none."""
+        count = len(given) - len(node.of)
+        indexes, elements = given[:count], given[count:]
+        is_row = count == 1 and node.of == tuple((node.of[0][0] + i,) for i in range(len(node.of)))
+        if is_row and not any(e.moves or e.op in CONDITIONS for e in elements):
+            place = self.simple("-", indexes[0], self.number(float(node.of[0][0])))
+            return self.value("element", place, *elements)
+        places = [
+            reduce(
+                partial(self.value, "and"),
+                (
+                    self.value("==", index, self.number(float(i)))
+                    for index, i in zip(indexes, at, strict=True)
+                    if index.op != "number"
+                ),
+            )
+            for at in node.of
+        ]
+        if elements[0].op in CONDITIONS:
+            chosen = [self.value("and", *pair) for pair in zip(places, elements, strict=True)]
+            value = reduce(partial(self.value, "or"), chosen)
+            self.unknowns[value] = self.value("not", reduce(partial(self.value, "or"), places))
+            return value
+        value = self.number(math.nan)
+        for place, element in zip(places[::-1], elements[::-1], strict=True):
+            value = self.value("if", place, element, value)
+        return value
 
     def in_table(self, table: Table, given: list[Value], is_instant: bool) -> Value:
         """The value of a table, which `looked_up` knows at an instant."""
@@ -471,6 +503,9 @@ class Graph:
                 return self.negative(d[0])
             case "moving_as":
                 return d[1]
+            case "element":
+                rests = all(is_number(slope, 0.0) for slope in d[1:])
+                return d[1] if rests else self.value("element", a, *d[1:])
             case "if":
                 of_first = y.arguments[1] if is_unknown(y) else d[1]
                 return of_first if of_first is d[2] else self.value("if", a, of_first, d[2])

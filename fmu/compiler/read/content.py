@@ -40,6 +40,7 @@ WRITTEN = {  # where files have them
     COUNTS: "discrete",
 }
 BOOLEAN, INTEGER = "Boolean", "Integer"
+FIXED, DISCRETE = "fixed", "discrete"  # variabilities: of parameters, and of what follows
 MOST_OPERATIONS = 1_000_000  # of all expressions
 # what other languages have, by what it looks like, and what to do instead
 INSTEAD = {
@@ -99,9 +100,10 @@ class Variable:
     display: tuple[str, float, float] | None = None  # unit in the file, with factor and offset
     description: str = ""
     derivative_of: str = ""  # the state of which the FMU has it as the derivative
-    variability: str = ""  # "fixed" if the file says so
+    variability: str = ""  # "fixed" or "discrete" if the file says so
+    shown: bool = True  # the FMU has it as a variable
     expression: Expression | None = None  # derivative of a state, value of others
-    initial: Expression | None = None  # start value that follows from parameters
+    initial: Expression | None = None  # start value that follows from parameters and inputs
     leaf: Any = None  # what a generator makes of a parameter, input, state or discrete variable
     arguments: tuple[Variable, ...] = ()  # those of [where] and [outputs] that it names
 
@@ -216,7 +218,8 @@ class ModelFile:
             try:
                 if text not in self.parsed:
                     self.parsed[text] = parse(text, RANDOM | self.functions)
-                tree = at_indexes(self.parsed[text], self.sizes | element.indexes)
+                indexes = self.sizes | element.indexes
+                tree = at_indexes(self.parsed[text], indexes, are_known=False)
             except ValueError as error:
                 raise ModelFileError(f"{error}{instead_of(text)}") from None
             nodes = in_order([tree])
@@ -285,7 +288,7 @@ class ModelFile:
 
     @property
     def started(self) -> list[Variable]:
-        """States and discrete variables whose start values follow from parameters."""
+        """States and discrete variables whose start values follow from parameters and inputs."""
         return [v for v in self.of("states", "discrete", COUNTS) if v.initial is not None]
 
     @property
@@ -297,9 +300,14 @@ class ModelFile:
     @property
     def constant(self) -> list[Expression]:
         """All expressions of parameters only."""
-        found = [v.expression for v in self.of(FOLLOWS)] + [v.initial for v in self.started]
+        found = [v.expression for v in self.of(FOLLOWS)]
         found += [e for s in self.sampled for e in s.periods]
         return found + [condition for _, condition in self.checks]
+
+    @property
+    def initial(self) -> list[Expression]:
+        """All start values that follow from parameters and inputs."""
+        return [v.initial for v in self.started]
 
     def place_of(self, name: str) -> str:
         """Return the section that has a name."""

@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,8 @@ from .code import read as read_code
 from .content import (
     BOOLEAN,
     COUNTS,
+    DISCRETE,
+    FIXED,
     FOLLOWS,
     SWITCHES,
     Element,
@@ -252,6 +255,10 @@ def _read_variable(file: ModelFile, section: str, element: Element) -> None:
         texts = {key: given.pop(key) for key in ("derivative", "value") if key in given}
         _set_start(section, given, texts)
         variable = Variable(element.name, section, **given)
+        wanted = DISCRETE if section in keys.CALCULATED else FIXED
+        if variable.variability not in ("", wanted):
+            said = shown(variable.variability)
+            raise ModelFileError(f'variability: expected "{wanted}", got {said}')
         _set_unit(variable, file)
         _check_range(variable)
     for key, text in texts.items():
@@ -260,6 +267,7 @@ def _read_variable(file: ModelFile, section: str, element: Element) -> None:
         expression = file.expression(element, whole, text, *options)
         if key == "start":
             variable.initial = expression
+            expression.event = "then"  # inputs jump at the start
         else:
             variable.expression = expression
     if section in header.CALCULATED and not texts:
@@ -426,17 +434,19 @@ def _given(
     found: dict[str, dict[str, Expression]] = {"reinit": {}, "set": {}}
     where, local = _local(file, element, place, given.get("where", {}))
     for key, (sections, what) in kinds.items():
-        for written, text in given.get(key, {}).items():
+        for written, text, own in _each(file, element, place, key, given.get(key, {})):
             whole = (place, f"{key}: {written}")
             with placed(*whole):
-                name = target(written, element, file.sizes)
+                name = target(written, own, file.sizes)
+                if name in found[key]:
+                    raise ModelFileError(f"{name} has a new value already")
             variable = file.variables.get(name)
             is_mode = key == "set" and name in file.modes
             if not is_mode and (variable is None or variable.section not in sections):
                 hint = _hint(variable, name in file.modes)
                 raise ModelFileError(f"{place}: {key}: expected {what}, got {shown(name)}{hint}")
             kind = CONDITION if is_mode else variable.kind
-            new = file.expression(element, whole, text, kind, name, event="then")
+            new = file.expression(own, whole, text, kind, name, event="then")
             new.tree = with_names(new.tree, local)
             found[key][name] = new
     during = None
@@ -444,6 +454,21 @@ def _given(
         whole = (place, "while")
         during = file.expression(element, whole, given["while"], CONDITION, event=event)
     return during, found["reinit"], found["set"], where
+
+
+def _each(
+    file: ModelFile, element: Element, place: str, key: str, entries: dict[str, object]
+) -> Iterator[tuple[str, object, Element]]:
+    """Yield key, expression and indexes of each new value: an entry may be a table with `for`."""
+    for written, entry in entries.items():
+        if not isinstance(entry, dict):
+            yield written, entry, element
+            continue
+        with placed(place, f"{key}: {written}"):
+            given = keys.entries(entry, ("value", FOR), "value")
+            over = every(file, given.get(FOR), element.indexes)
+        for at in over:
+            yield written, given["value"], replace(element, indexes=element.indexes | at)
 
 
 def _local(

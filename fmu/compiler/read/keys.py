@@ -44,21 +44,24 @@ RESERVED = {*FUNCTIONS, *NO_NAMES, "pi", "time", "GUID", "NAME", "TOKEN_FMI3"}
 TAKEN = {*RESERVED, *FURTHER, "sum", "der"}  # no names of functions
 NUMBERS = ("start", "min", "max", "nominal")
 CALCULATED = ("where", "outputs")
+OF_VALUES = ("value", "unit", "description", "variability", "derivative_of")
+OF_COUNTS = ("type", "value", "min", "max", "description")
 OF_ALL = ("start", "unit", "min", "max", "description")
 SECTIONS = {  # keys of their entries, and the one that each needs
     "parameters": ((*OF_ALL, "type", "variability"), "start"),
     "inputs": ((*OF_ALL, "type"), ""),
     "states": ((*OF_ALL, "nominal", "derivative", "derivative_of"), "derivative"),
-    "discrete": (("start", "unit", "description", "type"), ""),
-    "where": (("value", "unit", "description", "type", "derivative_of"), "value"),  # or expressions
-    "outputs": (("value", "unit", "description", "type", "derivative_of"), "value"),
+    "discrete": (("start", "unit", "description", "type", "shown"), ""),
+    "where": ((*OF_VALUES, "type", "shown"), "value"),  # or expressions
+    "outputs": ((*OF_VALUES, "type"), "value"),
 }
 OWN_KEYS = {
     FOLLOWS: (("value", "unit", "description"), "value"),
     OPTIONS: (("type", "start", "min", "max", "description", "variability"), "start"),
     SWITCHES: (("type", "start", "description"), ""),
-    COUNTS: (("type", "start", "min", "max", "description"), ""),
-    **dict.fromkeys(CALCULATED, (("type", "value", "min", "max", "description"), "value")),
+    COUNTS: (("type", "start", "min", "max", "description", "shown"), ""),
+    "where": ((*OF_COUNTS, "shown"), "value"),
+    "outputs": (OF_COUNTS, "value"),
 }
 NOT_REAL = {"parameters": OPTIONS, "inputs": SWITCHES, "discrete": COUNTS}
 NOT_REAL |= {section: section for section in CALCULATED}
@@ -154,7 +157,8 @@ READ = {
     **dict.fromkeys((*NUMBERS, *EXPERIMENT), finite_number),
     "start": lambda given: given if type(given) in (bool, str) else finite_number(given),
     "type": _type,
-    "variability": _expect('"fixed"', str, lambda value: value == "fixed"),
+    "variability": TEXT,
+    "shown": _expect("true or false", bool, lambda _: True),
     "description": plain_text,
     "unit": _unit,
     **dict.fromkeys(TABLES, _expect("a table", dict, lambda _: True)),

@@ -15,12 +15,13 @@ from ..expressions.expression import (
     in_order,
     kind_of,
     names,
+    with_elements,
     with_kinds,
 )
 from ..expressions.hints import meant
 from ..expressions.units import BASE, Unit, times, unit_of, unit_of_exponents
 from ..expressions.units import shown as unit_shown
-from .content import FOLLOWS, OPTIONS, Expression, ModelFile, ModelFileError, placed
+from .content import FOLLOWS, OPTIONS, SWITCHES, Expression, ModelFile, ModelFileError, placed
 
 SECOND = unit_of_exponents({"s": 1})
 SHORTEST = 1e-12  # s, of periods
@@ -29,6 +30,7 @@ MOST_COMPARED = 1000  # names that may have been meant
 
 def check(file: ModelFile) -> None:
     """Check all expressions, and order them: each after those that it names; ModelFileError."""
+    _add_elements(file)
     _check_names(file)
     _check_derivatives(file)
     file.order = _in_order(file)
@@ -36,6 +38,20 @@ def check(file: ModelFile) -> None:
     _check_periods(file)
     if file.has_units:
         _check_units(file)
+
+
+def _add_elements(file: ModelFile) -> None:
+    """Add their elements to look-ups by indexes that follow from variables."""
+    elements: dict[str, list[tuple[int, ...]]] = {}
+    for name in (*file.variables, *file.modes):
+        base, bracket, rest = name.partition("[")
+        if bracket:
+            at = tuple(map(int, rest.rstrip("]").split(",")))
+            elements.setdefault(base, []).append(at)
+    for expression in [*file.assigned, *file.constant, *file.initial]:
+        with placed(*expression.place):
+            if any(node.op == "element" for node in in_order([expression.tree])):
+                expression.tree = with_elements(expression.tree, elements)
 
 
 def _check_names(file: ModelFile) -> None:
@@ -46,9 +62,11 @@ def _check_names(file: ModelFile) -> None:
     parameters = dict.fromkeys((*(v.name for v in constant), *CONSTANTS))
     for index in file.indexes & known.keys():
         raise ModelFileError(f"{file.place_of(index)}: {index}: this name is an index of for, too")
+    inputs = dict.fromkeys(variable.name for variable in file.of("inputs", SWITCHES))
     for expressions, allowed, mistake in (
         (file.assigned, known, "unknown name {}"),
         (file.constant, parameters, "{} is no parameter"),
+        (file.initial, parameters | inputs, "{} is no parameter or input"),
     ):
         for expression in expressions:
             with placed(*expression.place):
@@ -121,13 +139,14 @@ def _in_order(file: ModelFile) -> list[Expression]:
         ) from None
     variables = in_order(entries.values())
     happening = [expression for change in file.changes for expression in change.expressions]
-    constant = [e for e in file.constant if e.target not in entries]
+    constant = [e for e in [*file.constant, *file.initial] if e.target not in entries]
     return [*(v.expression for v in variables), *happening, *constant]
 
 
 def _check_periods(file: ModelFile) -> None:
     """Check that samplers can tick, and starts exist, with the start values of the parameters."""
-    starts = {variable.name: variable.start for variable in file.of("parameters", OPTIONS)}
+    given = file.of("parameters", OPTIONS, "inputs", SWITCHES)
+    starts = {variable.name: variable.start for variable in given}
     follows = {variable.expression for variable in file.of(FOLLOWS)}
     for expression in file.order:
         if expression in follows and (number := _known_number(expression, starts)) is not None:

@@ -6,7 +6,7 @@ from functools import cache, partial
 from pathlib import Path
 
 from ..expressions.expression import CONDITION, RELATIONS, Node, derivative_of, written
-from ..graph.graph import Graph, Value
+from ..graph.graph import MOVING, Graph, Value
 from ..names import Fields
 from ..plain_c.memory import is_real
 from ..plain_c.text import CTextError
@@ -72,6 +72,12 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
             known[derivative_of(expression.target)] = expression.value
         elif expression.target:
             known.setdefault(expression.target, expression.value)
+    for variable in file.of("where", "outputs"):
+        if variable.variability and variable.value.moves:
+            moving = sorted(name or op for op, name in variable.value.leaves if op in MOVING)
+            with file_reader.located(path, file.text), placed(variable.place, variable.name):
+                what = f"is for what only events change, but {moving[0]} moves"
+                raise ModelFileError(f'variability: "{variable.variability}" {what}')
     places = [source.place for source in sources]
     in_c = calls.relation_texts if calls else {}
     file.relation_texts = [

@@ -79,11 +79,17 @@ class Tick:
 
 
 def ticks(file: ModelFile) -> list[Tick]:
-    """When samplers tick, and what each would set now; the largest double is no finite value."""
+    """When samplers tick, and what each would set now; the largest double is no finite value.
+
+    Those that set what the FMU does not show have none.
+    """
     graph, found, taken = file.graph, [], {*file.variables, *file.modes}
     uncoupled = _uncoupled(file)
     one, zero, largest = map(graph.number, (1.0, 0.0, sys.float_info.max))
+    hidden = {variable.name for variable in file.variables.values() if not variable.shown}
     for i, sampler in enumerate(file.sampled, 1):
+        if hidden & sampler.given.keys():  # what it does shows in part
+            continue
         every, offset = (period.value for period in sampler.periods)
         own = [("every", every, SECOND, "period"), ("offset", offset, SECOND, "offset")]
         for target, given in sampler.given.items():
@@ -245,6 +251,7 @@ class Events:
                 + [text(f"sampler {sampler.name}") for sampler in file.sampled]
                 or ["NULL"]
             ),
+            every_names=", ".join(map(text, map(_every_name, file.sampled))) or "NULL",
             assignment=assigned or ["{0},"],
             assignments=len(assigned),
             discrete=", ".join(
@@ -426,6 +433,13 @@ class Events:
                 return f"relations_state_indicator({place}, {holds}, {factor}, {offset}, {rate})"
         limit = code.of(relation.limit or zero)
         return f"(struct indicator){{.kind = INDICATOR_OF_MODEL, .offset = fabs({limit})}}"
+
+
+def _every_name(sampler: Sampler) -> str:
+    """Name of a period in messages, with the parameter that it is."""
+    every = sampler.every
+    of = f" = {every.tree.name}" if every.tree.op == "name" else ""
+    return f"sampler {sampler.name}: every{of}"
 
 
 def count(code: Code, kind: Kind, value: Value) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 from ..expressions.expression import in_order
 from ..graph.band import band
 from ..graph.graph import FALLIBLE, Value, is_number
-from ..read.content import OPTIONS, ModelFile, Variable
+from ..read.content import OPTIONS, ModelFile
 from .c_code import Code, declared, filled, indented, number, shortened, text
 from .c_events import Events, arrays, count, leaves, ticks
 from .c_series import Series
@@ -281,11 +281,24 @@ def _at_start(file: ModelFile, structure: str, derivatives: Mapping[str, Value])
     return [f"if ({condition}) {{", *indented(code.lines), "}"]
 
 
+def _message(given: str, fields: Mapping[str, tuple[str, str]]) -> str:
+    """Format and arguments of a message, in which values stand in the place of {NAME}."""
+    parts = re.split(r"\{(\w+(?:\[[0-9,]+\])?)\}", given)
+    form, arguments = parts[0].replace("%", "%%"), []
+    for name, rest in zip(parts[1::2], parts[2::2], strict=True):
+        shown, field = fields.get(name, (f"{{{name}}}", ""))
+        form += shown + rest.replace("%", "%%")
+        arguments += [f", values->{field}"] if field else []
+    return text(form) + "".join(arguments)
+
+
 def _checks(file: ModelFile) -> list[str]:
     """Refuses parameters that are not finite or break a condition, or leave it undefined."""
     graph, code = file.graph, Code(leaves(file))
-    conditions: list[tuple[str, str, list[Variable]]] = [
-        (f"isfinite(values->{file.fields.value(v.name)})", f"{base} is not finite", [])
+    fields = {v.name: ("%g", file.fields.value(v.name)) for v in file.of("parameters")}
+    fields |= {v.name: ("%d", file.fields.count(v.name)) for v in file.of(OPTIONS)}
+    conditions = [
+        (f"isfinite(values->{file.fields.value(v.name)})", text(f"{base} is not finite"))
         for v in file.of("parameters")
         for base in v.name.split("[")[:1]
     ]
@@ -293,14 +306,10 @@ def _checks(file: ModelFile) -> list[str]:
         holds, unknown = check.value, graph.unknown(check.value)
         if unknown is not None:
             holds = graph.value("and", graph.value("not", unknown), holds)
-        read = [v for v in file.of("parameters") if (v.leaf.op, v.name) in check.value.leaves]
-        conditions.append((code.of(holds), message, read[:MOST_SHOWN]))
+        conditions.append((code.of(holds), _message(message, fields)))
     lines = []
-    for condition, message, read in conditions:
-        shown = ", ".join(f"{v.name} = %g" for v in read)
-        values = "".join(f", values->{file.fields.value(v.name)}" for v in read)
-        given = f'"%s{shown and f" ({shown})"}", {text(message)}{values}'
-        why = f"    (void)snprintf(text, size, {given});"
+    for condition, message in conditions:
+        why = f"    (void)snprintf(text, size, {message});"
         refused = [f"if (!{condition}) {{", why, "    return STATUS_INVALID_PARAMETERS;", "}"]
         lines.append("\n".join(refused))
     return rolled(code.lines + lines)[0]
