@@ -7,7 +7,6 @@
 #include "rp_controller_model.h"
 #include "rp_plant_model.h"
 #include "rp_plant_modes.h"
-#include "rp_sensor_model.h"
 #include "rp_test_support.h"
 #include "rp_trajectory_example.h"
 #include "rp_trajectory_model.h"
@@ -17,7 +16,7 @@
 #include <string.h>
 #include <unity.h>
 
-enum { PLANT, CONTROLLER, TRAJECTORY, SENSOR, WALL, SUBJECTS };
+enum { PLANT, CONTROLLER, TRAJECTORY, WALL, SUBJECTS };
 enum { DOUBLES = 256, STATES = 4, INPUTS = 10, INDICATORS = 16, ROWS = 64, POINTS = 2000 };
 
 /* A value structure, of any model. */
@@ -26,7 +25,6 @@ union point {
     struct rp_plant_values plant;
     struct rp_controller_values controller;
     struct rp_trajectory_values trajectory;
-    struct rp_sensor_values sensor;
     struct equations_values wall;
 };
 
@@ -137,21 +135,6 @@ static void place_trajectory(int n) {
     now = times[n / 6 % 6];
 }
 
-static void place_sensor(int n) {
-    struct rp_sensor_values *v = &at.sensor;
-    v->parameters.latency = n % 3;
-    if (n % 5 == 0) { // no sample has been: counts follow the inputs
-        v->q[0] = v->q[1] = 0.0;
-        v->parameters.noise[0] = v->parameters.noise[1] = 0.0;
-    }
-    for (int k = 0; k < n % 5; k++) {
-        const struct event event = {.t = k == 0 ? 0.0 : model->events->next_time(v),
-                                    .is_timed = k > 0};
-        v->q[0] += 3.0;
-        ASSERT_OK(model->events->update(v, &event));
-    }
-}
-
 /* Pressed; on the way out, where the wall does not pull; outside. */
 static void place_wall(int n) {
     struct equations_values *v = &at.wall;
@@ -180,11 +163,6 @@ static const struct subject subjects[SUBJECTS] = {
      {{PLACE(rp_trajectory_values, parameters.l1), PLACE(rp_trajectory_values, payload)}},
      {{PLACE(rp_trajectory_values, q), PLACE(rp_trajectory_values, payload_attached)}},
      {offsetof(struct rp_trajectory_values, payload_attached), sizeof(int)}, place_trajectory},
-    [SENSOR] = {&rp_sensor_model,
-     {{0, PLACE(rp_sensor_values, parameters.latency)},
-      {PLACE(rp_sensor_values, q), PLACE(rp_sensor_values, q_measured)}},
-     {{PLACE(rp_sensor_values, q_measured), PLACE(rp_sensor_values, counts)}},
-     {offsetof(struct rp_sensor_values, counts), sizeof(int[2])}, place_sensor},
     [WALL] = {&equations_model, {{0, PLACE(equations_values, v_n_x)}},
      {{PLACE(equations_values, v_n_x), END(equations_values)}}, .place = place_wall},
 };
@@ -448,8 +426,7 @@ static void check(int which) {
 }
 
 static void test_each_model(void) {
-    static const char *const names[SUBJECTS] = {"plant",  "controller",
-                                                "trajectory", "sensor", "wall"};
+    static const char *const names[SUBJECTS] = {"plant", "controller", "trajectory", "wall"};
     for (int which = 0; which < SUBJECTS; which++) {
         TEST_MESSAGE(names[which]); // the last one is the one that fails
         check(which);
