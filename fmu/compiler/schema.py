@@ -42,6 +42,8 @@ ABOVE_0 = NUMBER | {"exclusiveMinimum": 0}
 TRUTH = {"type": "boolean"}
 WORD = {"type": "string", "pattern": NAME}
 ITEMS = {"type": "array", "items": WORD, "minItems": 1, "uniqueItems": True}
+DESCRIBED = {"type": "object", "propertyNames": WORD, "additionalProperties": TEXT}
+ENUMERATION = {"anyOf": [ITEMS, DESCRIBED | {"minProperties": 1}]}
 ROWS = {"type": "array", "items": NUMBER, "minItems": 2}
 VALUE = {"type": "object", "properties": {"value": EXPRESSION, FOR: EXPRESSION}}
 NEW = {"anyOf": [EXPRESSION, VALUE | {"required": ["value"], "additionalProperties": False}]}
@@ -57,7 +59,7 @@ KEYS: dict[str, Schema] = {  # start: by the type
     "variability": {"enum": ["fixed", "discrete"]},
     "shown": TRUTH,
     "derivative_of": WORD,
-    "type": {"anyOf": [{"enum": [BOOLEAN, INTEGER]}, ITEMS]},
+    "type": {"anyOf": [{"enum": [BOOLEAN, INTEGER]}, ENUMERATION]},
     "z": {"type": "array", "items": ROWS, "minItems": 2},
     "interpolation": {"enum": INTERPOLATIONS},
     "outside": {"enum": OUTSIDE},
@@ -168,7 +170,7 @@ def _entry(section: str) -> Schema:
         if reader.NOT_REAL[section] != SWITCHES:
             whole = {"min": WHOLE, "max": WHOLE} | start(WHOLE, *follows)
             kinds.append((keys, needed, {"type": {"const": INTEGER}} | whole))
-            kinds.append((unordered, needed, {"type": ITEMS} | start({"type": "string"})))
+            kinds.append((unordered, needed, {"type": ENUMERATION} | start({"type": "string"})))
     known = [*dict.fromkeys(key for keys, *_ in kinds for key in keys)]
     found = _keys(known) | {"anyOf": []}
     for keys, needed, own in kinds:

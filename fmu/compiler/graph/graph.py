@@ -135,6 +135,7 @@ class Graph:
     looked_up: dict[Value, tuple[Table, list[Value]]] = field(default_factory=dict)  # at instants
     of_inputs: dict[Value, bool] = field(default_factory=dict)  # of distances
     has_switches: bool = True  # else relations are evaluated with the values
+    has_times: bool = False  # without switches: relations of the time with constants are some
     is_guarded: bool = True  # else an infinite slope makes derivatives infinite, as in C
 
     @property
@@ -349,6 +350,8 @@ class Graph:
     def relation(self, op: str, left: Value, right: Value) -> Value:
         """A comparison of two values: a switch if one of them moves and the graph has switches."""
         if self.has_switches and (left.moves or right.moves):
+            return self.switch(op, left, right)
+        if self.has_times and self._switch(op, left, right).time is not None:
             return self.switch(op, left, right)
         return self.value(op, left, right)
 

@@ -273,13 +273,13 @@ class ModelFile:
 
     @property
     def calculated_reals(self) -> list[Variable]:
-        """Those that are real numbers."""
-        return [v for v in self.calculated if v.is_real]
+        """Those that are real numbers, and that the FMU shows."""
+        return [v for v in self.calculated if v.is_real and v.shown]
 
     @property
     def calculated_counts(self) -> list[Variable]:
-        """Those that are conditions, whole numbers or enumerations."""
-        return [v for v in self.calculated if not v.is_real]
+        """Those that are conditions, whole numbers or enumerations, and that the FMU shows."""
+        return [v for v in self.calculated if not v.is_real and v.shown]
 
     @cached_property
     def places(self) -> dict[str, int]:
@@ -302,7 +302,12 @@ class ModelFile:
         """All expressions of parameters only."""
         found = [v.expression for v in self.of(FOLLOWS)]
         found += [e for s in self.sampled for e in s.periods]
-        return found + [condition for _, condition in self.checks]
+        return found
+
+    @property
+    def checked(self) -> list[Expression]:
+        """Conditions on parameters and on what follows from them."""
+        return [condition for _, condition in self.checks]
 
     @property
     def initial(self) -> list[Expression]:

@@ -4,7 +4,7 @@ Every mistake is a ModelFileError or a ValueError, in one line.
 """
 
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from typing import Any
 
 from declaration.load import shown
@@ -132,13 +132,26 @@ def _modes(value: Any) -> list[tuple[str, Any]]:
         raise ValueError("expected a list of names, or a table of true and false") from None
 
 
+class Items(tuple[str, ...]):
+    """The items of an enumeration, with their descriptions."""
+
+    descriptions: dict[str, str]
+
+    def __new__(cls, given: Iterable[str]) -> "Items":
+        """Take the items, of a table with their descriptions."""
+        found = super().__new__(cls, given)
+        texts = given if isinstance(given, dict) else {}
+        found.descriptions = {item: plain_text(texts.get(item, item)) for item in found}
+        return found
+
+
 def _type(value: Any) -> Kind:
     """Return the kind of variables of a type."""
     if value in (BOOLEAN, INTEGER):
         return CONDITION if value == BOOLEAN else WHOLE
-    are_texts = isinstance(value, list) and value and all(type(item) is str for item in value)
+    are_texts = isinstance(value, list | dict) and value and all(type(x) is str for x in value)
     if are_texts and len({*value}) == len(value) and all(map(NAME.fullmatch, value)):
-        return tuple(value)
+        return Items(value)
     raise ValueError(f'expected "{BOOLEAN}", "{INTEGER}" or a list of different names')
 
 

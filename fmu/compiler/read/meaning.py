@@ -48,7 +48,7 @@ def _add_elements(file: ModelFile) -> None:
         if bracket:
             at = tuple(map(int, rest.rstrip("]").split(",")))
             elements.setdefault(base, []).append(at)
-    for expression in [*file.assigned, *file.constant, *file.initial]:
+    for expression in [*file.assigned, *file.constant, *file.initial, *file.checked]:
         with placed(*expression.place):
             if any(node.op == "element" for node in in_order([expression.tree])):
                 expression.tree = with_elements(expression.tree, elements)
@@ -63,10 +63,12 @@ def _check_names(file: ModelFile) -> None:
     for index in file.indexes & known.keys():
         raise ModelFileError(f"{file.place_of(index)}: {index}: this name is an index of for, too")
     inputs = dict.fromkeys(variable.name for variable in file.of("inputs", SWITCHES))
+    where = dict.fromkeys(variable.name for variable in file.of("where"))
     for expressions, allowed, mistake in (
         (file.assigned, known, "unknown name {}"),
         (file.constant, parameters, "{} is no parameter"),
         (file.initial, parameters | inputs, "{} is no parameter or input"),
+        (file.checked, parameters | where, "{} is no parameter"),
     ):
         for expression in expressions:
             with placed(*expression.place):
@@ -140,7 +142,7 @@ def _in_order(file: ModelFile) -> list[Expression]:
     variables = in_order(entries.values())
     happening = [expression for change in file.changes for expression in change.expressions]
     constant = [e for e in [*file.constant, *file.initial] if e.target not in entries]
-    return [*(v.expression for v in variables), *happening, *constant]
+    return [*(v.expression for v in variables), *happening, *constant, *file.checked]
 
 
 def _check_periods(file: ModelFile) -> None:

@@ -281,22 +281,24 @@ def _at_start(file: ModelFile, structure: str, derivatives: Mapping[str, Value])
     return [f"if ({condition}) {{", *indented(code.lines), "}"]
 
 
-def _message(given: str, fields: Mapping[str, tuple[str, str]]) -> str:
+def _message(file: ModelFile, code: Code, given: str) -> str:
     """Format and arguments of a message, in which values stand in the place of {NAME}."""
     parts = re.split(r"\{(\w+(?:\[[0-9,]+\])?)\}", given)
-    form, arguments = parts[0].replace("%", "%%"), []
+    form, arguments = parts[0].replace("%", "%%"), ""
     for name, rest in zip(parts[1::2], parts[2::2], strict=True):
-        shown, field = fields.get(name, (f"{{{name}}}", ""))
+        variable, shown = file.variables.get(name), f"{{{name}}}"
+        value = variable and (variable.leaf or variable.value)
+        if value and {op for op, _ in value.leaves} <= {"parameter", "integer"}:
+            shown = "%g" if variable.is_real else "%d"
+            found = code.of(value) if variable.is_real else f"(int){code.of(value)}"
+            arguments += f", {found} + 0.0" if variable.is_real else f", {found}"
         form += shown + rest.replace("%", "%%")
-        arguments += [f", values->{field}"] if field else []
-    return text(form) + "".join(arguments)
+    return text(form) + arguments
 
 
 def _checks(file: ModelFile) -> list[str]:
     """Refuses parameters that are not finite or break a condition, or leave it undefined."""
     graph, code = file.graph, Code(leaves(file))
-    fields = {v.name: ("%g", file.fields.value(v.name)) for v in file.of("parameters")}
-    fields |= {v.name: ("%d", file.fields.count(v.name)) for v in file.of(OPTIONS)}
     conditions = [
         (f"isfinite(values->{file.fields.value(v.name)})", text(f"{base} is not finite"))
         for v in file.of("parameters")
@@ -306,7 +308,7 @@ def _checks(file: ModelFile) -> list[str]:
         holds, unknown = check.value, graph.unknown(check.value)
         if unknown is not None:
             holds = graph.value("and", graph.value("not", unknown), holds)
-        conditions.append((code.of(holds), _message(message, fields)))
+        conditions.append((code.of(holds), _message(file, code, message)))
     lines = []
     for condition, message in conditions:
         why = f"    (void)snprintf(text, size, {message});"

@@ -251,7 +251,7 @@ def _entries_of_count(variable: Variable, file: ModelFile) -> dict[str, object]:
         "variability": variability,
     }
     if isinstance(kind, tuple):
-        entries["items"] = {item: {"description": item} for item in kind}
+        entries["items"] = {item: {"description": kind.descriptions[item]} for item in kind}
     bounds = {"min": variable.min, "max": variable.max}
     entries |= {key: number for key, number in bounds.items() if number is not None}
     if is_calculated:
