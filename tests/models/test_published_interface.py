@@ -24,7 +24,8 @@ CHANGED: dict[tuple[str, str, str], str] = {
         for column in ("output", "initial unknown")
     },
     **{
-        ("RPSensor", name, ""): "models of files with equations have it"
+        (fmu, name, ""): "models of files with equations have it"
+        for fmu in ("RPSensor", "RPTrajectory")
         for name in ("event_count", "last_event_time", "max_events")
     },
 }
